@@ -10,6 +10,7 @@ prints itself, and turns into pandas, matplotlib, python-control or plain dictio
 """
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -137,7 +138,8 @@ def read(
     """Read a log, of an actuator or of anything.
 
     A log without the actuator's channels is read as it stands, every column of numbers under its own name, if neither
-    rig, columns nor kind are given: `Log.identify` relates them.
+    rig, columns nor kind are given: `Log.identify` relates them. So it does in a log, or a channel, of which up to half
+    of the samples are missing; to estimate, to diagnose and for the rest at most 5 % may be.
 
     Parameters
     ----------
@@ -163,7 +165,7 @@ def read(
     Raises
     ------
     LogError
-        If the file cannot be read or trusted.
+        If the file cannot be read or trusted, or over half of the samples are missing.
     HydrostateError
         If the rig or the kind of actuator is not usable.
 
@@ -174,8 +176,9 @@ def read(
     plant.errors.LogError: none.csv: there is no such file
     """
     from experiments.actuators import DEFAULT, actuator
-    from experiments.command.logs import overheard, read_log
+    from experiments.command.logs import read_log
     from experiments.log_pages.log import ANY, options_by_name
+    from experiments.log_pages.reading import read_whole_or_sparse
     from plant.errors import NoChannelError
     from plant.log.any_columns import read_any
     from plant.log.frames import frame_table, is_frame
@@ -190,13 +193,16 @@ def read(
     more: dict[str, Any] = {"sample_time": sample_time, "beside": others}
     file = Path(path) if isinstance(path, str | Path) else frame_table(path)
     try:
-        with options_by_name(), overheard() as said:
-            record = read_log(file, bench.columns, dict(columns or {}), kind.required, **more)
-        return Log(record, bench, kind.name, said)
+        with options_by_name():
+            found = read_whole_or_sparse(
+                partial(read_log, file, bench.columns, dict(columns or {}), kind.required, **more)
+            )
+        name = kind.name
     except NoChannelError:
         if rig is not None or columns is not None or plant is not None or others:
             raise
-    return Log(read_any(file, sample_time=sample_time), bench, ANY)
+        found, name = read_whole_or_sparse(partial(read_any, file, sample_time=sample_time)), ANY
+    return Log(found.record, bench, name, found.said, sparse=found.sparse, refusal=found.refusal)
 
 
 def load_model(path: "str | Path") -> "Relation":

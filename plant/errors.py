@@ -61,6 +61,10 @@ class NoChannelError(LogError):
     """A log lacks the channels of an actuator; as a log of anything it may still be read."""
 
 
+class SparseLogError(LogError):
+    """A log lacks too many samples to be estimated; models between its channels may still be identified."""
+
+
 class RigError(HydrostateError):
     """A rig file, or a parameter in it, is not usable."""
 

@@ -112,9 +112,9 @@ def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path
 
 def _record(log: Path, wanted: Sequence[str], sample_time: float | None) -> "Record":
     from plant.log.any_columns import read_any
+    from plant.log.clock import MOST_MISSING_TO_RELATE
 
-    # an output that is missing is left out of a fit, and a log is split where an input is
-    return read_any(log, wanted, sample_time=sample_time, most_missing=0.5)
+    return read_any(log, wanted, sample_time=sample_time, most_missing=MOST_MISSING_TO_RELATE)
 
 
 def _together(records: "Sequence[Record]", asked: Asked, outputs: Sequence[str]) -> "dict[str, Identified]":

@@ -192,6 +192,7 @@ def read_log(
     *,
     sample_time: float | None = None,
     beside: Sequence[Path] = (),
+    most_missing: float | None = None,
 ) -> "Record":
     """Read a log by a rig's column names and the command line's, which go first.
 
@@ -210,6 +211,8 @@ def read_log(
         Time between rows [s] of a log that has no time.
     beside : sequence of Path
         Files of other loggers of the same test.
+    most_missing : float, optional
+        Share of the samples that may be missing [fraction]; 5 % if not given.
 
     Raises
     ------
@@ -231,6 +234,8 @@ def read_log(
         more["sample_time"] = sample_time
     if beside:
         more["beside"] = beside
+    if most_missing is not None:
+        more["most_missing"] = most_missing
     record = with_rig_columns(lambda given: read_record(path, columns=given, **more), rig_columns, columns)
     require_measurable(record.channels, source_of(path))
     return record

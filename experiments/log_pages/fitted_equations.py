@@ -182,11 +182,12 @@ def record_of(log: Any) -> "Record":
     """
     import pandas as pd
 
+    from experiments.log_pages.log import Log
     from plant.log.record import Record
 
     if isinstance(log, pd.DataFrame):
         return _of_table(log)
-    record = getattr(log, "record", log)
+    record = log.whole() if isinstance(log, Log) else log
     if not isinstance(record, Record):
         raise HydrostateError(f"a Log, a Record or a pandas.DataFrame is needed, got {type(log).__name__}")
     return record

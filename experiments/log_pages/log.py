@@ -91,9 +91,17 @@ class Log(Shown):
     """A log of one actuator."""
 
     def __init__(
-        self, record: "Record", rig: "Rig[Any]", plant: str = "eha", said: "Sequence[LogWarning]" = ()
+        self,
+        record: "Record",
+        rig: "Rig[Any]",
+        plant: str = "eha",
+        said: "Sequence[LogWarning]" = (),
+        *,
+        sparse: "Record | None" = None,
+        refusal: str = "",
     ) -> None:
         self.record, self.rig, self.plant, self._said = record, rig, plant, tuple(said)
+        self._sparse, self._refusal = sparse, refusal
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -135,7 +143,28 @@ class Log(Shown):
         first, last = (round((at - self.record.start_time) / self.sample_time) for at in (begin, end))
         if not 0 <= first < last:
             refuse(f"a part of the log is needed from an earlier to a later time, got {begin:g} s to {end:g} s")
-        return Log(self.record.slice(first, last + 1), self.rig, self.plant, self._said)
+        span = first, last + 1
+        sparse = None if self._sparse is None else self._sparse.slice(*span)
+        return Log(self.record.slice(*span), self.rig, self.plant, self._said, sparse=sparse, refusal=self._refusal)
+
+    def whole(self) -> "Record":
+        """Return the record, of which few enough samples are missing to estimate an actuator.
+
+        Raises
+        ------
+        LogError
+            If over 5 % of the samples were missing in the log that was read.
+        """
+        from plant.errors import SparseLogError
+
+        if self._refusal:
+            raise SparseLogError(self._refusal)
+        return self.record
+
+    @property
+    def related(self) -> "Record":
+        """The record whose channels `identify` relates, also those of which up to half is missing."""
+        return self.record if self._sparse is None else self._sparse
 
     def estimate(self, **options: Any) -> "Answer":
         """Estimate what cannot be measured: effective bulk modulus, leakage, and what the actuator's kind adds.
@@ -196,7 +225,7 @@ class Log(Shown):
         if self.plant == ANY or logs or (options.keys() & {"input", "output"} and options.keys() <= free.keys()):
             known_options(options, free, "identify")
             return self._relation([self, *logs], dict(options))
-        return Model(identify_record(self.record, **known_options(options, known, "identify")))
+        return Model(identify_record(self.whole(), **known_options(options, known, "identify")))
 
     def _relation(self, logs: "list[Log]", options: dict[str, Any]) -> "Relation":
         from experiments.log_pages.relation import identified
@@ -204,7 +233,25 @@ class Log(Shown):
         if not {"input", "output"} <= options.keys():
             refuse(f"input and output are needed, channels among {', '.join(self.channels)}")
         inputs, outputs = options.pop("input"), options.pop("output")
-        return identified([one.record for one in logs], inputs, outputs, options)
+        for one in logs:
+            one._tell_sparse((inputs, outputs, options.get("reference") or ()))
+        return identified([one.related for one in logs], inputs, outputs, options)
+
+    def _tell_sparse(self, asked: "Sequence[Any]") -> None:
+        """Warn of channels that were left out of the record, and of which what is there is used now."""
+        import warnings
+
+        import numpy as np
+
+        from plant.errors import LogWarning
+        from plant.log.checks import counted
+        from plant.log.notes import LogCode
+
+        for name in (one for given in asked for one in ([given] if isinstance(given, str) else given)):
+            if name not in self.record and name in self.related:
+                missing = int(np.isnan(self.related[name]).sum())
+                said = LogCode.SAMPLES_MASKED.note(channel=name, **counted(missing, len(self)))
+                warnings.warn(LogWarning(said), stacklevel=4)
 
     def _asked(self, verb: str, options: Mapping[str, Any]) -> "Answer":
         from experiments.actuators import actuator, offered
@@ -214,13 +261,13 @@ class Log(Shown):
                 f"{verb} needs the channels of an actuator, the log has {', '.join(self.channels)}: name them by "
                 "read(..., columns={'motor_speed_rad_s': 'N:rpm'}), or relate them by identify(input=..., output=...)"
             )
-        chosen = offered(actuator(self.plant), verb)
+        record, chosen = self.whole(), offered(actuator(self.plant), verb)
         asked = {**chosen.options, **known_options(options, chosen.options, verb)}
         if isinstance(asked.get("healthy"), Log):
-            asked["healthy"] = asked["healthy"].record
+            asked["healthy"] = asked["healthy"].whole()
         with options_by_name():
             rig, prepared = chosen.prepare(self.rig, {**asked, "seed": 2024})
-            found: Finding = chosen.run(self.record, rig, prepared)
+            found: Finding = chosen.run(record, rig, prepared)
         entries = {**chosen.blank, **chosen.entries(found)}
 
         def page(title: str) -> str:
@@ -228,7 +275,7 @@ class Log(Shown):
             from experiments.command.logs import with_said
 
             about = {"file": title, "plant": self.plant, "rig": rig.name, "seed": 2024, "expected": None}
-            return page_of(chosen, with_said({**about, **entries}, self._said), found, self.record)
+            return page_of(chosen, with_said({**about, **entries}, self._said), found, record)
 
         return Answer(found, entries, lambda rows: chosen.screen(rows, asked), page)
 

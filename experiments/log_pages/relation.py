@@ -68,10 +68,10 @@ class Relation(Shown):
         """
         import numpy as np
 
-        if not hasattr(log, "record"):
+        if not hasattr(log, "related"):
             runs = [one.simulate(log) for one in self.models]
         else:
-            parts = [_channels(one, log.record) for one in self.models]
+            parts = [_channels(one, log.related) for one in self.models]
             runs = [one.simulate(part.u[0], part.y[0]) for one, part in zip(self.models, parts, strict=True)]
         return runs[0] if len(runs) == 1 else np.column_stack(runs)
 
@@ -90,7 +90,7 @@ class Relation(Shown):
         """
         import pandas as pd
 
-        parts = [_channels(one, log.record, split=True) for one in self.models]
+        parts = [_channels(one, log.related, split=True) for one in self.models]
         rows = {one.output: vars(one.quality(part.u, part.y)) for one, part in zip(self.models, parts, strict=True)}
         return pd.DataFrame.from_dict(rows, orient="index")
 

@@ -5,7 +5,7 @@ from collections.abc import Collection
 import numpy as np
 
 from plant.arrays import Array
-from plant.errors import LogError, NoChannelError
+from plant.errors import LogError, NoChannelError, SparseLogError
 from plant.log.chamber_pressures import CHAMBERS, tells_difference, with_difference
 from plant.log.clock import FEWEST_SAMPLES, MOST_MISSING, Channels, Checked, long_enough, on_uniform_clock
 from plant.log.clock import Clock as Clock
@@ -51,8 +51,10 @@ def trusted(
     Raises
     ------
     LogError
-        If a required channel is missing or over 5 % empty (or the share that is told), a value is infinite, time does
-        not increase or is no clock's even if its jitter is mended, or there are fewer than 10 samples.
+        If a required channel is missing, a value is infinite, time does not increase or is no clock's even if its
+        jitter is mended, or there are fewer than 10 samples.
+    SparseLogError
+        If a required channel, or the clock, lacks over 5 % of its samples, or the share that is told.
 
     Examples
     --------
@@ -91,7 +93,8 @@ def alternatives(wanted: str) -> list[str]:
     return [name.strip() for name in wanted.split(" or ")]
 
 
-def _counted(count: int, total: int) -> dict[str, float]:
+def counted(count: int, total: int) -> dict[str, float]:
+    """Return the data of a note on samples that are missing: how many of how many, and that in percent."""
     return {"count": count, "total": total, "percent": 100.0 * count / total}
 
 
@@ -120,7 +123,7 @@ def _rows_with_time(columns: Channels, source: str, notes: list[Note]) -> Channe
         return columns
     if count > MOST_MISSING * total or total - count < FEWEST_SAMPLES:
         raise LogError(f"{TIME} is missing in {_share(count, total)}, at most 5 % may be", source)
-    notes.append(LogCode.TIME_MISSING.note(channel=TIME, **_counted(count, total)))
+    notes.append(LogCode.TIME_MISSING.note(channel=TIME, **counted(count, total)))
     return {name: values[~empty] for name, values in columns.items()}
 
 
@@ -154,17 +157,17 @@ def _masked(
         if count == 0 or name.startswith(TRUTH):
             continue
         if count <= most_missing * total:
-            notes.append(LogCode.SAMPLES_MASKED.note(channel=name, **_counted(count, total)))
+            notes.append(LogCode.SAMPLES_MASKED.note(channel=name, **counted(count, total)))
             continue
         if (rows := _slower(values)) > 1:
             notes.append(LogCode.CHANNEL_SLOWER.note(channel=name, rows=rows))
             continue
         del kept[name]
         if not all(any(other in kept for other in alternatives(wanted)) for wanted in required):
-            raise LogError(
+            raise SparseLogError(
                 f"{name} is missing in {_share(count, total)}, at most {100.0 * most_missing:g} % may be", source
             )
-        notes.append(LogCode.CHANNEL_LEFT_OUT.note(channel=name, **_counted(count, total)))
+        notes.append(LogCode.CHANNEL_LEFT_OUT.note(channel=name, **counted(count, total)))
     if not kept:
-        raise LogError(f"no channel has {100.0 * (1.0 - most_missing):g} % of its samples", source)
+        raise SparseLogError(f"no channel has {100.0 * (1.0 - most_missing):g} % of its samples", source)
     return kept

@@ -7,14 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.arrays import Array
-from plant.errors import LogError
+from plant.errors import LogError, SparseLogError
 from plant.log.columns import TIME
 from plant.log.jitter import GAP, grid_of, resampled, rounded_clock, usual_step
 from plant.log.notes import LogCode
 from plant.notes import Note
 
 FEWEST_SAMPLES = 10
-MOST_MISSING = 0.05
+
+MOST_MISSING, MOST_MISSING_TO_RELATE = 0.05, 0.5
+"""Share of a channel's samples, or of the clock's, that may be missing [fraction]: where an actuator is estimated, and
+where channels are related. There missing outputs are left out, and a log is split where inputs are missing."""
+
 MOST_JITTER = 0.35
 """Root mean square by which steps may differ from the sample time and still be a clock's, over it [fraction]."""
 
@@ -88,7 +92,9 @@ def on_uniform_clock(
     Raises
     ------
     LogError
-        If the stamps are no clock's, or over 5 % of the samples, or the share that is told, are left out.
+        If the stamps are no clock's.
+    SparseLogError
+        If over 5 % of the samples, or the share that is told, are left out.
     """
     time = columns[TIME]
     channels = {name: values for name, values in columns.items() if name != TIME}
@@ -233,7 +239,7 @@ def _few_left_out(there: int, total: float, source: str, most: float = MOST_MISS
     if not there >= (1.0 - most) * total:
         said = "{:.0f} of {:.0f}" if total < 1e15 else "{:.3g} of {:.3g}"
         left_out = said.format(total - there, total)
-        raise LogError(f"{TIME} leaves out {left_out} samples, wanted at most {100.0 * most:g} %", source)
+        raise SparseLogError(f"{TIME} leaves out {left_out} samples, wanted at most {100.0 * most:g} %", source)
 
 
 def _agrees(time: Array, clock: Clock) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 from plant.atomic import replacing
 from plant.errors import LogError, LogWarning
 from plant.log.checks import REQUIRED, Clock, trusted
+from plant.log.clock import MOST_MISSING
 from plant.log.columns import TIME
 from plant.log.csv import write_csv
 from plant.log.formats import open_tables
@@ -32,6 +33,7 @@ def read_record(
     required: Collection[str] = REQUIRED,
     sample_time: float | None = None,
     beside: Sequence[str | Path] = (),
+    most_missing: float = MOST_MISSING,
 ) -> Record:
     """Read a log, convert its columns to SI, and refuse it if it cannot be trusted.
 
@@ -50,6 +52,8 @@ def read_record(
         Time between rows [s] of a log that has no time.
     beside : Sequence[str or Path]
         Files of other loggers of the same test, whose channels are put on one clock with these.
+    most_missing : float
+        Share of the samples that may be missing [fraction].
 
     Returns
     -------
@@ -61,7 +65,9 @@ def read_record(
     ------
     LogError
         If the file cannot be read, a column is missing, double, or in an unknown unit, or its values cannot
-        be trusted: text, infinities, over 5 % missing, time that does not increase or is no clock's.
+        be trusted: text, infinities, time that does not increase or is no clock's.
+    SparseLogError
+        If over 5 % of the samples are missing, or the share that is told.
 
     Warns
     -----
@@ -75,7 +81,7 @@ def read_record(
     found = gathered(tables, columns, required, source, sample_time)
     document, notes = _document(next((one.metadata for one in tables if one.metadata), None))
     clock = None if beside else _clock(document)
-    checked = trusted(found.columns, source=source, required=required, clock=clock)
+    checked = trusted(found.columns, source=source, required=required, clock=clock, most_missing=most_missing)
     for note in (*notes, *found.notes, *checked.notes):
         warnings.warn(LogWarning(note, source), stacklevel=2)
     began = {} if found.began is None else {"began": found.began}

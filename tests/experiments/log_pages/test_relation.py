@@ -8,7 +8,9 @@ import pytest
 
 from estimation.identification.free_run.saved import load_models
 from estimation.identification.model.recursion import filtered
+from experiments.log_pages.log import ANY, Log
 from experiments.log_pages.relation import Relation, identified
+from plant.eha.rig import Rig
 from plant.errors import NoSuchNameError
 from plant.log.record import Record
 
@@ -26,11 +28,8 @@ def record(seed: int) -> Record:
     return Record(T, {"valve": valve, "load": load, "flow": flow + noise[0], "heat": heat + noise[1]})
 
 
-class Opened:
-    """What has a record, as a log does."""
-
-    def __init__(self, one: Record) -> None:
-        self.record = one
+def opened(one: Record) -> Log:
+    return Log(one, Rig(), ANY)
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +74,7 @@ def test_one_model_has_what_it_was_fitted_with_as_attributes_and_two_have_not(bo
 def test_inputs_alone_are_simulated_too_and_a_log_begins_from_its_measured_output(both: Relation) -> None:
     log = record(2)
     alone = both.simulate(np.column_stack([log["valve"], log["load"]]))
-    begun = both.simulate(Opened(log))
+    begun = both.simulate(opened(log))
     assert alone.shape == begun.shape == (400, 2)
     np.testing.assert_allclose(alone[100:], begun[100:], atol=1e-6)  # the slowest pole is 0.8
     np.testing.assert_allclose(begun[:, 0], log["flow"], atol=0.3)
@@ -83,7 +82,7 @@ def test_inputs_alone_are_simulated_too_and_a_log_begins_from_its_measured_outpu
 
 
 def test_another_log_is_followed_output_by_output(both: Relation) -> None:
-    told = both.validate(Opened(record(2)))
+    told = both.validate(opened(record(2)))
     assert list(told.index) == ["flow", "heat"]
     assert (told["fit_percent"] > 95.0).all()
     assert told["rmse"].to_numpy() == pytest.approx(0.02, rel=0.2)  # the noise is all that is left
@@ -111,4 +110,4 @@ def test_every_output_has_two_drawings(both: Relation) -> None:
 def test_a_slower_model_is_simulated_on_its_own_clock() -> None:
     slow = identified([record(1)], "load", "heat", {"order": 1, "delay": 1, "sample_time": 2 * T})
     assert slow.sample_time == pytest.approx(2 * T)
-    assert slow.simulate(Opened(record(2))).shape == (200,)
+    assert slow.simulate(opened(record(2))).shape == (200,)
