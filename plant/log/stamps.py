@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Sequence
 from datetime import date, timedelta
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ _DAY, _SECOND = 86_400_000_000_000, 1_000_000_000
 _EPOCH = date(1970, 1, 1)
 _ISO = re.compile(r"(?:1[89]|2[01])\d{2}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}(?:\.(\d{1,9}))?(Z|[-+]\d{2}:?\d{2})?")
 
+_DIGITS = str.maketrans("123456789", "000000000")
+
 LONGEST = 48
 """Characters of the longest stamp that is read."""
 
@@ -41,7 +44,13 @@ def is_stamp(cell: str) -> bool:
     (True, True, False)
     """
     text = cell.strip()
-    return len(text) <= LONGEST and any(one.fullmatch(text) for one in (*_PATTERNS, _MINUTES))
+    return len(text) <= LONGEST and _shaped(text.translate(_DIGITS))
+
+
+@lru_cache(maxsize=64)
+def _shaped(text: str) -> bool:
+    """Return whether a stamp looks so; no pattern asks which digit it is, and all stamps of a column look alike."""
+    return any(one.fullmatch(text) for one in (*_PATTERNS, _MINUTES))
 
 
 def read_stamps(cells: Sequence[str], refuse: Callable[[int, str], Exception]) -> Stamps:
