@@ -7,7 +7,7 @@ import numpy as np
 
 from estimation.eha.changing_leakage import growth_note, leakage_over, step_note
 from estimation.finding import NORMAL_95
-from estimation.fits.play import crossings
+from estimation.fits.play_courses import crossings
 from estimation.fits.teeth import EVENLY, Turning, delivering
 from estimation.fits.tried import Explanation
 from estimation.log_checks.bridging import bridged

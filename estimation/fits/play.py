@@ -1,38 +1,20 @@
-"""Play between the piston and its encoder: where the piston may be in it, and whether a fit's residuals show one.
-
-The encoder says at which end of its play it is while it moves. While it stands the piston may be anywhere in between:
-it turns and crosses, or springs back on its seals and comes again. So where it is has a few courses, of which a log
-chooses (`crossings`).
-"""
+"""Play between the piston and its encoder: whether a fit's residuals, or a velocity sensor, show one."""
 
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
 
-from estimation.arrays import Array, BoolArray, IntArray
+from estimation.arrays import Array, BoolArray
 from estimation.fits.greybox_problem import Problem
 from estimation.fits.hypotheses import LEAST_PLAY
+from estimation.fits.play_courses import SMOOTHED, STANDS, cell, crossings, smoothed, standings
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.channel_names import POSITION, PRESSURE, VELOCITY
-from estimation.log_checks.measurement_noise import position_variance
 from estimation.log_checks.order import percentile
 from estimation.notes import EstimateCode, RigCode
 from plant.log.record import Record
 from plant.notes import Note
-
-CELLS = 8.0
-"""Width of the cells in which a reading is followed, in standard deviations of its noise [dimensionless]."""
-
-FINEST = 1e-9
-"""Their least width [m]."""
-
-SMOOTHED = 2e-2
-"""Length over which pressure is averaged, by a Hann window [s]: its noise then moves no piston, and the quickest of
-crossings takes as long; judged."""
-
-STANDS = 0.02
-"""Time for which an encoder stands before the piston is taken to spring back [s]; judged: one may creep in steps."""
 
 NUDGE = 1e-6
 """Play by which the residuals' answer to one is read off [m]."""
@@ -84,52 +66,6 @@ PLAY_SENSED = 2.7
 which its interval holds one that no fit took up: one log in 100 gains it by chance, and fewer seem to move by more than
 the encoder resolves, which is asked too. The check is shut from `PLAY_SHOWN` on, which one log in 400 gains by chance
 [dimensionless]."""
-
-
-def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
-    """Return courses of the piston in its encoder's play.
-
-    Between the last movement one way and the first one back the piston turns, and crosses the play with the square of
-    time, as under a constant force. Two steps the same way, from cell to cell, are a movement; one is noise.
-
-    Parameters
-    ----------
-    position : ndarray, shape (n,)
-        The reading, without gaps [m].
-    pressure : ndarray, shape (n,)
-        Differential pressure [Pa]; NaN is missing.
-    sample_time : float
-        Seconds between samples [s].
-
-    Returns
-    -------
-    ndarray, shape (n, 4)
-        In the order of `estimation.models.wide_flow.COURSES`: at which end of its play the encoder is, 1 after it moved
-        up, -1 after it moved down, 0 before anything is known, and from the one to the other while it stands and the
-        piston crosses at last; then what is to be added to that where the piston follows pressure in place of time, as
-        one that is held by the stretch of its seals does; where it crosses at first, and not at last; and where it
-        springs back and comes again, by the share of the pressure that is lost meanwhile [dimensionless].
-
-    Examples
-    --------
-    >>> out_and_back = 30.0 - np.abs(30.0 - np.arange(61.0))
-    >>> late = crossings(out_and_back, np.zeros(61), 1e-3)[:, 0]
-    >>> late[[0, 20, 30, 34, 60]].round(1).tolist()
-    [0.0, 1.0, 0.9, -1.0, -1.0]
-    """
-    stands = _standings(position)
-    late, early = (_crossed(stands, crossed) for crossed in (lambda share: share**2, lambda share: share * (2 - share)))
-    force = _smoothed(bridged(pressure), round(SMOOTHED / sample_time))
-    before, after = force[stands.first], force[stands.last]
-    turned = np.divide(force - before, after - before, out=np.ones_like(force), where=after != before)
-    followed = turned.clip(0.0, 1.0)
-    by_pressure = stands.side + (stands.next_side - stands.side) * followed
-    held = before + (after - before) * stands.share
-    most = np.abs(held)
-    below = np.maximum(stands.side * (force - held), -2.0 * most).clip(max=0.0)
-    lost = np.divide(below, most, out=below, where=below < 0.0)
-    sprung = np.where(stands.turns | (stands.length * sample_time < STANDS), 0.0, stands.side * lost)
-    return np.column_stack([late, by_pressure - late, early - late, sprung])
 
 
 def crossed_drives(problem: Problem) -> list[Array]:
@@ -253,8 +189,8 @@ def sensed_play(record: Record) -> ShownPlay:
     if VELOCITY not in record:
         return NO_PLAY
     position = bridged(record[POSITION])
-    stands = _standings(position)
-    force = _smoothed(bridged(record[PRESSURE]), round(SMOOTHED / record.sample_time))
+    stands = standings(position)
+    force = smoothed(bridged(record[PRESSURE]), round(SMOOTHED / record.sample_time))
     # the encoder's rate is over two sample times, so velocity is averaged over them too
     velocity, rate = (
         np.convolve(record[VELOCITY], (0.25, 0.5, 0.25), mode="same"),
@@ -272,7 +208,7 @@ def sensed_play(record: Record) -> ShownPlay:
         return NO_PLAY
     here, standing = force[still], stands.first[still]
     at_once = here - (np.bincount(standing, here) / np.maximum(np.bincount(standing), 1))[standing]
-    if (moved - seen) * _spread(at_once) <= max(_cell(position), LEAST_PLAY):
+    if (moved - seen) * _spread(at_once) <= max(cell(position), LEAST_PLAY):
         return NO_PLAY
     looks = np.count_nonzero(still) / together
     gain = 0.5 * looks * np.log1p((moved - seen) ** 2 * power / chance / looks)
@@ -290,60 +226,3 @@ def _lasting(left: Array, there: BoolArray, samples: int) -> float:
 
 def _spread(values: Array) -> float:
     return percentile(values, 95.0) - percentile(values, 5.0)
-
-
-class _Standings(NamedTuple):
-    """For each sample: the movements before and after, at which sides they left the play, and how far it is there."""
-
-    first: IntArray
-    last: IntArray
-    side: Array
-    next_side: Array
-
-    @property
-    def turns(self) -> BoolArray:
-        return self.side != self.next_side
-
-    @property
-    def length(self) -> IntArray:
-        return self.last - self.first
-
-    @property
-    def away(self) -> IntArray:
-        samples = np.arange(len(self.first))
-        return np.minimum(samples - self.first, self.last - samples)
-
-    @property
-    def share(self) -> Array:
-        samples = np.arange(len(self.first))
-        return (samples - self.first) / np.maximum(self.length, 1)
-
-
-def _standings(position: Array) -> _Standings:
-    at = np.round(position / _cell(position))
-    steps = np.flatnonzero(np.diff(at)) + 1
-    ways = np.sign(at[steps] - at[steps - 1])
-    sure = np.flatnonzero(ways[1:] == ways[:-1]) + 1
-    # what is after the last movement ends with the log, at the side where it began
-    places = np.concatenate([[0], steps[sure], [len(position) - 1]])
-    sides = np.concatenate([[0.0], ways[sure], ways[sure][-1:] if len(sure) else [0.0]])
-    before = np.searchsorted(places[:-1], np.arange(len(position)), side="right") - 1
-    return _Standings(places[before], places[before + 1], sides[before], sides[before + 1])
-
-
-def _cell(position: Array) -> float:
-    return max(CELLS * position_variance(position) ** 0.5, FINEST)
-
-
-def _crossed(stands: _Standings, course: Callable[[Array], Array]) -> Array:
-    return stands.side + (stands.next_side - stands.side) * course(stands.share)
-
-
-def _smoothed(values: Array, samples: int) -> Array:
-    """Return means under a Hann window of so many samples."""
-    if samples < 2:
-        return values
-    window = np.hanning(samples + 2 + samples % 2 - 1)[1:-1]
-    reach = len(window) // 2
-    padded = np.pad(values, (reach, len(window) - 1 - reach), mode="edge")
-    return np.convolve(padded, window / np.sum(window), mode="valid")

@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import PRESUMED
-from estimation.fits.play import crossings
+from estimation.fits.play_courses import crossings
 from estimation.log_checks.channel_names import POSITION
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS

@@ -1,0 +1,181 @@
+"""Where the piston may be in the play of its encoder.
+
+The encoder says at which end of its play it is while it moves. While it stands the piston may be anywhere in between:
+it turns and crosses, or springs back on its seals and comes again. So where it is has a few courses, of which a log
+chooses (`crossings`).
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.arrays import Array, BoolArray, IntArray
+from estimation.log_checks.bridging import bridged
+from estimation.log_checks.measurement_noise import position_variance
+
+CELLS = 8.0
+"""Width of the cells in which a reading is followed, in standard deviations of its noise [dimensionless]."""
+
+FINEST = 1e-9
+"""Their least width [m]."""
+
+SMOOTHED = 2e-2
+"""Length over which pressure is averaged, by a Hann window [s]: its noise then moves no piston, and the quickest of
+crossings takes as long; judged."""
+
+STANDS = 0.02
+"""Time for which an encoder stands before the piston is taken to spring back [s]; judged: one may creep in steps."""
+
+
+def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
+    """Return courses of the piston in its encoder's play.
+
+    Between the last movement one way and the first one back the piston turns, and crosses the play with the square of
+    time, as under a constant force. Two steps the same way, from cell to cell, are a movement; one is noise.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n,)
+        The reading, without gaps [m].
+    pressure : ndarray, shape (n,)
+        Differential pressure [Pa]; NaN is missing.
+    sample_time : float
+        Seconds between samples [s].
+
+    Returns
+    -------
+    ndarray, shape (n, 4)
+        In the order of `estimation.models.wide_flow.COURSES`: at which end of its play the encoder is, 1 after it moved
+        up, -1 after it moved down, 0 before anything is known, and from the one to the other while it stands and the
+        piston crosses at last; then what is to be added to that where the piston follows pressure in place of time, as
+        one that is held by the stretch of its seals does; where it crosses at first, and not at last; and where it
+        springs back and comes again, by the share of the pressure that is lost meanwhile [dimensionless].
+
+    Examples
+    --------
+    >>> out_and_back = 30.0 - np.abs(30.0 - np.arange(61.0))
+    >>> late = crossings(out_and_back, np.zeros(61), 1e-3)[:, 0]
+    >>> late[[0, 20, 30, 34, 60]].round(1).tolist()
+    [0.0, 1.0, 0.9, -1.0, -1.0]
+    """
+    stands = standings(position)
+    late, early = (_crossed(stands, crossed) for crossed in (lambda share: share**2, lambda share: share * (2 - share)))
+    force = smoothed(bridged(pressure), round(SMOOTHED / sample_time))
+    before, after = force[stands.first], force[stands.last]
+    turned = np.divide(force - before, after - before, out=np.ones_like(force), where=after != before)
+    followed = turned.clip(0.0, 1.0)
+    by_pressure = stands.side + (stands.next_side - stands.side) * followed
+    held = before + (after - before) * stands.share
+    most = np.abs(held)
+    below = np.maximum(stands.side * (force - held), -2.0 * most).clip(max=0.0)
+    lost = np.divide(below, most, out=below, where=below < 0.0)
+    sprung = np.where(stands.turns | (stands.length * sample_time < STANDS), 0.0, stands.side * lost)
+    return np.column_stack([late, by_pressure - late, early - late, sprung])
+
+
+class Standings(NamedTuple):
+    """For each sample: the movements before and after, at which sides they left the play, and how far it is there.
+
+    Parameters
+    ----------
+    first, last : ndarray of int, shape (n,)
+        Samples of the movement before and after.
+    side, next_side : ndarray, shape (n,)
+        At which end of its play the encoder is from each on: 1 after it moved up, -1 after it moved down, 0 before
+        anything is known.
+    """
+
+    first: IntArray
+    last: IntArray
+    side: Array
+    next_side: Array
+
+    @property
+    def turns(self) -> BoolArray:
+        """Whether the piston turns meanwhile."""
+        return self.side != self.next_side
+
+    @property
+    def length(self) -> IntArray:
+        """How long the encoder stands [samples]."""
+        return self.last - self.first
+
+    @property
+    def away(self) -> IntArray:
+        """How far the nearer movement is [samples]."""
+        samples = np.arange(len(self.first))
+        return np.minimum(samples - self.first, self.last - samples)
+
+    @property
+    def share(self) -> Array:
+        """How much of the time between the movements is over [fraction]."""
+        samples = np.arange(len(self.first))
+        return (samples - self.first) / np.maximum(self.length, 1)
+
+
+def standings(position: Array) -> Standings:
+    """Return between which movements an encoder stands.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n,)
+        The reading, without gaps [m].
+
+    Returns
+    -------
+    Standings
+        For each sample.
+    """
+    at = np.round(position / cell(position))
+    steps = np.flatnonzero(np.diff(at)) + 1
+    ways = np.sign(at[steps] - at[steps - 1])
+    sure = np.flatnonzero(ways[1:] == ways[:-1]) + 1
+    # what is after the last movement ends with the log, at the side where it began
+    places = np.concatenate([[0], steps[sure], [len(position) - 1]])
+    sides = np.concatenate([[0.0], ways[sure], ways[sure][-1:] if len(sure) else [0.0]])
+    before = np.searchsorted(places[:-1], np.arange(len(position)), side="right") - 1
+    return Standings(places[before], places[before + 1], sides[before], sides[before + 1])
+
+
+def cell(position: Array) -> float:
+    """Return the width of the cells in which a reading is followed.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n,)
+        The reading, without gaps [m].
+
+    Returns
+    -------
+    float
+        Width [m].
+    """
+    return max(CELLS * position_variance(position) ** 0.5, FINEST)
+
+
+def _crossed(stands: Standings, course: Callable[[Array], Array]) -> Array:
+    return stands.side + (stands.next_side - stands.side) * course(stands.share)
+
+
+def smoothed(values: Array, samples: int) -> Array:
+    """Return means of a signal under a Hann window.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Any signal without gaps.
+    samples : int
+        Length of the window.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Its means, in the same unit; beyond either end it is held.
+    """
+    if samples < 2:
+        return values
+    window = np.hanning(samples + 2 + samples % 2 - 1)[1:-1]
+    reach = len(window) // 2
+    padded = np.pad(values, (reach, len(window) - 1 - reach), mode="edge")
+    return np.convolve(padded, window / np.sum(window), mode="valid")
