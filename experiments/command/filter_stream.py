@@ -1,9 +1,6 @@
 """`hydrostate filter -`: what a filter believes of a stream, as it comes, one JSON object a line."""
 
-import json
-import signal
 import sys
-import threading
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
@@ -24,8 +21,7 @@ from experiments.command.options import (
     option,
     require_positive,
 )
-from experiments.command.terminal import SOME_FAILED, emit, note, unexpected
-from experiments.command.watch import STANDARD_INPUT, stream_input
+from experiments.command.streamed import STANDARD_INPUT, end_told, say_line, stop_at_sigterm, stream_input
 from experiments.command.watch_outputs import published
 from experiments.command.watching import told_of
 from plant.errors import HydrostateError
@@ -83,15 +79,14 @@ def filter_stream(
     rows the filter restarts from where the actuator then is.
     """
     require_positive("--every", every, "s")
-    sinks: list[Any] = [_say]
+    sinks: list[Any] = [say_line]
 
     def say(entries: Mapping[str, Any]) -> None:
         shown = plain(dict(entries))
         for sink in sinks:
             sink(shown)
 
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    stop_at_sigterm()
     from estimation.eha.online import Asked
 
     with ExitStack() as outputs:
@@ -102,28 +97,12 @@ def filter_stream(
         told = Filtering(say, asked, (bench.columns, named), every, log, state, source)
         if publish is not None:
             sinks.append(outputs.enter_context(published(publish)))
-        _ended(told, stream)
-
-
-def _ended(told: Filtering, stream: str) -> None:
-    """Filter a stream; whatever ends it, the last line says so."""
-    received = Received()
-    try:
-        told.follow(_lines(stream, received))
-    except HydrostateError as error:
-        told.end("failed", str(error))
-        raise
-    except KeyboardInterrupt:
-        told.end("interrupted", "interrupted")
-        raise
-    except BaseException as error:
-        said = unexpected(error)
-        told.end("failed", said)
-        note(said)
-        raise typer.Exit(SOME_FAILED) from error
-    finally:
-        told_of(stream, received)
-    told.end("ok", "")
+        received = Received()
+        with end_told(told):
+            try:
+                told.follow(_lines(stream, received))
+            finally:
+                told_of(stream, received)
 
 
 def _lines(stream: str, received: Received) -> Iterator[str]:
@@ -137,7 +116,3 @@ def _lines(stream: str, received: Received) -> Iterator[str]:
                 yield from file
         except OSError as error:
             raise HydrostateError(f"{stream}: it cannot be read: {error.strerror or error}") from error
-
-
-def _say(entries: Mapping[str, Any]) -> None:
-    emit(json.dumps(entries, allow_nan=False))

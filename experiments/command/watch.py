@@ -1,14 +1,9 @@
 """`hydrostate watch -`: events of a stream as they come, one JSON object a line."""
 
-import io
-import json
-import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Any, TextIO
+from typing import Annotated
 
 import typer
 
@@ -23,17 +18,11 @@ from experiments.command.options import (
     option,
     require_positive,
 )
-from experiments.command.terminal import SOME_FAILED, emit, note, unexpected
+from experiments.command.streamed import STANDARD_INPUT, end_told, say_line, stop_at_sigterm, stream_input
 from experiments.command.watch_outputs import Watched, metrics_offered, published
 from experiments.command.watch_view import lines_wanted, viewed
 from experiments.command.watching import Asked, watch_file, watch_network, watch_rows
-from plant.errors import HydrostateError, LogError
 from plant.log.stream_source import is_stream
-
-STANDARD_INPUT = "standard input"
-
-LONGEST_LINE = 1 << 20
-"""Characters of the longest line of a stream."""
 
 commands = typer.Typer()
 
@@ -88,11 +77,11 @@ def watch(
     require_positive("--heartbeat", heartbeat, "s")
     told = Watched(STANDARD_INPUT if log == "-" else log)
     if lines_wanted(view):
-        told.to(_say)
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        told.to(say_line)
+    stop_at_sigterm()
 
-    def run() -> None:
+    with ExitStack() as outputs, end_told(told):  # they hear of the end before they are closed
+        _opened(told, outputs, publish, metrics, view)
         asked = Asked(load_rig(rig), load_columns(columns), false_alarms, learning, healthy, no_pressure)
         with beating(told, heartbeat):
             if log == "-":
@@ -101,9 +90,6 @@ def watch(
                 watch_network(told, log, asked, state)
             else:
                 watch_file(told, Path(log), asked)
-
-    with ExitStack() as outputs:  # they hear of the end before they are closed
-        _ended(told, lambda: _opened(told, outputs, publish, metrics, view), run)
 
 
 def _opened(told: Watched, outputs: ExitStack, publish: str | None, metrics: str | None, view: bool) -> None:
@@ -114,44 +100,3 @@ def _opened(told: Watched, outputs: ExitStack, publish: str | None, metrics: str
         outputs.enter_context(metrics_offered(metrics, told))
     if view:
         outputs.enter_context(viewed(told))
-
-
-def _ended(told: Watched, *parts: Callable[[], None]) -> None:
-    """Do one part after the other; whatever ends them, the last line says so."""
-    try:
-        for part in parts:
-            part()
-    except HydrostateError as error:
-        told.end("failed", str(error))
-        raise
-    except KeyboardInterrupt:
-        told.end("interrupted", "interrupted")
-        raise
-    except BaseException as error:
-        said = unexpected(error)
-        told.end("failed", said)
-        note(said)
-        raise typer.Exit(SOME_FAILED) from error
-    told.end("ok", "")
-
-
-def _say(entries: Mapping[str, Any]) -> None:
-    emit(json.dumps(entries, allow_nan=False))
-
-
-def stream_input(file: TextIO) -> Iterator[str]:
-    """Yield the lines of a stream; bytes that are no text are refused later as no numbers.
-
-    Raises
-    ------
-    LogError
-        If a line does not end.
-    """
-    if not isinstance(file, io.TextIOWrapper):
-        yield from file
-        return
-    file.reconfigure(errors="replace")
-    while line := file.readline(LONGEST_LINE):
-        if len(line) == LONGEST_LINE and not line.endswith("\n"):
-            raise LogError(f"a line must have fewer than {LONGEST_LINE} characters", STANDARD_INPUT)
-        yield line

@@ -124,7 +124,7 @@ def test_a_stream_on_standard_input_is_read_as_it_comes(log: Path, monkeypatch: 
             return super().__next__()
 
     printed: list[str] = []
-    monkeypatch.setattr("experiments.command.watch.emit", lambda line: printed.append(line))
+    monkeypatch.setattr("experiments.command.streamed.emit", lambda line: printed.append(line))
     monkeypatch.setattr("sys.stdin", Growing(log.read_text()))
     from experiments.command.watch import watch
 

@@ -1,0 +1,89 @@
+"""What the commands on streams share: lines in, lines out, and a last line that says how the stream ended."""
+
+import io
+import json
+import signal
+import threading
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, Protocol, TextIO
+
+import typer
+
+from experiments.command.terminal import SOME_FAILED, emit, note, unexpected
+from plant.errors import HydrostateError, LogError
+
+STANDARD_INPUT = "standard input"
+"""What standard input is called in events and errors."""
+
+LONGEST_LINE = 1 << 20
+"""Characters of the longest line of a stream."""
+
+
+class Told(Protocol):
+    """What tells of a stream."""
+
+    def end(self, outcome: str, message: str) -> None:
+        """Tell that the stream has ended, and how."""
+        ...
+
+
+@contextmanager
+def end_told(told: Told) -> Generator[None]:
+    """Follow a stream; whatever ends it, the last line says so.
+
+    Parameters
+    ----------
+    told : Told
+        What tells of it.
+
+    Raises
+    ------
+    HydrostateError
+        As within.
+    typer.Exit
+        After an error that nobody expected, which is noted.
+    """
+    try:
+        yield
+    except HydrostateError as error:
+        told.end("failed", str(error))
+        raise
+    except KeyboardInterrupt:
+        told.end("interrupted", "interrupted")
+        raise
+    except BaseException as error:
+        said = unexpected(error)
+        told.end("failed", said)
+        note(said)
+        raise typer.Exit(SOME_FAILED) from error
+    told.end("ok", "")
+
+
+def stop_at_sigterm() -> None:
+    """Let a signal to end a process interrupt it, so that its last line is written."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
+def say_line(entries: Mapping[str, Any]) -> None:
+    """Print entries as a line of JSON."""
+    emit(json.dumps(entries, allow_nan=False))
+
+
+def stream_input(file: TextIO) -> Iterator[str]:
+    """Yield the lines of a stream; bytes that are no text are refused later as no numbers.
+
+    Raises
+    ------
+    LogError
+        If a line does not end.
+    """
+    if not isinstance(file, io.TextIOWrapper):
+        yield from file
+        return
+    file.reconfigure(errors="replace")
+    while line := file.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE and not line.endswith("\n"):
+            raise LogError(f"a line must have fewer than {LONGEST_LINE} characters", STANDARD_INPUT)
+        yield line
