@@ -46,7 +46,7 @@ def actuator(name: str) -> "ActuatorKind":
     for kind in actuators():
         if name == kind.name or name in kind.models:
             return kind
-    known = [model for kind in actuators() for model in kind.models or (kind.name,)]
+    known = [one for kind in actuators() for one in (kind.name, *kind.models)]
     raise HydrostateError(f"--plant must be one of {', '.join(known)}, got {name!r}")
 
 

@@ -112,7 +112,7 @@ MISTAKES: dict[str, tuple[Callable[[hs.Log, Path], object], str]] = {
     "text for a number": (lambda log, file: log.estimate(start_std="1e8"), "start_std must be a number, got '1e8'"),
     "misspelt option": (lambda log, file: log.estimate(methd="ekf"), "did you mean 'method'"),
     "misspelt condition": (lambda log, file: hs.simulate("minor_leak"), "condition must be one of normal"),
-    "misspelt plant": (lambda log, file: hs.simulate(plant="pump"), "must be one of reduced, lumped"),
+    "misspelt plant": (lambda log, file: hs.simulate(plant="pump"), "must be one of eha, reduced, lumped"),
     "misspelt verb": (lambda log, file: log.estimat(), "did you mean 'estimate'"),
     "misspelt name": (lambda log, file: hs.reed, "did you mean 'read'"),
     "no such channel": (lambda log, file: log["pressure"], "channel 'pressure' is needed; the record has"),

@@ -135,11 +135,13 @@ def _diagnosed(
     from experiments.command.batch import run_plan
 
     kind, _ = load_actuator(plant, rig)
-    found = sorted(
-        one for one in folder.rglob("*") if one.suffix.lower() in (*SUFFIXES, *OTHERS) and out not in one.parents
-    )
+    if not folder.is_dir():
+        got = "got a file" if folder.is_file() else "there is no such folder"
+        raise HydrostateError(f"{folder}: must be a folder with logs or a store, {got}")
+    known = (*SUFFIXES, *OTHERS)
+    found = sorted(one for one in folder.rglob("*") if one.suffix.lower() in known and out not in one.parents)
     if not found:
-        raise HydrostateError(f"{folder}: must be a folder with logs or a store, no file in it ends like a log")
+        raise HydrostateError(f"{folder}: must hold logs, files that end in {', '.join(known)}, but there are none")
     ends = sorted({one.suffix for one in found})
     methods = [{"verb": "diagnose"}]
     logs = [{"glob": f"**/*{end}", "columns": dict(columns), "methods": methods} for end in ends]

@@ -22,6 +22,7 @@ from experiments.command.options import (
     load_columns,
     load_rig,
     option,
+    require_png,
     require_positive,
 )
 from experiments.command.terminal import short_names, table
@@ -163,6 +164,8 @@ def identify(
     from estimation.identification.from_record import identify_record, record_signals
     from plant.errors import NoChannelError
 
+    require_png("--figure", figure)
+    require_png("--response", response)
     related = any(one is not None for one in (inputs, outputs, references, simulate))
     any_columns = related and rig is None and not columns
     if any_columns or structure in ("narx", "hammerstein", "state-space"):

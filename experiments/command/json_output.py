@@ -99,6 +99,10 @@ def _harmless(value: Any) -> Any:
     return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
 
 
+_OF_FILES = (".csv", ".txt", ".xml", ".xlsx", ".html", ".png", ".pdf", ".toml", ".parquet", ".mat")
+"""Endings of files: a folder of such a name would be a slip."""
+
+
 def prepare_output(out: Path | None) -> None:
     """Make the folder that results will be written to, before any work is done for them.
 
@@ -110,10 +114,12 @@ def prepare_output(out: Path | None) -> None:
     Raises
     ------
     HydrostateError
-        If the folder cannot be made or written.
+        If the name is that of another file, or the folder cannot be made or written.
     """
     if out is None:
         return
+    if out.suffix.lower() in _OF_FILES and not out.is_dir():
+        raise HydrostateError(f"--out must be a folder, or a file that ends in .json, got {str(out)!r}")
     folder = _folder(out)
     with refused(f"--out {out}: the folder cannot be made"):
         folder.mkdir(parents=True, exist_ok=True)

@@ -8,7 +8,7 @@ import typer
 
 from experiments.command.json_output import Result, prepare_output, write_whole
 from experiments.command.logs import finish, overheard, read_log, run_logs, with_said
-from experiments.command.options import figure_path, load_actuator, load_columns, understood
+from experiments.command.options import figure_path, load_actuator, load_columns, require_png, understood
 from experiments.command.terminal import clauses, note
 from plant.errors import HydrostateError, require_known
 
@@ -39,6 +39,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     diagnosing = verb == "diagnose"
     kind, bench = load_actuator(asked["plant"], asked["rig"])
     options = understood(context, asked, kind, verb, COMMON | ({"condition"} if diagnosing else set()))
+    require_png("--figure", options.get("figure"))
     chosen: LogVerb = getattr(kind, verb)
     logs, mapping = asked["logs"], load_columns(asked["columns"])
     expected: str | None = asked["condition"] if diagnosing else None

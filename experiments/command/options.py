@@ -195,6 +195,25 @@ def require_positive(option: str, value: float | None, unit: str) -> None:
         raise HydrostateError(f"{option} must be positive and finite, got {value:g} {unit}")
 
 
+def require_png(option: str, path: Path | None) -> None:
+    """Refuse a figure that is asked for under the name of another kind of file.
+
+    Parameters
+    ----------
+    option : str
+        As the command line has it.
+    path : Path or None
+        Where the figure goes; None where none is wanted.
+
+    Raises
+    ------
+    HydrostateError
+        If the name does not end in ``.png``.
+    """
+    if path is not None and path.suffix.lower() != ".png":
+        raise HydrostateError(f"{option} must end in .png, got {str(path)!r}")
+
+
 def figure_path(target: Path | None, log: Path, logs: int) -> Path | None:
     """Return where the figure of a log goes; with several logs, each one's name goes into the file's.
 

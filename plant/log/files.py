@@ -143,7 +143,7 @@ def sidecar(path: Path) -> Path:
     Path
         ``run.csv.json`` for ``run.csv``.
     """
-    return path.with_name(path.name + ".json")
+    return path.parent / f"{path.name}.json"
 
 
 def _kind(path: Path) -> str:

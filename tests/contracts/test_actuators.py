@@ -181,7 +181,7 @@ def test_a_verb_that_a_kind_has_not_says_so(monkeypatch: pytest.MonkeyPatch, tmp
 
 
 def test_an_unknown_kind_is_refused_with_those_that_are_known() -> None:
-    with pytest.raises(HydrostateError, match="--plant must be one of reduced, lumped, circuit, piezo-stack"):
+    with pytest.raises(HydrostateError, match="--plant must be one of eha, reduced, lumped, circuit, piezo-stack"):
         actuator("toy")
 
 

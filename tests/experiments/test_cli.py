@@ -125,7 +125,7 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
         (["simulate", "-o", "a.xls"], "--out must end in .csv"),
         (
             ["simulate", "-o", "a.csv", "--plant", "toy"],
-            "--plant must be one of reduced, lumped, circuit, piezo-stack, diaphragm-motor, got 'toy'",
+            "--plant must be one of eha, reduced, lumped, circuit, piezo-stack, diaphragm-motor, got 'toy'",
         ),
         (["simulate", "-o", "a.csv", "--drive", "walk"], "--drive must be one of sine"),
         (["simulate", "-o", "a.csv", "--duration", "inf"], "--duration must be positive and finite, got inf s"),
@@ -134,6 +134,11 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
             ["simulate", "-o", "a.csv", "--leakage-severity", "1", "--condition", "normal"],
             "give either --condition or severities, not both",
         ),
+        (["estimate", "a.csv", "--method", "ekf", "--figure", "a.pdf"], "--figure must end in .png, got 'a.pdf'"),
+        (["identify", "a.csv", "--response", "a.svg"], "--response must end in .png, got 'a.svg'"),
+        (["diagnose", "a.csv", "--out", "a.csv"], "--out must be a folder, or a file that ends in .json, got 'a.csv'"),
+        (["diagnose", "."], ".: a file is needed, got a directory; `hydrostate fleet FOLDER` reads all logs of one"),
+        (["fleet", "none"], "none: must be a folder with logs or a store, there is no such folder"),
         (["conditions", "--seed", "-1"], "Invalid value for '--seed'"),
     ],
 )

@@ -18,7 +18,7 @@ def invoke(*arguments: object) -> tuple[int, str, str]:
 def test_a_folder_without_logs_is_refused(tmp_path: Path) -> None:
     code, _, said = invoke("fleet", tmp_path, "--out", tmp_path / "out")
     assert code == 2
-    assert "must be a folder with logs or a store" in said
+    assert "must hold logs, files that end in .csv, .txt, " in said
 
 
 @pytest.mark.parametrize(
