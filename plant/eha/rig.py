@@ -120,7 +120,7 @@ def read_rig(path: str | Path, parameter_class: type[Any] = EhaParameters, plant
     ------
     RigError
         If the file cannot be read or is no TOML, is of another kind of actuator, or an entry is unknown, of the wrong
-        kind, or out of range.
+        kind, out of range, or of a size that no actuator has in SI.
     """
     from plant.eha.rig_entries import wrong_kinds
 
@@ -165,6 +165,7 @@ def _content(path: Path) -> dict[str, Any]:
 
 def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> Rig[Any]:
     from plant.eha.rig_entries import RigEntries, numbers_of
+    from plant.eha.rig_units import require_si
 
     _known(content, RigEntries.model_fields, "")
     file = RigEntries.model_validate(content)
@@ -172,7 +173,10 @@ def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> 
         raise RigError(f"a rig of plant {plant!r} is needed here, got one of {file.plant!r}")
     _known(file.parameters, _names(parameter_class), "parameters")
     values = numbers_of(_unpaired(file.parameters, _pairs_of(parameter_class)), parameter_class)
-    return Rig(file.name, parameter_class(**values), file.uncertainty, file.columns, file.measured)
+    parameters = parameter_class(**values)
+    if isinstance(parameters, EhaParameters):
+        require_si(parameters)
+    return Rig(file.name, parameters, file.uncertainty, file.columns, file.measured)
 
 
 def _pairs_of(parameter_class: type[Any]) -> Mapping[str, str]:
