@@ -49,8 +49,8 @@ class ChannelCode(Code):
         "correct the names of the columns (--columns CHANNEL=NAME)"
     )
     CHANNEL_UNIT = (
-        "{channel} reads {factor:.3g} times what {against} implies, which looks like {slip}; give the column's unit "
-        "(--columns CHANNEL=NAME:UNIT)"
+        "{channel}: the values are {factor:.3g} times what {against} would give, which looks like {slip}; give the "
+        "column's unit (--columns CHANNEL=NAME:UNIT)"
     )
 
 

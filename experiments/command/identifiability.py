@@ -52,7 +52,10 @@ def identifiability(
     ] = "",
     noise: Noise = "bench",
     drive: Drive = "steps",
-    seconds: Annotated[float, option("S", "Length of the experiment [s].", show_default="10, piezo-stack 0.1")] = 10.0,
+    seconds: Annotated[
+        float,
+        option("S", "Length of the experiment [s].", "--seconds", "--duration", show_default="10, piezo-stack 0.1"),
+    ] = 10.0,
     rate: Annotated[float, option("HZ", "Sample rate [Hz].", show_default="1000, piezo-stack 20000")] = 1000.0,
     ranked: Ranked = False,
     condition: ConditionName = None,

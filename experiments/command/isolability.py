@@ -27,7 +27,7 @@ def isolability(
     ] = "position,velocity,dp",
     noise: Noise = "bench",
     drive: Drive = "steps",
-    seconds: Annotated[float, option("S", "Length of the experiment [s].")] = 10.0,
+    seconds: Annotated[float, option("S", "Length of the experiment [s].", "--seconds", "--duration")] = 10.0,
     rate: Annotated[float, option("HZ", "Sample rate [Hz].")] = 1000.0,
     ranked: Ranked = False,
     rig: RigFile = None,

@@ -244,13 +244,14 @@ class Log(Shown):
         import numpy as np
 
         from plant.errors import LogWarning
-        from plant.log.checks import counted
         from plant.log.notes import LogCode
 
         for name in (one for given in asked for one in ([given] if isinstance(given, str) else given)):
             if name not in self.record and name in self.related:
-                missing = int(np.isnan(self.related[name]).sum())
-                said = LogCode.SAMPLES_MASKED.note(channel=name, **counted(missing, len(self)))
+                count, total = int(np.isnan(self.related[name]).sum()), len(self)
+                said = LogCode.SAMPLES_MASKED.note(
+                    channel=name, count=count, total=total, percent=100.0 * count / total
+                )
                 warnings.warn(LogWarning(said), stacklevel=4)
 
     def _asked(self, verb: str, options: Mapping[str, Any]) -> "Answer":

@@ -3,6 +3,7 @@
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from itertools import combinations
 
 import numpy as np
@@ -74,7 +75,10 @@ def kind_of(name: str) -> Kind:
     """
     first, both, second = name.partition(BOTH)
     for one in (first, second) if both else (first,):
-        require_known("kind", one, KINDS)
+        if one not in KINDS:
+            near = get_close_matches(one, KINDS, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else "`hydrostate benchmark kinds` lists those that are there"
+            raise HydrostateError(f"kind {one!r} is unknown, {hint}")
     return pair_of(KINDS[first], KINDS[second]) if both else KINDS[first]
 
 

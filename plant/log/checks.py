@@ -93,8 +93,7 @@ def alternatives(wanted: str) -> list[str]:
     return [name.strip() for name in wanted.split(" or ")]
 
 
-def counted(count: int, total: int) -> dict[str, float]:
-    """Return the data of a note on samples that are missing: how many of how many, and that in percent."""
+def _counted(count: int, total: int) -> dict[str, float]:
     return {"count": count, "total": total, "percent": 100.0 * count / total}
 
 
@@ -123,7 +122,7 @@ def _rows_with_time(columns: Channels, source: str, notes: list[Note]) -> Channe
         return columns
     if count > MOST_MISSING * total or total - count < FEWEST_SAMPLES:
         raise LogError(f"{TIME} is missing in {_share(count, total)}, at most 5 % may be", source)
-    notes.append(LogCode.TIME_MISSING.note(channel=TIME, **counted(count, total)))
+    notes.append(LogCode.TIME_MISSING.note(channel=TIME, **_counted(count, total)))
     return {name: values[~empty] for name, values in columns.items()}
 
 
@@ -157,7 +156,7 @@ def _masked(
         if count == 0 or name.startswith(TRUTH):
             continue
         if count <= most_missing * total:
-            notes.append(LogCode.SAMPLES_MASKED.note(channel=name, **counted(count, total)))
+            notes.append(LogCode.SAMPLES_MASKED.note(channel=name, **_counted(count, total)))
             continue
         if (rows := _slower(values)) > 1:
             notes.append(LogCode.CHANNEL_SLOWER.note(channel=name, rows=rows))
@@ -167,7 +166,7 @@ def _masked(
             raise SparseLogError(
                 f"{name} is missing in {_share(count, total)}, at most {100.0 * most_missing:g} % may be", source
             )
-        notes.append(LogCode.CHANNEL_LEFT_OUT.note(channel=name, **counted(count, total)))
+        notes.append(LogCode.CHANNEL_LEFT_OUT.note(channel=name, **_counted(count, total)))
     if not kept:
         raise SparseLogError(f"no channel has {100.0 * (1.0 - most_missing):g} % of its samples", source)
     return kept

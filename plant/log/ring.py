@@ -125,7 +125,8 @@ class RingReader:
             with path.open("rb+") as file:
                 self._held = mmap.mmap(file.fileno(), 0)
         except (OSError, ValueError) as error:
-            raise LogError(f"the ring cannot be read: {error}", str(path)) from error
+            why = error.strerror if isinstance(error, OSError) and error.strerror else error
+            raise LogError(f"the ring cannot be read: {why}", str(path)) from error
         if len(self._held) < ROWS_AT or self._held[: len(MAGIC)] != MAGIC:
             raise LogError("a ring is needed, the file is none", str(path))
         columns, slots = struct.unpack_from("<II", self._held, COLUMNS_AT)

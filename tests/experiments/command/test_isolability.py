@@ -28,6 +28,11 @@ def test_json_holds_all_pairs() -> None:
     assert "cannot be told apart" in found["message"]
 
 
+def test_a_length_may_be_called_as_simulate_calls_it() -> None:
+    (found,) = json.loads(_run("--duration", "2", "--json").stdout)
+    assert found["seconds"] == 2.0
+
+
 def test_drives_are_ranked_by_their_hardest_pair() -> None:
     ranked = json.loads(_run("--rank", "--json").stdout)
     least = [one["hardest_nats_per_second"] for one in ranked]

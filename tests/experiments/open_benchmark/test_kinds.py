@@ -10,7 +10,7 @@ import pytest
 import hydrostate as hs
 from experiments.open_benchmark.drives import DRIVES
 from experiments.open_benchmark.folders import truth_of, write_set
-from experiments.open_benchmark.kinds import KINDS, SPLITS, STRIDE, VERSION, make, seed_of
+from experiments.open_benchmark.kinds import KINDS, SPLITS, STRIDE, VERSION, kind_of, make, seed_of
 from experiments.open_benchmark.loaders import read_arrays, read_logs, read_truth
 from experiments.open_benchmark.logger import DIFFERENCE, SPEED, Sensor
 from experiments.open_benchmark.run import RECORD
@@ -157,6 +157,13 @@ def test_a_sensor_holds_drifts_follows_with_play_and_passes_slow_waves_alone() -
     assert np.max(np.abs(behind - true)) == pytest.approx(0.1, abs=1e-3)
     assert np.std(read(30.0, corner=30.0)[1000:]) == pytest.approx(0.5, rel=0.02)
     assert np.std(read(1.0, corner=30.0) - true) == pytest.approx(np.std(np.gradient(true, time)) * 7.5e-3, rel=0.02)
+
+
+def test_a_kind_that_is_not_there_is_answered_with_the_nearest() -> None:
+    with pytest.raises(HydrostateError, match=r"^kind 'plane' is unknown, did you mean 'plain'\?$"):
+        kind_of("plane")
+    with pytest.raises(HydrostateError, match=r"^kind 'q' is unknown, `hydrostate benchmark kinds` lists"):
+        kind_of("q")
 
 
 @pytest.mark.usefixtures("_short")
