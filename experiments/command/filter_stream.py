@@ -21,7 +21,14 @@ from experiments.command.options import (
     option,
     require_positive,
 )
-from experiments.command.streamed import STANDARD_INPUT, end_told, say_line, stop_at_sigterm, stream_input
+from experiments.command.streamed import (
+    STANDARD_INPUT,
+    end_told,
+    require_folder,
+    say_line,
+    stop_at_sigterm,
+    stream_input,
+)
 from experiments.command.watch_outputs import published
 from experiments.command.watching import told_of
 from plant.errors import HydrostateError
@@ -79,6 +86,7 @@ def filter_stream(
     rows the filter restarts from where the actuator then is.
     """
     require_positive("--every", every, "s")
+    require_folder(state)
     sinks: list[Any] = [say_line]
 
     def say(entries: Mapping[str, Any]) -> None:

@@ -62,14 +62,15 @@ def fleet(
     from experiments.fleet.page import fleet_page
     from experiments.fleet.rows import log_rows
 
-    limits = limits_of_options(limit or [])
+    limits, repairs = limits_of_options(limit or []), read_maintenance(maintenance)
+    _names((), pattern, names)  # what is wrong with it is said before any log is diagnosed
     store = open_store(place)
     from_logs = store.manifest() is None
     if from_logs:
         store = _diagnosed(Path(place), out, plant, rig, load_columns(columns), workers or os.cpu_count() or 1)
     table = store.rows(["file", "verb", "outcome", "found_condition", "reason", "quantities"]).to_pylist()
     files = [row["file"] for row in table if row["file"]]
-    rows = actuator_rows(log_rows(table, _names(files, pattern, names), limits), read_maintenance(maintenance))
+    rows = actuator_rows(log_rows(table, _names(files, pattern, names), limits), repairs)
     if not rows:
         raise HydrostateError(f"{place}: must contain logs that were diagnosed (verb diagnose), but there are none")
     base = Path(place) if from_logs else Path()

@@ -18,7 +18,14 @@ from experiments.command.options import (
     option,
     require_positive,
 )
-from experiments.command.streamed import STANDARD_INPUT, end_told, say_line, stop_at_sigterm, stream_input
+from experiments.command.streamed import (
+    STANDARD_INPUT,
+    end_told,
+    require_folder,
+    say_line,
+    stop_at_sigterm,
+    stream_input,
+)
 from experiments.command.watch_outputs import Watched, metrics_offered, published
 from experiments.command.watch_view import lines_wanted, viewed
 from experiments.command.watching import Asked, watch_file, watch_network, watch_rows
@@ -75,6 +82,7 @@ def watch(
     reports sudden changes only. Use diagnose for a fault that was there from the start.
     """
     require_positive("--heartbeat", heartbeat, "s")
+    require_folder(state)
     told = Watched(STANDARD_INPUT if log == "-" else log)
     if lines_wanted(view):
         told.to(say_line)

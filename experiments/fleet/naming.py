@@ -170,7 +170,8 @@ def table_rows(table: Path, wanted: Iterable[str]) -> list[dict[str, str]]:
             columns = [name.strip() for name in reader.fieldnames or ()]
             rows = [{str(name).strip(): (value or "").strip() for name, value in row.items() if name} for row in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise HydrostateError(f"{table}: must be a CSV table in UTF-8 that can be read: {error}") from error
+        why = getattr(error, "strerror", None) or error
+        raise HydrostateError(f"{table}: must be a CSV table in UTF-8 that can be read: {why}") from error
     missing = [name for name in wanted if name not in columns]
     if missing:
         raise HydrostateError(f"{table}: must have a column {missing[0]!r}, it has {', '.join(columns) or 'none'}")

@@ -58,7 +58,8 @@ def read_library(path: Path | None = None, which: str = "model") -> dict[str, Li
     try:
         library = json.loads(source.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise HydrostateError(f"library {source} cannot be read: {error}") from error
+        why = getattr(error, "strerror", None) or error
+        raise HydrostateError(f"library {source} cannot be read: {why}") from error
     if not isinstance(library, dict) or library.get("format") != FORMAT or library.get("version") != VERSION:
         raise HydrostateError(f"library {source} must say format {FORMAT!r} and version {VERSION}")
     try:

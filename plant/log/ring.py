@@ -125,7 +125,7 @@ class RingReader:
             with path.open("rb+") as file:
                 self._held = mmap.mmap(file.fileno(), 0)
         except (OSError, ValueError) as error:
-            why = error.strerror if isinstance(error, OSError) and error.strerror else error
+            why = getattr(error, "strerror", None) or error
             raise LogError(f"the ring cannot be read: {why}", str(path)) from error
         if len(self._held) < ROWS_AT or self._held[: len(MAGIC)] != MAGIC:
             raise LogError("a ring is needed, the file is none", str(path))
