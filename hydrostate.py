@@ -12,6 +12,7 @@ prints itself, and turns into pandas, matplotlib, python-control or plain dictio
 from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib.util import find_spec
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -183,8 +184,11 @@ def read(
     from plant.log.any_columns import read_any
     from plant.log.frames import frame_table, is_frame
 
-    kind = actuator(plant or DEFAULT)
+    with options_by_name():
+        kind = actuator(plant or DEFAULT)
     bench = _rig(rig, kind)
+    if not isinstance(sample_time, Real | None):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
+        refuse(f"sample_time must be a number of seconds, got {sample_time!r}")
     if not isinstance(path, str | Path) and not is_frame(path):
         refuse(f"the path of a log or a pandas.DataFrame is needed, got {path!r}"[:200])
     if columns is not None and not isinstance(columns, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
@@ -265,7 +269,8 @@ def simulate(
     """
     from experiments.actuators import actuator, offered
 
-    kind = actuator(plant)
+    with options_by_name():
+        kind = actuator(plant)
     bench = _rig(rig, kind)
     simulation = offered(kind, "simulate")
     if condition is not None:

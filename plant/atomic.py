@@ -1,5 +1,6 @@
 """Files that are there whole or not at all."""
 
+import errno
 import os
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -26,6 +27,8 @@ def replacing(path: Path) -> Generator[BinaryIO]:
     OSError
         If the folder cannot be written, or ``path`` is a folder.
     """
+    if not path.name:  # the current folder
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     temporary = path.with_name(f".{path.name}.{os.urandom(4).hex()}.tmp")
     try:
         with temporary.open("xb") as file:

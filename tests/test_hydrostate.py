@@ -112,7 +112,24 @@ MISTAKES: dict[str, tuple[Callable[[hs.Log, Path], object], str]] = {
     "text for a number": (lambda log, file: log.estimate(start_std="1e8"), "start_std must be a number, got '1e8'"),
     "misspelt option": (lambda log, file: log.estimate(methd="ekf"), "did you mean 'method'"),
     "misspelt condition": (lambda log, file: hs.simulate("minor_leak"), "condition must be one of normal"),
-    "misspelt plant": (lambda log, file: hs.simulate(plant="pump"), "must be one of eha, reduced, lumped"),
+    "misspelt plant": (lambda log, file: hs.simulate(plant="pump"), "plant must be one of eha, reduced, lumped"),
+    "plant of none": (lambda log, file: hs.read(file, plant="pump"), "plant must be one of eha, reduced, lumped"),
+    "text for a time": (lambda log, file: hs.read(file, sample_time="1 ms"), "sample_time must be a number of seconds"),  # type: ignore[arg-type]
+    "text for a count": (lambda log, file: log.identify(n_denominator="3"), "n_denominator must be a number, got '3'"),
+    "no whole order": (
+        lambda log, file: log.identify(input="motor_speed_rad_s", output="velocity_m_s", order="two"),
+        "order must be a whole number, got 'two'",
+    ),
+    "a part that is not there": (
+        lambda log, file: log.between(50.0, 60.0),
+        "50 s to 60 s has 0 of the log's, which is",
+    ),
+    "a part too short": (lambda log, file: log.between(1.0, 1.005), "a part of at least 10 samples is needed"),
+    "a folder for a page": (lambda log, file: log.estimate().report("."), "cannot be written: Is a directory"),
+    "no such folder": (
+        lambda log, file: log.identify(input="motor_speed_rad_s", output="velocity_m_s", order=1).save("none/a.json"),
+        "none/a.json: the model cannot be written: No such file or directory",
+    ),
     "misspelt verb": (lambda log, file: log.estimat(), "did you mean 'estimate'"),
     "misspelt name": (lambda log, file: hs.reed, "did you mean 'read'"),
     "no such channel": (lambda log, file: log["pressure"], "channel 'pressure' is needed; the record has"),

@@ -43,7 +43,11 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     chosen: LogVerb = getattr(kind, verb)
     logs, mapping = asked["logs"], load_columns(asked["columns"])
     expected: str | None = asked["condition"] if diagnosing else None
-    report: Path | None = asked["report"].with_suffix(".html") if asked.get("report") else None
+    report: Path | None = asked.get("report")
+    if report is not None:
+        if not report.name:
+            raise HydrostateError(f"--report must be a file, got the folder {str(report)!r}")
+        report = report.with_suffix(".html")
     if expected is not None:
         require_known("--condition", expected, kind.conditions)
 

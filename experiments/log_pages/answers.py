@@ -165,7 +165,7 @@ class Answer(Shown):
 
         from experiments.command.json_output import write_whole
 
-        file = Path(path).with_suffix(".html")
+        file = Path(path).with_suffix(".html") if Path(path).name else Path(path)
         write_whole(file, self._page(title))
         return file
 

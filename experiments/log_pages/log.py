@@ -3,6 +3,7 @@
 import re
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from experiments.log_pages.answers import Answer, Model, Shown, no_such
@@ -25,6 +26,10 @@ ANY = "anything"
 
 FREE_OPTIONS = ("input", "output", "structure", "order", "delay", "n_numerator", "sample_time", "reference")
 """Options of `Log.identify` between any channels."""
+
+
+WHOLE = ("order", "delay", "n_numerator")
+"""Those of them that are whole numbers, if given."""
 
 
 def refuse(message: str) -> NoReturn:
@@ -80,7 +85,8 @@ def known_options(options: Mapping[str, Any], known: Mapping[str, Any], verb: st
         if name not in known:
             refuse(no_such(verb, name, list(known)))
         default = known[name]
-        if isinstance(default, float) and (isinstance(value, bool) or not isinstance(value, int | float)):
+        counts = isinstance(default, int) and not isinstance(default, bool)
+        if (counts or isinstance(default, float)) and (isinstance(value, bool) or not isinstance(value, Real)):
             refuse(f"{name} must be a number, got {value!r}")
         if isinstance(default, str) and not isinstance(value, str):
             refuse(f"{name} must be a text such as {default!r}, got {value!r}")
@@ -139,11 +145,24 @@ class Log(Shown):
         ----------
         begin, end : float
             From when to when [s].
+
+        Raises
+        ------
+        HydrostateError
+            If the part has too few samples to be a log.
         """
+        from plant.log.clock import FEWEST_SAMPLES
+
         first, last = (round((at - self.record.start_time) / self.sample_time) for at in (begin, end))
         if not 0 <= first < last:
             refuse(f"a part of the log is needed from an earlier to a later time, got {begin:g} s to {end:g} s")
         span = first, last + 1
+        if (count := max(0, min(last + 1, len(self)) - first)) < FEWEST_SAMPLES:
+            ends = f"{self.record.start_time:g} to {self.record.start_time + self.duration:g} s"
+            refuse(
+                f"a part of at least {FEWEST_SAMPLES} samples is needed, {begin:g} s to {end:g} s has {count} of the "
+                f"log's, which is from {ends}"
+            )
         sparse = None if self._sparse is None else self._sparse.slice(*span)
         return Log(self.record.slice(*span), self.rig, self.plant, self._said, sparse=sparse, refusal=self._refusal)
 
@@ -224,6 +243,9 @@ class Log(Shown):
         free: dict[str, Any] = dict.fromkeys(FREE_OPTIONS)
         if self.plant == ANY or logs or (options.keys() & {"input", "output"} and options.keys() <= free.keys()):
             known_options(options, free, "identify")
+            for name in WHOLE:
+                if not isinstance(options.get(name), Integral | None) or isinstance(options.get(name), bool):
+                    refuse(f"{name} must be a whole number, got {options[name]!r}")
             return self._relation([self, *logs], dict(options))
         return Model(identify_record(self.whole(), **known_options(options, known, "identify")))
 

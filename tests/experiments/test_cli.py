@@ -146,6 +146,7 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
             "a.csv: must be a CSV table in UTF-8 that can be read: No such file",
         ),
         (["library", "a.json"], "library a.json cannot be read: No such file or directory"),
+        (["diagnose", "a.csv", "--report", "."], "--report must be a file, got the folder '.'"),
         (["fleet", "none"], "none: must be a folder with logs or a store, there is no such folder"),
         (["conditions", "--seed", "-1"], "Invalid value for '--seed'"),
     ],

@@ -19,9 +19,17 @@ def save_models(models: Sequence[FreeRunModel], path: str | Path) -> None:
         One an output.
     path : str or Path
         Where to.
+
+    Raises
+    ------
+    HydrostateError
+        If the file cannot be written.
     """
-    with replacing(Path(path)) as file:
-        file.write((json.dumps([one.to_dict() for one in models], indent=1) + "\n").encode())
+    try:
+        with replacing(Path(path)) as file:
+            file.write((json.dumps([one.to_dict() for one in models], indent=1) + "\n").encode())
+    except OSError as error:
+        raise HydrostateError(f"the model cannot be written: {error.strerror or error}", str(path)) from error
 
 
 def load_models(path: str | Path) -> list[FreeRunModel]:
