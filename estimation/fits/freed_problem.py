@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from estimation.fits.descent import Point
+from estimation.fits.greybox_kernel import compile_kernel
 from estimation.fits.greybox_log import GreyBoxLog
-from estimation.fits.greybox_loops import compile_kernel
 from estimation.fits.greybox_problem import OUTLIER, Problem, weighed
 from estimation.fits.normal_loops import fill_differences
 from estimation.fits.side_by_side import LANES, MANY, ResidualsRun, compile_side_by_side

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from estimation.arrays import Array, IntArray
 from estimation.fits.descent import Point
+from estimation.fits.greybox_kernel import Kernel, compile_kernel
 from estimation.fits.greybox_log import GreyBoxLog
-from estimation.fits.greybox_loops import Kernel, compile_kernel
 from estimation.fits.normal_loops import fill_weighed
 from estimation.models.greybox import GreyBoxModel
 

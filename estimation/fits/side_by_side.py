@@ -9,7 +9,8 @@ from functools import cache
 from typing import TypeAlias
 
 from estimation.arrays import Array, IntArray
-from estimation.fits.greybox_loops import RUNAWAY, model_step
+from estimation.fits.greybox_kernel import model_step
+from estimation.fits.greybox_loops import RUNAWAY
 from estimation.fits.side_by_side_loops import absorb, residuals_side_by_side
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.expression import as_expression, symbol

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.fits import greybox_loops
-from estimation.fits.greybox_loops import compile_kernel
+from estimation.fits import greybox_kernel, greybox_loops
+from estimation.fits.greybox_kernel import compile_kernel
 from estimation.models.flow import FLOW_FORM, MASS_FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
 from estimation.models.greybox import GreyBoxModel
@@ -29,7 +29,7 @@ def _numbers(address: int, count: int) -> "ctypes.Array[ctypes.c_double]":
     ids=["flow", "mass flow", "without gaps"],
 )
 def test_the_same_bits_as_python(model: GreyBoxModel, asked: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = text_of(monkeypatch, greybox_loops, lambda: compile_kernel.__wrapped__(model))
+    text = text_of(monkeypatch, greybox_kernel, lambda: compile_kernel.__wrapped__(model))
     rng, samples, block = np.random.default_rng(3), 60, 4
     drives = np.stack([120.0 * np.sign(np.sin(0.3 * np.arange(samples))), 0.01 * np.sin(0.1 * np.arange(samples))], 1)
     measured = 1e6 * rng.normal(size=(samples, 1))
