@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from estimation.fits.descent import descend
+from estimation.fits.descent import Point, descend
 from estimation.fits.form_fit import weighed
 from estimation.fits.freed_problem import FreedProblem
 from estimation.fits.greybox_fit import GreyBoxFit, concluded
@@ -283,11 +283,16 @@ def _finished(log: GreyBoxLog, tried: Tried) -> Tried:
     done.sort(key=lambda one: one[0].cost)
     best = replace(done[0][0], coarse=tried.values)
     count = [one for one in done if one[0].cost <= best.cost + ALIKE]
-    first, *rivals = (concluded(problem, one.point, warned=False) for one, problem in count)
+    first, *rivals = (_concluded(problem, one.point, log) for one, problem in count)
     found = ((one, one.free[0]) for one in best.together)
     if best.meant and all(one.told(best.values[name], first.std.get(name, 0.0)) for one, name in found):
         return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
     return replace(best, void=True, fits=(replace(first, cost=NEVER),))
+
+
+def _concluded(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxFit:
+    least, _ = flow_bounds(problem.model, [point.theta], log)
+    return concluded(problem, point, least=least, warned=False)
 
 
 def _to_its_end(log: GreyBoxLog, tried: Tried, start: Array, *more: str) -> Tried:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import ceil
+from typing import TypeAlias
 
 import numpy as np
 
@@ -65,6 +66,10 @@ UNLIKELY = 36.0
 
 RIVAL = 2.0 * UNLIKELY
 """The same between searches with long model steps, which have errors [dimensionless]."""
+
+
+_Found: TypeAlias = tuple[Problem, Point, tuple[Array, Array]]
+"""A problem, its solution, and the bounds of its search."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,13 +152,15 @@ def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mappin
     swinging = min((one for one in done if not _held(one[0])), key=_cost)
     least = best[1].cost
 
-    def told(one: tuple[Problem, Point]) -> GreyBoxFit:
-        return concluded(*one, disturbed=_cost(one) < least + UNLIKELY, asked=one is best or one is swinging)
+    def told(one: _Found) -> GreyBoxFit:
+        problem, point, bounds = one
+        counts, asked = point.cost < least + UNLIKELY, one is best or one is swinging
+        return concluded(problem, point, least=bounds[0], disturbed=counts, asked=asked)
 
     return each(told, done)
 
 
-def _finished(one: _Rough, log: GreyBoxLog, wanted: float = np.inf, *, bent: bool) -> tuple[Problem, Point]:
+def _finished(one: _Rough, log: GreyBoxLog, wanted: float = np.inf, *, bent: bool) -> _Found:
     """Return where short model steps lead; what they alone explain is completed as well, for long ones have errors.
 
     A search that will not come down to the cost ``wanted`` ends early. Make-up valves that must let in more than the
@@ -163,12 +170,12 @@ def _finished(one: _Rough, log: GreyBoxLog, wanted: float = np.inf, *, bent: boo
     if not _plain(one):
         one = replace(one, point=descend(one.problem.at, one.point.theta, SETTLING, one.bounds, wanted=wanted))
         if not _plain(one):
-            return one.problem, one.point
+            return one.problem, one.point, one.bounds
     problem, theta, bounds = _completed(one, log, bent=bent)
-    return problem, descend(problem.at, theta, FINISHING, bounds, wanted=wanted)
+    return problem, descend(problem.at, theta, FINISHING, bounds, wanted=wanted), bounds
 
 
-def _cost(one: tuple[Problem, Point]) -> float:
+def _cost(one: _Found) -> float:
     return one[1].cost
 
 

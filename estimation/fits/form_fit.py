@@ -23,9 +23,10 @@ TEMPER = 5.0
 """What a difference of log-likelihood is divided by before models are weighed. None is exact: on a log of the circuit
 the balance that explained it better by 5.6 put bulk modulus five deviations off, the other one not [dimensionless]."""
 
-DISCRETISED = 5e-5
-"""Relative standard deviation of bulk modulus from a form's steps and from what is averaged before it: that of two
-training logs at 10 kHz, known to 0.002 % from noise, is 0.005 and 0.007 % too high under any noise [fraction]."""
+DISCRETISED = 3e-5
+"""Relative standard deviation of bulk modulus from a form's steps and from what is averaged before it [fraction]. Two
+training logs at 10 kHz, known to 0.002 % from noise, are 0.005 and 0.007 % too high under any noise; likeliest on 876
+logs is 0.002 to 0.003 %."""
 
 
 @dataclass(frozen=True, eq=False)

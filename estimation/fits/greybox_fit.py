@@ -21,6 +21,7 @@ from estimation.fits.play import NO_PLAY, ShownPlay, shown_play
 from estimation.fits.rig_response import rig_slopes
 from estimation.fits.small_teeth import NOT_MOVED, small_teeth
 from estimation.fits.teeth import NO_OFFSET, ShownOffset, ShownTeeth, shown_teeth
+from estimation.fits.within_bounds import bounded
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.spare_processors import each
@@ -240,7 +241,13 @@ def _cost(point: Point) -> float:
 
 
 def concluded(
-    problem: Problem, point: Point, *, disturbed: bool = True, asked: bool = True, warned: bool = True
+    problem: Problem,
+    point: Point,
+    *,
+    least: Array | None = None,
+    disturbed: bool = True,
+    asked: bool = True,
+    warned: bool = True,
 ) -> GreyBoxFit:
     """Return what a solution says, with its deviations.
 
@@ -250,6 +257,8 @@ def concluded(
         The problem.
     point : Point
         Its solution.
+    least : ndarray, shape (unknowns,), optional
+        Lowest coordinates of its search, see `estimation.fits.within_bounds` [dimensionless].
     disturbed : bool
         Whether the deviations hold the drives' noise too.
     asked : bool
@@ -285,7 +294,8 @@ def concluded(
         told = disturbed and asked
         known, moved = changes_beside(problem, theta) if told else (None, [])
         tilt = bread[:, : len(felt)] @ problem.untilted(theta, errors)[felt]
-        variance = np.diag(spread) + (NOISE_DOUBT * tilt) ** 2
+        kept = spread if least is None else bounded(problem, point, least, felt, fitted_bread, spread)
+        variance = np.diag(kept) + (NOISE_DOUBT * tilt) ** 2
         variance = variance + (drive_variance(problem, theta, bread, slopes, known) if disturbed else 0.0)
         if problem.log.course is not None and disturbed:  # a window's estimate of few turns is poor
             variance = variance + np.maximum(np.diag(bread - spread), 0.0)

@@ -92,6 +92,7 @@ def test_what_is_set_above_the_rig_files_or_has_no_interval_is_void(
     monkeypatch.setattr(explain, "freed", lambda *_: problem)
     monkeypatch.setattr(explain, "usual_values", lambda _: {})
     monkeypatch.setattr(explain, "_to_its_end", lambda _, tried, *__: tried)
+    monkeypatch.setattr(explain, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
     monkeypatch.setattr(explain, "concluded", lambda *_, **__: fit)
     nothing: Any = None
     found = explain._finished(nothing, relieved(setting))  # pyright: ignore[reportPrivateUsage]
