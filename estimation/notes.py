@@ -24,6 +24,10 @@ class SensorCode(Code):
         "{channel} has a new sample every {milliseconds:.3g} ms only and lies on straight lines in between; the {rows} "
         "rows from sample to sample were taken as one"
     )
+    DROPOUT = (
+        "{channel} repeats its last sample, as all channels do, and then goes on elsewhere: the logger missed "
+        "{rows} rows in {count} places; the repeated rows were left out"
+    )
     FILTERED = (
         "{channel} was filtered or averaged before it was logged: its noise is alike over {rows} rows, and one sample "
         "in {rows} was used"

@@ -12,6 +12,7 @@ from estimation.fits.form_fit import LONGEST_STEP
 from estimation.fits.greybox_log import GreyBoxLog, greybox_log
 from estimation.fits.speed_course import straightened
 from estimation.log_checks.bridging import bridged, within_gaps
+from estimation.log_checks.dropout import LONG_GAP, without_pauses
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance, struck_variance
 from estimation.log_checks.outliers import without_outliers
 from estimation.models.completed_flow import CRACKS
@@ -40,9 +41,6 @@ the sample time over the motor's lag, so that only a motor that settles within a
 
 FULLEST = 0.7
 """Share of a chamber that the piston is believed to sweep at most: an encoder's zero may be anywhere [fraction]."""
-
-LONG_GAP = 5
-"""Missing speeds in a row after which nothing is concluded from the speeds at the gap's ends [samples]."""
 
 FELT_GAP = 0.1
 """A gap in speed matters where what it leaves open moves pressure by this share of its noise or more [fraction]."""
@@ -139,6 +137,7 @@ def flow_log(
     GreyBoxLog
         Averaged where it is faster than the form has use for.
     """
+    record = without_pauses(record)
     pressure = "differential_pressure_pa"  # a motor's blows stay in its noise: so intervals hold its course
     quiet = {pressure: min(variances[pressure], struck_variance(record[pressure]))}
     log = greybox_log(

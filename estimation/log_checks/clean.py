@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED, VELOCITY
 from estimation.log_checks.channel_physics import channel_mistakes
+from estimation.log_checks.dropout import without_dropouts
 from estimation.log_checks.filtered import independent_variance, without_correlated_noise
 from estimation.log_checks.held import without_held
 from estimation.log_checks.hum import without_hum
@@ -28,8 +29,8 @@ class CleanLog:
     Parameters
     ----------
     record : Record
-        The log, without repeated samples, gross outliers, clipped pressures, hum, an offset of its velocity sensor, and
-        samples of like noise.
+        The log, without repeated samples, dropouts, gross outliers, clipped pressures, hum, an offset of its velocity
+        sensor, and samples of like noise.
     variances : Mapping[str, float]
         Measurement variance of each of its channels [SI squared].
     left_out : tuple of Note
@@ -83,7 +84,8 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
         The log to fit, and what was found.
     """
     sampled, held = without_held(record)
-    sound, outliers = without_gross_outliers(sampled, CLEANED)
+    whole, dropouts = without_dropouts(sampled)
+    sound, outliers = without_gross_outliers(whole, CLEANED)
     clipped: tuple[Note, ...] = ()
     if PRESSURE in sound:
         sound, clipped = without_saturated(sound, parameters)
@@ -95,7 +97,7 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     mistakes = channel_mistakes(sound.replace(**{PRESSURE: None}) if dead else sound, parameters)
     objections = () if mistakes else objections  # a sensor cannot be judged by channels of another meaning
     sound, filtered = without_correlated_noise(sound)
-    left_out = (*held, *outliers, *clipped, *hum, *offset, *filtered)
+    left_out = (*held, *dropouts, *outliers, *clipped, *hum, *offset, *filtered)
     variances = {**measurement_variances(sound, known), **_thinned_variances(sound, filtered)}
     return CleanLog(sound, variances, left_out, objections, mistakes)
 

@@ -15,6 +15,7 @@ from estimation.arrays import IntArray
 from estimation.eha.explained import LEAKAGE_COURSE
 from estimation.log_checks.bridging import bridged, filled
 from estimation.log_checks.channel_names import PRESSURE
+from estimation.log_checks.dropout import long_gaps
 from estimation.log_checks.first_belief import begins_in_motion
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from plant.arrays import Array
@@ -192,6 +193,9 @@ def blocks_of(record: Record) -> Blocks:
             pressure = None  # a sensor that was out for all of the stretch
             del whole[PRESSURE]
     speed = bridged(whole["motor_speed_rad_s"])
+    blind = _with_gaps(whole["motor_speed_rad_s"], block, round(SETTLING / sample_time))
+    velocity = np.where(blind | _with_gaps(whole.get("position_m"), block), np.nan, velocity)
+    pressure = None if pressure is None else np.where(blind, np.nan, pressure)
     noise, course, opening = _noise(whole, block, sample_time), whole.get(LEAKAGE_COURSE), _opening(whole, velocity)
     begun = opening if opening is not None and _pressed(opening[0], whole[PRESSURE]) else None
     if pressure is not None and rows > 1:
@@ -210,6 +214,15 @@ def blocks_of(record: Record) -> Blocks:
         place=_place(whole),
         settling=_settling(record, whole),
     )
+
+
+def _with_gaps(values: Array | None, block: int, behind: int = 0) -> NDArray[np.bool_]:
+    """Return the blocks with a long gap of a channel, or with one up to so many samples ago: the circuit ran blind."""
+    if values is None or not np.any(gone := long_gaps(values)):
+        return np.zeros(1, dtype=np.bool_)
+    sums = np.cumsum(np.concatenate([np.zeros(behind + 1, dtype=np.intp), gone]))
+    within = sums[behind + 1 :] > sums[: -behind - 1]
+    return np.any(within[: (len(values) - 1) // block * block].reshape(-1, block), axis=1)
 
 
 def _settling(record: Record, whole: Mapping[str, Array]) -> float:

@@ -161,6 +161,16 @@ def test_speeds_missing_at_reversals_do_not_bias_bulk_modulus() -> None:
     assert fit.reasons == ()
 
 
+@pytest.mark.parametrize("channel", ["motor_speed_rad_s", "position_m"])
+def test_a_long_gap_of_one_channel_does_not_shut_the_check(channel: str) -> None:
+    record = log("normal", 19, "multisine")
+    values = record[channel].copy()
+    values[3000:3300] = np.nan
+    fit = fit_flow(record.replace(**{channel: values}), HEALTHY, 3e8)
+    assert fit.parameters["bulk_modulus"][0] == pytest.approx(HEALTHY.bulk_modulus, rel=0.005)
+    assert fit.reasons == ()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("condition", thinned(["normal", "major_leakage_major_friction"], ["normal"]))
 def test_a_drop_out_of_all_channels_costs_no_more_than_its_samples(condition: str) -> None:

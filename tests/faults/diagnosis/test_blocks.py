@@ -52,3 +52,16 @@ def test_a_circuit_from_rest_follows_a_running_test_once_its_beginning_is_forgot
     assert not creeps(blocks, fits.best)
     begun = blocks.velocity - fits.best.fitted[:, 0]
     assert np.sqrt(np.mean(begun[: blocks.first] ** 2)) > 3.0 * fits.best.scales[0]
+
+
+def test_blocks_in_a_long_gap_of_speed_and_shortly_behind_it_do_not_count() -> None:
+    record = running(8.0, 0.0)
+    speed, position = record["motor_speed_rad_s"].copy(), record["position_m"].copy()
+    speed[2000:2300], position[3000:3300] = np.nan, np.nan
+    blocks = blocks_of(record.replace(motor_speed_rad_s=speed, position_m=position))
+    rows = round(0.01 / record.sample_time)
+    blind = np.flatnonzero(np.isnan(blocks.velocity)) * rows
+    behind = 2300 + round(SETTLING / record.sample_time)
+    assert blind.tolist() == [*range(2000, behind, rows), *range(3000, 3300, rows)]
+    assert blocks.pressure is not None
+    assert np.flatnonzero(np.isnan(blocks.pressure)).tolist() == list(range(2000 // rows, behind // rows))

@@ -1,0 +1,125 @@
+"""Dropouts: rows that a logger filled with its last ones, and gaps of one channel that the balance of flows feels.
+
+A logger that misses a while may write its last row again and again. Nothing tells that from rest but its end: then the
+channels are somewhere else at once, farther than they ever go from one row to the next.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.log_checks.bridging import within_gaps
+from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED, VELOCITY
+from estimation.log_checks.order import median
+from estimation.notes import SensorCode
+from plant.arrays import Array
+from plant.log.record import Record
+from plant.notes import Note
+
+ASKED = tuple(dict.fromkeys((SPEED, POSITION, VELOCITY, PRESSURE, *PRESSURES)))
+"""Channels that a row must repeat, all that are logged."""
+
+FEWEST_CHANNELS, FEWEST_ROWS = 3, 10
+"""Channels that must be logged, and rows that must repeat the one before, to speak of a dropout [count]."""
+
+JUMP = 2.0
+"""How many times the largest step elsewhere a channel goes at once when a dropout ends [dimensionless]."""
+
+LONG_GAP = 5
+"""Missing samples in a row from which a line between a gap's ends says nothing of what lies between [samples]."""
+
+
+def without_dropouts(record: Record) -> tuple[Record, tuple[Note, ...]]:
+    """Return a log without the rows that its logger only wrote again while it had none.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+
+    Returns
+    -------
+    tuple of (Record, tuple of Note)
+        The log, those rows missing in all channels, and a note for each channel if there are any.
+    """
+    asked = [name for name in ASKED if name in record]
+    if len(asked) < FEWEST_CHANNELS:
+        return record, ()
+    again = record[asked[0]][1:] == record[asked[0]][:-1]
+    for name in asked[1:]:
+        if np.count_nonzero(again) < FEWEST_ROWS:
+            return record, ()
+        again &= record[name][1:] == record[name][:-1]
+    first, behind = np.flatnonzero(np.diff(again, prepend=False, append=False)).reshape(-1, 2).T + 1
+    long = (behind - first >= FEWEST_ROWS) & (behind < len(record))
+    first, behind = first[long], behind[long]
+    if not len(first):
+        return record, ()
+    ended = np.any([_jumps(record[name], behind) for name in asked], axis=0)
+    dropped = np.zeros(len(record), dtype=np.bool_)
+    for begin, end in zip(first[ended], behind[ended], strict=True):
+        dropped[begin:end] = True
+    if not np.any(dropped):
+        return record, ()
+    rows, count = int(np.count_nonzero(dropped)), int(np.count_nonzero(ended))
+    notes = tuple(SensorCode.DROPOUT.note(channel=name, rows=rows, count=count) for name in asked)
+    return record.replace(**{name: np.where(dropped, np.nan, record[name]) for name in asked}), notes
+
+
+def _jumps(values: Array, at: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return whether a channel goes farther to some samples than it ever does from one to the next elsewhere."""
+    steps = np.abs(np.diff(values))
+    there = steps[at - 1]
+    steps[at - 1] = 0.0
+    return there > JUMP * np.nanmax(steps, initial=0.0)
+
+
+def without_pauses(record: Record) -> Record:
+    """Return a log for the balance of flows, in which a long gap of motor speed or position is one of all it balances.
+
+    Without either, pressure within the gap says nothing, and what the pump delivered or the piston swept meanwhile is
+    known from the other only where nothing leaks, opens or runs empty.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with motor speed, position and differential pressure.
+
+    Returns
+    -------
+    Record
+        The same one where no such gap is.
+    """
+    gone = long_gaps(record[SPEED]) | long_gaps(record[POSITION])
+    if not np.any(gone):
+        return record
+    return record.replace(**{name: np.where(gone, np.nan, record[name]) for name in (SPEED, POSITION, PRESSURE)})
+
+
+def long_gaps(values: Array) -> NDArray[np.bool_]:
+    """Return the samples in gaps of `LONG_GAP` samples or more; none is between those of a slow channel.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        A channel [any unit]; NaN where missing.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        Whether a sample lies in one; nowhere in a channel of which nothing is there.
+
+    Examples
+    --------
+    >>> gone = np.nan
+    >>> np.flatnonzero(long_gaps(np.array([1.0, gone, 1.0, 1.0, gone, gone, gone, gone, gone, 1.0]))).tolist()
+    [4, 5, 6, 7, 8]
+    """
+    missing = np.isnan(values)
+    if np.count_nonzero(missing) < LONG_GAP or missing.all():
+        return np.zeros(len(values), dtype=np.bool_)
+    usual = median(np.diff(np.flatnonzero(~missing)).astype(np.float64)) if np.count_nonzero(~missing) > 1 else 1.0
+    first, behind = np.flatnonzero(np.diff(within_gaps(values), prepend=False, append=False)).reshape(-1, 2).T
+    out = np.zeros(len(values), dtype=np.bool_)
+    for begin, end in zip(first, behind, strict=True):
+        out[begin:end] = end - begin >= max(LONG_GAP, usual)  # a slow channel's end is shorter
+    return out
