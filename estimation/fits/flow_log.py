@@ -137,9 +137,9 @@ def flow_log(
     GreyBoxLog
         Averaged where it is faster than the form has use for.
     """
-    record = without_pauses(record)
+    sensed, record = record, without_pauses(record)
     pressure = "differential_pressure_pa"  # a motor's blows stay in its noise: so intervals hold its course
-    quiet = {pressure: min(variances[pressure], struck_variance(record[pressure]))}
+    quiet = {pressure: min(variances[pressure], struck_variance(sensed[pressure]))}
     log = greybox_log(
         FLOW_FORM,
         record,
@@ -152,7 +152,7 @@ def flow_log(
     swept = _swept_share(log.drives[:, position], parameters)
     drives = log.drives.copy()
     drives[:, speed] = straightened(log.drives[:, speed], slow=record.sample_time >= SLOW)
-    passed_on = swept * position_variance(record["position_m"]) ** 0.5
+    passed_on = swept * position_variance(sensed["position_m"]) ** 0.5
     open_gaps = speed_gaps(record, parameters, variances["differential_pressure_pa"] ** 0.5)
     log = replace(
         log,

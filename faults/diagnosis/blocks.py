@@ -118,13 +118,18 @@ class Blocks:
     @property
     def travel(self) -> float:
         """How far the piston moves to and fro [m]."""
-        return float(np.ptp(np.cumsum(np.nan_to_num(self.velocity)))) * self.block * self.sample_time
+        return float(np.ptp(self._gone))
 
     @cached_property
     def reach(self) -> float:
         """How far the piston goes from where the log begins [m], to either side."""
-        gone = np.cumsum(np.nan_to_num(self.velocity)) * self.block * self.sample_time
-        return float(np.max(np.abs(gone), initial=0.0))
+        return float(np.max(np.abs(self._gone), initial=0.0))
+
+    @cached_property
+    def _gone(self) -> Array:
+        """How far the piston went until each block [m], through gaps as fast as beside them."""
+        known = bridged(self.velocity) if np.any(np.isfinite(self.velocity)) else np.zeros(len(self.velocity))
+        return np.cumsum(known) * self.block * self.sample_time
 
     @property
     def first(self) -> int:
