@@ -8,7 +8,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from estimation.fits import play, teeth
+from estimation.fits import play, play_courses, teeth
 from estimation.fits.hypotheses import LEAST_PLAY
 from estimation.fits.lateness import LATE_NUDGE, changes_beside, lateness
 from estimation.fits.teeth import COUNTS, Teeth, _delivered, _likeliest, _turned, shown_teeth, with_teeth
@@ -46,7 +46,7 @@ FORCE = 1e6 * np.sin(0.021 * SAMPLES + 0.4) + 3e5 * np.sin(0.11 * SAMPLES)
 @NUMBERS.case()
 def courses_of_a_play() -> dict[str, Any]:
     holey = np.where(SAMPLES % 90 < 7, np.nan, FORCE)
-    stands = play._standings(READING)
+    stands = play_courses.standings(READING)
     told: dict[str, Any] = {
         "movements": len(set(stands.first.tolist())),
         "sides": [float(stands.side[i]) for i in (0, 3, 200, 400, 600, 700, 899)],
@@ -54,10 +54,10 @@ def courses_of_a_play() -> dict[str, Any]:
         "away": [int(stands.away[i]) for i in (0, 200, 400, 500, 700, 899)],
         "share": [float(stands.share[i]) for i in (0, 200, 400, 500, 700, 899)],
         "cells [m]": [
-            play._cell(one)
+            play_courses.cell(one)
             for one in (READING, np.zeros(99), 1e-11 * np.arange(99), 3e-6 * np.random.default_rng(1).normal(size=99))
         ],
-        "smoothed": [play._smoothed(FORCE[:60], count)[[0, 4, 30, 58, 59]] for count in (1, 2, 3, 4, 5, 20, 21)],
+        "smoothed": [play_courses.smoothed(FORCE[:60], count)[[0, 4, 30, 58, 59]] for count in (1, 2, 3, 4, 5, 20, 21)],
     }
     for name, pressure, step in (
         ("plain", FORCE, TIME),
@@ -67,7 +67,7 @@ def courses_of_a_play() -> dict[str, Any]:
         ("none", np.zeros(900), TIME),
         ("reversed", -FORCE, TIME),
     ):
-        courses = play.crossings(READING, pressure, step)
+        courses = play_courses.crossings(READING, pressure, step)
         told[name] = {
             kind: some(column, 40)
             for kind, column in zip(("late", "by pressure", "at once", "sprung"), courses.T, strict=True)
