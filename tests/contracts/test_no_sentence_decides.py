@@ -175,6 +175,7 @@ def test_with_every_sentence_put_as_x_all_but_text_stays(
     assert bool(said) == any(one["notes"] for one in before)
 
 
+@pytest.mark.slow
 def test_the_logs_bring_up_notes_of_every_kind(
     folder: Path, as_written: dict[str, tuple[int, list[dict[str, Any]]]]
 ) -> None:

@@ -65,7 +65,9 @@ def test_without_fused_products_it_differs_by_rounding_alone(form: str, tmp_path
     assert 0.0 < apart(in_c(tmp_path, problem, "ekf", "-O2")[0], in_python(problem)) < 1e-12
 
 
-@pytest.mark.parametrize("form", [form for form in EXPORTED_FORMS if form not in ("acceleration", "pressure")])
+@pytest.mark.parametrize(
+    "form", thinned([form for form in EXPORTED_FORMS if form not in ("acceleration", "pressure")], ["flow"])
+)
 def test_a_form_that_rounding_spoils_is_fused_on_every_processor_unless_it_is_told_otherwise(
     form: str, tmp_path: Path
 ) -> None:
@@ -91,7 +93,7 @@ def test_it_does_so_over_a_hundred_thousand_steps(form: str, condition: str, tmp
     assert apart(in_c(tmp_path, problem)[0], in_python(problem)) < 1e-12
 
 
-@pytest.mark.parametrize("method", [name for name in EXPORTED if name not in ("ekf", "imm")])
+@pytest.mark.parametrize("method", thinned([name for name in EXPORTED if name not in ("ekf", "imm")], ["ukf"]))
 def test_every_rule_gives_in_c_what_it_gives_in_python(method: str, tmp_path: Path) -> None:
     problem = task("pressure", "normal", 500)
     assert apart(in_c(tmp_path, problem, method)[0], in_python(problem, method)) < 1e-12

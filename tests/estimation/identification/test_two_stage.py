@@ -30,6 +30,7 @@ def gain_of(record: Record, references: tuple[str, ...]) -> float:
     return float(b.sum() / f.sum())
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
 def test_a_reference_takes_the_bias_of_a_closed_loop_away() -> None:
     told = np.array([[gain_of(record, names) for names in ((), ("r",))] for record in map(closed_loop, range(3))])

@@ -125,6 +125,7 @@ def test_the_page_is_built_and_no_row_is_without_a_verdict(tmp_path: Path) -> No
     page_of_the_papers(tmp_path)
 
 
+@pytest.mark.slow
 def test_every_row_has_a_verdict_and_none_is_without_its_number(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
