@@ -99,9 +99,13 @@ def asked_of(
         pulled = (MAKEUP_BENDS,) if outruns_pump(log, parameters) else ()
         return (BEGUN,) if moving else (*HYPOTHESES, *pulled), ()
     by_mass = balances_mass(swinging.model)
-    delivery, zero, *hidden = promised_each(
+    promises = promised_each(
         log, parameters, swinging.values, ALWAYS_ASKED, by_mass=by_mass, slopes=slopes_of(swinging, log)
     )
+    # slopes promise more than there is where a chamber that nothing feeds ended below vapour pressure: no oil does that
+    if max(one.gain for one in promises) > swinging.cost:
+        promises = [one._replace(gain=0.0) for one in promises]
+    delivery, zero, *hidden = promises
     shows_zero = best is swinging or homed_at_stop(log)
     if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
         zero = max(zero, promised(log, parameters, best.values, ENCODER_ZERO))
@@ -121,7 +125,7 @@ def asked_of(
     fed = swinging.values["makeup_conductance"] > VANISHED * parameters.makeup_conductance
     lost = swinging is best and not fed and swinging.chi_square[0] > DOUBTED
     begun = promised(log.coarsened(), parameters, swinging.values, START_LOAD, by_mass=by_mass)
-    return (BEGUN, *asked) if lost or begun.gain > WORTH else asked, remarks
+    return (BEGUN, *asked) if lost or WORTH < begun.gain <= swinging.cost else asked, remarks
 
 
 def near_starts(

@@ -105,7 +105,7 @@ def what_is_asked_of_a_log() -> dict[str, Any]:
         (9.0, 0.011, 1.15, True),
         (9.0, 1.0, 2.0, True),
     ):
-        plain = made_fit(1.0, 2e8, 1e6, chi=chi)
+        plain = made_fit(100.0, 2e8, 1e6, chi=chi)
         fit = replace(plain, values={**plain.values, "makeup_conductance": fed * PAPER.makeup_conductance})
         with all_promise(Promise(gain, 0.0, 0.05)):
             asked, _ = asked_of(base, PAPER, fit, fit if likeliest else sound, loaded=False, moving=True)

@@ -157,7 +157,7 @@ def test_a_log_that_is_looked_into_gets_a_page_with_its_columns_and_the_client_s
 
 def test_a_log_of_the_gear_pump_actuator_gets_the_row_of_a_batch(tmp_path: Path) -> None:
     out = tmp_path / "kept-under-a-number.csv"
-    words = ["simulate", "--duration", "2", "--sample-time", "2e-3", "--condition", "major_leakage"]
+    words = ["simulate", "--duration", "2", "--sample-time", "1e-3", "--condition", "major_leakage"]
     made = CliRunner().invoke(app, [*words, "--out", str(out)])
     assert made.exit_code == 0, made.output
     found = work_on(task(out, tmp_path, plant=None))

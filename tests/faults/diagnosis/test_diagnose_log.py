@@ -28,7 +28,7 @@ PRESSURE = "differential_pressure_pa"
 @cache
 def log(condition: str = "minor_leakage", duration: float = 4.0) -> Record:
     p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(8)
-    return simulate(LUMPED, make_drive("steps", duration, 2e-3, p, rng), 2e-3, p, sensors=BENCH, rng=rng)
+    return simulate(LUMPED, make_drive("steps", duration, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
 
 
 def codes(found: Finding) -> set[object]:
