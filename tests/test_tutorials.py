@@ -19,9 +19,6 @@ PAGES = sorted(path.stem for path in TUTORIALS.glob("*.md"))
 WORKED = {**{name: TUTORIALS / f"{name}.md" for name in PAGES}, "severities": ROOT / "docs" / "severities.md"}
 """Pages whose blocks run: the tutorials, and the one that explains an interval."""
 
-FAST = ("your-log",)
-"""Those that ask the two questions most users have; the others take the minutes of the slow tests."""
-
 BLOCK = re.compile(r"```(sh|python)\n(.*?)```", re.DOTALL)
 
 
@@ -45,14 +42,8 @@ def worked_through(name: str, folder: Path) -> str:
     return "".join(ran(kind, text, folder) for kind, text in blocks(name))
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=() if name in FAST else pytest.mark.slow)
-        for name in WORKED
-        if name != "log-to-controller"
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in WORKED if name != "log-to-controller"])
 def test_every_block_runs_in_turn_and_what_it_claims_holds(name: str, tmp_path: Path) -> None:
     assert worked_through(name, tmp_path)
 

@@ -23,11 +23,14 @@ from plant.log.files import read_record
 from plant.log.record import Record
 from plant.sensors.faults import SensorFault, with_fault
 from plant.sensors.sensors import BENCH
+from tests.thinned import thinned
 
 TRUTH = 2.07e8
 STARTS = (0.0, 2e8, 5e8)
 WIDE_STARTS = (0.0, 0.5e8, 1e8, 2e8, 3e8, 4e8, 5e8)
-EVERY_CONDITION = pytest.mark.parametrize("name", CONDITIONS)
+EVERY_CONDITION = pytest.mark.parametrize(
+    "name", thinned(CONDITIONS, ["normal", "major_friction", "minor_leakage_minor_friction", "major_leakage"])
+)
 
 
 @cache

@@ -42,6 +42,7 @@ def test_bulk_modulus_and_leakage_come_back_without_knowing_the_condition(condit
     assert fit.reasons == ()
 
 
+@pytest.mark.slow
 def test_a_wandering_pressure_sensor_is_objected_to() -> None:
     record = log("normal", 12, duration=2.0)
     drift = 2e5 * np.sin(np.linspace(0.0, 6.0, len(record)))  # an even drift would be found and taken off
@@ -50,6 +51,7 @@ def test_a_wandering_pressure_sensor_is_objected_to() -> None:
     assert ratio > 3.0
 
 
+@pytest.mark.slow
 def test_a_position_on_another_scale_is_objected_to() -> None:
     record = log("minor_leakage", 14, duration=4.0)
     doubled = {name: 2.0 * record[name] for name in ("position_m", "velocity_m_s")}
@@ -65,6 +67,7 @@ def worn_log() -> Record:
     return simulate(CIRCUIT, make_drive("steps", 5.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
 
 
+@pytest.mark.slow
 def test_an_offset_of_speed_does_not_pass_for_one_of_pressure() -> None:
     record = worn_log()
     fit = fit_flow(record.replace(motor_speed_rad_s=record["motor_speed_rad_s"] - 2.0), HEALTHY, 2e8)

@@ -13,6 +13,7 @@ from experiments.open_benchmark.machine import Machine
 from experiments.open_benchmark.run import run
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
+from tests.thinned import thinned
 
 PAPER = EhaParameters()
 
@@ -28,7 +29,9 @@ def logged(crack_a: float, crack_b: float) -> Record:
     return Record(1e-3, {name: frame[name].to_numpy() for name in PLAIN})
 
 
-@pytest.mark.parametrize(("crack_a", "crack_b", "late"), [(2.8e4, 1.2e4, "A"), (1.2e4, 2.8e4, "B")])
+@pytest.mark.parametrize(
+    ("crack_a", "crack_b", "late"), thinned([(2.8e4, 1.2e4, "A"), (1.2e4, 2.8e4, "B")], [(1.2e4, 2.8e4, "B")])
+)
 def test_valves_that_open_apart_are_named_and_are_no_offset_of_the_pressure(
     crack_a: float, crack_b: float, late: str
 ) -> None:

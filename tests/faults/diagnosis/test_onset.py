@@ -121,6 +121,7 @@ def test_a_piston_that_creeps_at_first_was_in_no_other_condition_then(index: int
     assert last_part(foreign("plain", index), ACTUATOR).onset is None
 
 
+@pytest.mark.slow
 def test_a_seal_that_gives_way_is_dated_on_another_actuator() -> None:
     found = last_part(foreign("leakage_sets_in", 2), ACTUATOR)
     assert found.onset is not None

@@ -121,6 +121,7 @@ def test_auto_takes_the_state_space_where_outputs_share_their_dynamics() -> None
     assert compared >= {"state-space", "output-error"}
 
 
+@pytest.mark.slow
 def test_outputs_that_share_nothing_keep_models_of_their_own() -> None:
     rng = np.random.default_rng(8)
     u = np.repeat(rng.normal(size=(60, 2)), 4, axis=0)
