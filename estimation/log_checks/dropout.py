@@ -1,7 +1,7 @@
 """Dropouts: rows that a logger filled with its last ones, and gaps of one channel that the balance of flows feels.
 
-A logger that misses a while may write its last row again and again. Nothing tells that from rest but its end: then the
-channels are somewhere else at once, farther than they ever go from one row to the next.
+A logger that misses a while may write its last row again and again. Nothing tells that from rest but its end: then
+piston or pressure are somewhere else at once, farther than they ever go from one row to the next.
 """
 
 import numpy as np
@@ -54,7 +54,8 @@ def without_dropouts(record: Record) -> tuple[Record, tuple[Note, ...]]:
     first, behind = first[long], behind[long]
     if not len(first):
         return record, ()
-    ended = np.any([_jumps(record[name], behind) for name in asked], axis=0)
+    # a motor may leave rest from one row to the next, which neither piston nor oil does
+    ended = np.any([_jumps(record[name], behind) for name in asked if name != SPEED], axis=0)
     dropped = np.zeros(len(record), dtype=np.bool_)
     for begin, end in zip(first[ended], behind[ended], strict=True):
         dropped[begin:end] = True

@@ -8,7 +8,7 @@ from estimation.log_checks.dropout import FEWEST_ROWS, LONG_GAP, long_gaps, with
 from estimation.notes import SensorCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
-from plant.eha.simulate import CIRCUIT, simulate
+from plant.eha.simulate import CIRCUIT, LUMPED, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, IDEAL, Sensors
 
@@ -57,6 +57,13 @@ def test_a_machine_at_rest_that_goes_on_from_there_is_no_dropout() -> None:
     assert without_dropouts(record) == (record, ())
     beyond = np.where(time > 1.5, moved + 0.5, moved)
     assert without_dropouts(Record(1e-3, {name: record[name] + beyond for name in record}))[1] != ()
+
+
+def test_a_motor_that_leaves_rest_from_one_row_to_the_next_is_no_dropout() -> None:
+    """So a simulated log without noise begins; its rest was called a dropout."""
+    speed = np.where(np.arange(2000) < 1000, 0.0, 60.0)
+    record = simulate(LUMPED, speed, 1e-3, EhaParameters(), sensors=IDEAL)
+    assert without_dropouts(record) == (record, ())
 
 
 @pytest.mark.parametrize("channel", [SPEED, POSITION])
