@@ -14,6 +14,8 @@
   const coming = new Map(); // files on their way, by a key: name and what share has come
   let asked = MOST;
   let due = 0;
+  let begun = 0; // looks so far
+  let newest = 0; // the latest of them that was shown
   let shown = "";
 
   function element(tag, attributes = {}, ...children) {
@@ -93,9 +95,12 @@
 
   async function look() {
     clearTimeout(due);
+    const turn = (begun += 1);
     let unfinished = true;
     try {
       const { logs, counts } = await latest();
+      if (turn < newest) return; // what was asked later has been answered already
+      newest = turn;
       const total = Object.values(counts).reduce((sum, one) => sum + one, 0);
       unfinished = (counts.unfinished ?? 0) > 0;
       const text = JSON.stringify([logs, [...coming.values()]]);
@@ -113,7 +118,7 @@
     } catch (error) {
       status.textContent = `The server does not answer: ${error.message}`;
     }
-    due = setTimeout(look, unfinished ? OFTEN : SELDOM);
+    if (turn === begun) due = setTimeout(look, unfinished ? OFTEN : SELDOM);
   }
 
   function send(file, wanted) {

@@ -144,6 +144,28 @@ def test_a_log_that_failed_says_how_to_look_into_it_and_one_that_was_looked_into
     assert page.get_by_text("choose inspect").count() == 1
 
 
+def test_an_answer_that_comes_late_does_not_undo_a_newer_one(opened: Any, tmp_path: Path) -> None:
+    """A log that had failed was shown as waiting again, until the server was next asked."""
+    page, held = opened("home"), list[Any]()
+
+    def answer(route: Any) -> None:
+        if held:
+            route.continue_()
+        else:
+            held.append((route, route.fetch()))
+
+    page.route("**/api/logs?most=*", answer)
+    (tmp_path / "late answer.csv").write_text("a,b\n1,2\n3,4\n")
+    page.set_input_files("#file", str(tmp_path / "late answer.csv"))
+    row = page.locator("tr", has_text="late answer.csv")
+    row.locator("td", has_text="failed").wait_for(timeout=30_000)
+    (route, old) = held[0]
+    with page.expect_response("**/api/logs?most=*"):
+        route.fulfill(response=old)
+    page.wait_for_timeout(100)
+    assert "failed" in row.inner_text(timeout=500)
+
+
 def test_the_live_view_shows_gauges_and_what_the_watch_tells(opened: Any) -> None:
     page = opened("live")
     assert page.locator(".gauges li").count() == 7
