@@ -26,7 +26,7 @@ from estimation.fits.lateness import most_late
 from estimation.fits.left_open import wear_open
 from estimation.fits.objections import DOUBTED, fit_explains
 from estimation.fits.play import NO_PLAY, PLAY_SENSED, ShownPlay, play_left
-from estimation.fits.promises import promised, promised_each, slopes_of
+from estimation.fits.promises import Promise, promised, promised_each, slopes_of
 from estimation.models.completed_flow import CRACKS, balances_mass
 from estimation.models.flow import STIFFNESS
 from estimation.models.inner_circuit import BEND
@@ -102,10 +102,7 @@ def asked_of(
     promises = promised_each(
         log, parameters, swinging.values, ALWAYS_ASKED, by_mass=by_mass, slopes=slopes_of(swinging, log)
     )
-    # slopes promise more than there is where a chamber that nothing feeds ended below vapour pressure: no oil does that
-    if max(one.gain for one in promises) > swinging.cost:
-        promises = [one._replace(gain=0.0) for one in promises]
-    delivery, zero, *hidden = promises
+    delivery, zero, *hidden = _possible(promises, swinging)
     shows_zero = best is swinging or homed_at_stop(log)
     if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
         zero = max(zero, promised(log, parameters, best.values, ENCODER_ZERO))
@@ -125,7 +122,17 @@ def asked_of(
     fed = swinging.values["makeup_conductance"] > VANISHED * parameters.makeup_conductance
     lost = swinging is best and not fed and swinging.chi_square[0] > DOUBTED
     begun = promised(log.coarsened(), parameters, swinging.values, START_LOAD, by_mass=by_mass)
-    return (BEGUN, *asked) if lost or WORTH < begun.gain <= swinging.cost else asked, remarks
+    return (BEGUN, *asked) if lost or _possible([begun], swinging)[0].gain > WORTH else asked, remarks
+
+
+def _possible(promises: Sequence[Promise], fit: GreyBoxFit) -> Sequence[Promise]:
+    """Return promises of what can be gained: none where one is of more than a fit leaves.
+
+    Slopes were then taken where a chamber that nothing feeds is below vapour pressure, as no oil can be.
+    """
+    if max(one.gain for one in promises) > fit.cost:
+        return [one._replace(gain=0.0) for one in promises]
+    return promises
 
 
 def near_starts(

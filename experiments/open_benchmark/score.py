@@ -1,7 +1,6 @@
 """Scores what ships on sets of logs: every log is read, estimated and diagnosed as a user would, with its rig file."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -11,7 +10,7 @@ import pandas as pd
 from experiments.log_pages.log import Log
 from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class, named
 from experiments.open_benchmark.loaders import read_truth, rows_of
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.severity import severities_at
 from plant.eha.model import EhaParameters
@@ -77,16 +76,11 @@ def _asked(log: Log, verb: str, pressure: bool) -> Mapping[str, Any]:
         return {**FAILED, "message": str(error)}
 
 
-@lru_cache(maxsize=32)
-def _actuator(healthy: EhaParameters) -> Actuator:
-    return Actuator.of(healthy)
-
-
 def _severities(said: Mapping[str, Any], truth: Mapping[str, Any], healthy: EhaParameters) -> list[bool]:
     """Return which severities' intervals cover what they truly are, by the project's own definition of each."""
     from dataclasses import replace
 
-    actuator = _actuator(healthy)
+    actuator = actuator_of(healthy)
     true = replace(healthy, **{name: float(truth[column]) for name, column in COEFFICIENTS.items()})
     exact = severities_at(coordinates_of(true, actuator.rated), actuator)
     told = {name: one["ci95"] for name, one in (said.get("severity") or {}).items() if name != "entrained_air"}
