@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.arrays import Array, BoolArray
+from estimation.stretches import in_long_stretches
 
 RUN = 3
 """Samples in a row from which a channel is said to stand."""
@@ -82,22 +83,13 @@ def standing(channels: Sequence[Array], noise: float) -> Iterator[Standing]:
         extreme = float((sign * seen).max())
         level = sign * (extreme - reach)  # where noise lifts the largest sample above the level at which it stands
         near = [np.abs(one - level) <= 1.001 * reach for one in channels]
-        where = [_in_runs(one) for one in near]
+        where = [in_long_stretches(one, RUN) for one in near]
         share = float(np.mean(np.concatenate(where)))
         visits = sum(int(np.count_nonzero(np.diff(one.astype(np.int8)) == 1)) for one in where)
         if share < OFTEN or not _stands(seen, level, sign, reach, visits, share):
             continue
         flat = [one[held] for one, held in zip(channels, where, strict=True)]
         yield Standing(end, float(np.median(np.concatenate(flat))), share, where)
-
-
-def _in_runs(near: BoolArray) -> BoolArray:
-    """Return which samples are in runs of `RUN` or more."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(np.int8), [0]])))
-    kept = np.zeros_like(near)
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
-        kept[first:last] = last - first >= RUN
-    return kept
 
 
 def _stands(seen: Array, level: float, sign: float, reach: float, visits: int, share: float) -> bool:

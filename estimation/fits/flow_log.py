@@ -19,6 +19,7 @@ from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
 from estimation.models.inner_circuit import BEND
+from estimation.stretches import stretches
 from plant.eha.model import EhaParameters, piston_areas
 from plant.log.record import Record
 
@@ -99,7 +100,7 @@ def speed_gaps(record: Record, parameters: EhaParameters, noise: float) -> Array
         As `GreyBoxLog.gaps`, in pressure [Pa squared].
     """
     missing = np.isnan(record["motor_speed_rad_s"])
-    first, after = np.flatnonzero(np.diff(missing, prepend=False, append=False)).reshape(-1, 2).T
+    first, after = stretches(missing)
     speed, last, length = bridged(record["motor_speed_rad_s"]), len(missing) - 1, after - first
     before, further, behind = np.maximum(first - 1, 0), np.maximum(first - 2, 0), np.minimum(after, last)
     # a straight line is right where the speed goes on as it did before the gap and does after it

@@ -7,15 +7,16 @@ piston or pressure are somewhere else at once, farther than they ever go from on
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.log_checks.bridging import within_gaps
+from estimation.log_checks.bridging import gaps, within_gaps
 from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED, VELOCITY
 from estimation.log_checks.order import median
 from estimation.notes import SensorCode
+from estimation.stretches import in_long_stretches, stretches
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
 
-ASKED = tuple(dict.fromkeys((SPEED, POSITION, VELOCITY, PRESSURE, *PRESSURES)))
+ASKED = (SPEED, POSITION, VELOCITY, *PRESSURES)
 """Channels that a row must repeat, all that are logged."""
 
 FEWEST_CHANNELS, FEWEST_ROWS = 3, 10
@@ -49,7 +50,7 @@ def without_dropouts(record: Record) -> tuple[Record, tuple[Note, ...]]:
         if np.count_nonzero(again) < FEWEST_ROWS:
             return record, ()
         again &= record[name][1:] == record[name][:-1]
-    first, behind = np.flatnonzero(np.diff(again, prepend=False, append=False)).reshape(-1, 2).T + 1
+    first, behind = (ends + 1 for ends in stretches(again))
     long = (behind - first >= FEWEST_ROWS) & (behind < len(record))
     first, behind = first[long], behind[long]
     if not len(first):
@@ -118,9 +119,6 @@ def long_gaps(values: Array) -> NDArray[np.bool_]:
     missing = np.isnan(values)
     if np.count_nonzero(missing) < LONG_GAP or missing.all():
         return np.zeros(len(values), dtype=np.bool_)
-    usual = median(np.diff(np.flatnonzero(~missing)).astype(np.float64)) if np.count_nonzero(~missing) > 1 else 1.0
-    first, behind = np.flatnonzero(np.diff(within_gaps(values), prepend=False, append=False)).reshape(-1, 2).T
-    out = np.zeros(len(values), dtype=np.bool_)
-    for begin, end in zip(first, behind, strict=True):
-        out[begin:end] = end - begin >= max(LONG_GAP, usual)  # a slow channel's end is shorter
-    return out
+    apart, _ = gaps(values)
+    usual = median(apart) if len(apart) else 1.0
+    return in_long_stretches(within_gaps(values), max(LONG_GAP, usual))  # a slow channel's end is shorter

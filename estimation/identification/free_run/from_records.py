@@ -10,6 +10,7 @@ from estimation.identification.free_run.data import FEWEST, Channels, channels_f
 from estimation.identification.notes import IdentificationCode
 from estimation.identification.signals.preprocess import resample
 from estimation.log_checks.bridging import bridged, gaps
+from estimation.stretches import stretches
 from plant.arrays import Array
 from plant.errors import HydrostateError, LogWarning
 from plant.log.record import Record
@@ -113,9 +114,9 @@ def pieces(record: Record, inputs: Sequence[str]) -> list[Record]:
     unknown = np.zeros(len(record), dtype=np.bool_)
     for name in inputs:
         unknown |= _unknown(record[name])
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], unknown, [True]]).astype(np.int8)))
     least = max(FEWEST, len(record) // 200)
-    parts = [record.slice(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= least]
+    known = zip(*stretches(~unknown), strict=True)
+    parts = [record.slice(int(a), int(b)) for a, b in known if b - a >= least]
     if not unknown.any() or not parts:
         return [record]
     worst = max(inputs, key=lambda name: int(np.isnan(record[name]).sum()))

@@ -14,7 +14,8 @@ from estimation.equations.definition import Equations, Parameter
 from estimation.equations.fit import EquationsFit, _started, fit_equations, simulated
 from estimation.equations.problem import Part, Problem, known_noise, part_of, spread, start_of
 from estimation.equations.search import Solution
-from estimation.equations.stops import _in_runs, standing
+from estimation.equations.stops import RUN, standing
+from estimation.stretches import in_long_stretches
 from plant.arrays import Array
 from plant.log.record import Record
 from tests.numbers import Found, Numbers, Roughly, refused, some
@@ -341,7 +342,7 @@ def channels_that_stand() -> dict[str, Any]:
         ]
         for name, given in rows.items()
     }
-    return told | {"runs": _in_runs(np.array([1, 1, 0, 1, 1, 1, 0, 0, 1, 1, 1, 1], dtype=bool))}
+    return told | {"runs": in_long_stretches(np.array([1, 1, 0, 1, 1, 1, 0, 0, 1, 1, 1, 1], dtype=bool), RUN)}
 
 
 @pytest.mark.parametrize("case", NUMBERS.cases)
