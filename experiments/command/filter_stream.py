@@ -21,10 +21,10 @@ from experiments.command.options import (
     option,
     require_positive,
 )
+from experiments.command.own_paths import require_place
 from experiments.command.streamed import (
     STANDARD_INPUT,
     end_told,
-    require_folder,
     say_line,
     stop_at_sigterm,
     stream_input,
@@ -86,7 +86,7 @@ def filter_stream(
     rows the filter restarts from where the actuator then is.
     """
     require_positive("--every", every, "s")
-    require_folder(state)
+    require_place("--state", state)
     sinks: list[Any] = [say_line]
 
     def say(entries: Mapping[str, Any]) -> None:

@@ -18,13 +18,14 @@ from experiments.command.options import (
     Out,
     RigFile,
     Seed,
-    figure_path,
     load_columns,
     load_rig,
     option,
+    refuse_given,
     require_png,
     require_positive,
 )
+from experiments.command.own_paths import own_paths, require_place
 from experiments.command.terminal import short_names, table
 from plant.errors import HydrostateError, require_known
 
@@ -166,9 +167,13 @@ def identify(
 
     require_png("--figure", figure)
     require_png("--response", response)
+    for name, place in (("--figure", figure), ("--response", response), ("--simulated", simulated)):
+        require_place(name, place)
     related = any(one is not None for one in (inputs, outputs, references, simulate))
     any_columns = related and rig is None and not columns
     if any_columns or structure in ("narx", "hammerstein", "state-space"):
+        of_channels = {"--rig": rig, "--columns": columns, "--filter-hz": filter_hz}
+        refuse_given(of_channels, "does not go with --input and --output, which take columns as they stand in the log")
         asked = Asked(
             names(inputs),
             names(outputs),
@@ -185,18 +190,23 @@ def identify(
             response=response,
         )
         if simulate is not None:
+            of_fits = {"--validate": validate, "--figure": figure, "--response": response, "--resample": resample}
+            refuse_given(of_fits, "goes with a fit, not with --simulate")
             simulate_any(logs, simulate, asked, as_json=as_json, out=out)
         identify_any(logs, asked, as_json=as_json, out=out)
+    of_columns = {"--reference": references, "--simulate": simulate, "--simulated": simulated, "--validate": validate}
+    of_columns |= {"--response": response, "--resample": resample}
+    refuse_given(of_columns, "goes with --input and --output that name columns, without --rig and --columns")
     order, delay = order or "2", delay or "0"
-    input_channel, output_channel = (
-        (names(one) or (default,))[0] for one, default in ((inputs, INPUT), (outputs, OUTPUT))
-    )
+    input_channel = _one_channel("--input", inputs, INPUT)
+    output_channel = _one_channel("--output", outputs, OUTPUT)
     form = _form(structure, order, delay, numerator)
     form["covariance"] = "auto" if filter_hz is None else "coloured"
     require_positive("--sample-time", sample_time, "s")
     require_positive("--filter-hz", filter_hz, "Hz")
     bench, mapping = load_rig(rig), load_columns(columns)
     prepare_output(out)
+    figures = own_paths(figure, logs)
     chosen = {"input": input_channel, "output": output_channel, "rig": bench.name, "seed": seed}
 
     def work(log: Path) -> Result:
@@ -209,10 +219,17 @@ def identify(
         taken["sample_time"] = max(TABLE_6_TIME, record.sample_time) if sample_time is None else sample_time
         model = identify_record(record, **taken, **form)
         u, y = record_signals(record, **taken)
-        return {**chosen, **linear_entries(model), **_judged(model, u, y, log, figure_path(figure, log, len(logs)))}
+        return {**chosen, **linear_entries(model), **_judged(model, u, y, log, figures.get(log))}
 
     batch = run_logs(logs, work, {**NOTHING, **chosen}, "identifying")
     finish(batch, _screen, as_json=as_json, out=out)
+
+
+def _one_channel(option: str, given: list[str] | None, default: str) -> str:
+    channel, *others = names(given) or (default,)
+    if others:
+        raise HydrostateError(f"{option} takes one channel with --rig or --columns, got {channel}, {', '.join(others)}")
+    return channel
 
 
 def _form(structure: str, order: str, delay: str, numerator: int | None) -> dict[str, Any]:

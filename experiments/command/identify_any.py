@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish, run_logs
-from experiments.command.options import figure_path, require_positive
+from experiments.command.options import require_positive
+from experiments.command.own_paths import own_paths
 from experiments.command.terminal import clauses, table
 from plant.errors import HydrostateError, LogWarning, require_known
 
@@ -93,7 +94,7 @@ def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path
     shared: dict[str, Identified] = {}
 
     def work(name: Path) -> Result:
-        output = str(name)
+        output = columns[name]
         if not read:
             wanted, references = (*asked.inputs, *asked.outputs), asked.references
             read.append([_record(log, (*wanted, *references), asked.sample_time) for log in logs])
@@ -104,7 +105,8 @@ def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path
         found = shared.get(output) or _together(read[0], asked, (output,))[output]
         return _answer(found, read, output, asked, logs)
 
-    batch = run_logs([Path(output) for output in asked.outputs], work, BLANK, "identifying")
+    columns = {Path(output): output for output in asked.outputs}  # a path drops parts of some names, such as "x/."
+    batch = run_logs(list(columns), work, BLANK, "identifying")
     named = ", ".join(str(log) for log in logs)
     results = tuple({**result, "file": named} for result in batch.results)
     finish(Batch(results, batch.total), _screen, as_json=as_json, out=out)
@@ -141,19 +143,20 @@ def _answer(
     if not (asked.figure or asked.simulated or asked.response):
         return {**BLANK, **entries(found), "test": test, "frequency_response": None}
     data = channels_of(records, asked.inputs, output, asked.resampled)
-    figure = figure_path(asked.figure, Path(output), len(asked.outputs))
+    figure = own_paths(asked.figure, asked.outputs).get(output)
     if figure is not None:
         from experiments.log_pages.free_run_figure import write_free_run
 
         write_free_run(found.model, data, logs[0].name, figure)
-    if asked.simulated is not None:
-        place = figure_path(asked.simulated, Path(output), len(asked.outputs))
-        _write_simulated(found.model, data, place or asked.simulated)
-    answer = None if asked.response is None else _response(data, logs[0].name, asked.response, len(asked.outputs))
+    simulated = own_paths(asked.simulated, asked.outputs).get(output)
+    if simulated is not None:
+        _write_simulated(found.model, data, simulated)
+    response = own_paths(asked.response, asked.outputs).get(output)
+    answer = None if response is None else _response(data, logs[0].name, response)
     return {**BLANK, **entries(found), "test": test, "frequency_response": answer}
 
 
-def _response(data: "Channels", log: str, path: Path, outputs: int) -> dict[str, Any]:
+def _response(data: "Channels", log: str, path: Path) -> dict[str, Any]:
     """Draw the frequency response of the first log, and return it."""
     from estimation.identification.signals.measured_response import measured_response
     from experiments.log_pages.response_figure import write_response
@@ -162,8 +165,7 @@ def _response(data: "Channels", log: str, path: Path, outputs: int) -> dict[str,
     if len(data.inputs) > 1:
         raise HydrostateError(f"--response takes one input, got {sources}")
     found = measured_response(data.u[0][:, 0], data.y[0], data.sample_time)
-    target = figure_path(path, Path(data.output), outputs)
-    write_response(found, f"{log}, {sources} to {data.output}", target or path)
+    write_response(found, f"{log}, {sources} to {data.output}", path)
     return found.to_dict()
 
 
@@ -257,6 +259,7 @@ def simulate_any(logs: Sequence[Path], path: Path, asked: Asked, *, as_json: boo
     if asked.outputs:
         models = [one for one in models if one.output in asked.outputs] or models
     prepare_output(out)
+    simulated = own_paths(asked.simulated, logs)
     require_positive("--sample-time", asked.sample_time, "s")
 
     def work(log: Path) -> Result:
@@ -274,13 +277,10 @@ def simulate_any(logs: Sequence[Path], path: Path, asked: Asked, *, as_json: boo
             _warn_of_range(model, data)
             quality = _quality(model, channels_of([record], inputs, outputs[index], model.sample_time, split=True))
             results.append({"inputs": list(inputs), "output": outputs[index], "structure": model.structure, **quality})
-            if asked.simulated is not None:
-                several = figure_path(asked.simulated, log, len(logs))
-                place = figure_path(several, Path(outputs[index]), len(models))
-                _write_simulated(model, data, place or asked.simulated)
-        first = results[0]
+            if log in simulated:
+                _write_simulated(model, data, own_paths(simulated[log], outputs)[outputs[index]])
         message = clauses([f"{one['output']}: fit {one['fit_percent']:.1f} % running free" for one in results])
-        return {"outcome": "ok", **first, "outputs": results, "model_file": str(path), "message": message}
+        return {"outcome": "ok", **results[0], "outputs": results, "model_file": str(path), "message": message}
 
     blank: Result = {**dict.fromkeys(("inputs", "output", "structure", "fit_percent", "rmse")), "outputs": []}
     finish(run_logs(logs, work, blank, "simulating"), _simulated_screen, as_json=as_json, out=out)

@@ -10,6 +10,7 @@ import typer
 from experiments.command.json_output import Result, plain, write_whole
 from experiments.command.logs import caught, finish, read_log, run_logs
 from experiments.command.options import Beside, Json, Out, Plant, SampleTime, argument, load_actuator, option
+from experiments.command.own_paths import own_paths, require_place
 from experiments.command.terminal import note, sparkline, table, visible
 from plant.errors import HydrostateError
 
@@ -29,7 +30,7 @@ PLOTTED = 24
 commands = typer.Typer()
 
 
-@commands.command(epilog="Example: hydrostate inspect bench.tdms --html bench.html --write rig.toml")
+@commands.command(epilog="Example: hydrostate inspect bench.tdms --report bench.html --write rig.toml")
 def inspect(
     logs: Annotated[
         list[Path],
@@ -38,7 +39,15 @@ def inspect(
             "Logs: text with any delimiter, Parquet, Feather, MAT; with hydrostate[bench] XLSX, TDMS, MDF, HDF5.",
         ),
     ],
-    html: Annotated[Path | None, option("HTML", "Also write a page with a drawing of every column.")] = None,
+    report: Annotated[
+        Path | None,
+        option(
+            "FILE",
+            "Write a page (HTML) with a drawing of every column; several logs get one page each.",
+            "--report",
+            "--html",
+        ),
+    ] = None,
     write: Annotated[Path | None, option("FILE", "Write a new rig file that names the columns.")] = None,
     beside: Beside = None,
     sample_time: SampleTime = None,
@@ -56,17 +65,20 @@ def inspect(
 
     def work(log: Path) -> Result:
         found, tables = looked_into(log, kind, rig, sample_time, beside or ())
-        if html is not None:
+        if log in pages:
             from experiments.log_pages.inspect_page import inspect_page
 
-            write_whole(html, inspect_page({"file": str(log), **found}, tables), "--html")
+            write_whole(pages[log], inspect_page({"file": str(log), **found}, tables), "--report")
         if write is not None:
             _write_rig(write, found["columns"], kind)
             note(f"{write}: check units and parameters, then run: hydrostate diagnose {log} --rig {write}")
         return {"outcome": "ok", **found}
 
-    if (html is not None or write is not None or beside) and len(logs) > 1:
-        raise HydrostateError("--html, --write and --with go with one file, got several")
+    if (write is not None or beside) and len(logs) > 1:
+        raise HydrostateError("--write and --with go with one file, got several")
+    require_place("--report", report)
+    require_place("--write", write)
+    pages = own_paths(report, logs, ".html")
     batch = run_logs(logs, work, BLANK, "looking")
     finish(batch, _screen, as_json=as_json, out=out)
 

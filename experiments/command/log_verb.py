@@ -8,7 +8,8 @@ import typer
 
 from experiments.command.json_output import Result, prepare_output, write_whole
 from experiments.command.logs import finish, overheard, read_log, run_logs, with_said
-from experiments.command.options import figure_path, load_actuator, load_columns, require_png, understood
+from experiments.command.options import load_actuator, load_columns, require_png, understood
+from experiments.command.own_paths import own_paths, require_place
 from experiments.command.terminal import clauses, note
 from plant.errors import HydrostateError, require_known
 
@@ -40,13 +41,13 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     kind, bench = load_actuator(asked["plant"], asked["rig"])
     options = understood(context, asked, kind, verb, COMMON | ({"condition"} if diagnosing else set()))
     require_png("--figure", options.get("figure"))
+    require_place("--figure", options.get("figure"))
     chosen: LogVerb = getattr(kind, verb)
     logs, mapping = asked["logs"], load_columns(asked["columns"])
     expected: str | None = asked["condition"] if diagnosing else None
     report: Path | None = asked.get("report")
     if report is not None:
-        if not report.name:
-            raise HydrostateError(f"--report must be a file, got the folder {str(report)!r}")
+        require_place("--report", report)
         report = report.with_suffix(".html")
     if expected is not None:
         require_known("--condition", expected, kind.conditions)
@@ -64,6 +65,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
         options["healthy"] = read(options["healthy"])
     rig, prepared = chosen.prepare(bench, {**options, "seed": asked["seed"]})
     prepare_output(asked["out"])
+    figures, pages = own_paths(options.get("figure"), logs), own_paths(report, logs)
     about = {"plant": kind.name, "rig": bench.name, "seed": asked["seed"], "expected": expected}
     about |= {"condition": options["condition"]} if "condition" in options else {}
 
@@ -73,12 +75,11 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
         found = chosen.run(record, rig, prepared)
         result: dict[str, Any] = {**chosen.blank, **about, **chosen.entries(found)}
         result["message"] = clauses([result["message"], *_agreement(result, found)])
-        figure = figure_path(options.get("figure"), log, len(logs))
-        if figure is not None and chosen.figure is not None:
-            chosen.figure(found, log.name, figure)
-        page = figure_path(report, log, len(logs))
-        if page is not None:
-            write_whole(page, page_of(chosen, with_said({"file": str(log), **result}, said), found, record), "--report")
+        if log in figures and chosen.figure is not None:
+            chosen.figure(found, log.name, figures[log])
+        if log in pages:
+            page = page_of(chosen, with_said({"file": str(log), **result}, said), found, record)
+            write_whole(pages[log], page, "--report")
         return result
 
     batch = run_logs(logs, work, {**chosen.blank, **about}, doing)

@@ -214,27 +214,24 @@ def require_png(option: str, path: Path | None) -> None:
         raise HydrostateError(f"{option} must end in .png, got {str(path)!r}")
 
 
-def figure_path(target: Path | None, log: Path, logs: int) -> Path | None:
-    """Return where the figure of a log goes; with several logs, each one's name goes into the file's.
+def refuse_given(options: Mapping[str, object], why: str) -> None:
+    """Refuse options that would change nothing, rather than ignore them.
 
     Parameters
     ----------
-    target : Path or None
-        As given to ``--figure``.
+    options : mapping of str to object
+        What was given to each; None or empty where it was not given.
+    why : str
+        Rest of the sentence, after the name of the option.
 
-    Returns
-    -------
-    Path or None
-        None where no figure is wanted.
-
-    Examples
-    --------
-    >>> figure_path(Path("fit.png"), Path("logs/run1.csv"), 2)
-    PosixPath('fit-run1.png')
+    Raises
+    ------
+    HydrostateError
+        If one was given.
     """
-    if target is None or logs == 1:
-        return target
-    return target.with_name(f"{target.stem}-{log.stem}{target.suffix or '.png'}")
+    for name, value in options.items():
+        if value is not None and value != []:
+            raise HydrostateError(f"{name} {why}")
 
 
 def load_actuator(plant: str | None, path: Path | None) -> "tuple[ActuatorKind, Rig[Any]]":

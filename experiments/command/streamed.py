@@ -6,7 +6,6 @@ import signal
 import threading
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, Protocol, TextIO
 
 import typer
@@ -59,23 +58,6 @@ def end_told(told: Told) -> Generator[None]:
         note(said)
         raise typer.Exit(SOME_FAILED) from error
     told.end("ok", "")
-
-
-def require_folder(state: Path | None) -> None:
-    """Refuse a state file that cannot be written, before a stream is followed for its sake.
-
-    Parameters
-    ----------
-    state : Path or None
-        As given to ``--state``.
-
-    Raises
-    ------
-    HydrostateError
-        If its folder is not there.
-    """
-    if state is not None and not state.parent.is_dir():
-        raise HydrostateError(f"--state {state}: there is no such folder")
 
 
 def stop_at_sigterm() -> None:

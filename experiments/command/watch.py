@@ -18,10 +18,10 @@ from experiments.command.options import (
     option,
     require_positive,
 )
+from experiments.command.own_paths import require_place
 from experiments.command.streamed import (
     STANDARD_INPUT,
     end_told,
-    require_folder,
     say_line,
     stop_at_sigterm,
     stream_input,
@@ -82,7 +82,7 @@ def watch(
     reports sudden changes only. Use diagnose for a fault that was there from the start.
     """
     require_positive("--heartbeat", heartbeat, "s")
-    require_folder(state)
+    require_place("--state", state)
     told = Watched(STANDARD_INPUT if log == "-" else log)
     if lines_wanted(view):
         told.to(say_line)

@@ -58,7 +58,7 @@ def test_json_says_how_sure_each_guess_is_and_why(strange: Path) -> None:
 
 
 def test_the_page_draws_every_column(strange: Path, tmp_path: Path) -> None:
-    assert invoke(strange, "--html", tmp_path / "page.html").exit_code == 0
+    assert invoke(strange, "--report", tmp_path / "page.html").exit_code == 0
     page = (tmp_path / "page.html").read_text()
     assert "Kolbenweg [mm]" in page
     assert "image/svg+xml" in page
@@ -84,11 +84,13 @@ def test_several_files_are_looked_into_together_unless_what_is_written_goes_with
     other = tmp_path / "other.csv"
     other.write_text("time_s,x\n" + "".join(f"{0.1 * k:.1f},{k}\n" for k in range(20)))
     assert len(json.loads(invoke(strange, other, "--json").stdout)) == 2
-    for option in (("--html", tmp_path / "a.html"), ("--write", tmp_path / "a.toml"), ("--with", strange)):
+    for option in (("--write", tmp_path / "a.toml"), ("--with", strange)):
         done = invoke(strange, other, *option)
         assert done.exit_code == 2
         assert "go with one file, got several" in done.stderr
     assert not list(tmp_path.glob("a.*"))
+    assert invoke(strange, other, "--html", tmp_path / "page.html").exit_code == 0
+    assert {path.name for path in tmp_path.glob("page*")} == {f"page-{strange.stem}.html", "page-other.html"}
 
 
 def test_each_channel_is_the_surest_column_of_all_files_of_a_test(tmp_path: Path) -> None:

@@ -1,0 +1,91 @@
+"""Where the figure or page of each of several logs goes: no two of them may share a file."""
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+from plant.errors import HydrostateError
+
+Owner = TypeVar("Owner", Path, str)
+
+
+def own_paths(target: Path | None, owners: Sequence[Owner], ending: str = ".png") -> dict[Owner, Path]:
+    """Return the file of each log or output; with several, the name of each goes into that of its file.
+
+    Parameters
+    ----------
+    target : Path or None
+        As given to an option such as ``--figure``; None where nothing is to be written.
+    owners : sequence of Path or of str
+        Logs, or names of outputs.
+    ending : str
+        Of files where `target` has none.
+
+    Returns
+    -------
+    dict
+        File by log or output; empty where nothing is to be written. Logs of one name in two folders have the folders
+        in the names of their files.
+
+    Examples
+    --------
+    >>> own_paths(Path("fit.png"), [Path("a/run.csv"), Path("b/run.csv")])[Path("b/run.csv")]
+    PosixPath('fit-b-run.png')
+    """
+    if target is None:
+        return {}
+    distinct = list(dict.fromkeys(owners))
+    if len(distinct) == 1:
+        return {distinct[0]: target}
+    ending = target.suffix or ending
+    names = (f"{target.stem}-{label}{ending}" for label in _labels(distinct))
+    return {one: target.with_name(name) for one, name in zip(distinct, names, strict=True)}
+
+
+def require_place(option: str, path: Path | None) -> None:
+    """Refuse a file in a folder that is not there before the work, not after it.
+
+    Parameters
+    ----------
+    option : str
+        As the command line has it.
+    path : Path or None
+        Where the file goes; None, not given, passes.
+
+    Raises
+    ------
+    HydrostateError
+        If it names a folder, or a file in a folder that is not there.
+    """
+    if path is None:
+        return
+    if not path.name or path.is_dir():
+        raise HydrostateError(f"{option} must be a file, got the folder {str(path)!r}")
+    if not path.parent.is_dir():
+        raise HydrostateError(f"{option} {path}: there is no such folder")
+
+
+def _labels(owners: Sequence[Owner]) -> list[str]:
+    """Return a name for each, as short as tells them apart where letters have no case."""
+    labels: list[str] = []
+    for labels in _candidates(owners):
+        if len({label.casefold() for label in labels}) == len(labels):
+            return labels
+    given: list[str] = []
+    for label in labels:
+        taken = {one.casefold() for one in given}
+        numbered = (label, *(f"{label}-{number}" for number in range(2, len(labels) + 2)))
+        given.append(next(one for one in numbered if one.casefold() not in taken))
+    return given
+
+
+def _candidates(owners: Sequence[Owner]) -> Iterator[list[str]]:
+    """Yield names for all: of logs the last part of the path without and with its ending, then more of the path."""
+    paths = [one.absolute() for one in owners if isinstance(one, Path)]
+    if len(paths) < len(owners):
+        yield [re.sub(r"[^\w.+-]+", "_", str(one)).strip("_") or "output" for one in owners]
+        return
+    for depth in range(1, max(len(path.parts) for path in paths)):
+        yield ["-".join((*path.parts[1:-1], path.stem)[-depth:]) for path in paths]
+        yield ["-".join(path.parts[1:][-depth:]) for path in paths]

@@ -1,0 +1,55 @@
+"""Every log and every output has a figure or page of its own, and a place for it is asked for first."""
+
+from pathlib import Path
+
+import pytest
+
+from experiments.command.own_paths import own_paths, require_place
+from plant.errors import HydrostateError
+
+
+def test_nothing_is_written_where_nothing_is_asked_for() -> None:
+    assert own_paths(None, [Path("run.csv")]) == {}
+
+
+def test_one_log_has_the_file_that_was_asked_for() -> None:
+    assert own_paths(Path("fit.png"), [Path("run.csv")]) == {Path("run.csv"): Path("fit.png")}
+    assert own_paths(Path("fit.png"), [Path("run.csv")] * 2) == {Path("run.csv"): Path("fit.png")}
+
+
+@pytest.mark.parametrize(
+    ("logs", "files"),
+    [
+        (["one.csv", "two.csv"], ["p-one.html", "p-two.html"]),
+        (["a/run.csv", "b/run.csv"], ["p-a-run.html", "p-b-run.html"]),
+        (["run.csv", "run.parquet"], ["p-run.csv.html", "p-run.parquet.html"]),
+        (["a/x/run.csv", "b/x/run.csv"], ["p-a-x-run.html", "p-b-x-run.html"]),
+        (["Run.csv", "a/run.csv", "b/other.csv"], None),
+        (["a-b/run.csv", "a/b-run.csv"], ["p-run.html", "p-b-run.html"]),
+    ],
+)
+def test_logs_of_one_name_keep_their_files_apart(logs: list[str], files: list[str] | None) -> None:
+    found = own_paths(Path("out/p.html"), [Path(log) for log in logs])
+    assert list(found) == [Path(log) for log in logs]
+    assert len({str(path).casefold() for path in found.values()}) == len(logs)
+    if files is not None:
+        assert list(found.values()) == [Path("out") / file for file in files]
+
+
+def test_outputs_have_names_that_a_file_may_have_and_are_numbered_where_these_are_alike() -> None:
+    found = own_paths(Path("s.csv"), ["flow [l/min]", "flow (l/min)", "p.1", "p.2"])
+    names = [path.name for path in found.values()]
+    assert names == ["s-flow_l_min.csv", "s-flow_l_min-2.csv", "s-p.1.csv", "s-p.2.csv"]
+
+
+def test_a_file_without_an_ending_gets_one() -> None:
+    assert own_paths(Path("fit"), ["a", "b"], ".csv")["a"] == Path("fit-a.csv")
+
+
+def test_a_place_that_is_not_there_is_refused_first(tmp_path: Path) -> None:
+    require_place("--figure", None)
+    require_place("--figure", tmp_path / "a.png")
+    with pytest.raises(HydrostateError, match="--figure must be a file, got the folder"):
+        require_place("--figure", tmp_path)
+    with pytest.raises(HydrostateError, match="there is no such folder"):
+        require_place("--report", tmp_path / "pages" / "a.html")
