@@ -14,7 +14,7 @@ from estimation.eha.rig_share import fitted_responses, scaled_responses, with_we
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
 from estimation.fits.delivery import delivered
-from estimation.fits.flow_fit import FLOW_CHANNELS, REPORTED, fit_flow
+from estimation.fits.flow_fit import FLOW_CHANNELS, REPORTED, fit_flow, require_flow_channels
 from estimation.fits.form_fit import FormFit
 from estimation.fits.motion_fit import MOTION_CHANNELS, fit_motion
 from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED
@@ -238,6 +238,7 @@ def _fit(
     """
     if form != "flow":
         return FITTED[form][0](log.record, parameters, guess, {}, log.variances) if form in FITTED else None
+    require_flow_channels(log.record)
     doubted, record = {name: max(one) for name, one in spreads.items()}, log.record
     loaded = not chosen and first_load(record, log.variances) != 0.0
     how = {"loaded": loaded, "moving": begins_in_motion(record), "filtered": log.filtered}

@@ -207,14 +207,16 @@ def estimate_by_flow_filter(
     HydrostateError
         If something else is chosen.
     """
-    if (
-        replace(options, states=(), method="auto") != FilterOptions()
-        or options.method not in ("auto", "ekf", "chamber-ekf")
-        or any(name != "leakage" for name in options.states)
-    ):
+    asked = {
+        "tuning": options.tuned,
+        f"robust {options.robust}": options.robust != "none",
+        f"method {options.method}": options.method not in ("auto", "ekf", "chamber-ekf"),
+        f"states {', '.join(options.states)}": any(name != "leakage" for name in options.states),
+    }
+    if unfit := [name for name, here in asked.items() if here]:
         raise HydrostateError(
-            "the flow form is filtered by a bank of ekf, which finds leakage along with bulk modulus; "
-            f"it takes no other method, states, tuning or robust update, got {options}"
+            "the flow form is filtered by a bank of ekf, which finds leakage along with bulk modulus; it takes no "
+            f"other method or state, no tuning and no robust update, got {'; '.join(unfit)}"
         )
     estimate, again = filter_flow(log.record, parameters, variances=log.variances, guess=guess)
     last = 0.5 / len(estimate.mean)

@@ -66,6 +66,19 @@ pressure, but simulators and textbooks balance volumes."""
 _cost = attrgetter("cost")
 
 
+def require_flow_channels(record: Record) -> None:
+    """Refuse a record without the channels that the flow form needs.
+
+    Raises
+    ------
+    LogError
+        If one is missing.
+    """
+    lacking = [channel for channel in FLOW_CHANNELS if channel not in record]
+    if lacking:
+        raise LogError(f"the flow form needs {' and '.join(FLOW_CHANNELS)}, the record lacks {', '.join(lacking)}")
+
+
 def fit_flow(
     record: Record,
     parameters: EhaParameters,
@@ -117,9 +130,7 @@ def fit_flow(
     LogError
         If a channel is missing.
     """
-    lacking = [channel for channel in FLOW_CHANNELS if channel not in record]
-    if lacking:
-        raise LogError(f"the flow form needs {' and '.join(FLOW_CHANNELS)}, the record lacks {', '.join(lacking)}")
+    require_flow_channels(record)
     sensed = sensed_play(record)
     if variances is None:
         record, variances = without_strays(record)

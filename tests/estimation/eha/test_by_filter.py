@@ -17,7 +17,7 @@ from estimation.trust.consistency import MISMATCH_NIS
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.simulate import PLANTS, simulate
-from plant.errors import HydrostateError
+from plant.errors import HydrostateError, LogError
 from plant.log.record import Record
 from plant.notes import Note
 from plant.sensors.sensors import BENCH
@@ -86,7 +86,8 @@ REST = Record(1e-3, {name: np.zeros(300) for name in ("motor_speed_rad_s", "posi
         ({"method": "least-squares", "form": "pressure"}, "the pressure form is filtered, got method 'least-squares'"),
         ({"method": "ekf", "form": "motion"}, "the motion form is fitted by least squares, got method 'ekf'"),
         ({"states": ("weight",)}, "a further state must be one of"),
-        ({"form": "flow", "method": "ukf"}, "the flow form is filtered by a bank of ekf"),
+        ({"form": "flow", "method": "ukf"}, "no robust update, got method ukf$"),
+        ({"form": "flow", "tuned": True, "robust": "huber"}, "no robust update, got tuning; robust huber$"),
         ({"form": "flow", "states": ("friction",)}, "the flow form is filtered by a bank of ekf"),
         ({"form": "flow", "tuned": True}, "the flow form is filtered by a bank of ekf"),
     ],
@@ -94,6 +95,12 @@ REST = Record(1e-3, {name: np.zeros(300) for name in ("motor_speed_rad_s", "posi
 def test_what_no_form_can_do_is_refused(options: dict[str, Any], said: str) -> None:
     with pytest.raises(HydrostateError, match=said):
         estimate_bulk_modulus(REST.replace(differential_pressure_pa=np.zeros(300)), FAULTY, **options)
+
+
+def test_the_flow_form_says_which_channel_it_lacks() -> None:
+    for options in ({"form": "flow"}, {"form": "flow", "method": "ekf"}, {"method": "chamber-ekf"}):
+        with pytest.raises(LogError, match="differential_pressure_pa"):
+            estimate_bulk_modulus(REST, FAULTY, **options)
 
 
 def test_a_filter_that_diverged_or_cannot_know_gives_no_gate() -> None:
