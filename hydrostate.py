@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 
     __version__: str
 
+OF_A_LOG = ("estimate", "diagnose", "identify")
+"""Verbs of the command that Python asks of a log."""
+
 PACKAGES = ("plant", "estimation", "faults", "experiments")
 
 __all__ = [
@@ -102,6 +105,8 @@ def __getattr__(name: str) -> Any:
         return _late(name)
     from plant.errors import NoSuchNameError
 
+    if name in OF_A_LOG:
+        raise NoSuchNameError(f"hydrostate has no {name!r}; a log has it: hydrostate.read(path).{name}()")
     raise NoSuchNameError(no_such("hydrostate", name, __all__))
 
 

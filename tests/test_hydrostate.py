@@ -131,6 +131,8 @@ MISTAKES: dict[str, tuple[Callable[[hs.Log, Path], object], str]] = {
         "none/a.json: the model cannot be written: No such file or directory",
     ),
     "misspelt verb": (lambda log, file: log.estimat(), "did you mean 'estimate'"),
+    "verb of a log": (lambda log, file: hs.estimate, "a log has it: hydrostate.read(path).estimate()"),
+    "samples by number": (lambda log, file: log[0:10], "got a slice; between(begin, end) takes a part [s]"),
     "misspelt name": (lambda log, file: hs.reed, "did you mean 'read'"),
     "no such channel": (lambda log, file: log["pressure"], "channel 'pressure' is needed; the record has"),
 }

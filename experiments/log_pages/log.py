@@ -124,7 +124,9 @@ class Log(Shown):
         """Length of the log [s]."""
         return self.record.duration
 
-    def __getitem__(self, channel: str) -> "np.ndarray[Any, Any]":
+    def __getitem__(self, channel: str | slice) -> "np.ndarray[Any, Any]":
+        if isinstance(channel, slice):
+            refuse("a log takes the name of a channel, got a slice; between(begin, end) takes a part [s]")
         return self.record[channel]
 
     def __iter__(self) -> Iterator[str]:
