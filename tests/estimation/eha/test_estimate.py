@@ -23,6 +23,7 @@ from plant.log.record import Record
 from plant.notes import Note
 from plant.sensors.faults import SensorFault, with_fault
 from plant.sensors.sensors import BENCH
+from tests.thinned import thinned
 
 HEALTHY = EhaParameters()
 PRESSURE = "differential_pressure_pa"
@@ -148,13 +149,7 @@ WAYS = {
 }
 
 
-@pytest.mark.parametrize(
-    "way",
-    [
-        pytest.param(way, marks=pytest.mark.slow) if "tuned" in way or "smoothed" in way or "motion" in way else way
-        for way in WAYS
-    ],
-)
+@pytest.mark.parametrize("way", thinned(WAYS, ("the flow form, fitted", "the pressure form", "the acceleration form")))
 def test_the_noise_of_a_cleaned_log_is_measured_once(way: str, measured: list[tuple[Record, tuple[str, ...]]]) -> None:
     record = log(duration=1.0)
     for channel in ("motor_speed_rad_s", "position_m", "velocity_m_s", PRESSURE):

@@ -14,6 +14,7 @@ from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
 from plant.log.files import write_record
 from plant.sensors.sensors import BENCH
+from tests.thinned import thinned
 
 DEAR = {
     "control",
@@ -74,7 +75,10 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.mark.parametrize(
     ("verb", "suffix"),
-    [("estimate", "csv"), ("estimate", "parquet"), ("estimate", "mat"), ("diagnose", "csv"), ("identify", "csv")],
+    thinned(
+        [("estimate", "csv"), ("estimate", "parquet"), ("estimate", "mat"), ("diagnose", "csv"), ("identify", "csv")],
+        [("estimate", "csv"), ("diagnose", "csv"), ("identify", "csv")],
+    ),
 )
 def test_a_verb_on_a_log_imports_nothing_dear(logs: dict[str, Path], verb: str, suffix: str) -> None:
     assert not (DEAR | OTHERS) & loaded_by([verb, str(logs[suffix]), "--json"])
