@@ -21,9 +21,9 @@ PACKAGES = ("plant", "estimation", "faults", "experiments")
 
 HEAD = """# Notes
 
-What a result says beside its numbers is a list of notes: `notes` in the JSON, `found.all_notes` in Python. Each has a
-`code`, `data` (numbers in SI where the sentence does not say otherwise), and `text`, the sentence that is made of them.
-Decide by code and data; sentences may be put otherwise in any version. This page is written by `python docs/notes.py`.
+Every result has a list of notes beside its numbers: `notes` in the JSON, `found.all_notes` in Python. Each note has a
+`code`, `data` (in SI unless the sentence says otherwise), and `text`, the sentence made from them. Programs should
+decide by code and data: any version may change a sentence. `python docs/notes.py` writes this page.
 """
 
 

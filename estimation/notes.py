@@ -7,7 +7,7 @@ class SensorCode(Code):
     """Notes on the sensors of a log."""
 
     SENSOR_FROZE = (
-        "{channel} stays at {value:.6g} from {begin_s:.3g} s on for {length_s:.3g} s while other channels move: the "
+        "{channel} stays at {value:.6g} for {length_s:.3g} s, from {begin_s:.3g} s on, while other channels move: the "
         "sensor froze"
     )
     SENSOR_CONSTANT = "{channel} is {value:g} Pa throughout: the sensor is dead or not connected"
@@ -17,32 +17,32 @@ class SensorCode(Code):
     )
     HUM = "{channel} contains a hum of {amplitude_pa:.3g} Pa at {frequency_hz:.4g} Hz; it was removed"
     HELD = (
-        "{channel} has a new sample every {milliseconds:.3g} ms only and is repeated for {rows} rows; the repeated "
+        "{channel} has a new sample only every {milliseconds:.3g} ms and repeats it for {rows} rows; the repeated "
         "values were left out"
     )
     BRIDGED = (
-        "{channel} has a new sample every {milliseconds:.3g} ms only and lies on straight lines in between; the {rows} "
-        "rows from sample to sample were taken as one"
+        "{channel} has a new sample only every {milliseconds:.3g} ms and was interpolated linearly in between; one row "
+        "in {rows} was used"
     )
     DROPOUT = (
-        "{channel} repeats its last sample, as all channels do, and then goes on elsewhere: the logger missed "
-        "{rows} rows in {count} places; the repeated rows were left out"
+        "all channels repeat their last sample, and then {channel} jumps: the logger missed {rows} rows in {count} "
+        "places; the repeated rows were left out"
     )
     FILTERED = (
-        "{channel} was filtered or averaged before it was logged: its noise is alike over {rows} rows, and one sample "
-        "in {rows} was used"
+        "{channel} was filtered or averaged before it was logged: its noise is correlated over {rows} rows, so one "
+        "sample in {rows} was used"
     )
     OUTLIERS_LEFT_OUT = "{channel} has gross outliers in {count} of {total} samples; they were left out"
     SENSORS_DISAGREE = (
         "velocity_m_s and the slope of position_m differ by {difference_m_s:.2g} m/s: one of the two sensors is wrong"
     )
     VELOCITY_OFFSET = (
-        "{channel} reads {offset_m_s:.2g} m/s too much, by what position_m gains; the offset was subtracted"
+        "{channel} reads {offset_m_s:.2g} m/s too much, compared with position_m; the offset was subtracted"
     )
 
 
 class ChannelCode(Code):
-    """Notes on channels whose sign, unit or name is wrong: the log is another's than it says, and nothing follows."""
+    """Notes on channels whose sign, unit or name is wrong: correct the columns, then read the log again."""
 
     CHANNEL_REVERSED = (
         "{channel} has the wrong sign: compared with {against}, its correlation is {correlation:.2f}; give the column "
@@ -101,20 +101,20 @@ class EstimateCode(Code):
         "flow balance leaves out"
     )
     CHANNEL_LATE = (
-        "{channel} is {milliseconds:.1f} ms too {when} for the flow balance: a sensor or its filter lags, and this is "
-        "not corrected for"
+        "{channel} is {milliseconds:.1f} ms too {when} for the flow balance: a sensor or its filter lags, and this was "
+        "not corrected"
     )
     PLAY_LEFT = (
-        "the piston moves where position_m stands, as with a play (backlash) of some {play_um:.1g} um, and how it "
-        "crosses that is not found: bulk modulus may be several percent too low"
+        "the piston moves while position_m stands still, as with about {play_um:.1g} um of play (backlash), and the "
+        "fit could not correct this: bulk modulus may be several percent too low"
     )
     RIG_CONTRADICTED = (
-        "the piston moves as if the pump delivered {percent:.0f} % of its displacement, which no pump of this rig file "
-        "does: pump displacement, piston area, or the unit or scale of motor speed or position is wrong"
+        "the piston moves as if the pump delivered {percent:.0f} % of its displacement, which is impossible with this "
+        "rig file: pump displacement, piston area, or the unit or scale of motor speed or position is wrong"
     )
     TEETH_LEFT = (
-        "the pressure residuals go with the angle of the shaft, as where the teeth of the pump ({teeth} a turn) are "
-        "{percent:.0f} % in its flow, and they could not be taken up: bulk modulus may be a percent too low"
+        "the pressure residuals follow the shaft angle, as with a flow ripple of {percent:.0f} % from the pump's teeth "
+        "({teeth} per turn), and the fit could not correct this: bulk modulus may be a percent too low"
     )
     POSITION_RESIDUALS_LARGE = (
         "the position residuals are {ratio:.2f} times the sensors' noise ({motion_percent:.2g} % of the motion): "
@@ -125,12 +125,12 @@ class EstimateCode(Code):
         "Pa"
     )
     FORCES_ON_ANY_SCALE = (
-        "position alone does not fix the scale of the forces: bulk modulus between {least_pa:.3g} and {most_pa:.3g} Pa "
+        "position alone does not fix the scale of the forces: any bulk modulus from {least_pa:.3g} to {most_pa:.3g} Pa "
         "explains the log, with friction in proportion"
     )
     WEAKLY_HELD = (
-        "position alone holds bulk modulus weakly: noise leaves {noise_percent:.2g} % of it open, and a misfit too "
-        "small to show may move it by {percent:.0f} %"
+        "position alone determines bulk modulus only weakly: noise gives it a standard deviation of "
+        "{noise_percent:.2g} %, and a misfit too small to detect may move it by {percent:.0f} %"
     )
     INNOVATIONS_LARGE = (
         "the residuals of {channel} are {ratio:.1f} times as large as the filter expects (normalised innovation "
@@ -186,30 +186,31 @@ class RigCode(Code):
     )
     ENCODER_ZERO = "position_m reads {zero_mm:.1f} ± {half_width_mm:.1f} mm at mid-stroke; it was shifted to zero there"
     POSITION_PLAY = (
-        "position_m follows the piston with a play (backlash) of about {play_um:.1g} um; the play was taken up"
+        "position_m follows the piston with about {play_um:.1g} um of play (backlash); the play was corrected"
     )
     PLAY_NOT_EXCLUDED = (
-        "velocity_m_s moves with pressure while position_m stands, by chance or for a play (backlash) of some "
-        "{play_um:.1g} um: the interval of bulk modulus holds what that would do"
+        "velocity_m_s follows pressure while position_m stands still, by chance or because of about {play_um:.1g} um "
+        "of play (backlash): the interval of bulk modulus includes its effect"
     )
     AREA_TO_DISPLACEMENT = (
         "the ratio of pump displacement to piston area is {percent:.2f} ± {half_width:.2f} % of that in the rig file: "
-        "one of the two is wrong, and the log does not tell which"
+        "one of the two is wrong, and the log does not show which"
     )
     PUMP_WORN = (
         "the pump delivers {percent:.1f} ± {half_width:.1f} % of its displacement: it is worn, or displacement or "
         "piston area in the rig file is wrong"
     )
     PUMP_RIPPLES = (
-        "the teeth of the pump ({teeth} a turn) are {percent:.1f} ± {half_width:.1f} % in its flow; they were taken up"
+        "the pump's teeth ({teeth} per turn) make its flow ripple by {percent:.1f} ± {half_width:.1f} %; the fit "
+        "includes this"
     )
     MAKEUP_BENDS = (
-        "the make-up valves let in less than in proportion to a large drop, as an orifice does: half as much a pascal "
-        "at {drop_pa:.2g} Pa; this was taken up"
+        "the make-up valves restrict the flow as orifices do: at a pressure drop of {drop_pa:.2g} Pa they pass half as "
+        "much flow per pascal as at a small drop; the fit includes this"
     )
     MAKEUP_UNSEEN = (
-        "the make-up valve of side {side} never opened, so the log does not tell whether it is stuck shut; a drive "
-        "that empties side {side} would"
+        "the make-up valve of chamber {side} never opened, so this log does not show whether it is stuck shut; use a "
+        "drive that draws oil into chamber {side}"
     )
     SPEED_OFFSET = (
         "motor_speed_rad_s reads {offset_rad_s:.3g} ± {half_width:.2g} rad/s too much; the offset was subtracted"
@@ -219,7 +220,7 @@ class RigCode(Code):
         "speeds of this log, and bulk modulus would be lower by as much"
     )
     SINGLE_ROD = (
-        "side B of the piston has {percent:.1f} ± {half_width:.1f} % of the area of side A (rig file: "
+        "side B of the piston has {percent:.1f} ± {half_width:.2g} % of the area of side A (rig file: "
         "{rig_percent:.1f} %), chamber B has {volume_percent:.0f} % of the volume of chamber A (rig file: "
         "{rig_volume_percent:.0f} %), and pilot_share is {pilot_share:.2g} (rig file: {rig_pilot_share:.2g})"
     )
@@ -249,8 +250,8 @@ class RigCode(Code):
     )
     LEAKAGE_DRIFTS = (
         "leakage changes by a factor of {factor:.2f} over the log, from {first:.3g} to {last:.3g} m^3/(s Pa), as when "
-        "the oil warms or cools; severities are those at the end, and the condition holds wherever in between the rig "
-        "file's oil stands"
+        "the oil warms or cools; severities are those at the end; the condition holds for a rig file at any oil "
+        "temperature in between"
     )
     MAKEUP_BLOCKED = "the make-up valve of chamber {side} lets almost no oil in: it is stuck shut"
     PORT_DRAINS = (
@@ -264,11 +265,12 @@ class RigCode(Code):
         "compared at the measured value"
     )
     LEAKAGE_TURBULENT = (
-        "{percent:.0f} ± {half_width:.0f} % of the leakage at {at_pa:.3g} Pa goes with the root of pressure, as in "
-        "turbulent flow through a worn edge or a scratch, and leakage is stated at that pressure; this was taken up"
+        "{percent:.0f} ± {half_width:.0f} % of the leakage at {at_pa:.3g} Pa is turbulent (it grows with the square "
+        "root of pressure), as through a worn edge or a scratch; the fit includes this, and leakage is given at that "
+        "pressure"
     )
     CHECKS_CRACK = (
-        "the make-up valves open {crack_pa:.3g} ± {half_width_pa:.2g} Pa below the accumulator pressure in the rig file"
-        " on average, that of port {side} {later_pa:.3g} ± {later_half_width_pa:.2g} Pa lower than the other"
+        "on average the make-up valves open {crack_pa:.3g} ± {half_width_pa:.2g} Pa below the accumulator pressure in "
+        "the rig file; that of chamber {side} opens {later_pa:.3g} ± {later_half_width_pa:.2g} Pa lower than the other"
     )
     EXPLAINED_OTHERWISE = "{count} other explanation(s) fit the log about as well; the interval includes them"

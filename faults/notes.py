@@ -12,8 +12,8 @@ class AgainstCode(Code):
         "file and the columns' units"
     )
     PUMP_OFF = (
-        "the ratio of pump flow to piston flow is {percent:+.0f} % off the rig file: motor speed or position reads "
-        "wrong, or the rig file is of another actuator"
+        "the ratio of pump flow to piston flow differs by {percent:+.0f} % from the rig file: motor speed or position "
+        "reads wrong, or the rig file is of another actuator"
     )
     PUMP_DELIVERS_LESS = (
         "a pump that delivers {percent:.0f} % of its displacement explains the log better than any of the nine "
@@ -50,8 +50,8 @@ class ClassCode(Code):
     )
     BULK_MODULUS_NOT_VISIBLE = "this drive does not show bulk modulus"
     ONE_SCALE = (
-        "without pressure, leakage and friction are known only up to one common scale, which is limited only by how "
-        "alike actuators of one kind are"
+        "without pressure, leakage and friction are known only up to one common factor; its uncertainty is the spread "
+        "among actuators of one kind"
     )
     LEAKAGE_AND_BIAS_ALIKE = "the log does not separate the leakage coefficient from the flow bias"
     VELOCITY_LOST_TOLD = "the log does determine the velocity lost: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
@@ -73,14 +73,17 @@ class ClassCode(Code):
         "reads {pressure_pa:.3g} Pa too much: the force balance cannot separate the two"
     )
     SPRING_ON_ROD = "a spring of {value:.0f} N/m ({low:.0f} to {high:.0f}) on the rod; the rig file says {rig:.0f} N/m"
-    MASS_ON_ROD = "an inertia on the rod: {value:.3g} kg ({low:.3g} to {high:.3g}) move; the rig file says {rig:.3g} kg"
+    MASS_ON_ROD = (
+        "the moving mass is {value:.3g} kg ({low:.3g} to {high:.3g}), an inertia on the rod; the rig file says "
+        "{rig:.3g} kg"
+    )
     END_STOP = "the piston ran into a stop {reach_mm:.0f} mm from where the log begins; the fit includes the stop"
     HEALTHY_OF_THE_PAPER = (
-        "the rig file has a pump or piston of its own but the leakage and friction of the paper's actuator: the class "
-        "and every severity count from these; enter those of your healthy actuator"
+        "the rig file has the pump or piston of your actuator, but still the leakage and friction of the paper's: "
+        "class and severities are counted from these, so enter those of your healthy actuator"
     )
     PRESSURE_ABSENT_CLASS = (
-        "without differential_pressure_pa, friction shows only in velocity: the margins are usually smaller"
+        "without differential_pressure_pa, friction shows only in velocity: classes are usually told apart less clearly"
     )
 
 

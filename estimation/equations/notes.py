@@ -4,7 +4,7 @@ from plant.notes import Code
 
 
 class EquationsCode(Code):
-    """Notes on a fit of own equations: what speaks against it, what the logs do not tell, what they hold."""
+    """Notes on a fit of your own equations: what speaks against it, what the logs do not determine."""
 
     EQUATIONS_EXPLAIN_NOTHING = (
         "the equations predict {channel} no better than its mean does (fit {fit:.1f} %): check units, signs and start "
@@ -26,8 +26,8 @@ class EquationsCode(Code):
         "{parameter} ended at its bound {bound:g}: widen the bound, or the equations do not describe the log"
     )
     STEPS_TOO_LONG = (
-        "halving the integration steps moves the solution by {deviations:.2g} of its standard deviations, and steps "
-        "shorter than 1/{steps} of a sample were not tried: log faster, or make the equations less stiff"
+        "halving the integration steps moves the solution by {deviations:.2g} standard deviations, and steps shorter "
+        "than 1/{steps} of a sample were not tried: log faster, or make the equations less stiff"
     )
     NOT_CONVERGED = "the search stopped after {evaluations} evaluations before it settled: give better start values"
     LIMIT_UNEXPLAINED = (

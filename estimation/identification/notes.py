@@ -17,8 +17,8 @@ class IdentificationCode(Code):
         " where output error is biased; fit ARMAX or Box-Jenkins, or name the column that drives the loop (--reference)"
     )
     TWO_STAGES = (
-        "input {input!r} is taken as what {reference} explains of it, {share:.0%} of its power: the rest may be noise "
-        "that a closed loop fed back. Fits are from that part"
+        "only the part of input {input!r} that {reference} explains is used, {share:.0%} of its power: the rest may be "
+        "noise fed back by a closed loop"
     )
     VELOCITY_DIFFERENTIATED = (
         "channel 'velocity_m_s' is absent: it was computed from 'position_m' by central differences, which amplify "
@@ -63,11 +63,11 @@ class IdentificationCode(Code):
     )
     INPUT_BEYOND_RANGE = (
         "input {channel!r} ranges from {least:.4g} to {greatest:.4g}, but the polynomial model was fitted from "
-        "{low:.4g} to {high:.4g}: do not rely on its products in {share:.1%} of the samples; a linear model "
+        "{low:.4g} to {high:.4g}: do not rely on it outside that range ({share:.1%} of the samples); a linear model "
         "(--structure output-error) may do better"
     )
     NO_NONLINEARITY = (
         "neither dead zone nor saturation nor backlash at the input predicts {output!r} better on held-back data: the "
         "linear model was chosen"
     )
-    NO_FIT = "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): do not rely on it"
+    NO_FIT = "the model explains no more of {output!r} than chance would (fit {fit:.1f} %): do not rely on it"

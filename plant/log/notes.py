@@ -19,7 +19,7 @@ class LogCode(Code):
         "left out"
     )
     TIMES_OF_THEIR_OWN = (
-        "the channels have different time stamps; all were put on those of {channel}, with a sample time of "
+        "the channels have different time stamps; all were resampled to those of {channel}, with a sample time of "
         "{sample_time_s:.6g} s"
     )
     LOGGERS_MERGED = (
@@ -29,11 +29,11 @@ class LogCode(Code):
     SAMPLES_MASKED = "{channel} is missing in {count} of {total} samples ({percent:.2g} %); those samples are not used"
     CHANNEL_SLOWER = "{channel} has one value in {rows} rows"
     CHANNEL_LEFT_OUT = "{channel} is missing in {count} of {total} samples ({percent:.2g} %); the channel is not used"
-    LINES_SKIPPED = "lines among the rows that hold a comment or the header again were skipped: {count}"
-    END_LEFT_OUT = "lines after row {taken}, the last one of data, were left out: {count}"
+    LINES_SKIPPED = "lines skipped between rows of data (comments, or the header again): {count}"
+    END_LEFT_OUT = "lines left out after row {taken}, the last row of data: {count}"
     COLUMNS_ABSENT = "the rig file names columns that the log does not have: {columns}"
     COLUMN_OVERLOOKED = "column {column!r} was not used, but it may be {channel}; if it is, add --columns '{option}'"
-    CHAMBER_ALONE = "the pressure of one chamber alone, {channel}, was not used: differential pressure needs {other}"
+    CHAMBER_ALONE = "{channel} was not used: differential pressure also needs {other}"
     METADATA_UNREADABLE = "the log's metadata are not a valid {wanted} and were ignored"
     SAMPLE_TIME_SHORT = (
         "the sample time is {sample_time_s:.3g} s, which is unusually short: check the unit (s read as ms?)"
