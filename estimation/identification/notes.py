@@ -70,4 +70,4 @@ class IdentificationCode(Code):
         "neither dead zone nor saturation nor backlash at the input predicts {output!r} better on held-back data: the "
         "linear model was chosen"
     )
-    NO_FIT = "the model explains no more of {output!r} than chance would (fit {fit:.1f} %): do not rely on it"
+    NO_FIT = "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): do not rely on it"

@@ -178,7 +178,7 @@ def _interruptible() -> Generator[Event]:
         stop.set()
         for one in ENDINGS:
             signal.signal(one, signal.default_int_handler)
-        note("interrupted: finishing what is in flight; press Ctrl-C again to stop at once")
+        note("interrupted: finishing the running cases; press Ctrl-C again to stop at once")
 
     before = {one: signal.signal(one, wish) for one in ENDINGS}
     try:

@@ -43,7 +43,7 @@ def diagnose(
         flag(
             "--transfer-functions/--no-transfer-functions",
             "Print the errors of nine transfer functions (for your own rig they are identified first: 20 s), or leave "
-            "out the line on them that is printed for the paper's rig.",
+            "out the line that sums them up for the paper's rig.",
         ),
     ] = None,
     scores: Annotated[

@@ -137,8 +137,8 @@ def _diagnosed(
 
     kind, _ = load_actuator(plant, rig)
     if not folder.is_dir():
-        got = "got a file" if folder.is_file() else "there is no such folder"
-        raise HydrostateError(f"{folder}: must be a folder with logs or a store, {got}")
+        got = "it is a file" if folder.is_file() else "there is no such folder"
+        raise HydrostateError(f"{folder}: must be a folder with logs or a store, but {got}")
     known = (*SUFFIXES, *OTHERS)
     found = sorted(one for one in folder.rglob("*") if one.suffix.lower() in known and out not in one.parents)
     if not found:

@@ -276,7 +276,8 @@ def _clock_sentence(one: Mapping[str, Any]) -> str:
     clock = one["clock"]
     if clock is None:
         step = one["step_s"]
-        return f"the file gives a step of {step:g} s" if step else "no column is a clock: --sample-time S reads it"
+        without = "no column holds the time: give the time between rows with --sample-time S"
+        return f"the file gives a step of {step:g} s" if step else without
     flaws = [f"{clock[name]} {said}" for name, said in (("gaps", "gaps"), ("repeats", "repeats")) if clock[name]]
     if clock["backward"]:
         flaws.append(f"{clock['backward']} steps back")

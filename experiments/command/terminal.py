@@ -243,7 +243,7 @@ def unexpected(error: BaseException) -> str:
     if os.environ.get("HYDROSTATE_DEBUG", "") not in {"", "0"}:
         emit("".join(traceback.format_exception(error)).rstrip(), err=True)
     if isinstance(error, MemoryError):
-        return "the work on it needs more memory than there is"
+        return "this log needs more memory than there is"
     said = " ".join(str(error).split())[:200]
     what = type(error).__name__ + (f": {said}" if said else "")
     return f"an internal error ({what}), please report it; HYDROSTATE_DEBUG=1 prints the traceback"

@@ -97,7 +97,7 @@ def _of_logs(runs: Any, channels: Sequence[str] | None, sample_time: float | Non
         raise HydrostateError("sample_time is that of an array; logs have their own")
     records: list[Record] = [record_of(one) for one in (runs if isinstance(runs, list | tuple) else [runs])]
     if not records:
-        raise HydrostateError("features of one run at least are needed, got none")
+        raise HydrostateError("features of at least one run are needed, got none")
     names = list(records[0] if channels is None else channels)
     step, values = records[0].sample_time, list[Any]()
     for place, record in enumerate(records):

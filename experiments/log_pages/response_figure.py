@@ -36,7 +36,7 @@ def draw_response(found: MeasuredResponse, title: str) -> Figure:
                 levels = _decibels(told.power[where])
                 axes[1].semilogx(told.frequency[where], levels, marker, color=colour, ms=3, label=name)
         axes[1].semilogx(told.frequency, _decibels(told.noise), color=GREY, lw=0.6, label="noise")
-        axes[1].set(ylabel="power of the output a line [dB]", xlabel="frequency [Hz]")
+        axes[1].set(ylabel="output power per line [dB]", xlabel="frequency [Hz]")
         axes[1].legend(loc="lower left")
     axes[0].legend(loc="lower left")
     return figure

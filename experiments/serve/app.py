@@ -35,16 +35,16 @@ Name = Annotated[str, Query(min_length=1, max_length=200, description="Name of t
 StreamName = Annotated[str, Path(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
 
 WHY: Mapping[int, str] = {
-    400: "This is no HTTP, or the body broke off.",
+    400: "The request is not HTTP, or its body was cut off.",
     401: "A token is needed.",
-    403: "A page of another site asks.",
-    404: "There is no such thing.",
-    405: "That cannot be done with it.",
-    408: "It comes too slowly.",
-    409: "It is not done yet.",
+    403: "The request comes from a page of another site.",
+    404: "Not found.",
+    405: "This method is not allowed here.",
+    408: "The request arrives too slowly.",
+    409: "Not finished yet.",
     413: "It is too large, or the folder is full.",
     415: "The body must be the file itself.",
-    421: "The server is not asked by its name.",
+    421: "The host name is unknown.",
     422: "A parameter is missing or wrong, or the body is empty.",
     429: "The server is busy; come again after the seconds of Retry-After.",
 }

@@ -270,10 +270,10 @@ async def receive_file(chunks: AsyncIterator[bytes], path: Path, most: int, room
                 require_size(size, most, room)
                 took = time.monotonic() - began
                 if took > GRACE and size < took * SLOWEST:
-                    raise RefusedError(408, f"the file comes too slowly: {size / took:.0f} bytes a second")
+                    raise RefusedError(408, f"the file arrives too slowly: {size / took:.0f} bytes per second")
                 file.write(chunk)
             if not size:
-                raise RefusedError(422, "the body must be the file itself, it is empty")
+                raise RefusedError(422, "the body must be the file itself, but it is empty")
             file.flush()
             await asyncio.to_thread(os.fsync, file.fileno())
         whole = True

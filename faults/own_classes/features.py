@@ -71,7 +71,7 @@ def channel_features(names: Sequence[str], runs: Sequence[Array], sample_time: f
     ([5.0], [1.0])
     """
     if not runs:
-        raise HydrostateError("features of one run at least are needed, got none")
+        raise HydrostateError("features of at least one run are needed, got none")
     if not (np.isfinite(sample_time) and sample_time > 0.0):
         raise HydrostateError(f"sample_time must be positive and finite, got {sample_time!r}")
     shortest = min(run.shape[1] for run in runs)

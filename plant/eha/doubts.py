@@ -63,32 +63,32 @@ DOUBTS: Mapping[str, Doubt] = {
     "pump_displacement": Doubt(
         Spread.of(0.03),
         Spread.of(0.01),
-        "judged: a catalogue gives geometric displacement, a few per cent above what is delivered; measured as "
+        "judged: a catalogue gives geometric displacement, a few per cent more than the pump delivers; measured as "
         "ISO 4409 class B, flow within 1.5 %",
     ),
     "piston_area": Doubt(
         Spread.of(0.02),
         Spread.of(0.003),
-        "judged: tolerances of bore and rod (ISO 286 H8, 0.1 %) are nothing beside a rod or a mean that is not the "
-        "one fitted; measured with a calliper",
+        "judged: tolerances of bore and rod (ISO 286 H8, 0.1 %) matter less than a wrong rod or a wrong mean of two "
+        "areas; measured with a calliper",
     ),
     "chamber_volume": Doubt(
         Spread.of(0.15),
         Spread.of(0.05),
-        "judged: ports, hoses and the manifold are in no drawing of the cylinder, and the middle is not where the "
-        "rig file thinks; measured by filling, without what stays in as air",
+        "judged: the drawing of the cylinder leaves out ports, hoses and manifold, and mid-stroke is known only "
+        "roughly; measured by filling, without the air that stays inside",
     ),
     "moving_mass": Doubt(
         Spread(0.1, 0.4),
         Spread(0.05, 0.05),
-        "judged: a catalogue's piston and rod leave out the load, and oil in a line counts by the square of area "
-        "over bore (0.3 m of 12 mm line add 5 kg on 15 cm^2); measured by weighing with the load",
+        "judged: a catalogue's piston and rod leave out the load, and oil in a line counts by the square of piston "
+        "area over line area (0.3 m of 12 mm line add 5 kg on 15 cm^2); measured by weighing with the load",
     ),
     PRESSURE_GAIN: Doubt(
         Spread.of(0.015),
         Spread.of(0.003),
-        "judged: ISO 4409 class C, pressure within 2.5 %, is what an industrial transmitter keeps over years and "
-        "temperature; measured against a reference gauge, class A, within 0.5 %",
+        "judged: an industrial transmitter stays within ISO 4409 class C, 2.5 % of pressure, over years and "
+        "temperatures; measured against a reference gauge, class A, within 0.5 %",
     ),
 }
 """Of each entry that is doubted; any other is taken as known where the rig file does not say."""

@@ -53,25 +53,29 @@ class EhaParameters:
     friction_coulomb: float = si(436.0, "N", "Coulomb friction a_3", "Table 4", zero=True)
     relief_pressure: float = si(3.4475e6, "Pa", "relief setting, either direction", "sections 2, 3: 500 psi")
     relief_conductance: float = si(
-        1e-8, "m^3/(s Pa)", "relief flow a pascal above the setting", "judged: rated pump flow within 7 kPa", zero=True
+        1e-8,
+        "m^3/(s Pa)",
+        "relief flow per pascal above the setting",
+        "judged: rated pump flow within 7 kPa",
+        zero=True,
     )
     accumulator_pressure: float = si(2.758e5, "Pa", "inner circuit, absolute", "section 2: 40 psi")
     makeup_conductance: float = si(
-        1e-9, "m^3/(s Pa)", "make-up flow a pascal below the inner circuit", JUDGED, zero=True
+        1e-9, "m^3/(s Pa)", "make-up flow per pascal below the inner circuit", JUDGED, zero=True
     )
     motor_speed_per_volt: float = si(
-        31.41592653589793, "rad/(s V)", "motor speed a volt of command", "section 7: 4 V is 1200 rpm, errata E1"
+        31.41592653589793, "rad/(s V)", "motor speed per volt of command", "section 7: 4 V is 1200 rpm, errata E1"
     )
     motor_speed_limit: float = si(251.4, "rad/s", "highest motor speed", "section 4: 8 V input mean")
-    stroke: float | None = si(None, "m", "full stroke of the piston, where it is known", "the paper gives none")
+    stroke: float | None = si(None, "m", "full stroke of the piston, if known", "the paper gives none")
     area_difference: float = si(
-        0.0, "1", "areas of sides A and B: their difference over their sum", "0: a through rod", signed=True
+        0.0, "1", "difference of the areas of sides A and B over their sum", "0: a through rod", signed=True
     )
     volume_difference: float = si(
-        0.0, "1", "chambers A and B in mid-stroke: their difference over their sum", "0: alike", signed=True
+        0.0, "1", "difference of the volumes of chambers A and B in mid-stroke over their sum", "0: alike", signed=True
     )
     pilot_share: float = si(
-        0.0, "1", "make-up flow through valves that a pilot opens, over that of plain checks", "0: plain checks"
+        0.0, "1", "make-up flow through pilot-operated valves, over that of plain check valves", "0: plain checks"
     )
     load_force: float = si(0.0, "N", "constant load on the rod, against extension", "none in the paper", signed=True)
     load_stiffness: float = si(0.0, "N/m", "spring on the rod, free in mid-stroke", "none in the paper")

@@ -132,7 +132,7 @@ def require_volts(name: str, volts: float) -> None:
 
 def _require_monotone(name: str, volts: Sequence[float], *series: Sequence[float]) -> None:
     if len(volts) < 2 or any(len(values) != len(volts) for values in series):
-        raise RigError(f"{name} must have at least two points, one value a voltage, got {len(volts)} voltages")
+        raise RigError(f"{name} must have at least two points, one value per voltage, got {len(volts)} voltages")
     rising = all(b > a > 0.0 for values in series for a, b in pairwise(values))
     if not rising or any(b >= a for a, b in pairwise(volts)):
         raise RigError(f"{name} must open as its voltage falls, got {volts} V and {series}")

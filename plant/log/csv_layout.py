@@ -145,7 +145,7 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
     (';', ',', ['Zeit', 'Weg'])
     """
     if not any(line.strip() for line in lines):
-        raise LogError("a header line is needed, the file is empty", source)
+        raise LogError("a header line is needed, but the file is empty", source)
     head = "\n".join(lines[:5])
     strange = sum(one == "\ufffd" or (ord(one) < 32 and one not in "\t\n\x0c\x0b") for one in head)
     if strange > 0.1 * len(head) or "\0" in head:

@@ -59,7 +59,7 @@ class CsvStream:
         self._lines = iter(lines)
         header = next((line for line in self._lines if line.strip()), "")
         if not header:
-            raise LogError("a header line is needed, nothing came", source)
+            raise LogError("a header line is needed, but nothing came", source)
         self._delimiter = max(",;\t", key=header.count)
         names = next(csv.reader([header], delimiter=self._delimiter))
         self._width = len(names)

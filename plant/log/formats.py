@@ -63,7 +63,7 @@ def format_of(path: Path) -> str:
     with path.open("rb") as file:
         start = file.read(520)
     if not start:
-        raise LogError("a header line is needed, the file is empty", str(path))
+        raise LogError("a header line is needed, but the file is empty", str(path))
     for sign, kind in SIGNS.items():
         if start.startswith(sign):
             return kind

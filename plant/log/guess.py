@@ -233,9 +233,9 @@ def missing_channels(wanted: Sequence[str], headings: Sequence[Heading], source:
         The log.
     """
     names = listed([one.name for one in headings])
-    timeless = "; a log without time is read with --sample-time" if TIME in wanted else ""
+    timeless = "; to read a log without time, give --sample-time" if TIME in wanted else ""
     hint = hint_of([name for one in wanted for name in one.split(" or ")], headings)
-    return NoChannelError(f"{absent(wanted)}, the log has {names}{hint}{timeless}", source)
+    return NoChannelError(f"{absent(wanted)}; the log has {names}{hint}{timeless}", source)
 
 
 def absent(wanted: Sequence[str]) -> str:

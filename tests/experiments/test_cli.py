@@ -156,7 +156,7 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
         ),
         (["library", "a.json"], "library a.json cannot be read: No such file or directory"),
         (["diagnose", "a.csv", "--report", "."], "--report must be a file, got the folder '.'"),
-        (["fleet", "none"], "none: must be a folder with logs or a store, there is no such folder"),
+        (["fleet", "none"], "none: must be a folder with logs or a store, but there is no such folder"),
         (["conditions", "--seed", "-1"], "Invalid value for '--seed'"),
     ],
 )
@@ -250,7 +250,7 @@ def test_the_command_runs_as_a_process_with_its_exit_codes(tmp_path: Path) -> No
     assert (fine.returncode, len(json.loads(fine.stdout)), fine.stderr) == (0, 9, "")
     assert refused.returncode == 2
     assert [one["outcome"] for one in json.loads(refused.stdout)] == ["failed"]
-    assert "empty.csv: a header line is needed, the file is empty" in refused.stderr
+    assert "empty.csv: a header line is needed, but the file is empty" in refused.stderr
     assert "Traceback" not in refused.stderr
 
 

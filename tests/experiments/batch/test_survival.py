@@ -182,7 +182,7 @@ def test_ctrl_c_finishes_what_is_in_flight_and_says_how_to_go_on(tmp_path: Path)
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers too
         out, said = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "finishing what is in flight" in said
+    assert "finishing the running cases" in said
     assert "the same command goes on from there" in said
     assert "Traceback" not in said
     assert out.strip() == f"{store.name}/report.html"

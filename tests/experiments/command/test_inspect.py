@@ -127,6 +127,6 @@ def test_a_log_without_a_clock_or_a_known_column_is_told_what_to_give(tmp_path: 
     rng = np.random.default_rng(0)
     path.write_text("k,note\n" + "".join(f"{one:.4f},word\n" for one in rng.normal(size=50)))
     told = " ".join(invoke(path).stdout.split())
-    assert "no column is a clock: --sample-time S reads it" in told
+    assert "no column holds the time: give the time between rows with --sample-time S" in told
     assert "no column was recognised; name the columns yourself" in told
     assert "or add to one command" not in told

@@ -23,7 +23,7 @@ def raising(error: BaseException) -> int:
         (KeyboardInterrupt(), INTERRUPTED, "hydrostate: interrupted"),
         (HydrostateError("a rig is needed"), USAGE, "hydrostate: a rig is needed"),
         (ZeroDivisionError("by nothing"), SOME_FAILED, "an internal error (ZeroDivisionError: by nothing)"),
-        (MemoryError(), SOME_FAILED, "the work on it needs more memory than there is"),
+        (MemoryError(), SOME_FAILED, "this log needs more memory than there is"),
     ],
 )
 def test_whatever_goes_wrong_is_one_sentence_and_a_code(

@@ -155,7 +155,7 @@ def test_a_stream_without_motion_is_refused_by_its_name() -> None:
 
 
 def test_nothing_at_all_is_no_stream() -> None:
-    with pytest.raises(LogError, match="a header line is needed, nothing came"):
+    with pytest.raises(LogError, match="a header line is needed, but nothing came"):
         watch_rows(Told(lambda _: None), ["\n", "  \n"], asked(), "bench", None)
 
 

@@ -66,7 +66,7 @@ def test_columns_do_not_hang_on_the_other_runs() -> None:
         (np.zeros((4, 2, 60)), {"cycle": 1.0}, "without a cycle"),
         (np.zeros((4, 2, 6)), {}, "parts must lie between 1 and the samples of the shortest run, 6"),
         (np.full((1, 1, 60), np.inf), {}, "run 0 must hold finite values"),
-        ([], {}, "one run at least"),
+        ([], {}, "at least one run"),
         ([table(np.arange(50.0))], {"channels": ["r"]}, "run 0 has no channel 'r', it has p, q"),
         ([table(np.arange(50.0)), table(np.arange(50.0), 0.02)], {}, "run 1 has a sample every 0.02 s"),
         ([table(np.arange(50.0))], {"cycle": 1.0}, "cycle must be as long as run 0 at most"),
@@ -80,7 +80,7 @@ def test_runs_that_do_not_fit_are_refused(runs: Any, options: dict[str, Any], me
 
 
 def test_features_need_a_run_and_a_clock() -> None:
-    with pytest.raises(HydrostateError, match="features of one run at least are needed, got none"):
+    with pytest.raises(HydrostateError, match="features of at least one run are needed, got none"):
         channel_features(["p"], [], 1.0, Recipe())
     for wrong in (0.0, np.nan):
         with pytest.raises(HydrostateError, match="sample_time must be positive and finite"):

@@ -48,7 +48,7 @@ def test_dates_are_told_from_numbers() -> None:
 
 
 def test_blank_lines_alone_are_refused() -> None:
-    with pytest.raises(LogError, match="a header line is needed, the file is empty"):
+    with pytest.raises(LogError, match="a header line is needed, but the file is empty"):
         layout("", " ")
 
 

@@ -293,7 +293,7 @@ def test_a_sample_time_that_is_none_is_refused(sample_time: float, tmp_path: Pat
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("log.csv", b"", "a header line is needed, the file is empty"),
+        ("log.csv", b"", "a header line is needed, but the file is empty"),
         ("log.csv", b"\xd0\xcf\x11\xe0" + bytes(600), "xls"),
         ("log.csv", bytes(512) + b"\x89HDF\r\n\x1a\n" + bytes(99), "log.csv"),
     ],

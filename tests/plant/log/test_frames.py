@@ -55,7 +55,7 @@ def test_dates_are_time_and_say_when_the_log_began(zone: str | None, in_a_column
 
 def test_an_index_that_counts_rows_is_no_time() -> None:
     chosen = pd.concat([table(), table()], ignore_index=True).iloc[::2]
-    with pytest.raises(LogError, match=r"^the table: column time_s is missing.* is read with --sample-time"):
+    with pytest.raises(LogError, match=r"^the table: column time_s is missing.*without time, give --sample-time"):
         read_record(frame_table(chosen))
     with pytest.warns(LogWarning, match="no time column"):
         assert read_any(frame_table(chosen)).sample_time == 1.0

@@ -50,7 +50,7 @@ def test_a_missing_column_is_refused_with_headers_guess_and_the_command(tmp_path
     with pytest.raises(LogError) as caught:
         read_record(path)
     said = str(caught.value)
-    assert "columns motor_speed_rad_s, and position_m or velocity_m_s are missing, the log has 'Zeit [s]'" in said
+    assert "columns motor_speed_rad_s, and position_m or velocity_m_s are missing; the log has 'Zeit [s]'" in said
     assert "perhaps --columns 'position_m=Weg [mm]:mm,motor_speed_rad_s=n_Mot [rpm]:rpm'" in said
     assert "`hydrostate inspect FILE`" in said
 

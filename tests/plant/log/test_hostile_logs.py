@@ -75,7 +75,7 @@ def test_one_sample_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["time_s", "motor_speed_rad_s", "position_m"])
 def test_a_missing_column_is_named(tmp_path: Path, name: str) -> None:
-    refused(log(tmp_path, header=HEADER.replace(name, "other")), f"{name}.* is missing, the log has")
+    refused(log(tmp_path, header=HEADER.replace(name, "other")), f"{name}.* is missing; the log has")
 
 
 def test_an_unknown_unit_is_refused(tmp_path: Path) -> None:
