@@ -72,7 +72,7 @@ def _native(
     del sound
     for name in ("columns", "parameter"):
         if options[name]:
-            raise HydrostateError(f"--{name} is of an FMU: it needs --fmu FILE")
+            raise HydrostateError(f"--{name} needs --fmu FILE")
     plant = options["plant"] if options["plant"] in PLANTS else "circuit"
     sensors = NOISE[options["sensors"]]
     return plant, simulate(PLANTS[plant], speed, options["sample_time"], faulty, sensors=sensors, rng=rng)

@@ -29,13 +29,13 @@ class Log(BaseModel):
     id: str
     name: str
     verb: Verb
-    size: int = Field(description="Bytes of the file.")
+    size: int = Field(description="Size of the file [byte].")
     state: Literal["waiting", "running", "done", "failed", "interrupted"]
-    phase: str | None = Field(description="Where the work is, while it runs.")
-    received: float = Field(description="When it came, seconds since 1970.")
-    ended: float | None = Field(description="When the work on it was over, seconds since 1970.")
+    phase: str | None = Field(description="Current step, while the log is running.")
+    received: float = Field(description="When the log arrived [s since 1970].")
+    ended: float | None = Field(description="When the result was ready [s since 1970].")
     outcome: str | None = Field(description="ok, not_observable, mismatch, diverged or failed.")
-    message: str | None = Field(description="What came of it, in a sentence.")
+    message: str | None = Field(description="The result in one sentence.")
 
 
 class Logs(BaseModel):
@@ -48,9 +48,9 @@ class Logs(BaseModel):
 class Health(BaseModel):
     """Whether the server has room."""
 
-    waiting: int = Field(description="Logs that are worked on or wait.")
+    waiting: int = Field(description="Number of logs that are running or waiting.")
     most_waiting: int
-    room: int = Field(description="Bytes that the folder still takes.")
+    room: int = Field(description="Free space in the folder [byte].")
     version: str
 
 
@@ -88,11 +88,11 @@ class StreamState(BaseModel):
     name: str
     state: Literal["connecting", "learning", "watching", "ended", "failed"]
     message: str
-    gauges: dict[str, Any] | None = Field(description="The last of them; values in SI.")
+    gauges: dict[str, Any] | None = Field(description="The latest gauges, in SI.")
 
 
 class StreamHistory(StreamState):
-    """A stream with what is remembered of it."""
+    """A stream with its last ten minutes and its events."""
 
     history: list[dict[str, Any]]
     events: list[dict[str, Any]]

@@ -29,8 +29,8 @@ from experiments.serve.settings import Settings
 from experiments.serve.views import compared
 from plant.errors import HydrostateError
 
-Identity = Annotated[str, Path(pattern=r"^[0-9a-f]{16}$", description="As the list of logs has it.")]
-Asked = Annotated[str, Query(pattern=r"^[0-9a-f]{16}$", description="Identity of a log that is done.")]
+Identity = Annotated[str, Path(pattern=r"^[0-9a-f]{16}$", description="The id from the list of logs.")]
+Asked = Annotated[str, Query(pattern=r"^[0-9a-f]{16}$", description="The id of a finished log.")]
 Name = Annotated[str, Query(min_length=1, max_length=200, description="Name of the file.")]
 StreamName = Annotated[str, Path(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
 
@@ -154,7 +154,7 @@ def _answer_errors(app: FastAPI) -> None:
         return JSONResponse({"detail": said}, 500)
 
     async def left(_: Request, __: Exception) -> Response:
-        return JSONResponse({"detail": "the body broke off"}, 400)
+        return JSONResponse({"detail": "the body was cut off"}, 400)
 
     app.add_exception_handler(RefusedError, refused)
     app.add_exception_handler(HTTPException, http)
@@ -196,17 +196,17 @@ def _offer_logs(app: FastAPI, desk: Desk) -> None:
 
     @app.get("/api/logs/{id}", responses=why(404, 422), tags=["logs"])
     def log(id: Identity) -> Log:  # noqa: A002 - a path's name
-        """Return what is known of a log."""
+        """Return the state of a log."""
         return log_of(desk.known(id), desk.jobs)
 
     @app.get("/api/logs/{id}/result", responses=why(404, 409, 422), tags=["logs"])
     def result(id: Identity) -> dict[str, Any]:  # noqa: A002 - a path's name
-        """Return what came of a log: the object that `hydrostate VERB --json` prints for it."""
+        """Return the result of a log: the object that `hydrostate VERB --json` prints for it."""
         return desk.result(id)
 
     @app.delete("/api/logs/{id}", status_code=204, responses=why(404, 422), tags=["logs"])
     def delete(id: Identity) -> None:  # noqa: A002 - a path's name
-        """Delete a log with its page and result; the work on it ends at once."""
+        """Delete a log with its page and result; if it is running, it stops at once."""
         desk.delete(id)
 
     @app.get("/api/health", tags=["server"])
@@ -217,7 +217,7 @@ def _offer_logs(app: FastAPI, desk: Desk) -> None:
 
     @app.get("/metrics", response_class=PlainTextResponse, responses=why(page=True), tags=["server"])
     def metrics() -> PlainTextResponse:
-        """Return what a monitor wants to know, in the text format of Prometheus."""
+        """Return the metrics in the text format of Prometheus."""
         streams = [(one.state, one.alarms) for one in desk.streams.by_name.values()]
         text = exposition(desk.store.counts(), desk.jobs.waiting, streams, time.time())
         return PlainTextResponse(text, media_type=PROMETHEUS_TEXT)
@@ -235,7 +235,7 @@ def _offer_comparison(app: FastAPI, desk: Desk) -> None:
 def _offer_streams(app: FastAPI, desk: Desk) -> None:
     @app.get("/api/streams", tags=["streams"])
     def streams() -> list[StreamState]:
-        """Return the streams that are watched."""
+        """Return the watched streams."""
         return [StreamState.model_validate(one.state) for one in desk.streams.by_name.values()]
 
     @app.get("/api/streams/{name}", responses=why(404, 422), tags=["streams"])
@@ -254,7 +254,7 @@ def _offer_streams(app: FastAPI, desk: Desk) -> None:
         tags=["streams"],
     )
     async def follow(request: Request, name: StreamName) -> StreamingResponse:
-        """Return what a stream tells as it comes: `history` once, then `gauges`, and `state` with new events."""
+        """Return the events of a stream as they come: `history` once, then `gauges`, and `state` with new events."""
         one = desk.stream(name)
         if desk.streams.looking >= MOST_LOOKING:
             raise RefusedError(429, f"{MOST_LOOKING} views are open, close one")
@@ -278,7 +278,7 @@ def _offer_pages(app: FastAPI, desk: Desk) -> None:
 
     @app.get("/fleet", response_class=HTMLResponse, responses=why(404, page=True), tags=["pages"])
     async def fleet() -> HTMLResponse:
-        """Return the page of the fleet: a row an actuator, the sick ones on top."""
+        """Return the page of the fleet: one row per actuator, the worst on top."""
         return shown(await desk.fleet())
 
     @app.get("/compare", response_class=HTMLResponse, responses=why(404, 409, 422, page=True), tags=["pages"])
