@@ -107,7 +107,7 @@ def sureness(result: Mapping[str, Any]) -> str:
 
 def _how_sure(result: Mapping[str, Any]) -> str:
     share = result["probabilities"][result["condition"]]
-    what = "What is said of leakage and friction" if _soft_oil(result) else "This"
+    what = "The verdict on leakage and friction" if _soft_oil(result) else "This"
     if share >= SURE:
         return f"{what} is certain (over {100.0 * SURE:.0f} %)."
     word = "probable" if share >= LIKELY else "the most likely of several explanations"

@@ -41,7 +41,7 @@ def test_soft_oil_is_in_the_verdict_and_leaves_something_to_repair() -> None:
     assert "softer than its limit; leakage and friction are normal" in verdict(said_of("normal", **soft))
     assert verdict(said_of("minor_leakage", **soft)).endswith("; its oil is softer than its limit.")
     assert what_to_do(said_of("normal", **soft)) == ["Log again."]
-    assert sureness(said_of("normal", **soft)) == "What is said of leakage and friction is certain (over 99 %)."
+    assert sureness(said_of("normal", **soft)) == "The verdict on leakage and friction is certain (over 99 %)."
 
 
 def test_what_is_not_certain_is_not_called_certain() -> None:
