@@ -1,9 +1,7 @@
 """The process of a stream: it watches what comes and tells the server gauges a few times a second, and every event."""
 
 import contextlib
-import os
 import signal
-import threading
 import time
 from collections.abc import Mapping
 from multiprocessing.connection import Connection
@@ -15,6 +13,7 @@ from experiments.command.options import load_rig
 from experiments.command.terminal import unexpected
 from experiments.command.watch_told import Told
 from experiments.command.watching import Asked, watch_network
+from experiments.serve.process import bind_to_server
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -124,15 +123,7 @@ def watch_stream(
         File in which the watch is kept over a restart.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for name in ("OPENBLAS", "OMP", "MKL"):
-        os.environ.setdefault(f"{name}_NUM_THREADS", "1")
-
-    def look() -> None:
-        while os.getppid() == server:
-            time.sleep(1.0)
-        os._exit(1)
-
-    threading.Thread(target=look, daemon=True).start()
+    bind_to_server(server)
     told, outcome, said = Gauges(out), "failed", ""
     with contextlib.suppress(BrokenPipeError):
         try:

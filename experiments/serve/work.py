@@ -2,8 +2,6 @@
 
 import os
 import sys
-import threading
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -15,6 +13,7 @@ from experiments.command.log_verb import page_of
 from experiments.command.logs import caught, overheard, read_log, with_said
 from experiments.command.options import load_actuator
 from experiments.command.terminal import clauses, unexpected
+from experiments.serve.process import bind_to_server
 from plant.atomic import replacing
 from plant.errors import HydrostateError
 
@@ -27,9 +26,6 @@ READING, WORKING, WRITING = "reading the log", "working it out", "writing the pa
 
 NO_MEMORY = 77
 """How a process ends whose log asked for more memory than there is: what it still holds, the next log would want."""
-
-LOOKED_AFTER = 1.0
-"""Time between two looks whether the server is still there [s]."""
 
 
 @dataclass(frozen=True)
@@ -86,21 +82,13 @@ def begin_worker(server: int, memory: int) -> None:
     memory : int
         Most that it may ask for [bytes].
     """
-    for name in ("OPENBLAS", "OMP", "MKL"):
-        os.environ.setdefault(f"{name}_NUM_THREADS", "1")
+    bind_to_server(server)
     os.environ["ARROW_DEFAULT_MEMORY_POOL"] = "system"  # the others reserve 1 GiB ahead, which the limit counts
     if sys.platform == "linux":
         import resource
 
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-    def look() -> None:
-        while os.getppid() == server:
-            time.sleep(LOOKED_AFTER)
-        os._exit(1)
-
-    threading.Thread(target=look, daemon=True).start()
 
 
 def work_on(task: Task) -> Worked:

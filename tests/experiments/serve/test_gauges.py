@@ -1,6 +1,5 @@
 """The process of a stream: what its gauges say of what came, and how it ends."""
 
-import os
 import signal
 from pathlib import Path
 from types import SimpleNamespace
@@ -84,20 +83,15 @@ class Pipe:
 
 
 @pytest.fixture
-def looks(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """Return the threads that would look after the server; signals stay as they are."""
-    threads: list[Any] = []
-
-    def thread(target: Any, daemon: bool) -> Any:
-        assert daemon
-        return SimpleNamespace(start=lambda: threads.append(target))
-
-    monkeypatch.setattr(gauges, "threading", SimpleNamespace(Thread=thread))
+def bound(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Return the servers to which the process binds itself; signals stay as they are."""
+    servers: list[int] = []
+    monkeypatch.setattr(gauges, "bind_to_server", servers.append)
     monkeypatch.setattr(gauges, "signal", SimpleNamespace(signal=lambda *_: None, SIGINT=signal.SIGINT, SIG_IGN=None))
-    return threads
+    return servers
 
 
-def run(pipe: Pipe, state: Path, server: int = 1) -> None:
+def run(pipe: Pipe, state: Path, server: int = 41) -> None:
     watch_stream(pipe, server, "tcp://nowhere:1", None, (), 0.1, state)  # type: ignore[arg-type]
 
 
@@ -107,7 +101,7 @@ def rows(*_: object) -> list[str]:
 
 
 def test_a_stream_that_breaks_tells_its_last_gauges_before_its_end(
-    looks: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    bound: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("experiments.command.watching.stream_lines", rows)
     pipe = Pipe()
@@ -117,34 +111,15 @@ def test_a_stream_that_breaks_tells_its_last_gauges_before_its_end(
     assert (end["event"], end["outcome"]) == ("end", "failed")
     assert "must hold numbers" in end["message"]
     assert pipe.closed
-    assert len(looks) == 1
+    assert bound == [41]
     assert (tmp_path / "state.npz").exists()
 
 
 def test_a_server_that_is_gone_is_told_nothing_and_raises_nothing(
-    looks: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    bound: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    del looks
+    del bound
     monkeypatch.setattr("experiments.command.watching.stream_lines", rows)
     pipe = Pipe(gone=True)
     run(pipe, tmp_path / "state.npz")
     assert pipe.closed
-
-
-def test_the_process_ends_when_its_server_has_and_not_before(
-    looks: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("experiments.command.watching.stream_lines", rows)
-    run(Pipe(), tmp_path / "state.npz", server=41)
-    parents, slept, ended = iter([41, 41, 1]), list[float](), list[int]()
-    monkeypatch.setattr(gauges, "os", SimpleNamespace(getppid=lambda: next(parents), _exit=ended.append))
-    monkeypatch.setattr(gauges, "time", SimpleNamespace(sleep=slept.append))
-    looks[0]()
-    assert (slept, ended) == ([1.0, 1.0], [1])
-
-
-@pytest.fixture(autouse=True)
-def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep what a process sets for itself out of this one."""
-    for name in ("OPENBLAS", "OMP", "MKL"):
-        monkeypatch.setenv(f"{name}_NUM_THREADS", os.environ.get(f"{name}_NUM_THREADS", "1"))

@@ -111,7 +111,7 @@ def test_a_stream_s_process_says_how_it_ended(
     sent: list[Any] = []
     out: Any = SimpleNamespace(send=sent.append, close=lambda: sent.append("closed"))
     monkeypatch.setattr(gauges, "watch_network", watched)
-    monkeypatch.setattr(gauges, "threading", SimpleNamespace(Thread=lambda **_: SimpleNamespace(start=lambda: None)))
+    monkeypatch.setattr(gauges, "bind_to_server", lambda _: None)
     monkeypatch.setattr(gauges.signal, "signal", lambda *_: None)
     gauges.watch_stream(out, 1, "tcp://nowhere:1", None, (), 0.1, tmp_path / "state.npz")
     *_, (kind, last), closed = sent
@@ -120,27 +120,16 @@ def test_a_stream_s_process_says_how_it_ended(
     assert words in json.dumps(last)
 
 
-def test_a_worker_is_bound_to_its_limit_of_memory_and_ends_with_its_server(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_is_bound_to_its_server_and_its_limit_of_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     import resource
 
-    limits, looks, slept, ended = dict[int, Any](), list[Any](), list[float](), list[int]()
-    parents, environment = iter([41, 41, 1]), {"OMP_NUM_THREADS": "2"}
+    limits, servers, environment = dict[int, Any](), list[int](), dict[str, str]()
     monkeypatch.setattr(resource, "setrlimit", limits.__setitem__)
-    thread = SimpleNamespace(
-        Thread=lambda target, daemon: SimpleNamespace(start=lambda: looks.append((target, daemon)))
-    )
-    monkeypatch.setattr(work, "threading", thread)
-    monkeypatch.setattr(work, "time", SimpleNamespace(sleep=slept.append))
-    process = {"environ": environment, "getppid": lambda: next(parents), "_exit": ended.append}
-    monkeypatch.setattr(work, "os", SimpleNamespace(**process))
+    monkeypatch.setattr(work, "bind_to_server", servers.append)
+    monkeypatch.setattr(work, "os", SimpleNamespace(environ=environment))
     work.begin_worker(41, 1000)
+    assert servers == [41]
     assert limits == {resource.RLIMIT_DATA: (1000, 1000), resource.RLIMIT_CORE: (0, 0)}
-    assert environment["OPENBLAS_NUM_THREADS"] == environment["MKL_NUM_THREADS"] == "1"
-    assert environment["OMP_NUM_THREADS"] == "2"
-    ((look, daemon),) = looks
-    assert daemon
-    look()
-    assert (slept, ended) == ([work.LOOKED_AFTER] * 2, [1])
 
 
 def test_a_log_that_is_looked_into_gets_a_page_with_its_columns_and_the_client_s_name(
