@@ -22,7 +22,7 @@ from experiments.command.terminal import note, unexpected
 from experiments.serve.answers import Comparison, Health, Log, Logs, Said, StreamHistory, StreamState, Verb, log_of
 from experiments.serve.desk import Desk
 from experiments.serve.events import MOST_LOOKING, told
-from experiments.serve.limits import MOST_UPLOADS, Guard, RefusedError, receive_file, require_size
+from experiments.serve.limits import HEADERS, MOST_UPLOADS, Guard, RefusedError, receive_file, require_size
 from experiments.serve.metrics import PROMETHEUS_TEXT, exposition
 from experiments.serve.pages import home_page, live_page, policy_of, policy_of_file
 from experiments.serve.settings import Settings
@@ -151,7 +151,10 @@ def _answer_errors(app: FastAPI) -> None:
     async def strange(_: Request, error: Exception) -> Response:
         said = unexpected(error)
         note(f"serve: {said}")
-        return JSONResponse({"detail": said}, 500)
+        every = {
+            name.decode(): value.decode() for name, value in HEADERS.items()
+        }  # it does not pass the guard any more
+        return JSONResponse({"detail": said}, 500, every)
 
     async def left(_: Request, __: Exception) -> Response:
         return JSONResponse({"detail": "the body was cut off"}, 400)

@@ -8,7 +8,7 @@ import shutil
 import time
 from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -114,7 +114,7 @@ class Guard:
             raise RefusedError(421, f"this server answers for localhost alone, the request is for {host[:80]!r}")
         if scope["method"] not in ("GET", "HEAD", "OPTIONS"):
             origin = headers.get(b"origin")
-            foreign = origin is not None and urlsplit(origin.decode("latin-1").lower()).netloc != host
+            foreign = origin is not None and origin.decode("latin-1").lower().partition("://")[2] != host
             if foreign or headers.get(b"sec-fetch-site", b"none") not in (b"none", b"same-origin"):
                 raise RefusedError(403, "a page of another site may not change anything here")
         if self._token is None:

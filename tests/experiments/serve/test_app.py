@@ -95,6 +95,7 @@ def test_a_name_leads_nowhere(served: Served, tmp_path: Path, name: str, kept: s
         ("GET", "/", {"host": "evil.example"}, 421),
         ("POST", "/api/logs?name=a", {"origin": "http://evil.example"}, 403),
         ("POST", "/api/logs?name=a", {"origin": "null"}, 403),
+        ("POST", "/api/logs?name=a", {"origin": "http://["}, 403),
         ("DELETE", "/api/logs/0123456789abcdef", {"sec-fetch-site": "cross-site"}, 403),
         ("POST", "/api/logs", {}, 422),
         ("POST", "/api/logs?name=a&verb=obey", {}, 422),
@@ -236,6 +237,7 @@ def test_an_error_that_nobody_foresaw_is_told_in_a_sentence(
     answer = client.get("/api/logs")
     assert answer.status_code == 500
     assert "please report it" in answer.json()["detail"]
+    assert {name.decode() for name in HEADERS} <= set(answer.headers)
     assert "Traceback" not in capsys.readouterr().err
 
 
