@@ -52,7 +52,7 @@ class Desk:
         """
         settings = self.settings
         with refused(f"{settings.folder}: the server's folder cannot be made"):
-            for folder in (settings.logs, settings.pages, settings.work):
+            for folder in (settings.folder, settings.logs, settings.pages, settings.work):
                 folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             self._lock = (settings.folder / LOCK).open("a+")
         try:
@@ -95,6 +95,11 @@ class Desk:
             Its file, whole and on the disk.
         size : int
             Of the file [bytes].
+
+        Raises
+        ------
+        RefusedError
+            If the database takes no more; the file is deleted then.
         """
         place = log_file(self.settings, identity)
         part.replace(place)
@@ -103,7 +108,11 @@ class Desk:
             os.fsync(folder)
         finally:
             os.close(folder)
-        kept = self.store.add(identity, name, verb, size)
+        try:
+            kept = self.store.add(identity, name, verb, size)
+        except HydrostateError as error:
+            place.unlink(missing_ok=True)
+            raise RefusedError(413, f"the server's folder takes no more: {error}") from error
         self.room.takes(size)
         self.jobs.submit(kept)
         return kept

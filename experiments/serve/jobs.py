@@ -11,10 +11,11 @@ from typing import Any, TypeVar
 
 from pebble import ProcessExpired, ProcessPool
 
-from experiments.command.terminal import unexpected
+from experiments.command.terminal import note, unexpected
 from experiments.serve.settings import MB, Settings
 from experiments.serve.store import DONE, FAILED, INTERRUPTED, Kept, Store
 from experiments.serve.work import NO_MEMORY, Task, Worked, begin_worker, work_on
+from plant.errors import HydrostateError
 
 MOST_TRIES = 3
 """Servers that may end in the middle of the work on a log before it is given up [count]."""
@@ -169,6 +170,8 @@ class Jobs:
             self._store.finish(log.id, state, worked.result, worked.entries)
             if self._store.get(log.id) is None:
                 self._forget(log.id)
+        except HydrostateError as error:
+            note(f"serve: what came of {log.name} is lost, the next start works on it again: {error}")
         finally:
             phase_file(self._settings, log.id).unlink(missing_ok=True)
             with self._lock:

@@ -9,9 +9,11 @@ from collections.abc import Mapping
 from multiprocessing.connection import Connection
 from typing import Any
 
+from experiments.command.terminal import note
 from experiments.serve.gauges import watch_stream
 from experiments.serve.settings import Settings
 from experiments.serve.store import Store
+from plant.errors import HydrostateError
 
 KEPT = 2400
 """Gauges that are remembered [count]: ten minutes of four a second."""
@@ -84,37 +86,48 @@ class Stream:
         return self._store.events(self.name, SHOWN_EVENTS)
 
     def _run(self) -> None:
-        settings = self._settings
-        context = multiprocessing.get_context("spawn")
-        state = settings.folder / f"stream-{self.name}.npz"
-        columns = tuple(settings.columns.items())
         while not self._closed.is_set():
-            ours, theirs = context.Pipe(duplex=False)
-            asked = (theirs, os.getpid(), self.address, settings.rig, columns, settings.false_alarms, state)
-            self._process = context.Process(target=watch_stream, args=asked, daemon=True)
-            self._process.start()
-            theirs.close()
-            self._listen(ours)
-            self._process.join(AGAIN_AFTER)
-            if self._process.is_alive():
-                self._process.kill()
+            try:
+                self._watch_once()
+            except OSError as error:  # no process or pipe could be had; the next attempt may get them
+                self._fail(f"it cannot be watched: {error.strerror or error}")
             self._closed.wait(AGAIN_AFTER)
 
-    def _listen(self, ours: Connection) -> None:
+    def _watch_once(self) -> None:
+        """Watch the stream in a process of its own until that ends."""
+        settings, context = self._settings, multiprocessing.get_context("spawn")
+        state = settings.folder / f"stream-{self.name}.npz"
+        columns = tuple(settings.columns.items())
+        ours, theirs = context.Pipe(duplex=False)
         with ours:
-            while True:
-                try:
-                    kind, entries = ours.recv()
-                except (EOFError, OSError):
-                    break
-                if kind == "gauges":
-                    self._put(entries)
-                else:
-                    self._tell(entries)
+            with theirs:
+                asked = (theirs, os.getpid(), self.address, settings.rig, columns, settings.false_alarms, state)
+                self._process = context.Process(target=watch_stream, args=asked, daemon=True)
+                self._process.start()
+            if self._closed.is_set():  # while it was begun, so that `close` found none to end
+                self._process.terminate()
+            self._listen(ours)
+        self._process.join(AGAIN_AFTER)
+        if self._process.is_alive():
+            self._process.kill()
+
+    def _listen(self, ours: Connection) -> None:
+        while True:
+            try:
+                kind, entries = ours.recv()
+            except (EOFError, OSError):
+                break
+            if kind == "gauges":
+                self._put(entries)
+            else:
+                self._tell(entries)
+        if self._state not in ("ended", "failed"):
+            self._fail("the process that watched it ended")
+
+    def _fail(self, message: str) -> None:
         with self._lock:
-            if self._state not in ("ended", "failed"):
-                self._state, self._said = "failed", "the process that watched it ended"
-                self._fresh += 1
+            self._state, self._said = "failed", message
+            self._fresh += 1
 
     def _put(self, entries: Mapping[str, Any]) -> None:
         with self._lock:
@@ -126,7 +139,10 @@ class Stream:
         told = {"start": "learning", "ready": "watching", "end": "ended"}.get(event)
         failed = event == "end" and entries.get("outcome") == "failed"
         if not (failed and self._state == "failed" and self._said == entries["message"]):
-            self._store.add_event(self.name, entries)
+            try:
+                self._store.add_event(self.name, entries)
+            except HydrostateError as error:  # a full disk must not end the watch
+                note(f"serve: stream {self.name}: {event} is told, but not kept: {error}")
         with self._lock:
             self._state = "failed" if failed else told or self._state
             self._said = str(entries.get("message") or "")

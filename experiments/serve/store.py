@@ -1,6 +1,7 @@
 """What a server knows of logs and alarms, in SQLite: written ahead, so that a kill loses nothing that was finished."""
 
 import json
+import os
 import sqlite3
 import threading
 import time
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from experiments.running.refusal import refused
 from plant.errors import HydrostateError
 
 VERSION = 1
@@ -87,11 +89,14 @@ class Store:
     Raises
     ------
     HydrostateError
-        If the file is no such database, or of a later version.
+        If the file is no such database, or of a later version; later on, whenever it cannot be written.
     """
 
     def __init__(self, path: Path) -> None:
         self._lock = threading.Lock()
+        with refused(f"{path}: the server's database cannot be opened"):
+            # results are for the server's own user; SQLite gives its other files the same mode
+            os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
         self._connection = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
         try:
             self._connection.execute("PRAGMA journal_mode = WAL")
@@ -229,10 +234,12 @@ class Store:
     @contextmanager
     def _writing(self) -> Generator[sqlite3.Connection]:
         with self._lock:
-            self._connection.execute("BEGIN IMMEDIATE")
             try:
+                self._connection.execute("BEGIN IMMEDIATE")
                 yield self._connection
-            except BaseException:
-                self._connection.execute("ROLLBACK")
-                raise
-            self._connection.execute("COMMIT")
+                self._connection.execute("COMMIT")
+            except sqlite3.Error as error:
+                raise HydrostateError(f"the server's database cannot be written: {error}") from error
+            finally:
+                if self._connection.in_transaction:  # SQLite itself rolls back where the disk is full
+                    self._connection.execute("ROLLBACK")

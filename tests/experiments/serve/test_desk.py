@@ -145,3 +145,18 @@ def test_a_log_that_failed_has_no_page_and_its_reason_is_told(desk: Desk) -> Non
 def test_a_stream_is_known_by_its_name(desk: Desk) -> None:
     with pytest.raises(RefusedError, match="no stream 'press' is watched"):
         desk.stream("press")
+
+
+def test_the_folder_is_for_the_server_s_user_alone(desk: Desk) -> None:
+    assert desk.settings.folder.stat().st_mode & 0o077 == 0
+
+
+def test_a_log_that_the_database_cannot_take_is_refused_and_leaves_no_file(desk: Desk, tmp_path: Path) -> None:
+    part = tmp_path / "a.part"
+    part.write_bytes(b"a,b\n")
+    desk.store._connection.execute("PRAGMA max_page_count = 1")
+    with pytest.raises(RefusedError, match="takes no more") as refused:
+        desk.take_in("a", part, "x" * 100_000, "diagnose", 4)
+    assert refused.value.status == 413
+    assert list(desk.settings.logs.iterdir()) == []
+    assert desk.jobs.waiting == 0

@@ -111,6 +111,20 @@ def test_work_that_is_lost_is_told_so(
     assert words in str(found.message)
 
 
+def test_a_result_that_cannot_be_kept_is_noted_and_its_log_is_worked_on_again_later(
+    settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    worked = Worked({"outcome": "ok", "message": "x" * 100_000}, None)
+    monkeypatch.setattr(Ending, "ends", staticmethod(lambda future: future.set_result(worked)), raising=False)
+    monkeypatch.setattr("experiments.serve.jobs.ProcessPool", Ending)
+    jobs, log = Jobs(settings, store), added(store, settings, "a")
+    store._connection.execute("PRAGMA max_page_count = 1")
+    jobs.submit(log)
+    assert "what came of a.csv is lost" in capsys.readouterr().err
+    assert [one.id for one in store.unfinished()] == ["a"]
+    assert jobs.waiting == 0
+
+
 @pytest.fixture
 def pending(monkeypatch: pytest.MonkeyPatch) -> list["Future[Any]"]:
     """Return the futures of a pool whose work is still under way."""

@@ -1,6 +1,7 @@
 """Streams: gauges of what came, events that are kept, and what a view is told."""
 
 import asyncio
+import errno
 import json
 import multiprocessing
 import os
@@ -30,6 +31,11 @@ def stream(tmp_path: Path) -> Iterator[Stream]:
     store.close()
 
 
+def fill(store: Store) -> None:
+    """Let a database take no more, as on a full disk."""
+    store._connection.execute("PRAGMA max_page_count = 1")
+
+
 def heard(stream: Stream, *messages: tuple[str, dict[str, Any]]) -> None:
     """Let a stream hear what its process would say, and then that this has ended."""
     ours, theirs = multiprocessing.Pipe(duplex=False)
@@ -41,7 +47,8 @@ def heard(stream: Stream, *messages: tuple[str, dict[str, Any]]) -> None:
 
     saying = threading.Thread(target=say)
     saying.start()
-    stream._listen(ours)
+    with ours:
+        stream._listen(ours)
     saying.join()
 
 
@@ -75,6 +82,35 @@ def test_the_state_of_a_stream_is_that_of_its_last_event_and_events_are_kept(str
     assert (stream.state["state"], stream.state["message"]) == ("failed", "nobody answers")
     heard(stream, ("event", {"event": "ready", "time_s": 1.0, "message": "alarms can come"}))
     assert [one["event"] for one in stream.events()] == ["start", "end", "ready"]
+
+
+def test_an_alarm_that_cannot_be_kept_is_told_all_the_same_and_the_watch_goes_on(
+    stream: Stream, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The thread that listens ended with a full disk, and the stream stayed "watching" for ever."""
+    fill(stream._store)
+    heard(stream, ("event", {"event": "alarm", "message": "x" * 100_000}), ("gauges", {"time_s": 2.0}))
+    assert (stream.alarms, stream.revision[0]) == (1, 1)
+    assert "alarm is told, but not kept" in capsys.readouterr().err
+
+
+def test_a_stream_for_which_no_process_can_be_had_says_so_and_is_tried_again(
+    stream: Stream, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried: list[str] = []
+
+    def pipe(duplex: bool) -> Any:
+        tried.append(stream.state["message"])
+        if len(tried) == 2:
+            stream._closed.set()
+        raise OSError(errno.EMFILE, "Too many open files", str(duplex))
+
+    monkeypatch.setattr(live, "multiprocessing", SimpleNamespace(get_context=lambda _: SimpleNamespace(Pipe=pipe)))
+    monkeypatch.setattr(live, "AGAIN_AFTER", 0.01)
+    stream.start()
+    stream._thread.join(10.0)
+    assert tried == ["", "it cannot be watched: Too many open files"]
+    assert stream.state["state"] == "failed"
 
 
 def test_a_view_is_told_the_history_and_then_what_is_new(stream: Stream, monkeypatch: pytest.MonkeyPatch) -> None:

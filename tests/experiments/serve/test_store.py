@@ -1,5 +1,6 @@
 """What a server keeps: it is there after the file is opened again, and nothing else is taken for it."""
 
+import os
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
@@ -93,3 +94,22 @@ def test_a_log_that_goes_while_it_is_added_is_said_to_be_gone(tmp_path: Path, op
     connection.close()
     with pytest.raises(HydrostateError, match=r"run\.csv: was deleted while it came"):
         store.add("a", "run.csv", "diagnose", 10)
+
+
+def test_a_full_disk_is_told_in_a_sentence_and_what_was_there_stays(opened: Opened) -> None:
+    store = opened("a.sqlite")
+    store.add("a", "run.csv", "diagnose", 10)
+    store._connection.execute("PRAGMA max_page_count = 1")
+    with pytest.raises(HydrostateError, match="cannot be written: database or disk is full"):
+        store.finish("a", DONE, {**RESULT, "message": "x" * 100_000})
+    store._connection.execute("PRAGMA max_page_count = 100000")
+    store.finish("a", DONE, RESULT)
+    assert store.result("a") == RESULT
+
+
+@pytest.mark.skipif(os.name == "nt", reason="modes are another system's")
+def test_nobody_else_on_the_machine_may_read_the_results(tmp_path: Path, opened: Opened) -> None:
+    opened("a.sqlite").add("a", "run.csv", "diagnose", 10)
+    kept = sorted(tmp_path.iterdir())
+    assert [one.name for one in kept] == ["a.sqlite", "a.sqlite-shm", "a.sqlite-wal"]
+    assert [one.stat().st_mode & 0o077 for one in kept] == [0, 0, 0]
