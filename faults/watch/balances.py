@@ -13,7 +13,13 @@ FEATURES = 8
 """Regressors of a balance."""
 
 GAINS = 4
-"""Sums of a block from which gains follow: of q p, w p, p v and v v."""
+"""Sums of a block from which gains follow."""
+
+GAIN_QP, GAIN_WP, GAIN_PV, GAIN_VV = range(GAINS)
+"""Places in them: of q p, w p, p v and v v."""
+
+V1, V2, W1, P1, P2, Q1, Q2 = range(7)
+"""Places in what the last intervals were: velocity, pressure and lost speed of the last two, speed of the last one."""
 
 BENT = 0.05
 """Speed or velocity at which what depends on the direction of motion is half of what it is at speed [fraction]."""
@@ -21,7 +27,7 @@ BENT = 0.05
 
 def regress(w: float, v: float, p: float, lags: Array, features: Array, target: Array) -> None:
     """Set the regressors of each balance and what it predicts, from an interval and the last two."""
-    v1, v2, w1, p1, p2, q1, q2 = lags[0], lags[1], lags[2], lags[3], lags[4], lags[5], lags[6]
+    v1, v2, w1, p1, p2, q1, q2 = lags[V1], lags[V2], lags[W1], lags[P1], lags[P2], lags[Q1], lags[Q2]
     bent, bent1 = w / (abs(w) + BENT), w1 / (abs(w1) + BENT)
     rub, rub1 = v / (abs(v) + BENT), v1 / (abs(v1) + BENT)
     if target.shape[0] == 2:
@@ -38,8 +44,8 @@ def regress(w: float, v: float, p: float, lags: Array, features: Array, target: 
 
 def shift(w: float, v: float, p: float, lags: Array) -> None:
     """Make the interval the last one."""
-    lags[1], lags[0], lags[2] = lags[0], v, w
-    lags[4], lags[3], lags[6], lags[5] = lags[3], p, lags[5], w - v
+    lags[V2], lags[V1], lags[W1] = lags[V1], v, w
+    lags[P2], lags[P1], lags[Q2], lags[Q1] = lags[P1], p, lags[Q1], w - v
 
 
 def learn(
@@ -58,10 +64,10 @@ def learn(
 
 def count_gains(w: float, v: float, p: float, place: int, gains: Array) -> None:
     """Add an interval to its block's sums: flow lost against pressure, and force that motion takes."""
-    gains[place, 0] += (w - v) * p
-    gains[place, 1] += w * p
-    gains[place, 2] += p * v
-    gains[place, 3] += v * v
+    gains[place, GAIN_QP] += (w - v) * p
+    gains[place, GAIN_WP] += w * p
+    gains[place, GAIN_PV] += p * v
+    gains[place, GAIN_VV] += v * v
 
 
 def solve(information: Array, moment: Array, found: Array, factor: Array) -> None:

@@ -10,8 +10,8 @@ from functools import cache
 
 import numpy as np
 
-from faults.watch import balances, cusum, excitation, loss
-from faults.watch.balances import FEATURES, count_gains, learn, regress, shift, solve
+from faults.watch import balances, cusum, excitation, loss, memory
+from faults.watch.balances import FEATURES, W1, count_gains, learn, regress, shift, solve
 from faults.watch.cusum import PEAK, SQUARES, SUM, THRESHOLD, accumulate, threshold
 from faults.watch.excitation import OCTAVES, excitation_octave, standardise
 from faults.watch.loss import (
@@ -19,6 +19,8 @@ from faults.watch.loss import (
     DELAYS,
     LEAST_LEARNT,
     SPAN,
+    SPAN_RESISTANCE,
+    SPAN_TELLS,
     SPANS,
     WANTED,
     count_lag,
@@ -29,7 +31,24 @@ from faults.watch.loss import (
     measure_lag,
     measure_work,
 )
-from faults.watch.memory import Memory, WatchSetting, WatchSizes
+from faults.watch.memory import (
+    ALL,
+    CHANGED,
+    LEARNT_FROM,
+    MOVED,
+    OCTAVE,
+    POSITION,
+    PRESSURE_SUM,
+    SAMPLES,
+    SCORED,
+    SOUND,
+    SPEED_SUM,
+    USABLE,
+    WHOLE,
+    Memory,
+    WatchSetting,
+    WatchSizes,
+)
 from plant.arrays import Array
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.signature import signature_of
@@ -70,39 +89,38 @@ def advance(rows: Array, first: int, setting: WatchSetting, sizes: WatchSizes, m
     tuple of int
         The sample after the last one taken, and what a block has said.
     """
-    partial, clock, lags, information, moment, found, score, _, _, gains, _, work, speeds, lag, lost, _, _ = memory
-    fade, _, _, rated_speed, rated_step, relief = setting
-    samples, _, _, _ = sizes
+    partial, lags, score = memory.partial, memory.lags, memory.score
     features, target, factor = np.empty((2, FEATURES)), np.empty(score.shape[0]), np.empty((FEATURES, FEATURES))
     for k in range(first, rows.shape[0]):
-        partial[0] += 1.0
-        partial[1] += rows[k, 0]
-        partial[2] += rows[k, 2]
-        if partial[0] < samples:
+        partial[SAMPLES] += 1.0
+        partial[SPEED_SUM] += rows[k, 0]
+        partial[PRESSURE_SUM] += rows[k, 2]
+        if partial[SAMPLES] < sizes.samples:
             continue
-        w = partial[1] / (samples * rated_speed)
-        p = partial[2] / (samples * relief)
-        v = (rows[k, 1] - partial[3]) / (samples * rated_step)
-        partial[0] = partial[1] = partial[2] = 0.0
-        partial[3] = rows[k, 1]
+        w = partial[SPEED_SUM] / (sizes.samples * setting.rated_speed)
+        p = partial[PRESSURE_SUM] / (sizes.samples * setting.relief)
+        v = (rows[k, 1] - partial[POSITION]) / (sizes.samples * setting.rated_step)
+        partial[SAMPLES] = partial[SPEED_SUM] = partial[PRESSURE_SUM] = 0.0
+        partial[POSITION] = rows[k, 1]
         sound = math.isfinite(w) and math.isfinite(v) and math.isfinite(p)
-        partial[4] = partial[4] + 1.0 if sound else 0.0
+        partial[SOUND] = partial[SOUND] + 1.0 if sound else 0.0
         if sound:
             regress(w, v, p, lags, features, target)
-            if partial[4] > 3.0 and abs(w) + abs(lags[2]) + abs(v) > MOVING:
-                partial[5] += 1.0
-                partial[7] += (w - lags[2]) ** 2
+            if partial[SOUND] > 3.0 and abs(w) + abs(lags[W1]) + abs(v) > MOVING:
+                partial[MOVED] += 1.0
+                partial[CHANGED] += (w - lags[W1]) ** 2
                 for c in range(score.shape[0]):
-                    error = learn(c, features, target, fade, information, moment, found)
+                    error = learn(c, features, target, setting.fade, memory.information, memory.moment, memory.found)
                     score[c, SQUARES] += error * error
-                count_gains(w, v, p, int(clock[0]) % gains.shape[0], gains)
+                count_gains(w, v, p, int(memory.clock[ALL]) % memory.gains.shape[0], memory.gains)
                 if score.shape[0] == 2:
-                    count_work(w, v, p, work)
+                    count_work(w, v, p, memory.work)
             if score.shape[0] == 1:
-                count_lag(w, v, partial[4] > DELAYS + 1.0 and abs(w) > MOVING, speeds, lag, lost)
+                follows = partial[SOUND] > DELAYS + 1.0 and abs(w) > MOVING
+                count_lag(w, v, follows, memory.speeds, memory.lag, memory.lost)
             shift(w, v, p, lags)
-        partial[6] += 1.0
-        if partial[6] < INTERVALS:
+        partial[WHOLE] += 1.0
+        if partial[WHOLE] < INTERVALS:
             continue
         news = end_block(setting, sizes, memory, factor)
         if news != NOTHING:
@@ -112,47 +130,45 @@ def advance(rows: Array, first: int, setting: WatchSetting, sizes: WatchSizes, m
 
 def end_block(setting: WatchSetting, sizes: WatchSizes, memory: Memory, factor: Array) -> int:
     """Judge a whole block; return what it says."""
-    partial, clock, _, information, moment, found, score, peaks, scores, gains, usual, _, _, _, _, known, _ = memory
-    _, settle, learning, resume = sizes
-    _, score_memory, false_alarms, _, _, _ = setting
-    usable, recent, octave = partial[5], scores.shape[1], excitation_octave(partial[7])
-    excited = octave * OCTAVES + int(partial[8])
-    partial[5] = partial[6] = partial[7] = 0.0
-    partial[8] = octave
-    place = int(clock[0]) % recent
-    clock[0] += 1.0
-    gains[int(clock[0]) % recent, :] = 0.0
-    if 2.0 * usable < INTERVALS:
-        scores[:, place] = np.nan
+    partial, clock, score, peaks, known = memory.partial, memory.clock, memory.score, memory.peaks, memory.known
+    moved, recent, octave = partial[MOVED], memory.scores.shape[1], excitation_octave(partial[CHANGED])
+    excited = octave * OCTAVES + int(partial[OCTAVE])
+    partial[MOVED] = partial[WHOLE] = partial[CHANGED] = 0.0
+    partial[OCTAVE] = octave
+    place = int(clock[ALL]) % recent
+    clock[ALL] += 1.0
+    memory.gains[int(clock[ALL]) % recent, :] = 0.0
+    if 2.0 * moved < INTERVALS:
+        memory.scores[:, place] = np.nan
         score[:, SQUARES] = 0.0
         return NOTHING
-    clock[1] += 1.0
-    since = clock[1] - clock[2]
+    clock[USABLE] += 1.0
+    since = clock[USABLE] - clock[LEARNT_FROM]
     news = NOTHING
     for c in range(score.shape[0]):
-        value = math.log(score[c, SQUARES] / usable + 1e-30)
+        value = math.log(score[c, SQUARES] / moved + 1e-30)
         score[c, SQUARES] = 0.0
-        solve(information[c], moment[c], found[c], factor)
-        if since > settle:
-            u = standardise(value, score_memory, since > 2.0 * settle, usual[c, excited])
-            scores[c, place] = u
-            if since > resume:
+        solve(memory.information[c], memory.moment[c], memory.found[c], factor)
+        if since > sizes.settle:
+            u = standardise(value, setting.score_memory, since > 2.0 * sizes.settle, memory.usual[c, excited])
+            memory.scores[c, place] = u
+            if since > sizes.resume:
                 accumulate(score[c], peaks[c], u, ALLOWANCE, LEVEL)
         else:
-            scores[c, place] = 0.0
+            memory.scores[c, place] = 0.0
         if (
             score[c, SUM] > score[c, THRESHOLD]
-            and clock[1] > learning
+            and clock[USABLE] > sizes.learning
             and (news < 0 or score[c, SUM] / score[c, THRESHOLD] > score[news, SUM] / score[news, THRESHOLD])
         ):
             news = c
-    if since > resume:
-        clock[3] += 1.0
-    if clock[1] >= learning and (int(clock[1]) % REFRESHED == 0 or clock[1] == learning):
+    if since > sizes.resume:
+        clock[SCORED] += 1.0
+    if clock[USABLE] >= sizes.learning and (int(clock[USABLE]) % REFRESHED == 0 or clock[USABLE] == sizes.learning):
         for c in range(score.shape[0]):
-            expected = false_alarms * clock[3] / score.shape[0]
+            expected = setting.false_alarms * clock[SCORED] / score.shape[0]
             score[c, THRESHOLD] = threshold(peaks[c, :-1], peaks[c, peaks.shape[1] - 1], LEVEL, expected)
-        if clock[1] == learning:
+        if clock[USABLE] == sizes.learning:
             score[:, SUM : PEAK + 1] = 0.0
             known[WANTED] = max(known[SPANS], LEAST_LEARNT)
             return READY
@@ -165,34 +181,33 @@ def end_block(setting: WatchSetting, sizes: WatchSizes, memory: Memory, factor: 
 
 def end_span(memory: Memory) -> bool:
     """Judge what was lost in a whole span; return whether it is more than warming oil explains."""
-    _, clock, _, _, _, _, score, _, _, _, _, work, _, lag, lost, known, levels = memory
-    told = np.empty(6)
-    if score.shape[0] == 2:
-        measure_work(work, told)
+    told, known = np.empty(SPAN_TELLS), memory.known
+    if memory.score.shape[0] == 2:
+        measure_work(memory.work, told)
     else:
-        measure_lag(lag, lost, told)
+        measure_lag(memory.lag, memory.lost, told)
     drop_span(memory)
-    return told[3] > 0.0 and drive_is_alike(told, known) and judge_loss(told, clock[0], known, levels)
+    tells = told[SPAN_RESISTANCE] > 0.0 and drive_is_alike(told, known)
+    return tells and judge_loss(told, memory.clock[ALL], known, memory.levels)
 
 
 def drop_span(memory: Memory) -> None:
     """Begin a span anew."""
-    _, _, _, _, _, _, _, _, _, _, _, work, _, lag, lost, known, _ = memory
-    known[BLOCKS] = 0.0
-    work[:] = 0.0
-    lag[:] = 0.0
-    lost[:] = 0.0
+    memory.known[BLOCKS] = 0.0
+    memory.work[:] = 0.0
+    memory.lag[:] = 0.0
+    memory.lost[:] = 0.0
 
 
 def begin_again(memory: Memory) -> None:
     """Forget most of what the balances were, after an alarm: they are learnt again, what the peaks said is kept."""
-    _, clock, _, information, moment, _, score, _, _, _, usual, _, _, _, _, _, _ = memory
-    clock[2] = clock[1]
+    information, moment, score = memory.information, memory.moment, memory.score
+    memory.clock[LEARNT_FROM] = memory.clock[USABLE]
     information *= 0.01
     moment *= 0.01
     score[:, SUM : PEAK + 1] = 0.0
     score[:, SQUARES] = 0.0
-    usual[:] = 0.0
+    memory.usual[:] = 0.0
     drop_span(memory)
 
 
@@ -201,7 +216,7 @@ def watch_kernel() -> NativeKernel:
     """Return the compiled kernel: `advance`, `begin_again` and `threshold`."""
     constants = {
         name: value
-        for module in (balances, cusum, excitation, loss)
+        for module in (balances, cusum, excitation, loss, memory)
         for name, value in vars(module).items()
         if name.isupper() and isinstance(value, int | float)
     }

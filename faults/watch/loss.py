@@ -22,7 +22,17 @@ DELAYS = 16
 """Intervals over which the piston's lag behind the motor is regressed."""
 
 WORK = 5
-"""Sums of a span with pressure: of q p, the size of w p, p p, p v and v v."""
+"""Sums of a span with pressure."""
+
+WORK_QP, WORK_WP, WORK_PP, WORK_PV, WORK_VV = range(WORK)
+"""Places in them: of q p, the size of w p, p p, p v and v v."""
+
+SPAN_TELLS = 6
+"""Numbers that a span tells."""
+
+SPAN_SHARE, SPAN_OTHER_SHARE, SPAN_RATIO, SPAN_RESISTANCE, SPAN_FAST, SPAN_LIVELY = range(SPAN_TELLS)
+"""Places in them: two shares lost, the ratio that makes them one, pressure at a velocity (0 for a span that tells
+nothing), and how fast and how lively the drive is."""
 
 OIL = 2.0
 """By what thinner oil may raise what is lost [fraction]: an oil of VG 46 thins by half in 23 K (judged)."""
@@ -72,11 +82,11 @@ CUSUM and its threshold [standard deviations]; spans so far."""
 
 def count_work(w: float, v: float, p: float, work: Array) -> None:
     """Add an interval to the span's sums."""
-    work[0] += (w - v) * p
-    work[1] += abs(w * p)
-    work[2] += p * p
-    work[3] += p * v
-    work[4] += v * v
+    work[WORK_QP] += (w - v) * p
+    work[WORK_WP] += abs(w * p)
+    work[WORK_PP] += p * p
+    work[WORK_PV] += p * v
+    work[WORK_VV] += v * v
 
 
 def count_lag(w: float, v: float, full: bool, speeds: Array, lag: Array, lost: Array) -> None:
@@ -120,13 +130,12 @@ def measure_work(work: Array, told: Array) -> None:
     work : ndarray, shape (5,)
         Sums of the span.
     told : ndarray, shape (6,)
-        Two shares lost, the ratio that makes them one, pressure at a velocity (0 for a span that tells nothing), and
-        how fast and how lively the drive is, which do not matter here [dimensionless].
+        By place, see `SPAN_SHARE`; how fast and how lively the drive is does not matter here [dimensionless].
     """
-    told[3], told[4], told[5] = 0.0, 1.0, 1.0
-    if min(work[1], work[2], work[4]) > 0.0:
-        told[0], told[1] = work[0] / work[1], work[0] / work[2]
-        told[2], told[3] = work[2] / work[1], work[3] / work[4]
+    told[SPAN_RESISTANCE], told[SPAN_FAST], told[SPAN_LIVELY] = 0.0, 1.0, 1.0
+    if min(work[WORK_WP], work[WORK_PP], work[WORK_VV]) > 0.0:
+        told[SPAN_SHARE], told[SPAN_OTHER_SHARE] = work[WORK_QP] / work[WORK_WP], work[WORK_QP] / work[WORK_PP]
+        told[SPAN_RATIO], told[SPAN_RESISTANCE] = work[WORK_PP] / work[WORK_WP], work[WORK_PV] / work[WORK_VV]
 
 
 def measure_lag(lag: Array, lost: Array, told: Array) -> None:
@@ -135,24 +144,25 @@ def measure_lag(lag: Array, lost: Array, told: Array) -> None:
     It tells nothing where the drive's changes say all about its speed, as a sine's do: the lag may be anything then.
     """
     last = DELAYS + 1
-    told[3] = 0.0
+    told[SPAN_RESISTANCE] = 0.0
     if min(lag[0, 0], lag[last, last]) <= 0.0:
         return
     found, factor, first = np.empty(last), np.empty((last, last)), np.zeros(last)
     first[0] = 1.0
     solve(lag[:last, :last], first, found, factor)
-    told[3] = 1.0 if found[0] * lag[0, 0] * LEAST_TOLD < 1.0 else 0.0
+    told[SPAN_RESISTANCE] = 1.0 if found[0] * lag[0, 0] * LEAST_TOLD < 1.0 else 0.0
     solve(lag[:last, :last], lost[:last], found, factor)
-    told[0], told[4], told[5] = found[0], lag[0, 0] / lag[last, last], lag[1, 1] / lag[0, 0]
+    told[SPAN_SHARE] = found[0]
+    told[SPAN_FAST], told[SPAN_LIVELY] = lag[0, 0] / lag[last, last], lag[1, 1] / lag[0, 0]
     solve(lag[1:, 1:], lost[1:], found, factor)
-    told[1], told[2] = found[last - 1], lag[last, 0] / lag[0, 0]
+    told[SPAN_OTHER_SHARE], told[SPAN_RATIO] = found[last - 1], lag[last, 0] / lag[0, 0]
 
 
 def drive_is_alike(told: Array, loss: Array) -> bool:
     """Return whether a span's drive is like the one learnt; one that stays another is learnt instead."""
     if loss[SPANS] < loss[WANTED]:
         return True
-    fast, lively = told[4] / loss[FAST], told[5] / loss[LIVELY]
+    fast, lively = told[SPAN_FAST] / loss[FAST], told[SPAN_LIVELY] / loss[LIVELY]
     if max(fast, lively) <= ALIKE and min(fast, lively) >= 1.0 / ALIKE:
         loss[OTHERS] = 0.0
         return True
@@ -178,12 +188,12 @@ def judge_loss(told: Array, now: float, loss: Array, levels: Array) -> bool:
     """
     if loss[SPANS] < loss[WANTED]:
         loss[SPANS] += 1.0
-        loss[SHARE] += (told[0] - loss[SHARE]) / loss[SPANS]
-        loss[RATIO] += (told[2] - loss[RATIO]) / loss[SPANS]
-        loss[RESISTANCE] += (told[3] - loss[RESISTANCE]) / loss[SPANS]
-        loss[FAST] += (told[4] - loss[FAST]) / loss[SPANS]
-        loss[LIVELY] += (told[5] - loss[LIVELY]) / loss[SPANS]
-    level = min(told[0], loss[RATIO] * told[1])
+        loss[SHARE] += (told[SPAN_SHARE] - loss[SHARE]) / loss[SPANS]
+        loss[RATIO] += (told[SPAN_RATIO] - loss[RATIO]) / loss[SPANS]
+        loss[RESISTANCE] += (told[SPAN_RESISTANCE] - loss[RESISTANCE]) / loss[SPANS]
+        loss[FAST] += (told[SPAN_FAST] - loss[FAST]) / loss[SPANS]
+        loss[LIVELY] += (told[SPAN_LIVELY] - loss[LIVELY]) / loss[SPANS]
+    level = min(told[SPAN_SHARE], loss[RATIO] * told[SPAN_OTHER_SHARE])
     if loss[SEEN] > 0.0:
         apart = 0.5 * (level - loss[LAST]) ** 2
         if loss[KNOWN] >= LEAST_LEARNT:
@@ -192,7 +202,7 @@ def judge_loss(told: Array, now: float, loss: Array, levels: Array) -> bool:
         loss[SPREAD] += (apart - loss[SPREAD]) / loss[KNOWN]
     place = int(loss[SEEN]) % levels.shape[0]
     levels[place, 0], levels[place, 1] = level, now
-    loss[LAST], loss[LAST_RESISTANCE] = level, told[3]
+    loss[LAST], loss[LAST_RESISTANCE] = level, told[SPAN_RESISTANCE]
     loss[SEEN] += 1.0
     if loss[SPANS] < loss[WANTED]:
         return False

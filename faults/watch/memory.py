@@ -22,6 +22,15 @@ KEPT_SPANS = 512
 PARTIAL, CLOCK, LAGS, SCORE = 9, 4, 8, 4
 """Lengths of arrays: the interval and block under way, the clock, the last intervals, and a balance's score."""
 
+SAMPLES, SPEED_SUM, PRESSURE_SUM, POSITION, SOUND, MOVED, WHOLE, CHANGED, OCTAVE = range(PARTIAL)
+"""Places in the interval and the block under way: its samples, the sums of speed [rad/s] and pressure [Pa] over them,
+and position at its beginning [m]; sound intervals in a row; those of the block in which the actuator moved, and all of
+it; the summed squared changes of speed in it, and the octave of the last block's."""
+
+ALL, USABLE, LEARNT_FROM, SCORED = range(CLOCK)
+"""Places in the clock: blocks so far, those that moved, how many of them had when learning began anew, and those whose
+scores counted."""
+
 
 class Memory(NamedTuple):
     """What a watch remembers, a row a balance; scores are dimensionless, gains in shares of the ratings.
@@ -29,11 +38,11 @@ class Memory(NamedTuple):
     Parameters
     ----------
     partial : ndarray, shape (9,)
-        The interval and the block under way.
+        The interval and the block under way, by place: see `SAMPLES`.
     clock : ndarray, shape (4,)
-        Blocks so far: all, usable, where learning began anew, and those whose scores counted.
+        Blocks so far [count], by place: see `ALL`.
     lags : ndarray, shape (8,)
-        The last intervals.
+        The last intervals, by place: see `faults.watch.balances.V1`.
     information : ndarray, shape (balances, features, features)
         Of the balances' normal equations.
     moment, found : ndarray, shape (balances, features)
@@ -132,7 +141,7 @@ def empty_memory(balances: int, loss_threshold: float) -> Memory:
         *((RECENT, GAINS), (balances, OCTAVES**2, 3), *slow),
     )
     memory = Memory._make(np.zeros(shape) for shape in shapes)
-    memory.partial[3] = np.nan
+    memory.partial[POSITION] = np.nan
     memory.score[:, THRESHOLD] = np.inf
     memory.known[WANTED], memory.known[LIMIT] = np.inf, loss_threshold
     return memory

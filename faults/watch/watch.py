@@ -17,6 +17,7 @@ from math import exp, isfinite
 
 import numpy as np
 
+from faults.watch.balances import GAIN_PV, GAIN_QP, GAIN_VV, GAIN_WP
 from faults.watch.cusum import SUM, THRESHOLD
 from faults.watch.events import SLOW, Alarm, Change, Event, Ready, change_time
 from faults.watch.growth import growth_time
@@ -34,7 +35,19 @@ from faults.watch.loss import (
     learn_loss_again,
     loss_threshold,
 )
-from faults.watch.memory import KEPT_SPANS, RECENT, WatchSetting, WatchSizes, empty_memory
+from faults.watch.memory import (
+    ALL,
+    KEPT_SPANS,
+    LEARNT_FROM,
+    POSITION,
+    RECENT,
+    SAMPLES,
+    USABLE,
+    WHOLE,
+    WatchSetting,
+    WatchSizes,
+    empty_memory,
+)
 from faults.watch.samples import watched_samples
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -135,7 +148,7 @@ class Watch:
     @property
     def time(self) -> float:
         """End of the last whole block [s]."""
-        return self.start + float(self._clock[0]) * self.block * self.sample_time
+        return self.start + float(self._clock[ALL]) * self.block * self.sample_time
 
     @property
     def last(self) -> float:
@@ -182,7 +195,7 @@ class Watch:
                 events += self._lost()
             elif news >= 0:
                 events.append(self._raise(news))
-            if self._open is not None and self._clock[0] >= self._open[2]:
+            if self._open is not None and self._clock[ALL] >= self._open[2]:
                 events += self._told()
         return events
 
@@ -198,9 +211,9 @@ class Watch:
 
     def interrupt(self) -> None:
         """Say that the next sample does not follow on the last: another log, or a gap in time."""
-        self._clock[0] += 1.0 if self._taken > self._clock[0] * self.block else 0.0
+        self._clock[ALL] += 1.0 if self._taken > self._clock[ALL] * self.block else 0.0
         self._partial[:] = 0.0
-        self._partial[3] = np.nan
+        self._partial[POSITION] = np.nan
         watch_kernel().begin_again(self._memory)
 
     def remembered(self) -> dict[str, Array]:
@@ -251,8 +264,8 @@ class Watch:
     @property
     def _taken(self) -> int:
         """Samples taken, those of the block under way included."""
-        intervals = int(self._clock[0]) * INTERVALS + int(self._partial[6])
-        return intervals * (self.block // INTERVALS) + int(self._partial[0])
+        intervals = int(self._clock[ALL]) * INTERVALS + int(self._partial[WHOLE])
+        return intervals * (self.block // INTERVALS) + int(self._partial[SAMPLES])
 
     def _raise(self, which: int) -> Alarm:
         found, likely = change_time(self._recent_scores(which))
@@ -265,7 +278,7 @@ class Watch:
             float(self._score[which, SUM]),
             float(self._score[which, THRESHOLD]),
         )
-        now = int(self._clock[0])
+        now = int(self._clock[ALL])
         self._open = alarm, now - found, now + round(AFTER / duration)
         watch_kernel().begin_again(self._memory)
         return alarm
@@ -284,7 +297,8 @@ class Watch:
 
     def _recent_scores(self, which: int) -> Array:
         """Return the last scores, the newest first, those of blocks at rest left out as zero."""
-        now, usable = int(self._clock[0]), min(int(self._clock[1] - self._clock[2]), RECENT // 2)
+        clock = self._clock
+        now, usable = int(clock[ALL]), min(int(clock[USABLE] - clock[LEARNT_FROM]), RECENT // 2)
         return np.nan_to_num(self._memory.scores[which, (now - 1 - np.arange(usable)) % RECENT])
 
     def _told(self) -> list[Event]:
@@ -296,10 +310,11 @@ class Watch:
         gains = self._memory.gains
         before = gains[np.arange(changed - min(span, changed), changed) % RECENT].sum(axis=0)
         after = gains[np.arange(changed + 1, now) % RECENT].sum(axis=0)
-        if not self.pressure or min(before[1], before[3], after[1], after[3]) <= 0.0:
+        if not self.pressure or min(*before[[GAIN_WP, GAIN_VV]], *after[[GAIN_WP, GAIN_VV]]) <= 0.0:
             return [Change(self.time, alarm, None, None)]
-        lost = float(before[0] / before[1]), float(after[0] / after[1])
-        resisted = float(after[2] / after[3] / (before[2] / before[3]) - 1.0)
+        lost = float(before[GAIN_QP] / before[GAIN_WP]), float(after[GAIN_QP] / after[GAIN_WP])
+        resistance = before[GAIN_PV] / before[GAIN_VV], after[GAIN_PV] / after[GAIN_VV]
+        resisted = float(resistance[1] / resistance[0] - 1.0)
         return [Change(self.time, alarm, lost, resisted)]
 
 
