@@ -32,7 +32,7 @@ from experiments.command.streamed import (
 from experiments.command.watch_outputs import published
 from experiments.command.watching import told_of
 from plant.errors import HydrostateError
-from plant.log.stream_source import Received, is_stream, stream_lines
+from plant.log.stream_source import Received, bounded_lines, is_stream, stream_lines
 
 commands = typer.Typer()
 
@@ -121,6 +121,6 @@ def _lines(stream: str, received: Received) -> Iterator[str]:
     else:
         try:
             with Path(stream).open(encoding="utf-8", errors="replace", newline="\n") as file:
-                yield from file
+                yield from bounded_lines(file, stream)
         except OSError as error:
             raise HydrostateError(f"{stream}: it cannot be read: {error.strerror or error}") from error

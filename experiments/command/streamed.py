@@ -11,13 +11,11 @@ from typing import Any, Protocol, TextIO
 import typer
 
 from experiments.command.terminal import SOME_FAILED, emit, note, unexpected
-from plant.errors import HydrostateError, LogError
+from plant.errors import HydrostateError
+from plant.log.stream_source import bounded_lines
 
 STANDARD_INPUT = "standard input"
 """What standard input is called in events and errors."""
-
-LONGEST_LINE = 1 << 20
-"""Characters of the longest line of a stream."""
 
 
 class Told(Protocol):
@@ -72,18 +70,13 @@ def say_line(entries: Mapping[str, Any]) -> None:
 
 
 def stream_input(file: TextIO) -> Iterator[str]:
-    """Yield the lines of a stream; bytes that are no text are refused later as no numbers.
+    """Yield the lines of standard input; bytes that are no text are refused later as no numbers.
 
     Raises
     ------
     LogError
         If a line does not end.
     """
-    if not isinstance(file, io.TextIOWrapper):
-        yield from file
-        return
-    file.reconfigure(errors="replace")
-    while line := file.readline(LONGEST_LINE):
-        if len(line) == LONGEST_LINE and not line.endswith("\n"):
-            raise LogError(f"a line must have fewer than {LONGEST_LINE} characters", STANDARD_INPUT)
-        yield line
+    if isinstance(file, io.TextIOWrapper):
+        file.reconfigure(errors="replace")
+    return bounded_lines(file, STANDARD_INPUT)

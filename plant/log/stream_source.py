@@ -11,7 +11,7 @@ import socket
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 from urllib.parse import urlsplit
 
 from plant.errors import HydrostateError, LogError
@@ -25,7 +25,14 @@ QUEUED = 1000
 PATIENCE = 10.0
 """How long a connection may take [s]."""
 
+LONGEST_LINE = 1 << 20
+"""Characters of the longest line: what never ends its lines is no stream of rows, and must not fill the memory."""
+
 MQTT_PORT = 1883
+
+KEEPALIVE = {"TCP_KEEPIDLE": 30, "TCP_KEEPALIVE": 30, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
+"""Silence after which the other machine is asked whether it is still there, on two systems by two names, time to the
+next question [s], and questions [count]: a bench that lost its power closes no connection."""
 
 
 @dataclass
@@ -172,11 +179,36 @@ def _tcp(host: str, port: int, address: str) -> Iterator[str]:
     except OSError as error:
         raise LogError(f"no answer: {error.strerror or error}", address) from error
     connection.settimeout(None)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for name, value in KEEPALIVE.items():
+        if hasattr(socket, name):
+            connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
     with connection, connection.makefile("r", encoding="utf-8", errors="replace", newline="\n") as lines:
         try:
-            yield from lines
+            yield from bounded_lines(lines, address)
         except OSError as error:
             raise LogError(f"the connection broke: {error.strerror or error}", address) from error
+
+
+def bounded_lines(file: TextIO, source: str) -> Iterator[str]:
+    """Yield the lines of a text that may never end.
+
+    Parameters
+    ----------
+    file : TextIO
+        The text.
+    source : str
+        What it is called in errors.
+
+    Raises
+    ------
+    LogError
+        If a line does not end.
+    """
+    while line := file.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE and not line.endswith("\n"):
+            raise LogError(f"a line must have fewer than {LONGEST_LINE} characters", source)
+        yield line
 
 
 def batch(number: int, header: str, rows: Sequence[str]) -> str:

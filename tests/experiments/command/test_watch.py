@@ -119,9 +119,9 @@ def test_a_stream_on_standard_input_is_read_as_it_comes(log: Path, monkeypatch: 
     seen: list[int] = []
 
     class Growing(io.StringIO):
-        def __next__(self) -> str:
+        def readline(self, size: int | None = -1, /) -> str:
             seen.append(len(printed))
-            return super().__next__()
+            return super().readline(size)
 
     printed: list[str] = []
     monkeypatch.setattr("experiments.command.streamed.emit", lambda line: printed.append(line))

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from plant.errors import HydrostateError, LogError
+from plant.log import stream_source
 from plant.log.stream_source import Received, batch, broker_of, is_stream, stream_lines
 
 HEADER = "time_s,position_m"
@@ -58,6 +59,60 @@ def test_lost_and_late_batches_are_counted_and_left_out(broker: int) -> None:
     lines, received = through_broker(broker, "bench/broken", [*messages, ""])
     assert [line.split(",")[0] for line in lines[1:]] == ["4.0", "5.0", "8.0", "9.0"]
     assert (received.batches, received.late, received.lost) == (4, 1, 2)
+
+
+def test_a_sender_that_never_ends_its_line_is_refused_before_it_fills_the_memory(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(stream_source, "LONGEST_LINE", 1000)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        lines = stream_lines(address := f"tcp://127.0.0.1:{server.getsockname()[1]}", Received())
+
+        def serve() -> None:
+            connection, _ = server.accept()
+            with connection:
+                connection.sendall(b"time_s\n" + 2000 * b"1")
+
+        sender = threading.Thread(target=serve)
+        sender.start()
+        assert next(lines) == "time_s\n"
+        with pytest.raises(LogError, match="fewer than 1000 characters") as refused:
+            next(lines)
+        sender.join(10.0)
+    assert refused.value.source == address
+
+
+def test_a_bench_that_lost_its_power_is_noticed_within_a_minute_or_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A watch waited for ever: nobody had closed the connection."""
+    made: list[socket.socket] = []
+    connect = socket.create_connection
+
+    def connected(*asked: Any) -> socket.socket:
+        made.append(connect(*asked))
+        return made[-1]
+
+    monkeypatch.setattr(socket, "create_connection", connected)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        lines = stream_lines(f"tcp://127.0.0.1:{server.getsockname()[1]}", Received())
+
+        def serve() -> None:
+            connection, _ = server.accept()
+            with connection:
+                connection.sendall(b"time_s\n")
+
+        sender = threading.Thread(target=serve)
+        sender.start()
+        assert next(lines) == "time_s\n"
+        sender.join(10.0)
+        (one,) = made
+        assert one.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+        if hasattr(socket, "TCP_KEEPIDLE"):
+            idle, again, most = (
+                one.getsockopt(socket.IPPROTO_TCP, getattr(socket, name))
+                for name in ("TCP_KEEPIDLE", "TCP_KEEPINTVL", "TCP_KEEPCNT")
+            )
+            assert idle + again * most <= 120
+        lines.close()
 
 
 def test_rows_of_a_tcp_connection_wait_at_the_sender_until_they_are_read() -> None:
