@@ -25,6 +25,16 @@
     return made;
   }
 
+  // Delete a log; returns why not, where it was not.
+  async function removed(id) {
+    try {
+      const answer = await fetch(`api/logs/${id}`, { method: "DELETE" });
+      return answer.ok || answer.status === 404 ? "" : (await answer.json()).detail;
+    } catch (error) {
+      return `the server does not answer: ${error.message}`;
+    }
+  }
+
   // The log's own message is for a terminal; here a log is looked into by dropping it again.
   function advice(log) {
     if (log.state !== "failed" || log.verb === "inspect") return [];
@@ -50,9 +60,10 @@
     const remove = element("button", { type: "button", "aria-label": `Delete ${log.name}` }, "Delete");
     remove.addEventListener("click", async () => {
       if (!window.confirm(`Delete ${log.name} and what came of it?`)) return;
-      await fetch(`api/logs/${log.id}`, { method: "DELETE" });
+      const refused = await removed(log.id);
       ticked.delete(log.id);
-      look();
+      await look();
+      if (refused) status.textContent = `${log.name} was not deleted: ${refused}`;
     });
     return element(
       "tr",
@@ -101,6 +112,8 @@
       const { logs, counts } = await latest();
       if (turn < newest) return; // what was asked later has been answered already
       newest = turn;
+      const there = new Set(logs.map((log) => log.id)); // another page may have deleted one that is ticked here
+      for (const id of ticked) if (!there.has(id)) ticked.delete(id);
       const total = Object.values(counts).reduce((sum, one) => sum + one, 0);
       unfinished = (counts.unfinished ?? 0) > 0;
       const text = JSON.stringify([logs, [...coming.values()]]);

@@ -57,7 +57,7 @@ def test_what_openapi_allows_and_what_it_does_not_is_answered_as_it_says(tmp_pat
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     with (
-        feeding(60.0, 500.0) as (address, _),
+        feeding(1800.0, 500.0) as (address, _),  # for longer than all tests on these pages take
         Server(tmp_path_factory.mktemp("served") / "kept", "--watch", f"bench={address}") as server,
     ):
         yield server
@@ -134,14 +134,30 @@ def test_a_log_that_failed_says_how_to_look_into_it_and_one_that_was_looked_into
     opened: Any, tmp_path: Path
 ) -> None:
     page = opened("home")
-    for verb, name in (("diagnose", "no log.csv"), ("inspect", "nothing.csv")):
-        (tmp_path / name).write_text("a,b\n1,2\n3,4\n" if verb == "diagnose" else "")
+    rows: list[Any] = []
+    for verb, name, content in (("diagnose", "no log.csv", b"a,b\n1,2\n3,4\n"), ("inspect", "nothing.mat", b"\0\1\2")):
+        (tmp_path / name).write_bytes(content)
         page.select_option("#verb", verb)
         page.set_input_files("#file", str(tmp_path / name))
-    failed = page.locator("tr", has_text="no log.csv")
-    failed.locator("td", has_text="failed (diagnose)").wait_for(timeout=30_000)
-    assert "choose inspect and drop it again" in failed.inner_text()
-    assert page.get_by_text("choose inspect").count() == 1
+        rows.append(page.locator("tr", has_text=name))
+        rows[-1].locator("td", has_text=f"failed ({verb})").wait_for(timeout=30_000)
+    said = [row.get_by_text("choose inspect and drop it again").count() for row in rows]
+    assert said == [1, 0]
+
+
+def test_a_log_that_the_server_does_not_delete_stays_and_the_page_says_why(opened: Any, tmp_path: Path) -> None:
+    page = opened("home")
+    (tmp_path / "stays.csv").write_text("a,b\n1,2\n3,4\n")
+    page.set_input_files("#file", str(tmp_path / "stays.csv"))
+    row = page.locator("tr", has_text="stays.csv")
+    row.locator("td", has_text="failed").wait_for(timeout=30_000)
+    page.on("dialog", lambda dialog: dialog.accept())
+    page.route("**/api/logs/*", lambda route: route.fulfill(status=429, json={"detail": "the server is busy"}))
+    page.get_by_role("button", name="Delete stays.csv").click()
+    page.get_by_text("stays.csv was not deleted: the server is busy").wait_for(timeout=10_000)
+    page.unroute("**/api/logs/*")
+    page.get_by_role("button", name="Delete stays.csv").click()
+    row.wait_for(state="detached", timeout=10_000)
 
 
 def test_an_answer_that_comes_late_does_not_undo_a_newer_one(opened: Any, tmp_path: Path) -> None:
