@@ -13,10 +13,10 @@ import numpy as np
 
 from benchmarks.targets import misses, say
 from estimation.arrays import Array
-from estimation.identification.free_run.bends import KINDS
 from estimation.identification.free_run.data import Channels, channels_from
-from estimation.identification.free_run.hammerstein_body import HammersteinBody
+from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.identify import identify_channels
+from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.model.recursion import filtered
 
 SAMPLES = 1500
@@ -56,7 +56,7 @@ def logged(planted: Planted, seed: int) -> Channels:
     """Return a log of one plant."""
     rng = np.random.default_rng([seed, PLANTED.index(planted)])
     u = LEVEL + planted.drive(rng)
-    bent, _ = KINDS[planted.kind].bend(u, np.array(list(planted.values.values())), float(u[0]))
+    bent, _ = NONLINEARITIES[planted.kind].apply(u, np.array(list(planted.values.values())), float(u[0]))
     y = filtered([0.0, 0.1, 0.05], [1.0, -1.6, 0.75], bent)[100:]
     noisy = OFFSET + y + NOISE * y.std() * rng.normal(size=y.size)
     return channels_from([u[100:, None]], [noisy], 0.01, ["u"], "y")
@@ -85,9 +85,9 @@ def main(arguments: list[str] | None = None) -> int:
 def _found(planted: Planted, seed: int, form: Mapping[str, Any]) -> dict[str, float]:
     """Return the errors over their deviations; nothing where another kind is found."""
     model = identify_channels(logged(planted, seed), structure="hammerstein", **form).model
-    if not isinstance(model.body, HammersteinBody) or model.body.bend != planted.kind:
+    if not isinstance(model.dynamics, HammersteinDynamics) or model.dynamics.at_input != planted.kind:
         return {}
-    said = model.body.nonlinearity(model.scaling)
+    said = model.dynamics.nonlinearity(model.scaling)
     return {
         name: (said[name]["value"] - value) / (said[name]["std"] or np.inf) for name, value in planted.values.items()
     }

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.targets import misses, say
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels, channels_from
-from estimation.identification.state_space.body import StateSpaceBody, system_in_units
+from estimation.identification.state_space.dynamics import StateSpaceDynamics, system_in_units
 from estimation.identification.state_space.identify import identify_state_space
 from estimation.identification.state_space.joint import Joint, joined
 from estimation.identification.state_space.problem import Problem, Size, Values
@@ -81,8 +81,8 @@ def told(system: StateSpace) -> tuple[Array, Array]:
 def identified(data: list[Channels], order: int | None) -> StateSpace:
     """Return what is identified of a log, in its units."""
     models = [one.model for one in identify_state_space(data, order=order, delay=None if order is None else 1)]
-    bodies = [one.body for one in models if isinstance(one.body, StateSpaceBody)]
-    return system_in_units(bodies, [one.scaling for one in models])
+    outputs = [one.dynamics for one in models if isinstance(one.dynamics, StateSpaceDynamics)]
+    return system_in_units(outputs, [one.scaling for one in models])
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from estimation.identification.free_run.data import Channels
     from estimation.identification.free_run.identify import Identified
     from estimation.identification.free_run.model import FreeRunModel
-    from estimation.identification.state_space.body import StateSpaceBody
+    from estimation.identification.state_space.dynamics import StateSpaceDynamics
     from plant.log.record import Record
 
 
@@ -172,7 +172,7 @@ def _response(data: "Channels", log: str, path: Path) -> dict[str, Any]:
 def entries(found: "Identified") -> dict[str, Any]:
     """Return what was identified by the names of the JSON contract."""
     from estimation.identification.free_run.identify import WARNED
-    from estimation.identification.state_space.body import StateSpaceBody
+    from estimation.identification.state_space.dynamics import StateSpaceDynamics
 
     model, linear = found.model, found.model.linear
     result: dict[str, Any] = {
@@ -199,8 +199,8 @@ def entries(found: "Identified") -> dict[str, Any]:
         result |= {"numerator": [b.tolist() for b, _ in transfer], "denominator": transfer[0][1].tolist()}
         gains = [float(b.sum() / f.sum()) for b, f in transfer]
         result |= {"order": transfer[0][1].size - 1, "offset": model.offset, "dc_gain": {"value": gains}}
-    elif isinstance(model.body, StateSpaceBody):
-        result |= _state_space_entries(model, model.body)
+    elif isinstance(model.dynamics, StateSpaceDynamics):
+        result |= _state_space_entries(model, model.dynamics)
     result["nonlinearity"] = model.nonlinearity
     quality = found.quality
     result["message"] = clauses(
@@ -213,17 +213,17 @@ def entries(found: "Identified") -> dict[str, Any]:
     return result
 
 
-def _state_space_entries(model: "FreeRunModel", body: "StateSpaceBody") -> dict[str, Any]:
+def _state_space_entries(model: "FreeRunModel", dynamics: "StateSpaceDynamics") -> dict[str, Any]:
     """Return order, poles, steady gains and dead time of one output of a state space."""
     from experiments.command.identify import with_std
 
-    system, gain = body.system, model.scaling.y_std / model.scaling.u_std
+    system, gain = dynamics.system, model.scaling.y_std / model.scaling.u_std
     return {
         "order": system.order,
         "poles": with_std(system.poles, system.pole_std),
         "dc_gain": {
-            "value": (system.dc_gain[body.place] * gain).tolist(),
-            "std": (system.dc_gain_std[body.place] * gain).tolist(),
+            "value": (system.dc_gain[dynamics.place] * gain).tolist(),
+            "std": (system.dc_gain_std[dynamics.place] * gain).tolist(),
         },
         "offset": model.offset,
         "delay": {

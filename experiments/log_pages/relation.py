@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from estimation.identification.free_run.data import Channels
     from estimation.identification.free_run.model import FreeRunModel
-    from estimation.identification.state_space.body import StateSpaceBody
+    from estimation.identification.state_space.dynamics import StateSpaceDynamics
     from plant.log.record import Record
 
 _FIVE = "{:.5g}".format
@@ -104,11 +104,11 @@ class Relation(Shown):
         """
         import control
 
-        from estimation.identification.state_space.body import StateSpaceBody
+        from estimation.identification.state_space.dynamics import StateSpaceDynamics
 
-        bodies = [one.body for one in self.models if isinstance(one.body, StateSpaceBody)]
-        if bodies and len(bodies) == len(self.models) == len(bodies[0].system.c):
-            return _shared_states(self.models, bodies)
+        outputs = [one.dynamics for one in self.models if isinstance(one.dynamics, StateSpaceDynamics)]
+        if outputs and len(outputs) == len(self.models) == len(outputs[0].system.c):
+            return _shared_states(self.models, outputs)
         if len(self.models) == 1:
             return self.models[0].to_control()
         parts = [one.to_control() for one in self.models]
@@ -156,13 +156,13 @@ class Relation(Shown):
         return [axis for model, data in pairs for axis in draw_free_run(model, data, "log").axes]
 
 
-def _shared_states(models: "Sequence[FreeRunModel]", bodies: "Sequence[StateSpaceBody]") -> "StateSpace":
+def _shared_states(models: "Sequence[FreeRunModel]", outputs: "Sequence[StateSpaceDynamics]") -> "StateSpace":
     """Return the state space that all outputs share, its dead times as states of their own."""
     import control
 
-    from estimation.identification.state_space.body import system_in_units
+    from estimation.identification.state_space.dynamics import system_in_units
 
-    one = system_in_units(bodies, [model.scaling for model in models])
+    one = system_in_units(outputs, [model.scaling for model in models])
     names = {"inputs": list(models[0].inputs), "outputs": [model.output for model in models]}
     return control.StateSpace(*one.with_delays_as_states(), one.sample_time, **names)
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.free_run.bends import KINDS
 from estimation.identification.free_run.choose_linear import (
     BLOCKS,
     CLEARLY,
@@ -22,6 +21,7 @@ from estimation.identification.free_run.hammerstein_fit import (
     fit_hammerstein,
     refitted,
 )
+from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.free_run.transfer_function import linear_model
 
 ORDERS = 4
@@ -74,7 +74,7 @@ def hammerstein_candidates(linear: Sequence[Candidate], data: Channels) -> list[
         if one.doubt != "time_constant":
             denominators.setdefault(one.form.order, []).append(one.fit.f)
     found: list[HammersteinCandidate] = []
-    for kind in KINDS:
+    for kind in NONLINEARITIES:
         best: dict[int, tuple[float, HammersteinFit]] = {}
         for one in _bases(linear):
             order = one.form.order
@@ -151,9 +151,9 @@ def _bic(fit: HammersteinFit, data: Channels) -> float:
 
 def _doubt(fit: HammersteinFit, data: Channels) -> str:
     """Return whether a pole of the linear part, slower than a block that is held back, is not told from a zero."""
-    bent, _ = HammersteinProblem(fit.kind, fit.linear.form, data).bent(fit.values, fit.starts)
+    behind, _ = HammersteinProblem(fit.kind, fit.linear.form, data).behind_nonlinearity(fit.values, fit.starts)
     slow = np.exp(-(BLOCKS + 1.0) / data.longest)
-    pairs = linear_model(fit.linear, bent, UNSCALED).cancellations
+    pairs = linear_model(fit.linear, behind, UNSCALED).cancellations
     return "cancelling" if any(abs(one.pole) > slow for one in pairs) else ""
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from estimation.arrays import Array, BoolArray
 from estimation.identification.free_run.data import Channels, blocks, halves
-from estimation.identification.free_run.linear_body import LinearBody
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem, extended, fit_linear, quick_fit
 
 BLOCKS = 4
@@ -202,8 +202,8 @@ def halves_error(fit: LinearFit, data: Channels) -> float:
         return float("nan")
     squares = list[Array]()
     for part, other in ((first, second), (second, first)):
-        body = LinearBody.of(fit_linear(fit.form, part, [fit.f], bounded=fit.bounded))
-        squares += [(body.run(u, y) - y) ** 2 for u, y in zip(other.u, other.y, strict=True)]
+        dynamics = LinearDynamics.of(fit_linear(fit.form, part, [fit.f], bounded=fit.bounded))
+        squares += [(dynamics.run(u, y) - y) ** 2 for u, y in zip(other.u, other.y, strict=True)]
     return float(np.sqrt(np.nanmean(np.concatenate(squares))))
 
 

@@ -15,9 +15,9 @@ from estimation.identification.free_run.data import Channels, blocks
 from estimation.identification.free_run.dense_polynomial import Asked, Judged, Recipe, forms_tried, judged_recipes
 from estimation.identification.free_run.linear_fit import LinearFit, fit_linear
 from estimation.identification.free_run.other_orders import disagreement, is_wild
+from estimation.identification.free_run.output_friction import continued, fit_with_friction
 from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs
 from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, one_more, without_term
-from estimation.identification.free_run.rubbing import continued, rubbing
 from estimation.identification.free_run.selected_polynomial import Selection, forms_selected, judged_selections
 
 MOST_TERMS = 20
@@ -105,7 +105,7 @@ def _grown(linear: Sequence[Candidate], data: Channels) -> list[PolynomialCandid
         for base in _bases(linear)
         if (whole := begun(base.fit, data)) is not None
     ]
-    return [*_best_grown(growths, KEPT), *_best_grown(_rubbing(linear, data), 1)]
+    return [*_best_grown(growths, KEPT), *_best_grown(_with_friction(linear, data), 1)]
 
 
 def _best_grown(growths: Sequence["_Growth"], count: int) -> list[PolynomialCandidate]:
@@ -120,7 +120,7 @@ def _from_linear(base: LinearFit) -> Callable[[Channels], PolynomialFit | None]:
     return lambda part: begun(fit_linear(base.form, part, [base.f]), part)
 
 
-def _rubbing(linear: Sequence[Candidate], data: Channels) -> list["_Growth"]:
+def _with_friction(linear: Sequence[Candidate], data: Channels) -> list["_Growth"]:
     """Return growths from models whose output rubs, if friction explains much that linear models leave."""
     fits: list[PolynomialFit] = []
     for order in range(1, HIGHEST_RUBBING + 1):
@@ -128,7 +128,7 @@ def _rubbing(linear: Sequence[Candidate], data: Channels) -> list["_Growth"]:
         own = sorted((one for one in linear if one.form.order == order), key=lambda one: one.held_back)
         for base in own[:RUBBING_BASES]:
             for friction in ("velocity", "position")[:order]:
-                fit = rubbing(base.fit, friction, data)
+                fit = fit_with_friction(base.fit, friction, data)
                 if fit is not None and fit.cost < (1.0 - RUBS) * base.fit.cost:
                     fits.append(fit)
     best = sorted(fits, key=lambda one: _bic(one, data))[:KEPT]

@@ -1,4 +1,4 @@
-"""Output error of a linear model behind a bent input (Hammerstein): all values together, with exact derivatives."""
+"""Output error of a linear model behind an input nonlinearity (Hammerstein): all values at once, exact derivatives."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,8 +7,8 @@ import numpy as np
 
 from estimation.arrays import Array, BoolArray
 from estimation.fits.covariance import automatic_lags, least_squares_covariance
-from estimation.identification.free_run.bends import KINDS
 from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem, fit_linear
 from estimation.identification.free_run.linear_kernel import decay_rows, settles
 from estimation.identification.search.levenberg import levenberg
@@ -27,7 +27,7 @@ class HammersteinFit:
     Parameters
     ----------
     kind : str
-        One of `KINDS`.
+        One of `NONLINEARITIES`.
     values : ndarray, shape (k,)
         Of the nonlinearity.
     starts : ndarray, shape (logs,)
@@ -56,16 +56,16 @@ class HammersteinProblem:
     """Sensitivities of one kind and form on given data of one input."""
 
     def __init__(self, kind: str, form: Form, data: Channels) -> None:
-        self.kind, self.form, self.data = KINDS[kind], form, data
+        self.kind, self.form, self.data = NONLINEARITIES[kind], form, data
         self.name = kind
         self.input = np.concatenate([u[:, 0] for u in data.u])
         self.target = np.concatenate(data.y)
         self.used: BoolArray = np.isfinite(self.target)
-        self.n_bend = len(self.kind.names)
+        self.n_static = len(self.kind.names)
         self.n_starts = len(data.u) if self.kind.remembers else 0
 
-    def bent(self, values: Array, starts: Array) -> tuple[Channels, list[Array]]:
-        """Return the data behind the nonlinearity, and the derivatives of each log's bent input.
+    def behind_nonlinearity(self, values: Array, starts: Array) -> tuple[Channels, list[Array]]:
+        """Return the data behind the nonlinearity, and the derivatives of each log's input there.
 
         Parameters
         ----------
@@ -80,7 +80,7 @@ class HammersteinProblem:
             Columns are values, then the log's own start where there is one.
         """
         found = [
-            self.kind.bend(u[:, 0], values, float(starts[index]) if self.n_starts else 0.0)
+            self.kind.apply(u[:, 0], values, float(starts[index]) if self.n_starts else 0.0)
             for index, u in enumerate(self.data.u)
         ]
         return replace(self.data, u=tuple(one[:, None] for one, _ in found)), [slopes for _, slopes in found]
@@ -98,9 +98,9 @@ class HammersteinProblem:
         tuple of ndarray, shapes (n,) and (n, p)
             Output and derivatives, scaled.
         """
-        ahead = self.n_bend + self.n_starts
-        values, starts, linear = theta[: self.n_bend], theta[self.n_bend : ahead], theta[ahead:]
-        data, slopes = self.bent(values, starts)
+        ahead = self.n_static + self.n_starts
+        values, starts, linear = theta[: self.n_static], theta[self.n_static : ahead], theta[ahead:]
+        data, slopes = self.behind_nonlinearity(values, starts)
         problem = Problem(self.form, data)
         output, behind = problem.jacobian(linear)
         jacobian = np.zeros((output.size, theta.size), order="F")
@@ -110,9 +110,9 @@ class HammersteinProblem:
         for index, by in enumerate(slopes):
             part = slice(int(problem.bounds[index]), int(problem.bounds[index + 1]))
             answers = _answers(by, b, f, self.form.delays[0])
-            jacobian[part, : self.n_bend] = answers[:, : self.n_bend]
+            jacobian[part, : self.n_static] = answers[:, : self.n_static]
             if self.n_starts:
-                jacobian[part, self.n_bend + index] = answers[:, -1]
+                jacobian[part, self.n_static + index] = answers[:, -1]
         return output, jacobian
 
     def descend(self, values: Array, starts: Array, linear: Array) -> HammersteinFit:
@@ -123,7 +123,7 @@ class HammersteinProblem:
         values, starts, linear : ndarray, shapes (k,), (logs,) and (p,)
             Where to begin.
         """
-        ahead, n_b, n = self.n_bend + self.n_starts, self.form.n_b, self.form.order
+        ahead, n_b, n = self.n_static + self.n_starts, self.form.n_b, self.form.order
         target = self.target[self.used]
 
         def at(theta: Array) -> tuple[float, Array, Array]:
@@ -132,12 +132,15 @@ class HammersteinProblem:
             return float(left @ left), kept.T @ kept, kept.T @ left
 
         def acceptable(theta: Array) -> bool:
-            return self.kind.may(self.input, theta[: self.n_bend]) and settles(theta[ahead + n_b : ahead + n_b + n])
+            return self.kind.may(self.input, theta[: self.n_static]) and settles(theta[ahead + n_b : ahead + n_b + n])
 
         start = np.concatenate([values, starts, linear])
         cost, best = levenberg(at, start, acceptable, tolerance=TOLERANCE, most_steps=MOST_STEPS)
         return HammersteinFit(
-            self.name, best[: self.n_bend], best[self.n_bend : ahead], LinearFit(self.form, best[ahead:], cost)
+            self.name,
+            best[: self.n_static],
+            best[self.n_static : ahead],
+            LinearFit(self.form, best[ahead:], cost),
         )
 
 
@@ -157,7 +160,7 @@ def fit_hammerstein(kind: str, form: Form, data: Channels, denominators: Sequenc
     Parameters
     ----------
     kind : str
-        One of `KINDS`.
+        One of `NONLINEARITIES`.
     data : Channels
         Scaled, one input.
     denominators : sequence of ndarray, shape (order + 1,)
@@ -168,15 +171,15 @@ def fit_hammerstein(kind: str, form: Form, data: Channels, denominators: Sequenc
     for values in problem.kind.starts(problem.input):
         if not problem.kind.may(problem.input, values):
             continue
-        bent, _ = problem.bent(values, _first(problem))
-        if any(np.ptp(u) == 0.0 for u in bent.u):
+        behind, _ = problem.behind_nonlinearity(values, _first(problem))
+        if any(np.ptp(u) == 0.0 for u in behind.u):
             continue
-        inner = Problem(form, bent)
+        inner = Problem(form, behind)
         tried += [(inner.profiled(f)[0], values, f) for f in denominators]
     fits: list[HammersteinFit] = []
     for _, values, f in _apart(sorted(tried, key=lambda one: one[0])):
-        bent, _ = problem.bent(values, _first(problem))
-        near = fit_linear(form, bent, [f])
+        behind, _ = problem.behind_nonlinearity(values, _first(problem))
+        near = fit_linear(form, behind, [f])
         fits.append(problem.descend(values, _first(problem), near.theta))
     return min(fits, key=lambda one: one.cost) if fits else None
 
@@ -204,8 +207,8 @@ def refitted(fit: HammersteinFit, data: Channels) -> HammersteinFit:
     """
     problem = HammersteinProblem(fit.kind, fit.linear.form, data)
     starts = fit.starts if len(fit.starts) == problem.n_starts else _first(problem)
-    bent, _ = problem.bent(fit.values, starts)
-    begun = fit_linear(fit.linear.form, bent, [fit.linear.f])
+    behind, _ = problem.behind_nonlinearity(fit.values, starts)
+    begun = fit_linear(fit.linear.form, behind, [fit.linear.f])
     return problem.descend(fit.values, starts, begun.theta)
 
 
@@ -235,4 +238,4 @@ def deviations(fit: HammersteinFit, data: Channels) -> Array:
     variance = np.diag(spread)
     # of a residual as slow as the log the window's estimate need not be positive: then nothing is known
     found[felt] = np.sqrt(np.where(variance > 0.0, variance, np.inf))
-    return found[: problem.n_bend]
+    return found[: problem.n_static]

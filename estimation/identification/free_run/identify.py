@@ -9,7 +9,6 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimation.identification.fit.feedback import feedback_note
-from estimation.identification.free_run.bodies import LinearBody, PolynomialBody
 from estimation.identification.free_run.candidate_rows import hammerstein_row, linear_row, polynomial_row
 from estimation.identification.free_run.choose_hammerstein import (
     HammersteinCandidate,
@@ -26,11 +25,13 @@ from estimation.identification.free_run.choose_linear import (
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate, polynomial_candidates
 from estimation.identification.free_run.data import Channels, Scaling, scaled
 from estimation.identification.free_run.dense_polynomial import Asked
-from estimation.identification.free_run.hammerstein_body import HammersteinBody
+from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.hammerstein_fit import deviations, refitted
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
+from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.transfer_function import linear_model
 from estimation.identification.notes import IdentificationCode
 from plant.errors import HydrostateError, LogWarning, require_known
@@ -152,15 +153,15 @@ def _identified(
     sound = not best.doubt
     if structure in ADOPTED:
         return _adopted(structure, best, data, by, rows)
-    bend = None
+    nonlinear = None
     if structure == "hammerstein" or (structure == "auto" and len(data.inputs) == 1):
-        bend = _worthwhile_bend(linear, best, whole, rows, surely=structure == "auto")
+        nonlinear = _worthwhile_nonlinearity(linear, best, whole, rows, surely=structure == "auto")
     if structure == "hammerstein":
-        if bend is not None:
-            return _bent(bend, data, whole, rows)
+        if nonlinear is not None:
+            return _nonlinear(nonlinear, data, whole, rows)
         notes = [*notes, IdentificationCode.NO_NONLINEARITY.note(output=data.output)]
         structure = "output-error"
-    body, held_back, named = LinearBody.of(best.fit), best.held_back, "output-error"
+    dynamics, held_back, named = LinearDynamics.of(best.fit), best.held_back, "output-error"
     if structure != "output-error":
         polynomial = polynomial_candidates(linear if sound else [best], part, Asked(order, delay, n_numerator))
         rows += [polynomial_row(one) for one in polynomial]
@@ -169,20 +170,20 @@ def _identified(
             raise HydrostateError(f"no polynomial model of {data.output!r} runs free without growing beyond bounds")
         straight = min([best, *(one for one in linear if not one.doubt)], key=lambda one: one.held_back)
         taken = better is not None and (structure == "narx" or not sound or _clearly_better(better, straight))
-        if bend is not None and not (taken and better is not None and better.price < bend.held_back):
-            return _bent(bend, data, whole, rows)
+        if nonlinear is not None and not (taken and better is not None and better.price < nonlinear.held_back):
+            return _nonlinear(nonlinear, data, whole, rows)
         if taken and better is not None:
-            body, held_back, named = _refitted(better, whole), better.held_back, "narx"
+            dynamics, held_back, named = _refitted(better, whole), better.held_back, "narx"
             sound, notes = np.isfinite(held_back) and held_back < 1.0, []
     transfer = None
-    if isinstance(body, LinearBody):
+    if isinstance(dynamics, LinearDynamics):
         fit = fit_linear(best.form, whole, [best.fit.f], bounded=best.fit.bounded)
-        body = LinearBody.of(fit)
+        dynamics = LinearDynamics.of(fit)
         transfer = linear_model(fit, whole, by) if len(data.inputs) == 1 else None
-    model = FreeRunModel(data.inputs, data.output, data.sample_time, named, by, body, transfer)
+    model = FreeRunModel(data.inputs, data.output, data.sample_time, named, by, dynamics, transfer)
     quality = model.quality(data.u, data.y)
     notes = [*notes, *_fed_back(model, data)]
-    empty = isinstance(body, LinearBody) and best.doubt == "no_fit"
+    empty = isinstance(dynamics, LinearDynamics) and best.doubt == "no_fit"
     if empty or not quality.fit_percent > 0.0 or not held_back < 1.0:
         notes = [*notes, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
         sound = False
@@ -191,7 +192,7 @@ def _identified(
 
 def _fed_back(model: FreeRunModel, data: Channels) -> list[Note]:
     """Return a note where the input of a linear model follows the output's noise, by the longest log."""
-    if len(data.inputs) != 1 or not isinstance(model.body, LinearBody):
+    if len(data.inputs) != 1 or not isinstance(model.dynamics, LinearDynamics):
         return []
     k = int(np.argmax([y.size for y in data.y]))
     u, y = data.u[k], data.y[k]
@@ -199,7 +200,7 @@ def _fed_back(model: FreeRunModel, data: Channels) -> list[Note]:
     return [] if said is None else [said]
 
 
-def _worthwhile_bend(
+def _worthwhile_nonlinearity(
     linear: Sequence[Candidate], best: Candidate, whole: Channels, rows: list[dict[str, Any]], *, surely: bool
 ) -> HammersteinCandidate | None:
     """Return the best model with a nonlinearity at its input, or None where none is better than every linear one."""
@@ -210,13 +211,13 @@ def _worthwhile_bend(
     return worthwhile(found, linear, best, surely=surely)
 
 
-def _bent(taken: HammersteinCandidate, data: Channels, whole: Channels, rows: list[dict[str, Any]]) -> Identified:
+def _nonlinear(taken: HammersteinCandidate, data: Channels, whole: Channels, rows: list[dict[str, Any]]) -> Identified:
     """Return a model with a nonlinearity at its input, fitted to all data."""
     part = section(whole, MOST_FITTED)
     # on the data of the comparison a further descent would lead to a model that no block has judged
     fit = taken.fit if section(whole, MOST_CHOSEN) is whole else refitted(taken.fit, part)
-    body = HammersteinBody.of(fit, deviations(fit, part))
-    model = FreeRunModel(data.inputs, data.output, data.sample_time, "hammerstein", scaled(data)[1], body)
+    dynamics = HammersteinDynamics.of(fit, deviations(fit, part))
+    model = FreeRunModel(data.inputs, data.output, data.sample_time, "hammerstein", scaled(data)[1], dynamics)
     quality = model.quality(data.u, data.y)
     sound = quality.fit_percent > 0.0 and taken.held_back < 1.0
     notes = () if sound else (IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent),)
@@ -225,8 +226,8 @@ def _bent(taken: HammersteinCandidate, data: Channels, whole: Channels, rows: li
 
 def _adopted(structure: str, best: Candidate, data: Channels, by: Scaling, rows: list[dict[str, Any]]) -> Identified:
     """Return a structure that is not fitted by its free run, at the order of the best output-error model."""
-    body, linear, held_back = adopt(structure, best.form, data, by)
-    model = FreeRunModel(data.inputs, data.output, data.sample_time, structure, by, body, linear)
+    dynamics, linear, held_back = adopt(structure, best.form, data, by)
+    model = FreeRunModel(data.inputs, data.output, data.sample_time, structure, by, dynamics, linear)
     quality = model.quality(data.u, data.y)
     sound = quality.fit_percent > 0.0 and held_back < 1.0
     notes = () if sound else (IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent),)
@@ -299,9 +300,9 @@ def _undetermined(candidate: Candidate, data: Channels, by: Scaling) -> bool:
     return bool(model.cancellations) or not model.dc_gain_std < abs(model.dc_gain)
 
 
-def _refitted(found: PolynomialCandidate, whole: Channels) -> PolynomialBody:
-    """Return a polynomial body fitted to all data, or to as much as is practical."""
-    return PolynomialBody.of(found.refit(section(whole, MOST_FITTED)) or found.fit)
+def _refitted(found: PolynomialCandidate, whole: Channels) -> PolynomialDynamics:
+    """Return a polynomial dynamics fitted to all data, or to as much as is practical."""
+    return PolynomialDynamics.of(found.refit(section(whole, MOST_FITTED)) or found.fit)
 
 
 def section(data: Channels, most: int) -> Channels:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from estimation.identification.free_run.bodies import PolynomialBody
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import BEYOND
 from estimation.identification.notes import IdentificationCode
 from plant.notes import Note
@@ -25,9 +25,9 @@ def inputs_beyond(model: FreeRunModel, data: Channels) -> list[Note]:
     list of Note
         One an input that leaves its range by a tenth of it or more, with how far and how often.
     """
-    if not isinstance(model.body, PolynomialBody):
+    if not isinstance(model.dynamics, PolynomialDynamics):
         return []
-    variables, by, notes = model.body.variables, model.scaling, list[Note]()
+    variables, by, notes = model.dynamics.variables, model.scaling, list[Note]()
     together = np.concatenate(data.u)
     for index, name in enumerate(data.inputs):
         own = variables.limits[variables.source == index + 1]

@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.arrays import Array
-from estimation.identification.free_run.bodies import BODIES, Body, LinearBody, PolynomialBody, StateSpaceBody
 from estimation.identification.free_run.data import Scaling
-from estimation.identification.free_run.hammerstein_body import HammersteinBody
+from estimation.identification.free_run.dynamics import Dynamics
+from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
+from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
+from estimation.identification.state_space.dynamics import StateSpaceDynamics
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -22,6 +25,11 @@ FORMAT = "hydrostate-model"
 """What a saved model calls itself."""
 
 VERSION = 1
+
+KINDS: Mapping[str, Any] = {
+    one.kind: one for one in (LinearDynamics, PolynomialDynamics, HammersteinDynamics, StateSpaceDynamics)
+}
+"""Dynamics by what a saved model calls them."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +62,8 @@ class FreeRunModel:
         Seconds between samples [s].
     structure : str
         How it was fitted: ``"output-error"``, ``"narx"``, ...
+    scaling, dynamics : Scaling, Dynamics
+        Of the fitted data, and what runs between its scaled channels.
     linear : LinearModel, optional
         The transfer function with its covariance, where there is one input and the model is linear.
     """
@@ -63,21 +73,21 @@ class FreeRunModel:
     sample_time: float
     structure: str
     scaling: Scaling
-    body: Body
+    dynamics: Dynamics
     linear: "LinearModel | None" = field(default=None)
 
     @property
     def n_values(self) -> int:
         """Fitted coefficients."""
-        return self.body.n_values
+        return self.dynamics.n_values
 
     @property
     def nonlinearity(self) -> dict[str, Any] | None:
-        """What bends the input or holds the output, by kind and values in the channels' units; None without it."""
-        if isinstance(self.body, HammersteinBody):
-            return self.body.nonlinearity(self.scaling)
-        if isinstance(self.body, PolynomialBody):
-            return self.body.nonlinearity(self.scaling, self.sample_time)
+        """Nonlinearity of the input or friction of the output, by kind and values in the channels' units, or None."""
+        if isinstance(self.dynamics, HammersteinDynamics):
+            return self.dynamics.nonlinearity(self.scaling)
+        if isinstance(self.dynamics, PolynomialDynamics):
+            return self.dynamics.nonlinearity(self.scaling, self.sample_time)
         return None
 
     def simulate(self, u: ArrayLike, y: ArrayLike | None = None) -> Array:
@@ -97,7 +107,7 @@ class FreeRunModel:
             Output; NaN from where a polynomial model runs away.
         """
         inputs, outputs = self._scaled(u, y)
-        return self.scaling.y_mean + self.scaling.y_std * self.body.run(inputs, outputs)
+        return self.scaling.y_mean + self.scaling.y_std * self.dynamics.run(inputs, outputs)
 
     def predict(self, u: ArrayLike, y: ArrayLike) -> Array:
         """Return the prediction one step ahead from measured outputs, shape (n,); NaN where they are missing.
@@ -117,7 +127,7 @@ class FreeRunModel:
         inputs, outputs = self._scaled(u, y)
         if self.linear is not None and self.linear.noise_denominator.size > 1:
             return self.linear.predict(self.scaling.u_mean[0] + self.scaling.u_std[0] * inputs[:, 0], np.asarray(y))
-        return self.scaling.y_mean + self.scaling.y_std * self.body.one_step(inputs, outputs)
+        return self.scaling.y_mean + self.scaling.y_std * self.dynamics.one_step(inputs, outputs)
 
     def quality(self, u: Sequence[Array], y: Sequence[Array]) -> FreeRunQuality:
         """Return how well the model follows logs.
@@ -162,23 +172,23 @@ class FreeRunModel:
         HydrostateError
             If the model is not linear.
         """
-        body = self.body
-        if not isinstance(body, LinearBody | StateSpaceBody):
+        dynamics = self.dynamics
+        if not isinstance(dynamics, LinearDynamics | StateSpaceDynamics):
             raise HydrostateError(f"a {self.structure} model has no transfer function")
         factors = self.scaling.y_std / self.scaling.u_std
-        return [(b * factor, f) for (b, f), factor in zip(body.transfer_functions(), factors, strict=True)]
+        return [(b * factor, f) for (b, f), factor in zip(dynamics.transfer_functions(), factors, strict=True)]
 
     @property
     def level(self) -> float:
         """Output of a linear model whose inputs have long stood at the data's means [output unit]; NaN for others."""
-        if not isinstance(self.body, LinearBody | StateSpaceBody):
+        if not isinstance(self.dynamics, LinearDynamics | StateSpaceDynamics):
             return float("nan")
-        return self.scaling.y_mean + self.scaling.y_std * self.body.level
+        return self.scaling.y_mean + self.scaling.y_std * self.dynamics.level
 
     @property
     def offset(self) -> float:
         """Output at rest of a linear model whose inputs are zero [output unit]; NaN for others."""
-        if not isinstance(self.body, LinearBody | StateSpaceBody):
+        if not isinstance(self.dynamics, LinearDynamics | StateSpaceDynamics):
             return float("nan")
         gains = [float(b.sum() / f.sum()) for b, f in self.transfer_functions()]
         return self.level - float(np.dot(gains, self.scaling.u_mean))
@@ -204,14 +214,14 @@ class FreeRunModel:
             "output": self.output,
             "sample_time_s": self.sample_time,
             "structure": self.structure,
-            "kind": self.body.kind,
+            "kind": self.dynamics.kind,
             "scaling": {
                 "u_mean": by.u_mean.tolist(),
                 "u_std": by.u_std.tolist(),
                 "y_mean": by.y_mean,
                 "y_std": by.y_std,
             },
-            "body": self.body.to_dict(),
+            "body": self.dynamics.to_dict(),
         }
 
     @classmethod
@@ -231,9 +241,9 @@ class FreeRunModel:
         try:
             by = values["scaling"]
             scaling = Scaling(np.array(by["u_mean"]), np.array(by["u_std"]), float(by["y_mean"]), float(by["y_std"]))
-            body = BODIES[values["kind"]].from_dict(values["body"])
+            dynamics = KINDS[values["kind"]].from_dict(values["body"])
             names = (tuple(values["inputs"]), str(values["output"]))
-            return cls(*names, float(values["sample_time_s"]), str(values["structure"]), scaling, body)
+            return cls(*names, float(values["sample_time_s"]), str(values["structure"]), scaling, dynamics)
         except (KeyError, TypeError, ValueError) as error:
             raise HydrostateError(f"a saved model is not usable: {type(error).__name__} {error}") from error
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from estimation.arrays import Array, BoolArray
 from estimation.identification.choose import fit_structure
-from estimation.identification.free_run.bodies import LinearBody
 from estimation.identification.free_run.choose_linear import block_error
 from estimation.identification.free_run.data import Channels, Scaling, in_scale
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import Form, Problem
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.structure_names import STRUCTURE_NAMES
@@ -21,7 +21,7 @@ HELD_BACK = 1.0 / 3.0
 """Last share of every log that is not fitted, to judge the structure by."""
 
 
-def adopt(name: str, form: Form, data: Channels, by: Scaling) -> tuple[LinearBody, LinearModel, float]:
+def adopt(name: str, form: Form, data: Channels, by: Scaling) -> tuple[LinearDynamics, LinearModel, float]:
     """Fit a structure, and judge it by the free run on the last third of every log, fitted to the rest.
 
     Parameters
@@ -35,7 +35,7 @@ def adopt(name: str, form: Form, data: Channels, by: Scaling) -> tuple[LinearBod
 
     Returns
     -------
-    tuple of LinearBody, LinearModel and float
+    tuple of LinearDynamics, LinearModel and float
         What runs free, the fit with its offset, and the held-back error over the output's deviation.
 
     Raises
@@ -46,14 +46,14 @@ def adopt(name: str, form: Form, data: Channels, by: Scaling) -> tuple[LinearBod
     if len(data.inputs) > 1:
         raise HydrostateError(f"structure {name} takes one input, got {', '.join(data.inputs)}: use output-error")
     model = _fitted(name, form, data, by)
-    body, offset = _body(model, data, by)
+    dynamics, offset = _dynamics(model, data, by)
     cuts = [round(y.size * (1.0 - HELD_BACK)) for y in data.y]
     shorter = replace(
         data,
         u=tuple(u[:cut] for u, cut in zip(data.u, cuts, strict=True)),
         y=tuple(y[:cut] for y, cut in zip(data.y, cuts, strict=True)),
     )
-    part, _ = _body(_fitted(name, form, shorter, by), shorter, by)
+    part, _ = _dynamics(_fitted(name, form, shorter, by), shorter, by)
     whole = in_scale(data, by)
     errors, masks = list[Array](), list[BoolArray]()
     for u, y, cut in zip(whole.u, whole.y, cuts, strict=True):
@@ -66,7 +66,7 @@ def adopt(name: str, form: Form, data: Channels, by: Scaling) -> tuple[LinearBod
         level -= model.dc_gain * float(by.u_mean[0])
     else:
         level -= float(model.numerator[-1] / model.denominator[-1]) * float(by.u_mean[0])
-    return body, replace(model, offset=level), held_back
+    return dynamics, replace(model, offset=level), held_back
 
 
 def _fitted(name: str, form: Form, data: Channels, by: Scaling) -> LinearModel:
@@ -82,7 +82,7 @@ def _fitted(name: str, form: Form, data: Channels, by: Scaling) -> LinearModel:
     return fit_structure(ADOPTED[name], *both, data.sample_time, {**sizes, **about})
 
 
-def _body(model: LinearModel, data: Channels, by: Scaling) -> tuple[LinearBody, float]:
+def _dynamics(model: LinearModel, data: Channels, by: Scaling) -> tuple[LinearDynamics, float]:
     """Return what runs free of a fit, with the offset that suits the data best."""
     if not model.is_stable:
         raise HydrostateError(
@@ -95,4 +95,4 @@ def _body(model: LinearModel, data: Channels, by: Scaling) -> tuple[LinearBody, 
     columns = problem.linear_columns(one.denominator)
     left = (problem.y - columns[:, : b.size] @ b)[problem.used]
     offset = float(np.linalg.lstsq(columns[:, b.size :][problem.used], left, rcond=None)[0][0])
-    return LinearBody(form, np.concatenate([b, one.denominator[1:], [offset]])), offset
+    return LinearDynamics(form, np.concatenate([b, one.denominator[1:], [offset]])), offset

@@ -20,8 +20,8 @@ from estimation.identification.free_run.identify import (
 )
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.notes import IdentificationCode
-from estimation.identification.state_space.body import StateSpaceBody
 from estimation.identification.state_space.choose import StateCandidate, chosen_state, state_candidates
+from estimation.identification.state_space.dynamics import StateSpaceDynamics
 from estimation.identification.state_space.fit import fit_state_space, system_of
 from estimation.identification.state_space.joint import joined
 from plant.errors import HydrostateError, LogWarning
@@ -145,8 +145,8 @@ def _identified(data: Sequence[Channels], orders: Sequence[int], delay: int | No
     rows = tuple(one.row() for one in candidates)
     found: list[Identified] = []
     for place, (one, (_, by)) in enumerate(zip(data, both, strict=True)):
-        body = StateSpaceBody(system, place)
-        model = FreeRunModel(one.inputs, one.output, one.sample_time, STATE_SPACE, by, body)
+        dynamics = StateSpaceDynamics(system, place)
+        model = FreeRunModel(one.inputs, one.output, one.sample_time, STATE_SPACE, by, dynamics)
         found.append(_judged(model, one, best, best.held_back[place], rows))
     return found
 

@@ -10,8 +10,8 @@ from scipy.signal import lfilter, lfiltic
 
 from estimation.export.c_model import model_in_c
 from estimation.export.mat_model import model_in_mat
-from estimation.identification.free_run.bodies import LinearBody
 from estimation.identification.free_run.data import Scaling
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import Form
 from estimation.identification.free_run.model import FreeRunModel
 from tests.c_compiler import compiled, ran
@@ -27,7 +27,7 @@ def linear(denominator: tuple[float, ...]) -> FreeRunModel:
         1e-2,
         "output-error",
         scaling,
-        LinearBody(form, np.array([0.3, -0.1, 0.2, *denominator, 0.05])),
+        LinearDynamics(form, np.array([0.3, -0.1, 0.2, *denominator, 0.05])),
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimation.identification.free_run import choose_polynomial
-from estimation.identification.free_run.choose_polynomial import _best_grown, _dense, _rubbing
+from estimation.identification.free_run.choose_polynomial import _best_grown, _dense, _with_friction
 from estimation.identification.free_run.dense_polynomial import Asked
 from estimation.identification.free_run.linear_fit import Form
 
@@ -30,9 +30,9 @@ def rubs(
         left = share.get((fit.form.order, friction))
         return None if left is None else SimpleNamespace(cost=left * fit.cost, theta=np.zeros(3), name=fit.name)
 
-    monkeypatch.setattr(choose_polynomial, "rubbing", rubbing)
+    monkeypatch.setattr(choose_polynomial, "fit_with_friction", rubbing)
     monkeypatch.setattr(choose_polynomial, "_Growth", lambda whole, *_: whole)
-    return asked, _rubbing(models, DATA)
+    return asked, _with_friction(models, DATA)
 
 
 def test_friction_is_tried_on_two_models_of_each_order_to_the_third_and_holds_a_position_from_the_second(

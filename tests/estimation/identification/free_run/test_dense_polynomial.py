@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from estimation.arrays import Array
-from estimation.identification.free_run.bodies import PolynomialBody
 from estimation.identification.free_run.choose_linear import BLOCKS, linear_candidates
 from estimation.identification.free_run.choose_polynomial import polynomial_candidates
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
@@ -14,6 +13,7 @@ from estimation.identification.free_run.dense_polynomial import Asked, Recipe, e
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import Form
 from estimation.identification.free_run.other_orders import disagreement, reordered
+from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import Runs
 
 
@@ -134,7 +134,7 @@ def test_a_run_forgets_what_inputs_before_its_log_did() -> None:
     data = late_product()
     fit = Recipe(Form(1, (4,), (0,)), 2, 1e-8, (1e-6,)).fit(data)
     assert fit is not None
-    body, begin = PolynomialBody.of(fit), 211
+    body, begin = PolynomialDynamics.of(fit), 211
     u, y = data.u[0][begin : begin + 40], data.y[0][begin : begin + 40]
     error = body.run(u, y) - y
     assert np.abs(error[2:]).max() < 0.04

@@ -9,7 +9,6 @@ import pytest
 
 from benchmarks.bent_inputs import PLANTED, Planted, logged
 from estimation.identification.free_run import choose_hammerstein
-from estimation.identification.free_run.bends import KINDS, play
 from estimation.identification.free_run.choose_hammerstein import (
     ORDERS,
     HammersteinCandidate,
@@ -21,9 +20,10 @@ from estimation.identification.free_run.choose_hammerstein import (
 )
 from estimation.identification.free_run.choose_linear import linear_candidates, pooled
 from estimation.identification.free_run.data import Channels, channels_from, scaled
-from estimation.identification.free_run.hammerstein_body import HammersteinBody
+from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.hammerstein_fit import HammersteinFit, HammersteinProblem, fit_hammerstein
 from estimation.identification.free_run.identify import Identified, identify_channels
+from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES, play
 from estimation.identification.free_run.linear_fit import Form, LinearFit
 from estimation.identification.free_run.model import FreeRunModel
 from plant.errors import HydrostateError
@@ -42,8 +42,8 @@ def test_what_was_planted_is_found_within_its_interval(planted: Planted) -> None
     found = identified(logged(planted, 1))
     assert found.sound
     assert found.model.structure == "hammerstein"
-    assert isinstance(found.model.body, HammersteinBody)
-    said = found.model.body.nonlinearity(found.model.scaling)
+    assert isinstance(found.model.dynamics, HammersteinDynamics)
+    said = found.model.dynamics.nonlinearity(found.model.scaling)
     assert said["kind"] == planted.kind
     for name, value in planted.values.items():
         assert abs(said[name]["value"] - value) < 4.0 * said[name]["std"] < 0.1
@@ -52,7 +52,7 @@ def test_what_was_planted_is_found_within_its_interval(planted: Planted) -> None
         )
     assert found.held_back_percent > 94.0
     kinds = {row["nonlinearity"] for row in found.candidates if row["structure"] == "hammerstein"}
-    assert kinds == set(KINDS)
+    assert kinds == set(NONLINEARITIES)
 
 
 def test_a_model_is_the_same_after_it_was_saved(planted: Planted) -> None:
@@ -60,8 +60,8 @@ def test_a_model_is_the_same_after_it_was_saved(planted: Planted) -> None:
     model = identified(data).model
     again = FreeRunModel.from_dict(json.loads(json.dumps(model.to_dict())))
     np.testing.assert_array_equal(again.simulate(data.u[0], data.y[0]), model.simulate(data.u[0], data.y[0]))
-    assert isinstance(again.body, HammersteinBody)
-    assert again.body.nonlinearity(again.scaling) == model.body.nonlinearity(model.scaling)  # type: ignore[attr-defined]
+    assert isinstance(again.dynamics, HammersteinDynamics)
+    assert again.dynamics.nonlinearity(again.scaling) == model.dynamics.nonlinearity(model.scaling)  # type: ignore[attr-defined]
     with pytest.raises(HydrostateError, match="a hammerstein model has no transfer function"):
         model.to_control()
 
@@ -76,7 +76,7 @@ def test_a_run_without_outputs_follows_all_the_same(planted: Planted) -> None:
 def test_derivatives_are_exact_where_no_sample_changes_sides(planted: Planted) -> None:
     data, by = scaled(logged(planted, 4))
     problem = HammersteinProblem(planted.kind, Form(2, (2,), (1,)), data)
-    values = np.array(list(planted.values.values())) - (by.u_mean[0] if KINDS[planted.kind].level else 0.0)
+    values = np.array(list(planted.values.values())) - (by.u_mean[0] if NONLINEARITIES[planted.kind].level else 0.0)
     starts = np.full(problem.n_starts, data.u[0][0, 0])
     theta = np.concatenate([values / by.u_std[0], starts, [0.1, 0.05, -1.6, 0.75, 0.0, 0.1, 0.2]])
     _, jacobian = problem.jacobian(theta)
@@ -101,8 +101,8 @@ def test_gaps_and_several_logs_are_borne() -> None:
     outputs[0][300:350] = np.nan
     both = channels_from([one.u[0] for one in parts], outputs, 0.01, ["u"], "y")
     found = identified(both)
-    assert isinstance(found.model.body, HammersteinBody)
-    said = found.model.body.nonlinearity(found.model.scaling)["half_width"]
+    assert isinstance(found.model.dynamics, HammersteinDynamics)
+    said = found.model.dynamics.nonlinearity(found.model.scaling)["half_width"]
     assert abs(said["value"] - 0.3) < 4.0 * said["std"]
 
 
@@ -133,15 +133,15 @@ def test_a_play_follows_at_half_its_width_and_stands_still_in_between() -> None:
 def test_auto_takes_a_bend_where_it_is_better_than_every_other_on_blocks_held_back(bent: Planted) -> None:
     found = identify_channels(logged(bent, 5), structure="auto", order=2, delay=1)
     assert found.model.structure == "hammerstein"
-    assert isinstance(found.model.body, HammersteinBody)
-    assert found.model.body.bend == bent.kind
+    assert isinstance(found.model.dynamics, HammersteinDynamics)
+    assert found.model.dynamics.at_input == bent.kind
     rest = [row["held_back_percent"] for row in found.candidates if row["structure"] != "hammerstein"]
     assert found.held_back_percent > max(rest)
 
 
 def test_a_saved_model_of_an_unknown_kind_is_refused() -> None:
-    with pytest.raises(ValueError, match=f"a nonlinearity among {', '.join(KINDS)} is needed, got 'bent'"):
-        HammersteinBody.from_dict({"bend": "bent", "std": [None, 0.1], "values": [0.0, 1.0], "linear": {}})
+    with pytest.raises(ValueError, match=f"a nonlinearity among {', '.join(NONLINEARITIES)} is needed, got 'bent'"):
+        HammersteinDynamics.from_dict({"bend": "bent", "std": [None, 0.1], "values": [0.0, 1.0], "linear": {}})
 
 
 def candidate(order: int, held_back: float, delay: int = 1, doubt: str = "", f: float = -0.5) -> Any:
@@ -167,17 +167,17 @@ def test_a_denominator_with_an_unbelievable_time_constant_is_no_start(monkeypatc
     slow = candidate(1, 0.2, doubt="time_constant", f=-1.0)
     data = scaled(logged(PLANTED[0], 1))[0]
     assert hammerstein_candidates([slow, candidate(1, 0.3), candidate(2, 0.4, f=-0.9)], data) == []
-    assert given == [[-0.5], [-0.9]] * len(KINDS)
+    assert given == [[-0.5], [-0.9]] * len(NONLINEARITIES)
     given.clear()
     hammerstein_candidates([slow], data)
-    assert given == [[-1.0]] * len(KINDS)  # it alone is better than none
+    assert given == [[-1.0]] * len(NONLINEARITIES)  # it alone is better than none
 
 
 def test_the_best_of_each_kind_and_order_is_judged_so_that_a_smaller_one_may_do_better() -> None:
     data = scaled(logged(PLANTED[0], 3))[0]
     found = hammerstein_candidates(linear_candidates(data, [1, 2, 3], (1,)), data)
-    orders = {kind: [one.fit.linear.form.order for one in found if one.fit.kind == kind] for kind in KINDS}
-    assert orders == {kind: [1, 2, 3] for kind in KINDS}
+    orders = {kind: [one.fit.linear.form.order for one in found if one.fit.kind == kind] for kind in NONLINEARITIES}
+    assert orders == {kind: [1, 2, 3] for kind in NONLINEARITIES}
     assert chosen_hammerstein(found).fit.kind == "dead-zone"
     assert chosen_hammerstein(found).fit.linear.form.order == 2  # that of the plant, though 3 fits no worse
     assert found[2].fit.cost <= found[1].fit.cost
@@ -272,7 +272,7 @@ def test_where_no_bend_can_be_fitted_the_model_is_linear(monkeypatch: pytest.Mon
 def test_a_bend_is_sought_only_where_the_input_shows_it(
     kind: str, allowed: list[list[float]], refused: list[list[float]]
 ) -> None:
-    u, bend = np.linspace(-1.0, 1.0, 201), KINDS[kind]
+    u, bend = np.linspace(-1.0, 1.0, 201), NONLINEARITIES[kind]
     assert [bend.may(u, np.array(values)) for values in allowed] == [True] * len(allowed)
     assert [bend.may(u, np.array(values)) for values in refused] == [False] * len(refused)
     assert all(bend.may(u, start) for start in bend.starts(u))

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.identification.free_run.bodies import PolynomialBody
 from estimation.identification.free_run.data import Channels, channels_from
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.input_range import inputs_beyond
 from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from tests.estimation.identification.free_run.test_polynomial_fit import duffing, log
 
 
@@ -41,9 +41,9 @@ def test_an_input_that_leaves_the_range_is_named_with_how_far_and_how_often(mode
 
 
 def test_a_model_whose_products_hold_no_input_and_a_linear_one_have_no_range(model: FreeRunModel) -> None:
-    assert isinstance(model.body, PolynomialBody)
-    variables = replace(model.body.variables, source=np.zeros_like(model.body.variables.source))
-    own = replace(model, body=replace(model.body, variables=variables))
+    assert isinstance(model.dynamics, PolynomialDynamics)
+    variables = replace(model.dynamics.variables, source=np.zeros_like(model.dynamics.variables.source))
+    own = replace(model, dynamics=replace(model.dynamics, variables=variables))
     assert inputs_beyond(own, driven(9.0)) == []
     linear = identify_channels(log(), structure="output-error", order=2, delay=1).model
     assert inputs_beyond(linear, driven(9.0)) == []

@@ -13,7 +13,7 @@ from estimation.identification.free_run import choose_linear, identify, linear_f
 from estimation.identification.free_run.choose_linear import Candidate
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.least_squares import least_squares
-from estimation.identification.free_run.linear_body import LinearBody
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem, fit_linear
 from estimation.identification.free_run.linear_kernel import decay_rows
 from estimation.identification.free_run.model import FreeRunModel, _fit
@@ -217,7 +217,11 @@ def fed_back() -> dict[str, Any]:
     """Of which models the input is asked whether it follows the output's noise."""
     told: dict[str, Any] = {}
     fed = U + np.column_stack([np.concatenate([[0.0], 3.0 * NOISE[:-1]])] * 2)
-    for name, inputs, kind in (("a line", 1, LinearBody), ("two inputs", 2, LinearBody), ("another body", 1, Quiet)):
+    for name, inputs, kind in (
+        ("a line", 1, LinearDynamics),
+        ("two inputs", 2, LinearDynamics),
+        ("another body", 1, Quiet),
+    ):
         body: Any = kind(Form(1, (1,) * inputs, (1,) * inputs), np.array([0.1] * inputs + [-0.5, 0.0]))
         logs = [slice(0, 60), slice(60, N)]
         one = channels_from([fed[log, :inputs] for log in logs], [NOISE[log] for log in logs], 0.1, "ab"[:inputs], "y")
@@ -248,17 +252,17 @@ def models_in_units() -> dict[str, Any]:
             "state": [Found(float(v), 1e-2) for v in found.initial_state],
             "fit": [found.fit_percent, found.rmse, found.residual_std, found.n_samples, found.offset],
         }
-        model = FreeRunModel(one.inputs, one.output, 0.1, "output-error", by, LinearBody.of(fit), found)
+        model = FreeRunModel(one.inputs, one.output, 0.1, "output-error", by, LinearDynamics.of(fit), found)
         told[name] |= {
             "quality": [*vars(model.quality(one.u, one.y)).values()],
             "levels": [model.level, model.offset, model.n_values],
             "run": some(model.simulate(one.u[0], one.y[0]), 5),
             "run without outputs": some(model.simulate(one.u[0]), 5),
         }
-    body = LinearBody.of(fit_linear(FORMS["two inputs"], data(2)))
+    body = LinearDynamics.of(fit_linear(FORMS["two inputs"], data(2)))
     told["two inputs"] = [[Found(float(v), 1e-3) for v in b] for b, _ in body.transfer_functions()]
     few = np.where(np.arange(120) < 2, data().y[0], np.nan), np.where(np.arange(120) < 3, data().y[0], np.nan)
-    told["of few outputs"] = [some(LinearBody.of(fit).run(data().u[0], y), 3) for y in few]
+    told["of few outputs"] = [some(LinearDynamics.of(fit).run(data().u[0], y), 3) for y in few]
     measured = np.array([1.0, np.nan, 3.0, 5.0])
     rows = (([1.0, 2.0, 3.5, 4.0], True), ([1.0, 2.0, np.nan, 4.0], True), ([1.0, 2.0, np.nan, 4.0], False))
     told["fits"] = [_fit(measured, np.array(row), running=running) for row, running in rows]

@@ -15,19 +15,19 @@ from estimation.identification.free_run import (
     other_orders,
     polynomial_terms,
 )
-from estimation.identification.free_run.bends import KINDS, _inner, _outer, _widths, play
-from estimation.identification.free_run.bodies import PolynomialBody
 from estimation.identification.free_run.candidate_rows import hammerstein_row, linear_row, polynomial_row
 from estimation.identification.free_run.choose_linear import Candidate, linear_candidates
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
 from estimation.identification.free_run.dense_polynomial import Asked, Judged, Recipe
-from estimation.identification.free_run.hammerstein_body import HammersteinBody
+from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.hammerstein_fit import HammersteinProblem, fit_hammerstein
 from estimation.identification.free_run.identify import identify_channels
+from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES, _inner, _outer, _widths, play
 from estimation.identification.free_run.input_range import inputs_beyond
 from estimation.identification.free_run.linear_fit import Form, LinearFit, fit_linear
 from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, first_values, products
 from plant.arrays import Array
 from tests.kernels import loops_in_python
@@ -231,7 +231,7 @@ def choices_of_polynomials() -> dict[str, Any]:
 
 @NUMBERS.case()
 def polynomial_bodies() -> dict[str, Any]:
-    one = PolynomialBody.of(grown(1))
+    one = PolynomialDynamics.of(grown(1))
     whole = channels_from([U[:, None]], [answer()], 0.1, ("a",), "y")
     by = scaled(whole)[1]
     y = np.where(np.arange(90) % 7 == 2, np.nan, data().y[0])
@@ -242,7 +242,7 @@ def polynomial_bodies() -> dict[str, Any]:
         "few outputs": [
             some(one.run(data().u[0], np.where(np.arange(90) < n, data().y[0], np.nan)), 3) for n in (8, 9, 0)
         ],
-        "saved": PolynomialBody.from_dict(one.to_dict()).terms,
+        "saved": PolynomialDynamics.from_dict(one.to_dict()).terms,
     }
     model = FreeRunModel(("a",), "y", 0.1, "narx", by, one)
     limits = by.u_mean[0] + by.u_std[0] * one.variables.limits[one.variables.source == 1][0]
@@ -263,9 +263,9 @@ def bends() -> dict[str, Any]:
         out, slopes = np.zeros(N), np.zeros((N, 2))
         play(np.cumsum(NOISE), 1.5, 0.2, out, slopes)
         told["play"] = [some(out, 9), some(slopes[:, 0]), some(slopes[:, 1])]
-        for name, kind in KINDS.items():
+        for name, kind in NONLINEARITIES.items():
             values = np.array([-0.4, 0.5])[: len(kind.names)] if kind.level else np.array([0.3])
-            bent, by = kind.bend(U, values, 0.1)
+            bent, by = kind.apply(U, values, 0.1)
             told[name] = [some(bent, 9), *(some(one) for one in by.T), len(kind.starts(U))]
             trials = ((-0.4, 0.5), (0.5, -0.4), (0.2, 0.2), (U.min(), 0.5), (-0.4, U.max()), (-9.0, 0.5), (-0.4, 9.0))
             if kind.level:
@@ -280,8 +280,8 @@ def bends() -> dict[str, Any]:
 def bent_inputs() -> dict[str, Any]:
     told: dict[str, Any] = {}
     form = Form(1, (1,), (1,))
-    for kind in KINDS:
-        values = np.array([-0.6, 0.7]) if KINDS[kind].level else np.array([0.3])
+    for kind in NONLINEARITIES:
+        values = np.array([-0.6, 0.7]) if NONLINEARITIES[kind].level else np.array([0.3])
         problem = HammersteinProblem(kind, form, data(lost=True))
         starts = hammerstein_fit._first(problem)
         theta = np.concatenate([values, starts, [0.3, -0.6, 0.1, 0.2, -0.1]])
@@ -299,7 +299,7 @@ def bent_inputs() -> dict[str, Any]:
             found, choose_hammerstein._held_back(found, data()), choose_hammerstein._bic(found, data())
         )
         told[f"{kind}, judged"] = [Found(one.held_back, 1e-3), Found(one.bic, 1.0), hammerstein_row(one)["order"]]
-        body = HammersteinBody.of(found, spread)
+        body = HammersteinDynamics.of(found, spread)
         by = scaled(channels_from([U[:, None]], [answer()], 0.1, ("a",), "y"))[1]
         told[f"{kind}, told"] = {
             name: {key: Found(v, 1e-2) for key, v in row.items() if isinstance(v, float)}

@@ -11,13 +11,13 @@ import pytest
 
 from estimation.arrays import Array
 from estimation.identification.free_run import identify
-from estimation.identification.free_run.bodies import PolynomialBody
 from estimation.identification.free_run.choose_polynomial import _pruned
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import Form, fit_linear
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.other_orders import is_wild
+from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import Runs, products
 from estimation.identification.free_run.polynomial_kernel import run_free, write_products
 from estimation.identification.free_run.polynomial_terms import (
@@ -252,7 +252,7 @@ def test_a_fit_that_runs_away_is_wild_takes_no_product_and_predicts_nothing() ->
     assert runs.fit(away.theta, 10) is None
     assert one_more(away, candidate_terms(away.variables), data) is None
     assert is_wild(away, data)
-    body = PolynomialBody.of(away)
+    body = PolynomialDynamics.of(away)
     assert np.isnan(body.run(data.u[0], data.y[0])).all()
 
 

@@ -6,8 +6,8 @@ import pytest
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_fit import Form, fit_linear
+from estimation.identification.free_run.output_friction import _first_outputs
 from estimation.identification.free_run.polynomial_fit import BEYOND, Runs, Variables, first_values, variables_of
-from estimation.identification.free_run.rubbing import _first_outputs
 
 SIZES = (60, 90)
 

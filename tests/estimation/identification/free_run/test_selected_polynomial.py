@@ -5,12 +5,12 @@ import pytest
 
 from estimation.arrays import Array
 from estimation.identification.free_run import choose_polynomial
-from estimation.identification.free_run.bodies import PolynomialBody
 from estimation.identification.free_run.choose_linear import BLOCKS, linear_candidates
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
 from estimation.identification.free_run.dense_polynomial import Asked
 from estimation.identification.free_run.linear_fit import Form
 from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.selected_polynomial import (
     COUNTS,
     Selection,
@@ -109,7 +109,7 @@ def test_a_short_log_of_a_sparse_plant_is_a_case_for_few_products(monkeypatch: p
     for kept in (choose_polynomial._selected, lambda *_: []):
         monkeypatch.setattr(choose_polynomial, "_selected", kept)
         best = min(choose_polynomial.polynomial_candidates(linear, data), key=lambda one: one.price)
-        model = FreeRunModel(("u", "v"), "y", 1.0, "narx", by, PolynomialBody.of(best.fit))
+        model = FreeRunModel(("u", "v"), "y", 1.0, "narx", by, PolynomialDynamics.of(best.fit))
         left.append(model.quality([test_u], [test_y]).fit_percent)
     assert left[0] > 90.0
     assert left[1] < 80.0, "grown models begin at two lags, and there are too few samples for every product of four"

@@ -9,7 +9,7 @@ import pytest
 
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
 from estimation.identification.state_space import choose, fit, identify, starts
-from estimation.identification.state_space.body import StateSpaceBody, system_in_units
+from estimation.identification.state_space.dynamics import StateSpaceDynamics, system_in_units
 from estimation.identification.state_space.fit import Effort, StateSpaceFit, fit_state_space, system_of
 from estimation.identification.state_space.identify import _judged, identify_outputs, identify_state_space
 from estimation.identification.state_space.joint import Joint, delayed, joined
@@ -222,7 +222,7 @@ def bodies() -> dict[str, Any]:
     told: dict[str, Any] = {}
     y = outputs()[:, 0]
     for place in (0, 1):
-        body = StateSpaceBody(system(), place)
+        body = StateSpaceDynamics(system(), place)
         told[f"output {place}"] = {
             "run": some(body.run(U, y), 7),
             "run without outputs": some(body.run(U, np.full(240, np.nan)), 7),
@@ -231,9 +231,9 @@ def bodies() -> dict[str, Any]:
             "level": [body.level, body.n_values],
         }
     seen = [np.where(np.arange(240) < n, y, np.nan) for n in (2, 3)]
-    told["few outputs"] = [some(StateSpaceBody(system(), 0).run(U, one), 4) for one in seen]
+    told["few outputs"] = [some(StateSpaceDynamics(system(), 0).run(U, one), 4) for one in seen]
     scalings = [scaled(one)[1] for one in channels()]
-    told["in units"] = system_in_units([StateSpaceBody(system(), k) for k in (0, 1)], scalings).level
+    told["in units"] = system_in_units([StateSpaceDynamics(system(), k) for k in (0, 1)], scalings).level
     return told
 
 

@@ -18,7 +18,7 @@ LEVELS = (0.02, 0.1, 0.3, 0.6)
 """Friction that searches begin at, over what the inputs put in at one deviation [dimensionless]."""
 
 
-def rubbing(linear: LinearFit, friction: str, data: Channels) -> PolynomialFit | None:
+def fit_with_friction(linear: LinearFit, friction: str, data: Channels) -> PolynomialFit | None:
     """Return a linear model whose output rubs, fitted to its free run; None where it runs away.
 
     Parameters

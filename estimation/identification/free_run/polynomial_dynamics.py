@@ -1,47 +1,21 @@
-"""What runs free inside a model, in the data's scale: every kind of body by its name, and the polynomial one."""
+"""A polynomial model in the data's scale: its free run, its prediction one step ahead and its JSON form."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
 from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels, Scaling
-from estimation.identification.free_run.hammerstein_body import HammersteinBody
-from estimation.identification.free_run.linear_body import LinearBody as LinearBody
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, Variables, products
-from estimation.identification.state_space.body import StateSpaceBody as StateSpaceBody
 
 START_STEPS = 12
 """Refinements of the first outputs of a polynomial run."""
 
 
-class Body(Protocol):
-    """What a structure must offer to be simulated, judged and saved."""
-
-    kind: ClassVar[str]
-
-    @property
-    def n_values(self) -> int:
-        """Fitted coefficients."""
-        ...
-
-    def run(self, u: Array, y: Array) -> Array:
-        """Return the free run, shape (n,), from the state that suits the outputs that are there best."""
-        ...
-
-    def one_step(self, u: Array, y: Array) -> Array:
-        """Return the prediction one step ahead, shape (n,)."""
-        ...
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return JSON values."""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
-class PolynomialBody:
+class PolynomialDynamics:
     """A sum of products of lagged signals.
 
     Parameters
@@ -167,8 +141,8 @@ class PolynomialBody:
         }
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> "PolynomialBody":
-        """Return the body that `to_dict` wrote."""
+    def from_dict(cls, values: Mapping[str, Any]) -> "PolynomialDynamics":
+        """Return the dynamics that `to_dict` wrote."""
         source, lag = (np.array(values[name], dtype=np.int64) for name in ("source", "lag"))
         rub = values.get("friction", {"of": "", "values": []})
         limits = np.array(values["limits"], dtype=np.float64).reshape(-1, 2)
@@ -182,10 +156,6 @@ class PolynomialBody:
         return cls(variables, terms, np.array(values["values"], dtype=np.float64), friction)
 
     @classmethod
-    def of(cls, fit: PolynomialFit) -> "PolynomialBody":
-        """Return the body of a fit."""
+    def of(cls, fit: PolynomialFit) -> "PolynomialDynamics":
+        """Return the dynamics of a fit."""
         return cls(fit.variables, fit.terms, fit.coefficients, fit.friction)
-
-
-BODIES: Mapping[str, Any] = {one.kind: one for one in (LinearBody, PolynomialBody, HammersteinBody, StateSpaceBody)}
-"""Bodies by their name in JSON."""

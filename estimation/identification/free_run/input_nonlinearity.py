@@ -40,9 +40,9 @@ def play(u: Array, width: float, start: float, out: Array, slopes: Array) -> Non
         slopes[k, 1] = by_start
 
 
-Bend = Callable[[Array, Array, float], tuple[Array, Array]]
-"""``bend(u, values, start)``: the bent input, shape (n,), and its derivatives by the values, and by the start where
-there is one, shape (n, values)."""
+Applied = Callable[[Array, Array, float], tuple[Array, Array]]
+"""``apply(u, values, start)``: what the linear model sees of the input, shape (n,), and its derivatives by the values,
+and by the start where there is one, shape (n, values)."""
 
 
 def _dead_zone(u: Array, values: Array, start: float) -> tuple[Array, Array]:  # noqa: ARG001 -- all take a start
@@ -88,7 +88,7 @@ def _acts(u: Array, values: Array) -> bool:
 
 
 @dataclass(frozen=True)
-class Kind:
+class Nonlinearity:
     """One kind of nonlinearity.
 
     Parameters
@@ -99,8 +99,8 @@ class Kind:
         Whether they are levels.
     remembers : bool
         Whether it has a start of its own in every log.
-    bend : callable
-        See `Bend`.
+    apply : callable
+        See `Applied`.
     starts : callable
         From the input of all logs to values at which searches begin.
     may : callable
@@ -110,15 +110,17 @@ class Kind:
     names: tuple[str, ...]
     level: bool
     remembers: bool
-    bend: Bend
+    apply: Applied
     starts: Callable[[Array], list[Array]]
     may: Callable[[Array, Array], bool]
 
 
-KINDS: Mapping[str, Kind] = {
-    "dead-zone": Kind(("lower", "upper"), True, False, _dead_zone, _inner, _acts),
-    "saturation": Kind(("lower", "upper"), True, False, _saturation, _outer, lambda u, v: _acts(u, v) and v[0] < v[1]),
-    "backlash": Kind(
+NONLINEARITIES: Mapping[str, Nonlinearity] = {
+    "dead-zone": Nonlinearity(("lower", "upper"), True, False, _dead_zone, _inner, _acts),
+    "saturation": Nonlinearity(
+        ("lower", "upper"), True, False, _saturation, _outer, lambda u, v: _acts(u, v) and v[0] < v[1]
+    ),
+    "backlash": Nonlinearity(
         ("half_width",), False, True, _backlash, _widths, lambda u, v: bool(0.0 <= v[0] < 0.5 * np.ptp(u))
     ),
 }

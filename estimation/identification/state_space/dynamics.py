@@ -1,4 +1,4 @@
-"""One output of a state space as it runs free, in the data's scale, with its JSON form."""
+"""One output of a state space in the data's scale: its free run and its JSON form."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,13 +8,14 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Scaling
+from estimation.identification.free_run.dynamics import OutputErrorDynamics
 from estimation.identification.state_space.joint import delayed
 from estimation.identification.state_space.kernel import run_states
 from estimation.identification.state_space.system import StateSpace
 
 
 @dataclass(frozen=True, eq=False)
-class StateSpaceBody:
+class StateSpaceDynamics(OutputErrorDynamics):
     """One output of a state space that all outputs share.
 
     Parameters
@@ -70,23 +71,6 @@ class StateSpaceBody:
             free[:, k] = states @ one.c[self.place]
         return out + free @ np.linalg.lstsq(free[known], (y - out)[known], rcond=1e-10)[0]
 
-    def one_step(self, u: Array, y: Array) -> Array:
-        """Return the free run: noise is taken to be the sensor's, so what was measured before tells nothing.
-
-        Parameters
-        ----------
-        u : ndarray, shape (n, m)
-            Inputs, scaled.
-        y : ndarray, shape (n,)
-            Output, scaled; NaN where missing.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Output, scaled.
-        """
-        return self.run(u, y)
-
     def transfer_functions(self) -> list[tuple[Array, Array]]:
         """Return numerator and denominator from each input [scaled], in powers of the delay operator."""
         from scipy.signal import ss2tf
@@ -102,19 +86,19 @@ class StateSpaceBody:
         return {**self.system.to_dict(), "place": self.place}
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> "StateSpaceBody":
-        """Return the body that `to_dict` wrote."""
+    def from_dict(cls, values: Mapping[str, Any]) -> "StateSpaceDynamics":
+        """Return the dynamics that `to_dict` wrote."""
         return cls(StateSpace.from_dict(values), int(values["place"]))
 
 
-def system_in_units(bodies: Sequence[StateSpaceBody], scalings: Sequence[Scaling]) -> StateSpace:
+def system_in_units(outputs: Sequence[StateSpaceDynamics], scalings: Sequence[Scaling]) -> StateSpace:
     """Return the state space that several outputs share, in the channels' units.
 
     Parameters
     ----------
-    bodies, scalings : sequence of StateSpaceBody, sequence of Scaling
+    outputs, scalings : sequence of StateSpaceDynamics, sequence of Scaling
         One an output, all of them.
     """
     by = scalings[0]
     mean, std = (np.array([getattr(one, name) for one in scalings]) for name in ("y_mean", "y_std"))
-    return bodies[0].system.in_units(by.u_mean, by.u_std, mean, std)
+    return outputs[0].system.in_units(by.u_mean, by.u_std, mean, std)

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from estimation.arrays import Array
-from estimation.identification.free_run.bodies import PolynomialBody
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.identify import Identified, identify_channels
 from estimation.identification.free_run.linear_fit import Form, fit_linear
 from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.output_friction import continued, fit_with_friction
+from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import Runs
 from estimation.identification.free_run.polynomial_kernel import run_free
-from estimation.identification.free_run.rubbing import continued, rubbing
 from plant.errors import HydrostateError
 
 FRICTION, STEP = 0.4, 0.02
@@ -75,7 +75,7 @@ def test_friction_takes_a_level_off_and_holds_what_moves_less(way: Callable[[Any
 @pytest.mark.parametrize("friction", ["velocity", "position"])
 def test_sensitivities_are_the_derivatives_of_a_run_that_sticks(friction: str) -> None:
     data, _ = scaled(log(200))
-    fit = rubbing(fit_linear(Form(2, (2,), (1,)), data), friction, data)
+    fit = fit_with_friction(fit_linear(Form(2, (2,), (1,)), data), friction, data)
     assert fit is not None
     size = fit.theta.size - fit.variables.n_friction
     fit = replace(fit, theta=np.concatenate([fit.theta[:size], np.array([0.012, 0.01, 0.0])[: fit.friction.size]]))
@@ -123,7 +123,7 @@ def test_a_body_that_does_not_rub_is_given_no_friction() -> None:
 
 def test_a_fit_goes_on_with_other_data_from_where_it_is() -> None:
     data, by = scaled(log())
-    fit = rubbing(fit_linear(Form(1, (1,), (1,)), data), "velocity", data)
+    fit = fit_with_friction(fit_linear(Form(1, (1,), (1,)), data), "velocity", data)
     assert fit is not None
     masks = [np.arange(data.y[0].size) > 350]
     part = continued(fit, data.without(masks))
@@ -148,9 +148,9 @@ def test_a_saved_model_that_rubs_runs_and_predicts_as_before() -> None:
 @pytest.mark.parametrize("friction", ["velocity", "position"])
 def test_the_prediction_of_one_step_sticks_as_the_run_does(friction: str) -> None:
     data, _ = scaled(log(200))
-    fit = rubbing(fit_linear(Form(2, (2,), (1,)), data), friction, data)
+    fit = fit_with_friction(fit_linear(Form(2, (2,), (1,)), data), friction, data)
     assert fit is not None
-    body = PolynomialBody.of(fit)
+    body = PolynomialDynamics.of(fit)
     u = data.u[0]
     run = body.run(u, data.y[0])
     assert body.one_step(u, run)[4:] == pytest.approx(run[4:], abs=1e-9)

@@ -1,4 +1,4 @@
-"""A linear model as it runs free, in the data's scale, with its JSON form."""
+"""A linear model in the data's scale: its free run and its JSON form."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,11 +8,12 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.dynamics import OutputErrorDynamics
 from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem
 
 
 @dataclass(frozen=True, eq=False)
-class LinearBody:
+class LinearDynamics(OutputErrorDynamics):
     """Transfer functions with one denominator, and an offset.
 
     Parameters
@@ -72,23 +73,6 @@ class LinearBody:
         free = columns[:, n_b + 1 :]
         return driven + free @ np.linalg.lstsq(free[known], (y - driven)[known], rcond=None)[0]
 
-    def one_step(self, u: Array, y: Array) -> Array:
-        """Return the free run: noise is taken to be the sensor's, so what was measured before tells nothing.
-
-        Parameters
-        ----------
-        u : ndarray, shape (n, m)
-            Inputs, scaled.
-        y : ndarray, shape (n,)
-            Output, scaled; NaN where missing.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Output, scaled.
-        """
-        return self.run(u, y)
-
     def to_dict(self) -> dict[str, Any]:
         """Return JSON values."""
         form = self.form
@@ -100,12 +84,12 @@ class LinearBody:
         }
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> "LinearBody":
-        """Return the body that `to_dict` wrote."""
+    def from_dict(cls, values: Mapping[str, Any]) -> "LinearDynamics":
+        """Return the dynamics that `to_dict` wrote."""
         form = Form(int(values["order"]), tuple(values["sizes"]), tuple(values["delays"]))
         return cls(form, np.array(values["values"], dtype=np.float64))
 
     @classmethod
-    def of(cls, fit: LinearFit) -> "LinearBody":
-        """Return the body of a fit."""
+    def of(cls, fit: LinearFit) -> "LinearDynamics":
+        """Return the dynamics of a fit."""
         return cls(fit.form, fit.theta[: fit.form.n_values])

@@ -7,19 +7,19 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from estimation.arrays import Array
-from estimation.identification.free_run.bodies import START_STEPS, PolynomialBody
 from estimation.identification.free_run.data import Scaling
+from estimation.identification.free_run.polynomial_dynamics import START_STEPS, PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import Runs, Variables
 
 U = np.random.default_rng(4).uniform(-1.0, 1.0, (60, 1))
 
 
-def body(*friction: float, kind: str = "", lags: int = 1, square: float = 0.0) -> PolynomialBody:
+def body(*friction: float, kind: str = "", lags: int = 1, square: float = 0.0) -> PolynomialDynamics:
     """Return ``y = 0.6 y[-1] + 0.5 u[-1] + square y[-1]^2`` that may rub."""
     source, lag = np.array([0] * lags + [1]), np.array([*range(1, lags + 1), 1])
     variables = Variables(source, lag, np.array([[-9.0, 9.0]] * (lags + 1)), kind)
     terms = np.array([[0, -1, -1], [lags, -1, -1], [0, 0, -1]])
-    return PolynomialBody(variables, terms, np.array([0.6, 0.5, square]), np.array(friction))
+    return PolynomialDynamics(variables, terms, np.array([0.6, 0.5, square]), np.array(friction))
 
 
 def run_by_hand(first: float, square: float = 0.0) -> Array:
@@ -96,11 +96,11 @@ def test_a_prediction_of_one_step_is_what_the_measured_past_gives(kind: str, fri
 
 def test_a_body_comes_back_from_its_dictionary_and_counts_its_values() -> None:
     for one in (body(square=0.2), body(0.1, 0.2, 0.05, kind="velocity"), body(0.1, 0.2, kind="position")):
-        again = PolynomialBody.from_dict(one.to_dict())
+        again = PolynomialDynamics.from_dict(one.to_dict())
         assert np.array_equal(again.terms, one.terms)
         assert np.array_equal(again.run(U, run_by_hand(0.3)), one.run(U, run_by_hand(0.3)))
         assert again.n_values == one.n_values == 3 + one.friction.size
     values = body(0.1, 0.2, 0.05, kind="velocity").to_dict()
     values["friction"]["values"] = [0.1, 0.2]
     with pytest.raises(ValueError, match="friction of 3 values is needed, got 2"):
-        PolynomialBody.from_dict(values)
+        PolynomialDynamics.from_dict(values)
