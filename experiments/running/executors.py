@@ -103,12 +103,14 @@ def open_executor(workers: int = 1, cluster: str | None = None) -> Generator[tup
         with threadpool_limits(limits=1, user_api="blas"):
             yield SerialExecutor(), 1
         return
+    others = multiprocessing.active_children()
     executor = process_pool(workers)
     try:
         yield executor, workers
     except KeyboardInterrupt:  # the user will not wait for what is in flight
         for process in multiprocessing.active_children():
-            process.terminate()
+            if process not in others:
+                process.terminate()
         raise
     finally:
         executor.shutdown(wait=True, cancel_futures=True)

@@ -66,16 +66,22 @@ def test_a_cluster_runs_as_many_tasks_as_it_has_cores(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize("stopped", [False, True])
-def test_processes_in_flight_are_ended_only_when_the_user_will_not_wait(
+def test_processes_in_flight_are_ended_only_when_the_user_will_not_wait_and_no_others_are(
     stopped: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from experiments.running import executors
 
     happened: list[str] = []
     pool = SimpleNamespace(shutdown=lambda **how: happened.append(f"shut {how}"))
-    child = SimpleNamespace(terminate=lambda: happened.append("terminated"))
-    monkeypatch.setattr(executors, "process_pool", lambda workers: pool if workers == 3 else None)
-    monkeypatch.setattr(executors.multiprocessing, "active_children", lambda: [child])
+    child, other = (SimpleNamespace(terminate=lambda name=name: happened.append(name)) for name in ("ours", "theirs"))
+    children = [other]
+
+    def begun(workers: int) -> Any:
+        children.append(child)
+        return pool if workers == 3 else None
+
+    monkeypatch.setattr(executors, "process_pool", begun)
+    monkeypatch.setattr(executors.multiprocessing, "active_children", lambda: list(children))
 
     def use() -> None:
         with open_executor(3) as (executor, width):
@@ -88,4 +94,4 @@ def test_processes_in_flight_are_ended_only_when_the_user_will_not_wait(
             use()
     else:
         use()
-    assert happened == ["terminated"] * stopped + ["shut {'wait': True, 'cancel_futures': True}"]
+    assert happened == ["ours"] * stopped + ["shut {'wait': True, 'cancel_futures': True}"]
