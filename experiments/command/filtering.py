@@ -3,11 +3,13 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.logs import noted, with_rig_columns
+from experiments.command.streamed import Saving
 from experiments.command.terminal import note
 from plant.errors import LogError
 
@@ -70,6 +72,7 @@ class Filtering:
 
         stream = self._opened(lines)
         saved = told = stream.start_time
+        saving = Saving()
         try:
             for last, rows, gap in self._pieces(stream):
                 filtered = self._ready(stream, rows, last, gap)
@@ -81,7 +84,7 @@ class Filtering:
                     self._estimate(filtered)
                 if self.state is not None and last - saved > SAVED_EVERY:
                     saved = last
-                    save_filter(self.state, self.asked, filtered, last)
+                    saving.save(partial(save_filter, self.state, self.asked, filtered, last))
         finally:
             if self.state is not None and self.filtered is not None and self.last is not None:
                 save_filter(self.state, self.asked, self.filtered, self.last)

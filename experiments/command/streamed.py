@@ -4,7 +4,7 @@ import io
 import json
 import signal
 import threading
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Protocol, TextIO
 
@@ -56,6 +56,30 @@ def end_told(told: Told) -> Generator[None]:
         note(said)
         raise typer.Exit(SOME_FAILED) from error
     told.end("ok", "")
+
+
+class Saving:
+    """Saves what was learnt while a stream runs; where that fails the stream goes on, and it is said once."""
+
+    def __init__(self) -> None:
+        self._failed = False
+
+    def save(self, write: Callable[[], None]) -> None:
+        """Save now, or say why that is not possible.
+
+        Parameters
+        ----------
+        write : callable
+            Writes the state file, whole or not at all.
+        """
+        try:
+            write()
+        except HydrostateError as error:
+            if not self._failed:
+                note(f"warning: {error}; the stream goes on without")
+            self._failed = True
+        else:
+            self._failed = False
 
 
 def stop_at_sigterm() -> None:

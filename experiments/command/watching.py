@@ -2,12 +2,14 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.logs import noted, read_log, with_rig_columns
 from experiments.command.options import PRESSURE
+from experiments.command.streamed import Saving
 from experiments.command.terminal import note
 from experiments.command.watch_told import Told
 from plant.errors import LogError
@@ -170,7 +172,7 @@ def watch_rows(told: Told, lines: Iterable[str], asked: Asked, source: str, stat
     watch, travelled = _begun(asked, stream.sample_time, pressure, stream.start_time, source, state)
     T = watch.sample_time
     told.start(source, watch, asked.bench.name, asked.false_alarms)
-    kept = watch.last
+    kept, saving = watch.last, Saving()
     try:
         for last, rows, gap in stream.samples(watch.block):
             channels = dict(zip(stream.channels, rows.T, strict=True))
@@ -185,7 +187,7 @@ def watch_rows(told: Told, lines: Iterable[str], asked: Asked, source: str, stat
             told.saw(channels, last, gap)
             if state is not None and watch.last - kept > SAVED_EVERY:
                 kept = watch.last
-                save_watch(watch, state, travelled)
+                saving.save(partial(save_watch, watch, state, travelled))
     finally:
         if state is not None:
             save_watch(watch, state, travelled)

@@ -13,7 +13,7 @@ from experiments.command.filtering import FEWEST, SAVED_EVERY, Filtering
 from plant.eha.drives import sine
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
-from plant.errors import LogError
+from plant.errors import HydrostateError, LogError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
@@ -129,6 +129,23 @@ def test_the_state_is_kept_while_the_stream_runs(
     middle, end = times
     assert SAVED_EVERY < middle < SAVED_EVERY + 0.2
     assert end == pytest.approx(SECONDS - T, abs=1e-6)
+
+
+def test_a_disk_that_is_full_for_a_while_ends_no_filter(
+    bench: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked: list[float] = []
+
+    def full_at_first(*given: Any) -> None:
+        asked.append(given[-1])
+        if len(asked) == 1:
+            raise HydrostateError("state.npz: the state cannot be written: No space left on device")
+
+    monkeypatch.setattr(online, "save_filter", full_at_first)
+    told, _ = filtered(lines_of(bench), state=tmp_path / "state.npz")
+    assert len(asked) == 2
+    assert estimates(told)[-1]["time_s"] > asked[0]
+    assert "No space left on device" in capsys.readouterr().err
 
 
 def test_a_stream_that_breaks_leaves_the_state_of_its_last_whole_piece(bench: Record, tmp_path: Path) -> None:

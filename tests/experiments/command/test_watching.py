@@ -13,7 +13,7 @@ from experiments.command.watching import SAVED_EVERY, Asked, told_of, watch_rows
 from faults.watch.saved import load_state
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
-from plant.errors import LogError
+from plant.errors import HydrostateError, LogError
 from plant.log.stream_source import Received
 
 T = 0.01
@@ -102,6 +102,27 @@ def test_the_state_is_kept_while_the_stream_runs_and_not_only_at_its_end(
     assert np.all((steps > SAVED_EVERY) & (steps < SAVED_EVERY + 1.0))
     _, _, travelled = load_state(tmp_path / "state.npz")
     assert travelled == pytest.approx(T * sum(float(line.split(",")[2]) for line in lines), abs=1e-9)
+
+
+def test_a_disk_that_is_full_for_a_while_ends_no_watch_and_is_told_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A watch ended at its first save: with a full disk it never got to its alarms."""
+    import faults.watch.saved as saved
+
+    save, asked = saved.save_watch, list[float]()
+
+    def full_at_first(watch: Any, path: Path, travelled: float = 0.0) -> None:
+        asked.append(watch.last)
+        if len(asked) <= 5:
+            raise HydrostateError(f"{path}: the state cannot be written: No space left on device")
+        save(watch, path, travelled)
+
+    monkeypatch.setattr(saved, "save_watch", full_at_first)
+    events, _ = watched(rows(0.0, 70.0) + rows(70.0, 5.0, share=0.6, seed=1), tmp_path / "state.npz")
+    assert named(events) == ["start", "ready", "alarm", "change"]
+    assert capsys.readouterr().err.count("No space left on device; the stream goes on without") == 1
+    assert (tmp_path / "state.npz").exists()
 
 
 def test_a_broken_row_costs_nothing_of_what_was_learnt_before_it(tmp_path: Path) -> None:
