@@ -20,11 +20,11 @@ from starlette.types import Scope
 
 from experiments.command.terminal import note, unexpected
 from experiments.serve.answers import Comparison, Health, Log, Logs, Said, StreamHistory, StreamState, Verb, log_of
-from experiments.serve.desk import Desk
-from experiments.serve.events import MOST_LOOKING, told
+from experiments.serve.events import MOST_LOOKING, event_stream
 from experiments.serve.limits import HEADERS, MOST_UPLOADS, Guard, RefusedError, receive_file, require_size
 from experiments.serve.metrics import PROMETHEUS_TEXT, exposition
 from experiments.serve.pages import home_page, live_page, policy_of, policy_of_file
+from experiments.serve.service import Service
 from experiments.serve.settings import Settings
 from experiments.serve.views import compared
 from plant.errors import HydrostateError
@@ -85,18 +85,18 @@ def make_app(settings: Settings, refused: Callable[[HydrostateError], None] | No
     FastAPI
         Its folder is opened, and unfinished logs are taken up, when it starts.
     """
-    desk = Desk(settings)
+    service = Service(settings)
 
     @asynccontextmanager
     async def life(_: FastAPI) -> AsyncGenerator[None]:
         try:
-            desk.open()
+            service.open()
         except HydrostateError as error:
             if refused is not None:
                 refused(error)
             raise
         yield
-        await asyncio.to_thread(desk.close)
+        await asyncio.to_thread(service.close)
 
     app = FastAPI(
         title="Hydrostate",
@@ -109,10 +109,10 @@ def make_app(settings: Settings, refused: Callable[[HydrostateError], None] | No
     )
     app.add_middleware(Guard, settings=settings)
     _answer_errors(app)
-    _offer_logs(app, desk)
-    _offer_comparison(app, desk)
-    _offer_streams(app, desk)
-    _offer_pages(app, desk)
+    _offer_logs(app, service)
+    _offer_comparison(app, service)
+    _offer_streams(app, service)
+    _offer_pages(app, service)
     return app
 
 
@@ -166,85 +166,87 @@ def _answer_errors(app: FastAPI) -> None:
     app.add_exception_handler(Exception, strange)
 
 
-def _offer_logs(app: FastAPI, desk: Desk) -> None:
+def _offer_logs(app: FastAPI, service: Service) -> None:
     @app.post("/api/logs", status_code=202, responses=why(413, 415, 422), openapi_extra=BODY, tags=["logs"])
     async def drop(request: Request, response: Response, name: Name, verb: Verb = "diagnose") -> Log:
         """Take a log and put it into the queue; the body is the file itself."""
         known = plain_name(name)
         if request.headers.get("content-type", "").lower().startswith("multipart/"):
             raise RefusedError(415, "the body must be the file itself, not a form: curl --data-binary @run.csv")
-        desk.require_place()
-        if desk.room.uploads >= MOST_UPLOADS:
+        service.require_place()
+        if service.room.uploads >= MOST_UPLOADS:
             raise RefusedError(429, f"{MOST_UPLOADS} logs are coming in, come again")
-        desk.room.uploads += 1
+        service.room.uploads += 1
         try:
-            room, length = desk.room.left(), request.headers.get("content-length", "")
-            require_size(int(length) if length.isdecimal() else 0, desk.settings.largest, room)
+            room, length = service.room.left(), request.headers.get("content-length", "")
+            require_size(int(length) if length.isdecimal() else 0, service.settings.largest, room)
             identity = secrets.token_hex(8)
-            part = desk.settings.work / f"{identity}.part"
-            size = await receive_file(request.stream(), part, desk.settings.largest, room)
+            part = service.settings.work / f"{identity}.part"
+            size = await receive_file(request.stream(), part, service.settings.largest, room)
         finally:
-            desk.room.uploads -= 1
-        kept = await asyncio.to_thread(desk.take_in, identity, part, known, verb, size)
+            service.room.uploads -= 1
+        kept = await asyncio.to_thread(service.take_in, identity, part, known, verb, size)
         response.headers["Location"] = f"/api/logs/{identity}"
-        return log_of(kept, desk.jobs)
+        return log_of(kept, service.jobs)
 
     @app.get("/api/logs", responses=why(422), tags=["logs"])
     def logs(
         most: Annotated[int, Query(ge=1, le=500)] = 100, before: Annotated[int | None, Query(ge=0, le=1 << 60)] = None
     ) -> Logs:
         """Return logs, the latest first."""
-        found = desk.store.latest(most, before)
-        return Logs(logs=[log_of(one, desk.jobs) for one in found], counts=desk.store.counts())
+        found = service.store.latest(most, before)
+        return Logs(logs=[log_of(one, service.jobs) for one in found], counts=service.store.counts())
 
     @app.get("/api/logs/{id}", responses=why(404, 422), tags=["logs"])
     def log(id: Identity) -> Log:  # noqa: A002 - a path's name
         """Return the state of a log."""
-        return log_of(desk.known(id), desk.jobs)
+        return log_of(service.known(id), service.jobs)
 
     @app.get("/api/logs/{id}/result", responses=why(404, 409, 422), tags=["logs"])
     def result(id: Identity) -> dict[str, Any]:  # noqa: A002 - a path's name
         """Return the result of a log: the object that `hydrostate VERB --json` prints for it."""
-        return desk.result(id)
+        return service.result(id)
 
     @app.delete("/api/logs/{id}", status_code=204, responses=why(404, 422), tags=["logs"])
     def delete(id: Identity) -> None:  # noqa: A002 - a path's name
         """Delete a log with its page and result; if it is running, it stops at once."""
-        desk.delete(id)
+        service.delete(id)
 
     @app.get("/api/health", tags=["server"])
     def health() -> Health:
         """Return whether the server has room for more."""
-        waiting, most = desk.jobs.waiting, desk.settings.waiting
-        return Health(waiting=waiting, most_waiting=most, room=max(desk.room.left(), 0), version=version("hydrostate"))
+        waiting, most = service.jobs.waiting, service.settings.waiting
+        return Health(
+            waiting=waiting, most_waiting=most, room=max(service.room.left(), 0), version=version("hydrostate")
+        )
 
     @app.get("/metrics", response_class=PlainTextResponse, responses=why(page=True), tags=["server"])
     def metrics() -> PlainTextResponse:
         """Return the metrics in the text format of Prometheus."""
-        streams = [(one.state, one.alarms) for one in desk.streams.by_name.values()]
-        text = exposition(desk.store.counts(), desk.jobs.waiting, streams, time.time())
+        streams = [(one.state, one.alarms) for one in service.streams.by_name.values()]
+        text = exposition(service.store.counts(), service.jobs.waiting, streams, time.time())
         return PlainTextResponse(text, media_type=PROMETHEUS_TEXT)
 
 
-def _offer_comparison(app: FastAPI, desk: Desk) -> None:
+def _offer_comparison(app: FastAPI, service: Service) -> None:
     @app.get("/api/compare", responses=why(404, 409, 422), tags=["logs"])
     def compare(first: Asked, second: Asked) -> Comparison:
         """Return what differs between two logs, second less first."""
-        pair = [desk.result(one) for one in (first, second)]
-        logs = [log_of(desk.known(one), desk.jobs) for one in (first, second)]
+        pair = [service.result(one) for one in (first, second)]
+        logs = [log_of(service.known(one), service.jobs) for one in (first, second)]
         return Comparison.model_validate({"first": logs[0], "second": logs[1], "differences": compared(*pair)})
 
 
-def _offer_streams(app: FastAPI, desk: Desk) -> None:
+def _offer_streams(app: FastAPI, service: Service) -> None:
     @app.get("/api/streams", tags=["streams"])
     def streams() -> list[StreamState]:
         """Return the watched streams."""
-        return [StreamState.model_validate(one.state) for one in desk.streams.by_name.values()]
+        return [StreamState.model_validate(one.state) for one in service.streams.by_name.values()]
 
     @app.get("/api/streams/{name}", responses=why(404, 422), tags=["streams"])
     def stream(name: StreamName) -> StreamHistory:
         """Return a stream with the last ten minutes of its gauges, and its events."""
-        one = desk.stream(name)
+        one = service.stream(name)
         return StreamHistory.model_validate({**one.state, "history": one.since(0), "events": one.events()})
 
     @app.get(
@@ -258,39 +260,41 @@ def _offer_streams(app: FastAPI, desk: Desk) -> None:
     )
     async def follow(request: Request, name: StreamName) -> StreamingResponse:
         """Return the events of a stream as they come: `history` once, then `gauges`, and `state` with new events."""
-        one = desk.stream(name)
-        if desk.streams.looking >= MOST_LOOKING:
+        one = service.stream(name)
+        if service.streams.looking >= MOST_LOOKING:
             raise RefusedError(429, f"{MOST_LOOKING} views are open, close one")
-        return StreamingResponse(told(one, desk.streams, request.is_disconnected), media_type="text/event-stream")
+        return StreamingResponse(
+            event_stream(one, service.streams, request.is_disconnected), media_type="text/event-stream"
+        )
 
 
-def _offer_pages(app: FastAPI, desk: Desk) -> None:
+def _offer_pages(app: FastAPI, service: Service) -> None:
     def shown(page: str) -> HTMLResponse:
         return HTMLResponse(page, headers={"Content-Security-Policy": policy_of(page)})
 
     @app.get("/", response_class=HTMLResponse, responses=why(page=True), tags=["pages"])
     def home() -> HTMLResponse:
         """Return the page on which logs are dropped."""
-        return shown(home_page(desk.settings))
+        return shown(home_page(service.settings))
 
     @app.get("/logs/{id}", response_class=HTMLResponse, responses=why(404, 409, 422, page=True), tags=["pages"])
     def page(id: Identity) -> FileResponse:  # noqa: A002 - a path's name
         """Return the page of a log."""
-        path = desk.page(id)
+        path = service.page(id)
         return FileResponse(path, media_type="text/html", headers={"Content-Security-Policy": policy_of_file(path)})
 
     @app.get("/fleet", response_class=HTMLResponse, responses=why(404, page=True), tags=["pages"])
     async def fleet() -> HTMLResponse:
         """Return the page of the fleet: one row per actuator, the worst on top."""
-        return shown(await desk.fleet())
+        return shown(await service.fleet())
 
     @app.get("/compare", response_class=HTMLResponse, responses=why(404, 409, 422, page=True), tags=["pages"])
     async def comparison(first: Asked, second: Asked) -> HTMLResponse:
         """Return the page of two logs side by side."""
-        return shown(await desk.comparison(first, second))
+        return shown(await service.comparison(first, second))
 
     @app.get("/live/{name}", response_class=HTMLResponse, responses=why(404, 422, page=True), tags=["pages"])
     def live(name: StreamName) -> HTMLResponse:
         """Return the page of a stream."""
-        desk.stream(name)
-        return shown(live_page(list(desk.streams.by_name), name))
+        service.stream(name)
+        return shown(live_page(list(service.streams.by_name), name))

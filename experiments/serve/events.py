@@ -27,7 +27,7 @@ def message(event: str, data: Any) -> bytes:
     return f"event: {event}\ndata: {json.dumps(data, separators=(',', ':'), allow_nan=False)}\n\n".encode()
 
 
-async def told(stream: Stream, streams: Streams, gone: Callable[[], Awaitable[bool]]) -> AsyncIterator[bytes]:
+async def event_stream(stream: Stream, streams: Streams, gone: Callable[[], Awaitable[bool]]) -> AsyncIterator[bytes]:
     """Yield what a stream tells.
 
     Parameters

@@ -45,8 +45,8 @@ def run_server(settings: Settings, say: Callable[[str], None]) -> None:
     logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)  # what goes wrong is told by the application
     gc.freeze()
     gc.set_threshold(OBJECTS)
-    desk_errors: list[HydrostateError] = []
-    app = make_app(settings, desk_errors.append)
+    refusals: list[HydrostateError] = []
+    app = make_app(settings, refusals.append)
     with _listening(settings) as listener:
         config = uvicorn.Config(
             app,
@@ -66,10 +66,10 @@ def run_server(settings: Settings, say: Callable[[str], None]) -> None:
         try:
             server.run(sockets=[listener])
         except SystemExit:
-            if not desk_errors:
+            if not refusals:
                 raise
-        if desk_errors:
-            raise desk_errors[0]
+        if refusals:
+            raise refusals[0]
 
 
 class _Speaking(uvicorn.Server):

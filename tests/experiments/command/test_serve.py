@@ -42,7 +42,7 @@ def test_a_missing_package_is_named_with_what_installs_it(monkeypatch: pytest.Mo
 
 
 def test_a_system_without_locks_is_told_apart_from_a_missing_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("server", "desk", "app"):
+    for name in ("server", "service", "app"):
         monkeypatch.delitem(sys.modules, f"experiments.serve.{name}", raising=False)
     monkeypatch.setitem(sys.modules, "fcntl", None)
     assert "serve runs on Linux and macOS, this system has no fcntl" in refused()

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from pebble import ProcessExpired
 
-from experiments.serve.desk import Desk
 from experiments.serve.jobs import MOST_TRIES, MOST_VIEWS, BusyError, Jobs, log_file, page_file, phase_file
+from experiments.serve.service import Service
 from experiments.serve.settings import MB, Settings
 from experiments.serve.store import Kept, Store
 from experiments.serve.work import NO_MEMORY, Worked
@@ -249,15 +249,15 @@ def test_a_folder_has_one_server_and_no_files_of_logs_that_are_gone(
     in_threads: None,  # noqa: ARG001
 ) -> None:
     settings = Settings(folder=tmp_path / "kept")
-    desk = Desk(settings)
-    desk.open()
+    service = Service(settings)
+    service.open()
     try:
         with pytest.raises(HydrostateError, match="another server works in it"):
-            Desk(settings).open()
+            Service(settings).open()
         page_file(settings, "0123456789abcdef").write_text("left")
     finally:
-        desk.close()
-    again = Desk(settings)
+        service.close()
+    again = Service(settings)
     again.open()
     again.close()
     assert not list(settings.pages.iterdir())

@@ -17,7 +17,7 @@ import pytest
 from benchmarks.server_trials import feeding
 from experiments.serve import gauges as module
 from experiments.serve import live
-from experiments.serve.events import told
+from experiments.serve.events import event_stream
 from experiments.serve.gauges import Gauges
 from experiments.serve.live import KEPT, Stream, Streams
 from experiments.serve.settings import Settings
@@ -124,7 +124,7 @@ def test_a_view_is_told_the_history_and_then_what_is_new(stream: Stream, monkeyp
 
     async def looked() -> list[tuple[str, Any]]:
         found: list[tuple[str, Any]] = []
-        async for text in told(stream, streams, gone):  # type: ignore[arg-type]
+        async for text in event_stream(stream, streams, gone):  # type: ignore[arg-type]
             assert streams.looking == 1
             head, data = text.decode().removeprefix("event: ").rstrip("\n").split("\ndata: ")
             found.append((head, json.loads(data)))
@@ -192,7 +192,7 @@ def test_a_quiet_stream_says_now_and_then_that_it_is_still_there(
         return next(looks)
 
     async def looked() -> list[bytes]:
-        return [text async for text in told(stream, SimpleNamespace(looking=0), gone)]  # type: ignore[arg-type]
+        return [text async for text in event_stream(stream, SimpleNamespace(looking=0), gone)]  # type: ignore[arg-type]
 
     history, *rest = asyncio.run(looked())
     assert history.startswith(b"event: history")

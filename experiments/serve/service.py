@@ -3,9 +3,9 @@
 import asyncio
 import fcntl
 import os
-from contextlib import suppress
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
-from typing import Any, TextIO, TypeVar
+from typing import Any, TextIO
 
 from pebble import ProcessExpired
 
@@ -18,12 +18,10 @@ from experiments.serve.store import FAILED, INTERRUPTED, UNFINISHED, Kept, Store
 from experiments.serve.views import compare_view, fleet_view
 from plant.errors import HydrostateError
 
-T = TypeVar("T")
-
 LOCK = "in-use"
 
 
-class Desk:
+class Service:
     """A server's folder and what is done in it.
 
     Parameters
@@ -60,13 +58,16 @@ class Desk:
         except OSError as error:
             self._lock.close()
             raise HydrostateError(f"{settings.folder}: must be free, another server works in it") from error
-        self.store = Store(settings.database)
-        self.room = Room(settings)
-        delete_orphans(settings, self.store)
-        self.jobs = Jobs(settings, self.store)
-        self.jobs.resume()
-        self.streams = Streams(settings, self.store)
-        self.streams.start()
+        with ExitStack() as undone:  # what is open already is closed where the rest cannot be had
+            undone.callback(self._lock.close)
+            self.store = undone.enter_context(closing(Store(settings.database)))
+            self.room = Room(settings)
+            delete_orphans(settings, self.store)
+            self.jobs = undone.enter_context(closing(Jobs(settings, self.store)))
+            self.jobs.resume()
+            self.streams = Streams(settings, self.store)
+            self.streams.start()
+            undone.pop_all()
 
     def close(self) -> None:
         """End what is under way and let the folder go."""

@@ -1,0 +1,178 @@
+"""Pages over many logs are made once, and anew where that helps; files of logs that are kept stay."""
+
+import asyncio
+from collections.abc import Iterator
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pebble import ProcessExpired
+
+from experiments.serve.jobs import BusyError, log_file, page_file
+from experiments.serve.limits import RefusedError
+from experiments.serve.service import Service
+from experiments.serve.settings import Settings
+from experiments.serve.store import DONE, FAILED
+from plant.errors import HydrostateError
+
+RESULT = {"outcome": "ok", "message": "normal"}
+
+
+@pytest.fixture
+def service(tmp_path: Path, in_threads: None) -> Iterator[Service]:  # noqa: ARG001
+    opened = Service(Settings(folder=tmp_path / "kept"))
+    opened.open()
+    yield opened
+    opened.close()
+
+
+def kept(service: Service, identity: str, state: str = DONE) -> None:
+    log_file(service.settings, identity).write_bytes(b"a")
+    service.store.add(identity, f"{identity}.csv", "diagnose", 1)
+    service.store.finish(identity, state, RESULT, {"outcome": "ok"})
+
+
+class Views:
+    """What makes pages, as it is told; it counts what is asked."""
+
+    def __init__(self) -> None:
+        self.rows: list[list[str]] = []
+        self.error: Exception | None = None
+
+    def view(self, make: Any, *args: Any) -> "Future[str]":
+        del make
+        self.rows.append([identity for identity, *_ in args[0]])
+        if isinstance(self.error, BusyError):
+            raise self.error
+        future: Future[str] = Future()
+        if self.error is None:
+            future.set_result(f"page {len(self.rows)}")
+        else:
+            future.set_exception(self.error)
+        return future
+
+
+@pytest.fixture
+def views(service: Service, monkeypatch: pytest.MonkeyPatch) -> Views:
+    one = Views()
+    monkeypatch.setattr(service.jobs, "view", one.view)
+    return one
+
+
+def test_the_page_of_the_fleet_is_made_once_for_all_who_ask_and_anew_when_a_log_came_or_went(
+    service: Service, views: Views
+) -> None:
+    async def asked() -> list[str]:
+        kept(service, "a")
+        pages = list(await asyncio.gather(service.fleet(), service.fleet()))
+        pages.append(await service.fleet())
+        kept(service, "b")
+        pages.append(await service.fleet())
+        service.delete("a")
+        return [*pages, await service.fleet()]
+
+    assert asyncio.run(asked())[2:] == ["page 1", "page 2", "page 3"]
+    assert views.rows == [["a"], ["a", "b"], ["b"]]
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (TimeoutError(), "took too long"),
+        (ProcessExpired("gone", code=-9), "took too long"),
+        (BusyError(), "too many pages"),
+    ],
+)
+def test_a_page_that_could_not_be_made_is_made_when_it_is_asked_for_again(
+    service: Service, views: Views, error: Exception, words: str
+) -> None:
+    async def asked() -> str:
+        kept(service, "a")
+        views.error = error
+        with pytest.raises(RefusedError, match=words) as refused:
+            await service.fleet()
+        assert refused.value.status == 429
+        assert refused.value.headers["Retry-After"]
+        views.error = None
+        return await service.fleet()
+
+    assert asyncio.run(asked()) == "page 2"
+
+
+def test_one_who_stops_waiting_takes_the_page_from_no_one_else(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pending: Future[str] = Future()
+    monkeypatch.setattr(service.jobs, "view", lambda *_: pending)
+
+    async def asked() -> str:
+        kept(service, "a")
+        one, other = asyncio.ensure_future(service.fleet()), asyncio.ensure_future(service.fleet())
+        while service._fleet is None:
+            await asyncio.sleep(0.001)
+        one.cancel()
+        await asyncio.sleep(0.01)
+        pending.set_result("page")
+        return await other
+
+    assert asyncio.run(asked()) == "page"
+
+
+def test_files_of_logs_that_are_kept_stay_and_those_of_no_log_go(service: Service, tmp_path: Path) -> None:
+    kept(service, "a")
+    for identity in ("a", "gone"):
+        page_file(service.settings, identity).write_text("page")
+    log_file(service.settings, "gone").write_bytes(b"a")
+    service.close()
+    again = Service(Settings(folder=tmp_path / "kept"))
+    again.open()
+    assert [path.name for path in service.settings.logs.iterdir()] == ["a"]
+    assert [path.name for path in service.settings.pages.iterdir()] == ["a.html"]
+    assert again.page("a") == page_file(again.settings, "a")
+    again.close()
+    service.open()
+
+
+def test_a_log_that_failed_has_no_page_and_its_reason_is_told(service: Service) -> None:
+    kept(service, "a", FAILED)
+    page_file(service.settings, "a").write_text("half")
+    with pytest.raises(RefusedError, match=r"a\.csv has no page: normal") as refused:
+        service.page("a")
+    assert refused.value.status == 404
+    kept(service, "b")
+    with pytest.raises(RefusedError, match=r"b\.csv has no page"):
+        service.page("b")
+
+
+def test_a_stream_is_known_by_its_name(service: Service) -> None:
+    with pytest.raises(RefusedError, match="no stream 'press' is watched"):
+        service.stream("press")
+
+
+def test_the_folder_is_for_the_server_s_user_alone(service: Service) -> None:
+    assert service.settings.folder.stat().st_mode & 0o077 == 0
+
+
+def test_a_log_that_the_database_cannot_take_is_refused_and_leaves_no_file(service: Service, tmp_path: Path) -> None:
+    part = tmp_path / "a.part"
+    part.write_bytes(b"a,b\n")
+    service.store._connection.execute("PRAGMA max_page_count = 1")
+    with pytest.raises(RefusedError, match="takes no more") as refused:
+        service.take_in("a", part, "x" * 100_000, "diagnose", 4)
+    assert refused.value.status == 413
+    assert list(service.settings.logs.iterdir()) == []
+    assert service.jobs.waiting == 0
+
+
+def test_a_folder_that_could_not_be_opened_is_free_for_the_next_server(tmp_path: Path, in_threads: None) -> None:  # noqa: ARG001
+    settings = Settings(folder=tmp_path / "kept")
+    settings.folder.mkdir()
+    settings.database.write_bytes(b"no database, but long enough to be taken for one" * 100)
+    refused = Service(settings)
+    with pytest.raises(HydrostateError, match="must be a database of this server"):
+        refused.open()
+    settings.database.unlink()
+    again = Service(settings)
+    again.open()
+    again.close()
