@@ -15,7 +15,7 @@ from experiments.page.numbers import MISSING, number, shop_unit
 from experiments.page.panels import Curve, Mark, Panel
 from experiments.page.render import render_page
 from experiments.page.tables import Column
-from faults.trend.kalman import moments, moved, settings
+from faults.trend.kalman import moments, predict, settings
 from plant.arrays import Array
 
 AHEAD = 30
@@ -119,7 +119,7 @@ def _course(one: Outlook) -> tuple[Array, Array]:
     """Return level and standard deviation after every log, and as forecast, shape (logs + AHEAD,) each."""
     grid, series = settings(), one.series
     past = [trend.level for trend in one.course]
-    ahead = [moments(moved(one.trend.belief, float(step), grid), grid) for step in range(1, AHEAD + 1)]
+    ahead = [moments(predict(one.trend.belief, float(step), grid), grid) for step in range(1, AHEAD + 1)]
     future = [(series.healthy + series.size * mean, abs(series.size) * std) for mean, std in ahead]
     level, std = np.array([*past, *future]).T
     return level, std

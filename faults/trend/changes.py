@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterator
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from faults.trend.kalman import Belief, Settings, after, beliefs, evidence_of, first_belief
+from faults.trend.kalman import Belief, Settings, beliefs, evidence_of, first_belief, next_belief
 from plant.arrays import Array
 
 FEWEST, LATEST = 3, 6
@@ -43,7 +43,7 @@ def stretches(
         if place in known and place > start:
             start, run = place, [first_belief(grid)]
         step = float(times[place] - times[place - 1]) if place > start else 0.0
-        run.append(after(run[-1], step, float(values[place]), float(stds[place]), grid))
+        run.append(next_belief(run[-1], step, float(values[place]), float(stds[place]), grid))
         for length, large in jumped.items():
             begin = place + 1 - length
             if begin - start < FEWEST or not large[begin]:

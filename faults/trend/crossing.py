@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from faults.trend.kalman import Belief, Settings, paced
+from faults.trend.kalman import Belief, Settings, exponential_growth
 from plant.arrays import Array
 
 Index: TypeAlias = "np.ndarray[tuple[int], np.dtype[np.int64]]"
@@ -100,7 +100,7 @@ def _paced(stride: float, grid: Settings, chosen: Index) -> tuple[Array, Array]:
     """Return how slopes move on, shape (2, draws), and how two normal numbers bend them, shape (3, draws)."""
     moves, noises = np.empty((len(grid.pace), 2)), np.empty((len(grid.pace), 3))
     for pace, own in grid.by_pace:
-        moves[own], covariance = paced(stride, pace)
+        moves[own], covariance = exponential_growth(stride, pace)
         turned = np.sqrt(covariance[1, 1])
         along = covariance[0, 1] / turned
         noises[own] = along, np.sqrt(covariance[0, 0] - along**2), turned

@@ -154,11 +154,11 @@ def beliefs(times: Array, values: Array, stds: Array, grid: Settings) -> Iterato
     """
     now = first_belief(grid)
     for time, before, value, std in zip(times, np.concatenate([times[:1], times[:-1]]), values, stds, strict=True):
-        now = after(now, float(time - before), float(value), float(std), grid)
+        now = next_belief(now, float(time - before), float(value), float(std), grid)
         yield now
 
 
-def after(now: Belief, step: float, value: float, std: float, grid: Settings) -> Belief:
+def next_belief(now: Belief, step: float, value: float, std: float, grid: Settings) -> Belief:
     """Return what is believed after a further log.
 
     Parameters
@@ -168,10 +168,10 @@ def after(now: Belief, step: float, value: float, std: float, grid: Settings) ->
     value, std : float
         What the log says, and its own standard deviation [dimensionless].
     """
-    return absorbed(moved(now, step, grid), value, std, grid)
+    return update(predict(now, step, grid), value, std, grid)
 
 
-def moved(now: Belief, step: float, grid: Settings) -> Belief:
+def predict(now: Belief, step: float, grid: Settings) -> Belief:
     """Return what is believed of a later time.
 
     Parameters
@@ -195,11 +195,11 @@ def _step(step: float, pace: float) -> tuple[Array, Array, Array, Array]:
     move = np.array([[1.0, step, 0.5 * step**2], [0.0, 1.0, step], [0.0, 0.0, 1.0]])
     bent, jerked = _gained(step, 2), _gained(step, 3)
     if pace:  # such settings have no curvature
-        move[:2, 1], bent[:2, :2] = paced(step, pace)
+        move[:2, 1], bent[:2, :2] = exponential_growth(step, pace)
     return move, np.asarray(np.kron(move, move), dtype=np.float64), bent.ravel(), jerked.ravel()
 
 
-def paced(step: float, pace: float) -> tuple[Array, Array]:
+def exponential_growth(step: float, pace: float) -> tuple[Array, Array]:
     """Return what a slope of 1 becomes that grows by a pace, and what unit white noise on it brings in a time.
 
     Parameters
@@ -234,7 +234,7 @@ def _gained(step: float, states: int) -> Array:
     return gained
 
 
-def absorbed(now: Belief, value: float, std: float, grid: Settings) -> Belief:
+def update(now: Belief, value: float, std: float, grid: Settings) -> Belief:
     """Return what is believed after a log, an innovation beyond `GROSS` being counted as that.
 
     Parameters

@@ -10,13 +10,13 @@ from scipy.linalg import expm
 from faults.trend.kalman import (
     LEVEL,
     PACES,
-    after,
     beliefs,
+    exponential_growth,
     first_belief,
     growth_evidence,
     moments,
-    moved,
-    paced,
+    next_belief,
+    predict,
     settings,
 )
 from plant.arrays import Array
@@ -42,8 +42,8 @@ def test_without_process_noise_the_filter_is_bayesian_regression_on_a_line() -> 
 
 def test_two_steps_are_one_step_of_twice_the_time() -> None:
     grid = settings()
-    now = after(first_belief(grid), 0.0, 0.1, 0.05, grid)
-    once, twice = moved(now, 3.0, grid), moved(moved(now, 1.2, grid), 1.8, grid)
+    now = next_belief(first_belief(grid), 0.0, 0.1, 0.05, grid)
+    once, twice = predict(now, 3.0, grid), predict(predict(now, 1.2, grid), 1.8, grid)
     assert np.allclose(once.mean, twice.mean)
     assert np.allclose(once.covariance, twice.covariance, rtol=1e-9, atol=1e-18)
 
@@ -57,7 +57,7 @@ def test_a_slope_that_feeds_on_itself_moves_as_its_equation_says(step: float, pa
         found = expm(rates * after)[:, 1]
         return np.outer(found, found)
 
-    move, covariance = paced(step, pace)
+    move, covariance = exponential_growth(step, pace)
     # below a relative growth of 1e-4 in a step it is left out
     assert move == pytest.approx(expm(rates * step)[:, 1], rel=1e-4 if pace * step < 1e-4 else 1e-12)
     assert covariance == pytest.approx(quad_vec(brought, 0.0, step)[0], rel=1e-4 if pace * step < 1e-4 else 1e-6)
@@ -68,7 +68,7 @@ def test_exponential_growth_is_followed_without_noise() -> None:
     times = np.arange(40.0)
     level = 0.02 * np.expm1(0.1 * times)
     *_, last = beliefs(times, level, np.full(40, 1e-4), grid)
-    later = moved(last, 15.0, grid)
+    later = predict(last, 15.0, grid)
     assert later.mean[0, 0] == pytest.approx(0.02 * np.expm1(0.1 * 54.0), rel=1e-3)
     assert later.mean[0, 1] == pytest.approx(0.002 * np.exp(0.1 * 54.0), rel=1e-3)
 

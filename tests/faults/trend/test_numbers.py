@@ -12,12 +12,12 @@ from faults.trend.crossing import HORIZON, QUANTILES, Crossing, _drawn, crossing
 from faults.trend.kalman import (
     Belief,
     Settings,
-    after,
     beliefs,
     evidence_of,
     first_belief,
     growth_evidence,
     moments,
+    next_belief,
     settings,
 )
 from faults.trend.trend import Series, Trend, first_logs_after, trends
@@ -99,7 +99,7 @@ def beliefs_along_a_series() -> dict[str, Any]:
             "of growth": growth_evidence(last, grid),
             **{f"state {state}": list(moments(last, grid, state)) for state in range(3)},
         }
-    jumped = after(first_belief(grid), 2.5, 0.3, 0.02, grid)
+    jumped = next_belief(first_belief(grid), 2.5, 0.3, 0.02, grid)
     told["after one step"] = {
         "mean": jumped.mean[SOME],
         "covariance": jumped.covariance[SOME],

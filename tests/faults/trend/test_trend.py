@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from faults.trend.crossing import HORIZON, crossing
-from faults.trend.kalman import first_belief, paced
+from faults.trend.kalman import exponential_growth, first_belief
 from faults.trend.trend import Series, Trend, trend_of, trends
 from plant.arrays import Array
 from tests.faults.trend.one_setting import one_setting
@@ -138,7 +138,7 @@ def test_exponential_growth_crosses_where_its_exponential_does() -> None:
 def test_futures_of_exponential_growth_scatter_as_its_noise_says() -> None:
     grid = one_setting(pace=0.1, slope=1e-9, bend=0.004)
     belief = replace(first_belief(grid), mean=np.array([[0.0, 0.02, 0.0]]), covariance=np.zeros((1, 3, 3)))
-    rise, spread = paced(20.0, 0.1)
+    rise, spread = exponential_growth(20.0, 0.1)
     limit = 0.02 * rise[0] + 0.004 * np.sqrt(spread[0, 0])  # one standard deviation above the mean after 20 logs
     found = crossing(belief, grid, np.random.default_rng(0), float(limit))
     assert found.within(20.0) == pytest.approx(0.16, abs=0.05)
