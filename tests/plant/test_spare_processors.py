@@ -36,14 +36,14 @@ def test_no_processor_is_spare_in_a_pools_process_or_in_a_thread() -> None:
 
 @pytest.mark.usefixtures("two")
 def test_what_was_begun_runs_meanwhile_and_its_thread_ends_though_nobody_asks() -> None:
-    began = threading.Event()
+    began, others = threading.Event(), set(threading.enumerate())
     waiting = begun(began.set)
     assert waiting is not None
     assert began.wait(5.0)
     until = time.monotonic() + 5.0
-    while threading.active_count() > 1 and time.monotonic() < until:
+    while (left := set(threading.enumerate()) - others) and time.monotonic() < until:
         time.sleep(0.01)
-    assert threading.active_count() == 1
+    assert not left
     waiting()
 
 

@@ -2,7 +2,6 @@ import io
 import json
 import socket
 import threading
-import time
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from experiments.cli import app
+from experiments.command.watch_told import Told
 from plant.eha.model import EhaParameters
 from plant.log.files import write_record
 from plant.log.record import Record
@@ -158,15 +158,26 @@ def test_a_stream_over_tcp_that_is_restarted_goes_on_where_it_was(log: Path, tmp
     assert [one["event"] for one in told[0]] == ["ready", "alarm", "change"]
 
 
-def test_a_heartbeat_comes_while_no_row_does_and_every_event_has_the_clock(log: Path) -> None:
+def test_a_heartbeat_comes_while_no_row_does_and_every_event_has_the_clock(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     header, *rows = log.read_text().splitlines(keepends=True)
+    beats, enough, alive = list[int](), threading.Event(), Told.alive
+
+    def counted(self: Told) -> None:
+        alive(self)
+        beats.append(self.rows)
+        if beats.count(400) == 3:
+            enough.set()
+
+    monkeypatch.setattr(Told, "alive", counted)
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def serve() -> None:
             connection, _ = server.accept()
             with connection:
                 connection.sendall("".join([header, *rows[:400]]).encode())
-                time.sleep(0.6)
+                enough.wait(20.0)
 
         threading.Thread(target=serve, daemon=True).start()
         code, events, _ = _run(f"tcp://127.0.0.1:{server.getsockname()[1]}", "--heartbeat", "0.1")

@@ -1,3 +1,4 @@
+import queue
 import socket
 import threading
 import time
@@ -19,18 +20,26 @@ def free_port() -> int:
 
 
 def publish(port: int, topic: str, messages: list[str]) -> None:
-    """Publish once the topic is subscribed to, which the broker's own count of subscriptions tells."""
+    """Publish each message once it is subscribed to: MQTT 5 tells a message that nobody took."""
     from paho.mqtt import client as mqtt
     from paho.mqtt.enums import CallbackAPIVersion
 
-    client: Any = mqtt.Client(CallbackAPIVersion.VERSION2)
+    client: Any = mqtt.Client(CallbackAPIVersion.VERSION2, protocol=mqtt.MQTTv5)
+    answers: queue.Queue[str] = queue.Queue()
+    client.on_publish = lambda _client, _data, _number, reason, _properties: answers.put(str(reason))
     client.connect("127.0.0.1", port)
     client.loop_start()
-    time.sleep(0.5)
-    for message in messages:
-        client.publish(topic, message, qos=1).wait_for_publish(10.0)
-    client.loop_stop()
-    client.disconnect()
+    try:
+        until = time.monotonic() + 20.0
+        for message in messages:
+            client.publish(topic, message, qos=1)
+            while answers.get(timeout=10.0) == "No matching subscribers":
+                assert time.monotonic() < until
+                time.sleep(0.02)
+                client.publish(topic, message, qos=1)
+    finally:
+        client.loop_stop()
+        client.disconnect()
 
 
 def through_broker(port: int, topic: str, messages: list[str]) -> tuple[list[str], Received]:
