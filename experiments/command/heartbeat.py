@@ -5,11 +5,11 @@ import time
 from collections.abc import Generator
 from contextlib import contextmanager
 
-from experiments.command.watch_told import Told
+from experiments.command.watch_events import WatchEvents
 
 
 @contextmanager
-def beating(told: Told, every: float | None) -> Generator[None]:
+def beating(told: WatchEvents, every: float | None) -> Generator[None]:
     """Tell in this block, every so often, that the watch is alive.
 
     Parameters

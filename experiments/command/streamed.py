@@ -18,7 +18,7 @@ STANDARD_INPUT = "standard input"
 """What standard input is called in events and errors."""
 
 
-class Told(Protocol):
+class EventSource(Protocol):
     """What tells of a stream."""
 
     def end(self, outcome: str, message: str) -> None:
@@ -27,12 +27,12 @@ class Told(Protocol):
 
 
 @contextmanager
-def end_told(told: Told) -> Generator[None]:
+def end_told(told: EventSource) -> Generator[None]:
     """Follow a stream; whatever ends it, the last line says so.
 
     Parameters
     ----------
-    told : Told
+    told : EventSource
         What tells of it.
 
     Raises

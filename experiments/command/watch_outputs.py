@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.command.json_output import plain
 from experiments.command.terminal import note
-from experiments.command.watch_told import Told
+from experiments.command.watch_events import WatchEvents
 from experiments.serve.metrics import PROMETHEUS_TEXT, exposition
 from plant.errors import HydrostateError, LogError
 from plant.log.stream_source import broker_of, broker_package
@@ -34,7 +34,7 @@ STATES: Mapping[str, str] = {"start": "learning", "ready": "watching", "end": "e
 Sink = Callable[[Mapping[str, Any]], None]
 
 
-class Watched(Told):
+class Watched(WatchEvents):
     """What a watch tells, sent to every output, and how it stands meanwhile.
 
     Parameters

@@ -11,7 +11,7 @@ from experiments.command.logs import noted, read_log, with_rig_columns
 from experiments.command.options import PRESSURE
 from experiments.command.streamed import Saving
 from experiments.command.terminal import note
-from experiments.command.watch_told import Told
+from experiments.command.watch_events import WatchEvents
 from plant.errors import LogError
 from plant.log.stream_source import Received, stream_lines
 
@@ -93,7 +93,7 @@ class Asked:
         return made
 
 
-def watch_file(told: Told, path: Path, asked: Asked) -> None:
+def watch_file(told: WatchEvents, path: Path, asked: Asked) -> None:
     """Watch a log as if its rows came now.
 
     Raises
@@ -108,7 +108,7 @@ def watch_file(told: Told, path: Path, asked: Asked) -> None:
     told.events(watch.take(samples))
 
 
-def watch_network(told: Told, address: str, asked: Asked, state: Path | None) -> None:
+def watch_network(told: WatchEvents, address: str, asked: Asked, state: Path | None) -> None:
     """Watch a stream of the network until it ends.
 
     Parameters
@@ -141,7 +141,7 @@ def told_of(address: str, received: Received) -> None:
             note(f"{address}: warning: {count} {received.what} {said} beside {received.batches} that were read")
 
 
-def watch_rows(told: Told, lines: Iterable[str], asked: Asked, source: str, state: Path | None) -> None:
+def watch_rows(told: WatchEvents, lines: Iterable[str], asked: Asked, source: str, state: Path | None) -> None:
     """Watch header and rows as they come.
 
     Parameters

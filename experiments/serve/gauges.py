@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from experiments.command.json_output import plain
 from experiments.command.options import load_rig
 from experiments.command.terminal import unexpected
-from experiments.command.watch_told import Told
+from experiments.command.watch_events import WatchEvents
 from experiments.command.watching import Asked, watch_network
 from experiments.serve.process import bind_to_server
 from plant.errors import HydrostateError
@@ -24,7 +24,7 @@ EVERY = 0.25
 """Time between two messages of gauges [s]."""
 
 
-class Gauges(Told):
+class Gauges(WatchEvents):
     """What a watch tells, and what its channels read meanwhile.
 
     Parameters

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from experiments.cli import app
-from experiments.command.watch_told import Told
+from experiments.command.watch_events import WatchEvents
 from plant.eha.model import EhaParameters
 from plant.log.files import write_record
 from plant.log.record import Record
@@ -162,15 +162,15 @@ def test_a_heartbeat_comes_while_no_row_does_and_every_event_has_the_clock(
     log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     header, *rows = log.read_text().splitlines(keepends=True)
-    beats, enough, alive = list[int](), threading.Event(), Told.alive
+    beats, enough, alive = list[int](), threading.Event(), WatchEvents.alive
 
-    def counted(self: Told) -> None:
+    def counted(self: WatchEvents) -> None:
         alive(self)
         beats.append(self.rows)
         if beats.count(400) == 3:
             enough.set()
 
-    monkeypatch.setattr(Told, "alive", counted)
+    monkeypatch.setattr(WatchEvents, "alive", counted)
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def serve() -> None:

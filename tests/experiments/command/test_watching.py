@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.command import watching
-from experiments.command.watch_told import Told
+from experiments.command.watch_events import WatchEvents
 from experiments.command.watching import SAVED_EVERY, Asked, told_of, watch_rows
 from faults.watch.saved import load_state
 from plant.eha.model import EhaParameters
@@ -42,10 +42,10 @@ def asked(**changes: Any) -> Asked:
 
 def watched(
     lines: list[str], state: Path | None = None, header: str = HEADER, **changes: Any
-) -> tuple[list[dict[str, Any]], Told]:
+) -> tuple[list[dict[str, Any]], WatchEvents]:
     """Watch lines; return what is told, and who told it."""
     events: list[dict[str, Any]] = []
-    told = Told(events.append)
+    told = WatchEvents(events.append)
     watch_rows(told, [header + "\n", *lines], asked(**changes), "bench", state)
     return events, told
 
@@ -177,12 +177,12 @@ def test_a_stream_without_motion_is_refused_by_its_name() -> None:
 
 def test_nothing_at_all_is_no_stream() -> None:
     with pytest.raises(LogError, match="a header line is needed, but nothing came"):
-        watch_rows(Told(lambda _: None), ["\n", "  \n"], asked(), "bench", None)
+        watch_rows(WatchEvents(lambda _: None), ["\n", "  \n"], asked(), "bench", None)
 
 
 def test_empty_lines_before_the_header_are_no_header() -> None:
     events: list[dict[str, Any]] = []
-    watch_rows(Told(events.append), ["\n", HEADER + "\n", *rows(0.0, 5.0)], asked(), "bench", None)
+    watch_rows(WatchEvents(events.append), ["\n", HEADER + "\n", *rows(0.0, 5.0)], asked(), "bench", None)
     assert named(events) == ["start"]
 
 
@@ -231,7 +231,7 @@ def test_what_is_missing_is_told_even_if_the_stream_ends_in_an_error(
 
     monkeypatch.setattr(watching, "stream_lines", lines)
     with pytest.raises(LogError):
-        watching.watch_network(Told(lambda _: None), "tcp://bench:1", asked(), None)
+        watching.watch_network(WatchEvents(lambda _: None), "tcp://bench:1", asked(), None)
     assert "4 batches never came" in capsys.readouterr().err
 
 
@@ -239,10 +239,12 @@ def test_a_column_of_the_rig_that_the_stream_has_not_is_said_once_and_one_that_w
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     bench = Rig(columns={"differential_pressure_pa": "DP:bar"})
-    watch_rows(Told(lambda _: None), [HEADER + "\n", *rows(0.0, 5.0)], replace(asked(), bench=bench), "bench", None)
+    watch_rows(
+        WatchEvents(lambda _: None), [HEADER + "\n", *rows(0.0, 5.0)], replace(asked(), bench=bench), "bench", None
+    )
     (said,) = capsys.readouterr().err.splitlines()
     assert said.startswith("bench: warning: ")
     assert "DP:bar" in said
     wanted = replace(asked(), columns=bench.columns)
     with pytest.raises(LogError, match="DP"):
-        watch_rows(Told(lambda _: None), [HEADER + "\n", *rows(0.0, 5.0)], wanted, "bench", None)
+        watch_rows(WatchEvents(lambda _: None), [HEADER + "\n", *rows(0.0, 5.0)], wanted, "bench", None)

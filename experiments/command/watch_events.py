@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from faults.watch.watch import Watch
 
 
-class Told:
+class WatchEvents:
     """What is told of a watch, one entry after the other, and what has been so far, for the last one.
 
     Parameters

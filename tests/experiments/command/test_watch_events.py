@@ -4,13 +4,13 @@ from typing import Any
 
 import pytest
 
-from experiments.command.watch_told import Told
+from experiments.command.watch_events import WatchEvents
 from faults.watch.events import SLOW, Alarm, Change
 
 
 def told(*events: Any) -> list[dict[str, Any]]:
     lines: list[dict[str, Any]] = []
-    Told(lines.append).events(events)
+    WatchEvents(lines.append).events(events)
     return lines
 
 
