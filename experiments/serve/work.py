@@ -173,6 +173,8 @@ def _failed(task: Task, blank: Mapping[str, Any], message: str) -> Worked:
 def _write(task: Task, page: str) -> None:
     with replacing(task.page) as file:
         file.write(page.encode())
+    if not task.log.exists():  # deleted meanwhile, with all that came of it
+        task.page.unlink(missing_ok=True)
 
 
 def _without_path(value: Any, task: Task) -> Any:

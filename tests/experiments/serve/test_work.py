@@ -164,3 +164,21 @@ def test_a_rig_that_cannot_be_read_fails_a_log_with_its_reason(stack_log: Path, 
     assert found.result["outcome"] == found.entries["outcome"] == "failed"
     assert "rig.toml" in found.result["message"]
     assert "rig.toml" in found.entries["reason"]
+
+
+def test_a_log_that_is_deleted_while_its_page_is_written_leaves_none(
+    stack_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from experiments.log_pages import inspect_page
+
+    log = tmp_path / "kept-under-a-number.csv"
+    log.write_bytes(stack_log.read_bytes())
+
+    def deleted(*_: Any) -> str:
+        log.unlink()
+        return "<p>page</p>"
+
+    monkeypatch.setattr(inspect_page, "inspect_page", deleted)
+    work_on(task(log, tmp_path, verb="inspect"))
+    assert not log.exists()
+    assert [one.name for one in tmp_path.iterdir()] == ["phase"]
