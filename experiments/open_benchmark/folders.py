@@ -10,6 +10,7 @@ import pandas as pd
 from experiments.open_benchmark.kinds import VERSION, Made, make, seed_of
 from experiments.open_benchmark.machine import Machine
 from faults.conditions import CONDITIONS
+from plant.atomic import replacing
 from plant.errors import HydrostateError
 
 TRUTH = "truth.csv"
@@ -127,7 +128,8 @@ def write_set(kind: str, split: str, count: int, out: Path, first: int = 0) -> P
             if made.setup.rig:
                 (folder / RIG).write_text(rig_text(kind, made.kind.strange, made.setup.rig), "utf-8")
             rows.append(row)
-        pd.DataFrame(rows).to_csv(folder / TRUTH, index=False, lineterminator="\n")
+        with replacing(folder / TRUTH) as file:  # a folder with its truth is whole
+            file.write(pd.DataFrame(rows).to_csv(index=False, lineterminator="\n").encode())
     except OSError as error:
         raise HydrostateError(f"{folder}: cannot be written: {error.strerror or error}") from error
     return folder / TRUTH

@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from estimation.arrays import Array
+from plant.atomic import replacing
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -53,13 +54,28 @@ def to_dict(model: "LinearModel") -> dict[str, Any]:
     return {entry: _plain(getattr(model, name)) for name, entry in _ENTRIES.items()}
 
 
-def to_mat(model: "LinearModel", path: Path) -> None:
-    """Write the model to a MAT file at full precision, one variable an entry of `to_dict`."""
+def to_mat(model: "LinearModel", path: str | Path) -> None:
+    """Write the model to a MAT file at full precision, whole or not at all, one variable an entry of `to_dict`.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; ``.mat`` is added to a name without it.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
     from scipy.io import savemat
 
     entries = to_dict(model) | {name: getattr(model, name) for name in COVARIANCES}
     plain = {key: float("nan") if value is None else value for key, value in entries.items()}
-    savemat(path, {key: value if isinstance(value, str) else np.asarray(value) for key, value in plain.items()})
+    with replacing(Path(path) if str(path).endswith(".mat") else Path(f"{path}.mat")) as file:
+        savemat(
+            cast(Any, file),
+            {key: value if isinstance(value, str) else np.asarray(value) for key, value in plain.items()},
+        )
 
 
 def from_dict(cls: "type[LinearModel]", values: Mapping[str, Any]) -> "LinearModel":

@@ -1,5 +1,7 @@
+import errno
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -114,6 +116,23 @@ def test_json_and_mat_keep_every_bit(fitted: LinearModel, tmp_path: Path) -> Non
     np.testing.assert_array_equal(stored["denominator"], fitted.denominator)
     np.testing.assert_array_equal(stored["covariance_robust"], fitted.covariance_robust)
     assert str(stored["structure"]) == "output-error"
+
+
+def test_a_mat_file_is_written_whole_or_not_at_all(
+    fitted: LinearModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitted.to_mat(tmp_path / "model")
+    before = (tmp_path / "model.mat").read_bytes()
+
+    def full(file: Any, values: Any) -> None:
+        del values
+        file.write(b"half of it")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("scipy.io.savemat", full)
+    with pytest.raises(OSError, match="No space left"):
+        fitted.to_mat(tmp_path / "model.mat")
+    assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == [("model.mat", before)]
 
 
 def test_an_older_file_without_the_newer_entries_is_read(fitted: LinearModel) -> None:
