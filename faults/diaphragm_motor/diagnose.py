@@ -20,7 +20,7 @@ from estimation.diaphragm_motor.signature import Signature, logged_signature, mo
 from estimation.finding import interval_95
 from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS, MotorFault, motor_with_fault
 from plant.arrays import Floats
-from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
+from plant.diaphragm_motor.parameters import DIAPHRAGMS, DiaphragmMotorParameters
 from plant.errors import LogError
 from plant.log.record import Record
 
@@ -36,9 +36,29 @@ PRIOR_HEALTHY = 0.5
 TOLD_APART = 3.0
 """Standard deviations from which two faults count as told apart."""
 
-
 LOOKS_ALIKE = 0.99
 """Cosine between two faults' changes of the electrodes' fundamentals from which they look alike [dimensionless]."""
+
+SAME_DRIVE = 0.005
+"""By how much frequency and swing of a log and its healthy run may differ [fraction] (judged)."""
+
+LEAST_TONE = 0.1
+"""Fundamental of an electrode below which no motor is healthy [V] (judged)."""
+
+_FUNDAMENTALS = 2 * DIAPHRAGMS
+"""Numbers at the beginning of a signature: real parts of the electrodes' fundamentals, then imaginary ones."""
+
+_LEAST_CHANGE = 1e-3
+"""Size of a change of the fundamentals below which it has no direction [V] (judged)."""
+
+_GRID = 201
+"""Severities at which a fault's curve is looked at before its nearest point is sought [count]."""
+
+_KINDS = [fault.kind for fault in MOTOR_FAULTS.values()]
+_A_KIND = (1.0 - PRIOR_HEALTHY) / len(set(_KINDS))
+
+_PRIORS = {name: _A_KIND / _KINDS.count(fault.kind) for name, fault in MOTOR_FAULTS.items()}
+"""Probability of each fault before the log is seen: those of a kind share what the kind has [fraction]."""
 
 
 @dataclass(frozen=True)
@@ -264,15 +284,18 @@ def _operating_point(seen: Signature) -> tuple[float, float]:
 def _calibrated(seen: Signature, calibration: Signature, healthy: DiaphragmMotorParameters) -> Signature:
     """Return what a log would show on the model's own motor: fundamentals by ratio, all else by difference."""
     was, drive = calibration.drive, seen.drive
-    if abs(was.frequency / drive.frequency - 1.0) > _SAME or abs(was.peak_to_peak / drive.peak_to_peak - 1.0) > _SAME:
+    if (
+        abs(was.frequency / drive.frequency - 1.0) > SAME_DRIVE
+        or abs(was.peak_to_peak / drive.peak_to_peak - 1.0) > SAME_DRIVE
+    ):
         raise LogError(
             f"the healthy run must be under the log's drive, {drive.frequency:.4g} Hz and {drive.peak_to_peak:.4g} V "
             f"peak to peak, got {was.frequency:.4g} Hz and {was.peak_to_peak:.4g} V"
         )
-    if float(np.min(np.abs(calibration.tones))) < _LEAST_TONE:
-        raise LogError(f"the healthy run has an electrode below {_LEAST_TONE:g} V: it is not of a healthy motor")
+    if float(np.min(np.abs(calibration.tones))) < LEAST_TONE:
+        raise LogError(f"the healthy run has an electrode below {LEAST_TONE:g} V: it is not of a healthy motor")
     model = modelled_signature(healthy, *_operating_point(calibration))
-    turn = (model[:7] + 1j * model[7:_FUNDAMENTALS]) / calibration.tones
+    turn = (model[:DIAPHRAGMS] + 1j * model[DIAPHRAGMS:_FUNDAMENTALS]) / calibration.tones
     gain = np.tile(np.abs(turn), 2)
     first = seen.tones * turn
     second = slice(_FUNDAMENTALS, 2 * _FUNDAMENTALS)
@@ -280,13 +303,3 @@ def _calibrated(seen: Signature, calibration: Signature, healthy: DiaphragmMotor
     velocity = model[-1] + seen.velocity - calibration.velocity
     values = np.concatenate([first.real, first.imag, harmonics, [velocity]])
     return replace(seen, values=values, covariance=seen.covariance + calibration.covariance)
-
-
-_KINDS = [fault.kind for fault in MOTOR_FAULTS.values()]
-_A_KIND = (1.0 - PRIOR_HEALTHY) / len(set(_KINDS))
-_PRIORS = {name: _A_KIND / _KINDS.count(fault.kind) for name, fault in MOTOR_FAULTS.items()}
-_GRID = 201
-_FUNDAMENTALS = 14
-_LEAST_CHANGE = 1e-3
-_LEAST_TONE = 0.1
-_SAME = 0.005

@@ -33,6 +33,24 @@ CALIBRATED = (
 )
 """What a healthy run calibrates: with leaks known to be none, friction is told from lines and reeds."""
 
+SURE = 3.0
+"""Standard deviations by which a quantity must lie off its healthy value before a fault is named (judged)."""
+
+MORE_AIR = 0.3
+"""Rise of the entrained air from which it is a fault [fraction of the healthy share] (judged)."""
+
+LEAST_CHAMBER_LEAKAGE = 1e-12
+"""Leakage of the pump chamber from which it is a fault [m^3/(s Pa)] (judged)."""
+
+LEAST_DEPOLARISED = 0.05
+"""Lost stroke of the stack from which it is a fault [fraction] (judged)."""
+
+REED_CHANGED = 0.2
+"""Change of a reed's stiffness from which it is a fault [fraction] (judged)."""
+
+LEAST_GAP = 5e-6
+"""Gap below a reed from which it is a fault [m] (judged)."""
+
 
 class StackFaultCode(Code):
     """Notes on a diagnosis of the piezo-stack actuator."""
@@ -110,19 +128,19 @@ def _level(found: StackEstimate, name: str, healthy: float, levels: Mapping[str,
 
 def _fault(name: str, found: StackEstimate, healthy: PiezoStackParameters) -> Note | None:
     """Return what a quantity says of a fault; None where it says nothing, or not for sure."""
-    value, sure = found.values[name], 3.0 * found.deviations[name]
+    value, sure = found.values[name], SURE * found.deviations[name]
     base = 1.0 if name == "polarisation" else float(getattr(healthy, name))
     reed, _, part = name.partition("_reed_")
-    if name == "air_fraction" and value - base > max(0.3 * base, sure):
+    if name == "air_fraction" and value - base > max(MORE_AIR * base, sure):
         return StackFaultCode.AIR_IN_OIL.note(percent=100.0 * value, ratio=value / base)
-    if name == "chamber_leakage" and value - base > max(1e-12, sure):
+    if name == "chamber_leakage" and value - base > max(LEAST_CHAMBER_LEAKAGE, sure):
         return StackFaultCode.CHAMBER_LEAKS.note(leakage=value)
-    if name == "polarisation" and base - value > max(0.05, sure):
+    if name == "polarisation" and base - value > max(LEAST_DEPOLARISED, sure):
         return StackFaultCode.STACK_DEPOLARISED.note(percent=100.0 * (1.0 - value))
-    if part == "stiffness" and abs(value - base) > max(0.2 * base, sure):
+    if part == "stiffness" and abs(value - base) > max(REED_CHANGED * base, sure):
         code = StackFaultCode.REED_SOFT if value < base else StackFaultCode.REED_STIFF
         return code.note(reed=reed, ratio=value / base)
-    if part == "gap" and value - base > max(5e-6, sure):
+    if part == "gap" and value - base > max(LEAST_GAP, sure):
         return StackFaultCode.REED_OPEN.note(reed=reed, gap_um=1e6 * value)
     return None
 
