@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from estimation.identification.structure_names import STRUCTURE_NAMES
-from experiments.command.identify_any import Asked, identify_any, names, simulate_any
+from experiments.command.identify_any import Asked, identify_any, names
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, read_log, run_logs
 from experiments.command.options import (
@@ -26,6 +26,7 @@ from experiments.command.options import (
     require_positive,
 )
 from experiments.command.own_paths import own_paths, require_place
+from experiments.command.simulate_model import simulate_model
 from experiments.command.terminal import short_names, table
 from plant.errors import HydrostateError, require_known
 
@@ -192,7 +193,7 @@ def identify(
         if simulate is not None:
             of_fits = {"--validate": validate, "--figure": figure, "--response": response, "--resample": resample}
             refuse_given(of_fits, "goes with a fit, not with --simulate")
-            simulate_any(logs, simulate, asked, as_json=as_json, out=out)
+            simulate_model(logs, simulate, asked, as_json=as_json, out=out)
         identify_any(logs, asked, as_json=as_json, out=out)
     of_columns = {"--reference": references, "--simulate": simulate, "--simulated": simulated, "--validate": validate}
     of_columns |= {"--response": response, "--resample": resample}

@@ -1,17 +1,17 @@
 """`hydrostate identify LOG --input U --output Y`: a model between any columns, validated, saved and simulated again."""
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish, run_logs
 from experiments.command.options import require_positive
 from experiments.command.own_paths import own_paths
+from experiments.command.simulate_model import quality_of, record_of, warn_of_range, write_simulated
 from experiments.command.terminal import clauses, table
-from plant.errors import HydrostateError, LogWarning, require_known
+from plant.errors import HydrostateError, require_known
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -71,7 +71,7 @@ def names(given: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(part.strip() for text in given or () for part in text.split(",") if part.strip())
 
 
-def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path | None) -> None:
+def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path | None) -> NoReturn:
     """Identify one model an output from all logs together, print what it is worth, and leave with the exit code.
 
     Raises
@@ -97,8 +97,8 @@ def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path
         output = columns[name]
         if not read:
             wanted, references = (*asked.inputs, *asked.outputs), asked.references
-            read.append([_record(log, (*wanted, *references), asked.sample_time) for log in logs])
-            read.append([_record(log, wanted, asked.sample_time) for log in asked.validate])
+            read.append([record_of(log, (*wanted, *references), asked.sample_time) for log in logs])
+            read.append([record_of(log, wanted, asked.sample_time) for log in asked.validate])
         together = asked.structure == STATE_SPACE or (asked.structure == "auto" and len(asked.outputs) > 1)
         if together and not shared:
             shared.update(_together(read[0], asked, asked.outputs))
@@ -110,13 +110,6 @@ def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path
     named = ", ".join(str(log) for log in logs)
     results = tuple({**result, "file": named} for result in batch.results)
     finish(Batch(results, batch.total), _screen, as_json=as_json, out=out)
-
-
-def _record(log: Path, wanted: Sequence[str], sample_time: float | None) -> "Record":
-    from plant.log.any_columns import read_any
-    from plant.log.clock import MOST_MISSING_TO_RELATE
-
-    return read_any(log, wanted, sample_time=sample_time, most_missing=MOST_MISSING_TO_RELATE)
 
 
 def _together(records: "Sequence[Record]", asked: Asked, outputs: Sequence[str]) -> "dict[str, Identified]":
@@ -138,8 +131,8 @@ def _answer(
     test = None
     if tests:
         held = channels_of(tests, asked.inputs, output, found.model.sample_time, split=True)
-        _warn_of_range(found.model, held)
-        test = {"files": [str(one) for one in asked.validate], **_quality(found.model, held)}
+        warn_of_range(found.model, held)
+        test = {"files": [str(one) for one in asked.validate], **quality_of(found.model, held)}
     if not (asked.figure or asked.simulated or asked.response):
         return {**BLANK, **entries(found), "test": test, "frequency_response": None}
     data = channels_of(records, asked.inputs, output, asked.resampled)
@@ -150,7 +143,7 @@ def _answer(
         write_free_run(found.model, data, logs[0].name, figure)
     simulated = own_paths(asked.simulated, asked.outputs).get(output)
     if simulated is not None:
-        _write_simulated(found.model, data, simulated)
+        write_simulated(found.model, data, simulated)
     response = own_paths(asked.response, asked.outputs).get(output)
     answer = None if response is None else _response(data, logs[0].name, response)
     return {**BLANK, **entries(found), "test": test, "frequency_response": answer}
@@ -233,76 +226,6 @@ def _state_space_entries(model: "FreeRunModel", dynamics: "StateSpaceDynamics") 
     }
 
 
-def _quality(model: "FreeRunModel", data: "Channels") -> dict[str, Any]:
-    return vars(model.quality(data.u, data.y))
-
-
-def _warn_of_range(model: "FreeRunModel", data: "Channels") -> None:
-    from estimation.identification.free_run.input_range import inputs_beyond
-
-    for note in inputs_beyond(model, data):
-        warnings.warn(LogWarning(note), stacklevel=2)
-
-
-def simulate_any(logs: Sequence[Path], path: Path, asked: Asked, *, as_json: bool, out: Path | None) -> None:
-    """Simulate a saved model on every log, say how well it follows, and leave with the exit code.
-
-    Raises
-    ------
-    HydrostateError
-        If the model cannot be read, or has another number of channels than are named.
-    """
-    from estimation.identification.free_run.from_records import channels_of
-    from estimation.identification.free_run.saved import load_models
-
-    models = load_models(path)
-    if asked.outputs:
-        models = [one for one in models if one.output in asked.outputs] or models
-    prepare_output(out)
-    simulated = own_paths(asked.simulated, logs)
-    require_positive("--sample-time", asked.sample_time, "s")
-
-    def work(log: Path) -> Result:
-        results: list[Result] = []
-        for index, model in enumerate(models):
-            inputs = asked.inputs or model.inputs
-            outputs = asked.outputs or tuple(one.output for one in models)
-            if len(inputs) != len(model.inputs) or len(outputs) != len(models):
-                raise HydrostateError(
-                    f"the model goes from {len(model.inputs)} inputs to {len(models)} outputs, got columns for "
-                    f"{len(inputs)} and {len(outputs)}"
-                )
-            record = _record(log, (*inputs, outputs[index]), asked.sample_time)
-            data = channels_of([record], inputs, outputs[index], model.sample_time)
-            _warn_of_range(model, data)
-            quality = _quality(model, channels_of([record], inputs, outputs[index], model.sample_time, split=True))
-            results.append({"inputs": list(inputs), "output": outputs[index], "structure": model.structure, **quality})
-            if log in simulated:
-                _write_simulated(model, data, own_paths(simulated[log], outputs)[outputs[index]])
-        message = clauses([f"{one['output']}: fit {one['fit_percent']:.1f} % running free" for one in results])
-        return {"outcome": "ok", **results[0], "outputs": results, "model_file": str(path), "message": message}
-
-    blank: Result = {**dict.fromkeys(("inputs", "output", "structure", "fit_percent", "rmse")), "outputs": []}
-    finish(run_logs(logs, work, blank, "simulating"), _simulated_screen, as_json=as_json, out=out)
-
-
-def _write_simulated(model: "FreeRunModel", data: "Channels", path: Path) -> None:
-    """Write time, inputs, measured and simulated output of the first log as CSV."""
-    import numpy as np
-    import pandas as pd
-
-    from experiments.command.json_output import write_whole
-
-    u, y = data.u[0], data.y[0]
-    columns: Mapping[str, Any] = {
-        "time_s": model.sample_time * np.arange(y.size),
-        **{name: u[:, k] for k, name in enumerate(data.inputs)},
-        data.output: y,
-        f"{data.output}_simulated": model.simulate(u, y),
-    }
-    write_whole(path, pd.DataFrame(columns).to_csv(index=False), "--simulated")
-
-
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     shown = table("output", "structure", "values [-]", "fit [%]", "held back [%]", "test [%]", "rms error", "gain")
     for result in results:
@@ -340,11 +263,3 @@ def _with_interval(one: Mapping[str, Any]) -> str:
     """Return a value with its 95 % interval."""
     ends = one["ci95"]
     return f"{one['value']:.4g}" + ("" if ends is None else f" ({ends[0]:.4g} to {ends[1]:.4g})")
-
-
-def _simulated_screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
-    shown = table("log", "output", "fit [%]", "rms error", "one step [%]")
-    for log, one in ((str(result["file"]), one) for result in results for one in result["outputs"]):
-        numbers = (f"{one['fit_percent']:.2f}", f"{one['rmse']:.4g}", f"{one['one_step_percent']:.2f}")
-        shown.add_row(log, one["output"], *numbers)
-    yield shown

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 
@@ -22,7 +22,7 @@ COMMON = frozenset({"logs", "plant", "rig", "columns", "report", "out", "seed", 
 """Options of every kind of actuator."""
 
 
-def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[str, Any]) -> None:
+def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[str, Any]) -> NoReturn:
     """Find what logs say, print it, and leave with the exit code.
 
     Parameters

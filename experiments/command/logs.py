@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection, Generator, Iterable, Mapping, 
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, TypeVar
 
 import typer
 
@@ -157,7 +157,7 @@ def _failure(blank: Result, message: str) -> dict[str, Any]:
     return {"outcome": "failed", **blank, "message": message}
 
 
-def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None) -> None:
+def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None) -> NoReturn:
     """Print what was found, write it if wanted, and leave with the exit code.
 
     Parameters

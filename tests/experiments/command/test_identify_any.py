@@ -209,6 +209,15 @@ def test_a_saved_model_is_asked_for_one_of_its_outputs_or_for_columns_of_other_n
         assert "the model goes from 2 inputs to 2 outputs, got columns for" in " ".join(refused.output.split())
 
 
+def test_names_of_a_saved_model_are_its_own_in_whatever_order_they_are_asked_for(logs: list[Path], saved: Path) -> None:
+    """With outputs turned about, the model of each was compared with the column of the other."""
+    (one,) = json.loads(run(logs[1], "--simulate", saved, "--json").stdout)
+    turned = ("--input", "load,Valve [%]", "--output", "heat,flow")
+    (other,) = json.loads(run(logs[1], "--simulate", saved, *turned, "--json").stdout)
+    assert [part["output"] for part in other["outputs"]] == ["heat", "flow"]
+    assert other["outputs"] == one["outputs"][::-1]
+
+
 def test_a_frequency_response_has_one_input(logs: list[Path], tmp_path: Path) -> None:
     channels = ("--input", "Valve [%],load", "--output", "heat", "--order", 1, "--delay", 1)
     ran = run(logs[0], *channels, "--response", tmp_path / "response.png")

@@ -1,0 +1,125 @@
+"""`hydrostate identify LOG --simulate MODEL`: a saved model run free on other logs, and how well it follows them."""
+
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from experiments.command.json_output import Result, prepare_output
+from experiments.command.logs import finish, run_logs
+from experiments.command.options import require_positive
+from experiments.command.own_paths import own_paths
+from experiments.command.terminal import clauses, table
+from plant.errors import HydrostateError, LogWarning
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from estimation.identification.free_run.data import Channels
+    from estimation.identification.free_run.model import FreeRunModel
+    from experiments.command.identify_any import Asked
+    from plant.log.record import Record
+
+
+def simulate_model(logs: Sequence[Path], path: Path, asked: "Asked", *, as_json: bool, out: Path | None) -> NoReturn:
+    """Simulate a saved model on every log, say how well it follows, and leave with the exit code.
+
+    Raises
+    ------
+    HydrostateError
+        If the model cannot be read, or has another number of channels than are named.
+    """
+    from estimation.identification.free_run.from_records import channels_of
+    from estimation.identification.free_run.saved import load_models
+
+    models = _models_of(load_models(path), asked.outputs)
+    prepare_output(out)
+    require_positive("--sample-time", asked.sample_time, "s")
+    simulated = own_paths(asked.simulated, logs)
+
+    def work(log: Path) -> Result:
+        results: list[Result] = []
+        for index, model in enumerate(models):
+            own = not asked.inputs or sorted(asked.inputs) == sorted(model.inputs)
+            inputs = model.inputs if own else asked.inputs
+            outputs = asked.outputs or tuple(one.output for one in models)
+            if len(inputs) != len(model.inputs) or len(outputs) != len(models):
+                raise HydrostateError(
+                    f"the model goes from {len(model.inputs)} inputs to {len(models)} outputs, got columns for "
+                    f"{len(inputs)} and {len(outputs)}"
+                )
+            record = record_of(log, (*inputs, outputs[index]), asked.sample_time)
+            data = channels_of([record], inputs, outputs[index], model.sample_time)
+            warn_of_range(model, data)
+            quality = quality_of(model, channels_of([record], inputs, outputs[index], model.sample_time, split=True))
+            results.append({"inputs": list(inputs), "output": outputs[index], "structure": model.structure, **quality})
+            if log in simulated:
+                write_simulated(model, data, own_paths(simulated[log], outputs)[outputs[index]])
+        message = clauses([f"{one['output']}: fit {one['fit_percent']:.1f} % running free" for one in results])
+        return {"outcome": "ok", **results[0], "outputs": results, "model_file": str(path), "message": message}
+
+    blank: Result = {**dict.fromkeys(("inputs", "output", "structure", "fit_percent", "rmse")), "outputs": []}
+    finish(run_logs(logs, work, blank, "simulating"), _simulated_screen, as_json=as_json, out=out)
+
+
+def _models_of(models: "Sequence[FreeRunModel]", outputs: Sequence[str]) -> "list[FreeRunModel]":
+    """Return the models of outputs in the order that they are asked for; all where columns have other names."""
+    by_output = {one.output: one for one in models}
+    return [by_output[name] for name in outputs if name in by_output] or list(models)
+
+
+def write_simulated(model: "FreeRunModel", data: "Channels", path: Path) -> None:
+    """Write time, inputs, measured and simulated output of the first log as CSV."""
+    import numpy as np
+    import pandas as pd
+
+    from experiments.command.json_output import write_whole
+
+    u, y = data.u[0], data.y[0]
+    columns: Mapping[str, Any] = {
+        "time_s": model.sample_time * np.arange(y.size),
+        **{name: u[:, k] for k, name in enumerate(data.inputs)},
+        data.output: y,
+        f"{data.output}_simulated": model.simulate(u, y),
+    }
+    write_whole(path, pd.DataFrame(columns).to_csv(index=False), "--simulated")
+
+
+def record_of(log: Path, wanted: Sequence[str], sample_time: float | None) -> "Record":
+    """Read columns of a log of anything, of which as many samples may be missing as a model can do without.
+
+    Parameters
+    ----------
+    sample_time : float or None
+        Between rows of a log without a column of time [s].
+
+    Raises
+    ------
+    LogError
+        If it cannot be read, or lacks one of them.
+    """
+    from plant.log.any_columns import read_any
+    from plant.log.clock import MOST_MISSING_TO_RELATE
+
+    return read_any(log, wanted, sample_time=sample_time, most_missing=MOST_MISSING_TO_RELATE)
+
+
+def quality_of(model: "FreeRunModel", data: "Channels") -> dict[str, Any]:
+    """Return how well a model follows its outputs, by the names of the JSON contract."""
+    return vars(model.quality(data.u, data.y))
+
+
+def warn_of_range(model: "FreeRunModel", data: "Channels") -> None:
+    """Warn of inputs that lie beyond those that a polynomial model was fitted to."""
+    from estimation.identification.free_run.input_range import inputs_beyond
+
+    for note in inputs_beyond(model, data):
+        warnings.warn(LogWarning(note), stacklevel=2)
+
+
+def _simulated_screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
+    shown = table("log", "output", "fit [%]", "rms error", "one step [%]")
+    for log, one in ((str(result["file"]), one) for result in results for one in result["outputs"]):
+        numbers = (f"{one['fit_percent']:.2f}", f"{one['rmse']:.4g}", f"{one['one_step_percent']:.2f}")
+        shown.add_row(log, one["output"], *numbers)
+    yield shown
