@@ -27,7 +27,7 @@ from experiments.command.options import (
 )
 from experiments.command.own_paths import own_paths, require_place
 from experiments.command.simulate_model import simulate_model
-from experiments.command.terminal import short_names, table
+from experiments.command.terminal import note, short_names, table
 from plant.errors import HydrostateError, require_known
 
 if TYPE_CHECKING:
@@ -311,6 +311,8 @@ def _judged(model: "LinearModel", u: "Array", y: "Array", log: Path, figure: Pat
         interval = dc_gain_interval(model, u, y)
     entries: dict[str, Any] = {"dc_gain": {"value": gain, "std": std, "ci95": interval}}
     if not model.is_stable:
+        if figure is not None:
+            note(f"no figure: the model of {log.name} is unstable, so it cannot be simulated")
         return entries | {"validation": NOTHING["validation"]}
     part = slice(0, MOST_TESTED)
     found = validate(model.discretised() if model.continuous else model, u[part], y[part], fitted=fitted)

@@ -93,3 +93,14 @@ def test_auto_is_no_number() -> None:
     assert whole_or_auto("--delay", "auto", 0) is None
     with pytest.raises(HydrostateError, match="from 1 on, or auto, got '1"):
         whole_or_auto("--order", "1.5", 1)
+
+
+def test_the_figure_of_an_unstable_model_is_missed_out_loud(tmp_path: Path) -> None:
+    u = np.random.default_rng(3).choice([-1.0, 1.0], 400)
+    y = LinearModel([0.0, 1.0], [1.0, -1.01], 1e-3, "u", "y").simulate(u)
+    write_record(Record(1e-3, {"motor_speed_rad_s": u, "velocity_m_s": y}), tmp_path / "run.csv")
+    asked = ["--structure", "arx", "--order", "1", "--figure", str(tmp_path / "fit.png")]
+    ran = CliRunner().invoke(app, ["identify", str(tmp_path / "run.csv"), *asked])
+    assert ran.exit_code == 0, ran.output
+    assert "no figure: the model of run.csv is unstable" in ran.stderr
+    assert not (tmp_path / "fit.png").exists()
