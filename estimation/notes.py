@@ -257,6 +257,10 @@ class RigCode(Code):
     PORT_DRAINS = (
         "chamber {side} loses {drain:.3g} m^3/(s Pa) to the inner circuit: its make-up valve leaks or is stuck open"
     )
+    PORTS_DRAIN_APART = (
+        "chamber A loses {drain_a:.2g} and chamber B {drain_b:.2g} m^3/(s Pa) to the inner circuit: the case of a "
+        "sound pump drains up to {sound:.2g}, so this is no fault"
+    )
     OIL_STIFFER = (
         "bulk modulus is {ratio:.3g} times that in the rig file; the conditions were compared at the measured value"
     )

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.eha.changing_leakage import growth_note, leakage_over, step_note
+from estimation.eha.port_drains import drain_note
 from estimation.finding import NORMAL_95
 from estimation.fits.play_courses import crossings
 from estimation.fits.teeth import EVENLY, Turning, delivering
@@ -202,14 +203,6 @@ def _crack(found: Explanation, _: EhaParameters) -> Note:
     )
 
 
-def _drains(side: str) -> Callable[[Explanation, EhaParameters], Note]:
-    def note(found: Explanation, _: EhaParameters) -> Note:
-        share = found.values[f"drain_share_{side}"][0]
-        return RigCode.PORT_DRAINS.note(side=side.upper(), drain=share * found.values["case_leakage"][0])
-
-    return note
-
-
 _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "pressure_late": _late,
     "speed_late": _input_late(SPEED),
@@ -233,8 +226,8 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "makeup_blocked": _blocked,
     "makeup_bends": _bends,
     "checks_crack": _crack,
-    "port_a_drains": _drains("a"),
-    "port_b_drains": _drains("b"),
+    "port_a_drains": drain_note("a"),
+    "port_b_drains": drain_note("b"),
 }
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from estimation.eha.bulk_modulus import _impossible_delivery
 from estimation.eha.changing_leakage import WARMED
-from estimation.eha.explained import LEAKAGE_COURSE, at_pump_speed, notes_of, rig_set_right, set_right
+from estimation.eha.explained import LEAKAGE_COURSE, OUTSIDE, at_pump_speed, notes_of, rig_set_right, set_right
 from estimation.fits.teeth import EVENLY, Teeth, Turning, delivering
 from estimation.fits.tried import Explanation
 from estimation.log_checks.clean import CleanLog
@@ -145,8 +145,19 @@ def test_the_chamber_that_is_blocked_or_drains_is_named() -> None:
     for share, side in ((0.9, "B"), (1.1, "A")):
         assert told("makeup_blocked", makeup_share_b=(share, 0.0)).data["side"] == side
     for side in "ab":
-        drained = {f"drain_share_{side}": (7.0, 1.0), "case_leakage": (2e-13, 0.0)}
-        assert data(told(f"port_{side}_drains", **drained)) == {"side": side.upper(), "drain": 1.4e-12}
+        drained = {f"drain_share_{side}": (20.0, 1.0), "case_leakage": (2e-13, 0.0)}
+        assert data(told(f"port_{side}_drains", **drained)) == {"side": side.upper(), "drain": 4e-12}
+
+
+@pytest.mark.parametrize(
+    ("share", "case", "leaks"), [(0.1, 4e-12, "B"), (0.1, 1e-12, ""), (1.8, 1e-12, "A"), (1.6, 1e-12, "")]
+)
+def test_the_port_that_drains_more_leaks_if_no_sound_pump_drains_so(share: float, case: float, leaks: str) -> None:
+    """A twentieth of the healthy leakage is presumed, and may be seven times as much."""
+    note = told("port_a_drains", drain_share_a=(share, 0.0), case_leakage=(case, 0.0))
+    assert note.code is (RigCode.PORT_DRAINS if leaks else RigCode.PORTS_DRAIN_APART)
+    assert (note.code in OUTSIDE) == bool(leaks)
+    assert note.data.get("side", "") == leaks
 
 
 def test_rivals_are_counted_last() -> None:

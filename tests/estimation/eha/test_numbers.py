@@ -58,7 +58,7 @@ VALUES: dict[str, tuple[float, float]] = {
     "step_width": (1e-3, 1e-4),
     "makeup_bend": (5e-5, 1e-5),
     "case_leakage": (4e-12, 1e-13),
-    "drain_share_a": (0.7, 0.1),
+    "drain_share_a": (1.7, 0.1),
     "drain_share_b": (0.3, 0.1),
     "leakage_growth": (0.4, 0.05),
     "leakage_rise": (0.1, 0.05),

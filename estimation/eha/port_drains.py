@@ -1,0 +1,63 @@
+"""`drain_note(side)`: what a port that drains otherwise than the other one says: of its make-up valve, or nothing."""
+
+from collections.abc import Callable
+from math import exp
+
+from estimation.finding import NORMAL_95
+from estimation.fits.flow_log import DRAIN_START, PRESUMED_STD, usual_leakage
+from estimation.fits.tried import Explanation
+from estimation.notes import RigCode
+from plant.eha.model import EhaParameters
+from plant.notes import Note
+
+
+def most_drained(p: EhaParameters) -> float:
+    """Return the most that the case of a sound pump drains of a port, before a log is seen.
+
+    It is presumed a twentieth of the healthy leakage, and known to a factor of e: 97.5 % drain less than a third of it.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    float
+        Drain [m^3/(s Pa)].
+
+    Examples
+    --------
+    >>> round(most_drained(EhaParameters(leakage_coefficient=1e-11)) * 1e12, 2)
+    3.55
+    """
+    return DRAIN_START * usual_leakage(p) * exp(NORMAL_95 * PRESUMED_STD)
+
+
+def drain_note(side: str) -> Callable[[Explanation, EhaParameters], Note]:
+    """Return what tells of a port whose drain is not the other one's.
+
+    The port that drains more is the one of a make-up valve that leaks, whichever drain was freed; and where it drains
+    no more than the case of a sound pump does, no valve leaks.
+
+    Parameters
+    ----------
+    side : str
+        The port whose drain was freed, a or b.
+
+    Returns
+    -------
+    callable
+        ``note(found, parameters)``.
+    """
+    other = "ab".replace(side, "")
+
+    def note(found: Explanation, p: EhaParameters) -> Note:
+        case = found.values["case_leakage"][0]
+        drains = {side: case * found.values[f"drain_share_{side}"][0], other: case}
+        most = max(drains, key=lambda one: drains[one])
+        if drains[most] > most_drained(p):
+            return RigCode.PORT_DRAINS.note(side=most.upper(), drain=drains[most])
+        return RigCode.PORTS_DRAIN_APART.note(drain_a=drains["a"], drain_b=drains["b"], sound=most_drained(p))
+
+    return note
