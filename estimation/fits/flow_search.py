@@ -20,7 +20,7 @@ from estimation.fits.greybox_fit import NEAR_ENOUGH, GreyBoxFit, Search, conclud
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem
 from estimation.fits.wide_problem import flow_bounds
-from estimation.models.completed_flow import completed
+from estimation.models.completed_flow import CRACKS, completed
 from estimation.models.flow import (
     FLOW_FORM,
     HELD_FLOW_FORM,
@@ -121,7 +121,12 @@ def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]
     ]
 
 
-def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]) -> Sequence[GreyBoxFit]:
+def balanced(
+    log: GreyBoxLog,
+    parameters: EhaParameters,
+    starts: Sequence[Mapping[str, float]],
+    valley: Mapping[str, float] | None = None,
+) -> Sequence[GreyBoxFit]:
     """Return the fits of the balances that count.
 
     Parameters
@@ -132,6 +137,8 @@ def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mappin
         The actuator.
     starts : sequence of Mapping[str, float]
         Where searches begin, see `flow_starts` [SI].
+    valley : Mapping[str, float], optional
+        A place in a lower valley, see `lower_valley`, where searches with short model steps begin as well [SI].
 
     Returns
     -------
@@ -148,6 +155,8 @@ def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mappin
     done = each(lambda one: _finished(one, log, bent=bent), likely)
     wanted = min(done, key=_cost)[1].cost
     done += each(lambda one: _finished(one, log, wanted, bent=bent), behind)
+    if valley is not None:
+        done = each(lambda one: min(one, _from_valley(one[0].model, log, valley), key=_cost), done)
     best = min(done, key=_cost)
     swinging = min((one for one in done if not _held(one[0])), key=_cost)
     least = best[1].cost
@@ -158,6 +167,46 @@ def balanced(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mappin
         return concluded(problem, point, least=bounds[0], disturbed=counts, asked=asked)
 
     return each(told, done)
+
+
+def lower_valley(
+    log: GreyBoxLog, fit: GreyBoxFit, found: Mapping[str, tuple[float, float]], wanted: float
+) -> Mapping[str, float] | None:
+    """Return a place from which the plain form leads lower than a cost, given what explains a log better than its fit.
+
+    A form has several valleys where make-up valves open and shut. The way out of one may lead through a hypothesis of
+    which nothing is left at the end: a drain of one port that ends as the other one's.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the flow form sees it.
+    fit : GreyBoxFit
+        The plain form's.
+    found : Mapping[str, tuple of float]
+        Value and deviation of what explains the log, by parameter [SI].
+    wanted : float
+        The cost [dimensionless].
+
+    Returns
+    -------
+    Mapping[str, float] or None
+        Values of the unknowns of the plain form [SI]; None where it leads nowhere so low, where it was not completed
+        because it comes nowhere near the log, or the log has gaps.
+    """
+    if log.gaps.size or CRACKS[0] not in fit.values:
+        return None
+    values = {**fit.values, **dict.fromkeys(CRACKS, 0.0), **{name: value for name, (value, _) in found.items()}}
+    _, point, _ = _from_valley(fit.model, log, values, wanted)
+    return values if point.cost < wanted else None
+
+
+def _from_valley(form: GreyBoxModel, log: GreyBoxLog, valley: Mapping[str, float], wanted: float = np.inf) -> _Found:
+    """Return where a form leads from values of its unknowns."""
+    problem = FreedProblem.of(form, log)
+    theta = form.theta({STIFFNESS: 0.0, **valley})
+    bounds = flow_bounds(form, [theta], log)
+    return problem, descend(problem.at, theta, FINISHING, bounds, radius=GUESSED_WITHIN, wanted=wanted), bounds
 
 
 def _finished(one: _Rough, log: GreyBoxLog, wanted: float = np.inf, *, bent: bool) -> _Found:
