@@ -24,7 +24,7 @@ from estimation.fits.hypotheses import (
 )
 from estimation.fits.lateness import most_late
 from estimation.fits.left_open import wear_open
-from estimation.fits.objections import DOUBTED, fit_explains
+from estimation.fits.objections import doubted, fit_explains
 from estimation.fits.play import NO_PLAY, PLAY_SENSED, ShownPlay, play_left
 from estimation.fits.promises import Promise, promised, promised_each, slopes_of
 from estimation.models.completed_flow import CRACKS, balances_mass
@@ -32,10 +32,6 @@ from estimation.models.flow import STIFFNESS
 from estimation.models.inner_circuit import BEND
 from plant.eha.model import EhaParameters
 from plant.notes import Note
-
-MORE_THAN_CHANCE = 7.7
-"""Root of the number of samples times how far the same is above one by chance in one log of a thousand. The variance of
-white noise over what `measurement_variances` reads off it scatters by 2.45 over that root [dimensionless]."""
 
 ZERO_WORTH = 30.0
 """Gain in log-likelihood that the slopes must promise before a log that the plain form explains is asked for its
@@ -115,12 +111,10 @@ def asked_of(
     asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > WORTH)
     remarks = () if DELIVERY in asked else wear_open(delivery.deviation)
     if not moving:
-        by_chance = 1.0 + MORE_THAN_CHANCE / len(log.drives) ** 0.5
-        doubted = not log.passes_on and swinging.chi_square[0] > max(DOUBTED, by_chance)
-        return HYPOTHESES if doubted else asked, remarks
+        return HYPOTHESES if not log.passes_on and doubted(swinging) else asked, remarks
     # chambers shut in far above the accumulator take no make-up for seconds, and a search from rest ends without any
     fed = swinging.values["makeup_conductance"] > VANISHED * parameters.makeup_conductance
-    lost = swinging is best and not fed and swinging.chi_square[0] > DOUBTED
+    lost = swinging is best and not fed and doubted(swinging)
     begun = promised(log.coarsened(), parameters, swinging.values, START_LOAD, by_mass=by_mass)
     return (BEGUN, *asked) if lost or _possible([begun], swinging)[0].gain > WORTH else asked, remarks
 

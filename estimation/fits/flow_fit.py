@@ -12,7 +12,7 @@ from estimation.fits.between_samples import with_course
 from estimation.fits.delivery import contradicted
 from estimation.fits.explain import WORTH, explain
 from estimation.fits.flow_log import carried, flow_log, homed_at_stop, without_strays
-from estimation.fits.flow_search import balanced, flow_starts
+from estimation.fits.flow_search import balanced, flow_starts, lower_valley
 from estimation.fits.form_fit import DISCRETISED, FormFit, weighed, with_structure
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.hypotheses import (
@@ -22,7 +22,7 @@ from estimation.fits.hypotheses import (
     PRESSURE_LATE,
 )
 from estimation.fits.left_open import valves_unseen, wear_open
-from estimation.fits.objections import DOUBTED, LARGEST_CHI_SQUARE, NOISY, fit_explains, fit_explains_all, objections
+from estimation.fits.objections import doubted, fit_explains, fit_explains_all, limits, objections
 from estimation.fits.play import (
     NO_PLAY,
     play_left,
@@ -90,6 +90,7 @@ def fit_flow(
     moving: bool = False,
     filtered: bool = False,
     speed_offset: float = 0.0,
+    valley: Mapping[str, float] | None = None,
 ) -> FormFit:
     """Fit the flow form to a log, balanced by volume, by mass, and by volume in held chambers, and weigh the three.
 
@@ -119,6 +120,8 @@ def fit_flow(
         Whether the pressure was filtered: it is then late, and by how much is fitted whatever that gains.
     speed_offset : float
         First guess of how much the logged speed exceeds the shaft's [rad/s].
+    valley : Mapping[str, float], optional
+        Values of the plain form's unknowns from which searches begin as well, see `lower_valley` [SI].
 
     Returns
     -------
@@ -139,8 +142,9 @@ def fit_flow(
     log = flow_log(record, parameters, uncertainties or {}, variances)
     starts = flow_starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
     explains = partial(fit_explains, noisy=log.passes_on)
-    largest = NOISY[0] if log.passes_on else LARGEST_CHI_SQUARE
-    unturned = with_course(log, fitted := partial(balanced, parameters=parameters, starts=starts), parameters)
+    largest, _ = limits(log.passes_on, np.count_nonzero(np.isfinite(log.measured[:, 0])))
+    fitted = partial(balanced, parameters=parameters, starts=starts, valley=valley)
+    unturned = with_course(log, fitted, parameters)
     log, fits, teeth, teeth_left = toothed(unturned, fitted, explains, largest, speed_offset)
     turning = Turning(log.teeth, log.speed_offset)
     beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in fits]
@@ -174,6 +178,9 @@ def fit_flow(
             place = (strange.values, parameters.pump_displacement, one.cost - WORTH)
             if not speed_offset and (turned := speed_instead(unturned, fitted, *place)):
                 return again(parameters, bulk_modulus, speed_offset=turned)
+            wanted = one.cost + WORTH
+            if valley is None and (lower := lower_valley(log, swinging, strange.values, wanted)):
+                return again(parameters, bulk_modulus, speed_offset=speed_offset, valley=lower)
             bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
             left, open_play = float(np.hypot(FILTERED if filtered else STRUCTURE, untaken)), play
             if PLAY.name in strange.names:
@@ -212,4 +219,4 @@ def _wanted(names: Sequence[str], best: GreyBoxFit, swinging: GreyBoxFit, *, hom
 
 def _known(names: Sequence[str], fit: GreyBoxFit) -> bool:
     """Return whether a play's fit leaves no more than the sensors' noise: what is left is how the piston crosses it."""
-    return PLAY.name not in names or fit.chi_square[0] <= DOUBTED
+    return PLAY.name not in names or not doubted(fit)

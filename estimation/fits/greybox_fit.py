@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.fits.chance import largest_chi_square
 from estimation.fits.course import opened, vanished
 from estimation.fits.covariance import automatic_lags, least_squares_covariance
 from estimation.fits.descent import Point, descend
@@ -37,9 +38,6 @@ LENGTHENED = 8
 
 NEAR_ENOUGH = 0.01
 """Half the sum of squares that a further step must promise while model steps are long [dimensionless]."""
-
-EXPLAINED = 1.2
-"""Mean squared normalised residual up to which no other finalist is tried [dimensionless]."""
 
 NOISE_DOUBT = 0.2
 """Standard deviation of the share of a driving channel's noise that is counted with the slopes: its size is known to
@@ -81,6 +79,8 @@ class GreyBoxFit:
         What they say of an offset of the logged speed, the same.
     small_teeth : tuple of Mapping[str, float]
         By how much teeth that are not taken up move each coordinate, and add to its variance [dimensionless].
+    seen : float
+        Residuals of the first output that count; without end where they are not counted.
     """
 
     model: GreyBoxModel
@@ -97,6 +97,7 @@ class GreyBoxFit:
     teeth: Mapping[int, ShownTeeth] = field(default_factory=dict[int, ShownTeeth])
     speed_offset: ShownOffset = NO_OFFSET
     small_teeth: tuple[Mapping[str, float], Mapping[str, float]] = NOT_MOVED
+    seen: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -231,9 +232,9 @@ def explained(problem: Problem, point: Point) -> bool:
     Returns
     -------
     bool
-        Whether the mean squared residual is below `EXPLAINED`.
+        Whether no other finalist need be tried.
     """
-    return 2.0 * point.cost < EXPLAINED * problem.blocks
+    return 2.0 * point.cost < largest_chi_square(problem.blocks) * problem.blocks
 
 
 def _cost(point: Point) -> float:
@@ -302,9 +303,8 @@ def concluded(
             variance = variance + opened(problem, theta, errors, bread, slopes)
         # the window's estimate need not be positive: then nothing is known
         variance = np.where(np.diag(spread) > 0.0, variance, np.inf)[: len(felt)]
-        held = [one.count for one in problem.log.teeth]
+        held, shifted = [one.count for one in problem.log.teeth], problem.log.speed_offset != 0.0
         counts = problem.log.counts if asked else held
-        shifted = problem.log.speed_offset != 0.0
         if (disturbed and counts) or shifted:
             teeth, offset = shown_teeth(problem, theta, left_over, fitted_bread, fitted_slopes, counts)
             variance = variance + sum(teeth[count].opened for count in held if count in teeth)
@@ -318,8 +318,7 @@ def concluded(
             play = shown_play(moved[len(timed) :], left_over, left)
     # teeth that are taken up are not small, and the course of a slow log's motor looks like some
     asked_of_teeth = {} if problem.log.teeth or problem.log.course is not None else teeth
-    sizes = dict(model.linear)
-    values = model.values(theta)
+    sizes, values = dict(model.linear), model.values(theta)
     unit = np.array([sizes.get(name, values[name]) for name in model.unknowns])
     squares = np.einsum("ij,ij->i", errors, errors)
     slopes_si = {name: dict(zip(model.unknowns, map(float, unit * one), strict=True)) for name, one in rig.items()}
@@ -340,6 +339,7 @@ def concluded(
         cost=point.cost,
         chi_square=tuple(map(float, squares / seen)),
         autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),
+        seen=float(seen[0]),
     )
 
 

@@ -1,12 +1,10 @@
 """`objections(fit, noisy)`: what speaks against a fit of the flow form, by what it leaves of a log."""
 
+from estimation.fits.chance import LARGEST_CHI_SQUARE, alike_by_chance, largest_chi_square
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.lateness import most_late
 from estimation.notes import EstimateCode
 from plant.notes import Note
-
-LARGEST_CHI_SQUARE = 1.2
-"""Mean squared normalised residual above which the model is said to leave something out [dimensionless]."""
 
 DOUBTED = 1.1
 """The same above which a log that begins under load or in motion is not explained: its fit has many valleys, and the
@@ -28,6 +26,41 @@ LATE_SHARE = 0.25
 """Share of what a log leaves unexplained that this must take up to be named beside it [fraction]."""
 
 
+def limits(noisy: bool, samples: float) -> tuple[float, float]:
+    """Return what no fit that explains a log leaves; in a short one more is left by chance.
+
+    Parameters
+    ----------
+    noisy : bool
+        Whether the position's noise counts with the slopes.
+    samples : float
+        Residuals that are counted.
+
+    Returns
+    -------
+    tuple of float
+        The largest mean squared normalised residual, and correlation of neighbouring ones [dimensionless].
+    """
+    largest, correlated = NOISY if noisy else (LARGEST_CHI_SQUARE, LARGEST_AUTOCORRELATION)
+    return largest_chi_square(samples, largest), max(correlated, alike_by_chance(samples))
+
+
+def doubted(fit: GreyBoxFit) -> bool:
+    """Return whether a fit leaves more than the sensors' noise does.
+
+    Parameters
+    ----------
+    fit : GreyBoxFit
+        The fit of a log whose noise of position does not count.
+
+    Returns
+    -------
+    bool
+        Whether it does.
+    """
+    return fit.chi_square[0] > largest_chi_square(fit.seen, DOUBTED)
+
+
 def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
     """Return what speaks against a fit.
 
@@ -44,7 +77,7 @@ def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
         Nothing where the fit explains the log.
     """
     reasons: list[Note] = []
-    largest, correlated = NOISY if noisy else (LARGEST_CHI_SQUARE, LARGEST_AUTOCORRELATION)
+    largest, correlated = limits(noisy, fit.seen)
     if fit.chi_square[0] > largest:
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=fit.chi_square[0] ** 0.5))
     if abs(fit.autocorrelation[0]) > correlated:
@@ -90,4 +123,4 @@ def fit_explains_all(fit: GreyBoxFit, noisy: bool) -> bool:
     bool
         Whether it is so.
     """
-    return fit_explains(fit, noisy) and (noisy or fit.chi_square[0] <= DOUBTED)
+    return fit_explains(fit, noisy) and (noisy or not doubted(fit))

@@ -7,9 +7,10 @@ import numpy as np
 
 from estimation.fits import flow_fit
 from estimation.fits.asked import asked_of
+from estimation.fits.chance import LARGEST_CHI_SQUARE
 from estimation.fits.hypotheses import HYPOTHESES
 from estimation.fits.left_open import OPEN_DELIVERY
-from estimation.fits.objections import DOUBTED, LARGEST_CHI_SQUARE
+from estimation.fits.objections import DOUBTED
 from estimation.fits.promises import Promise
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
@@ -36,7 +37,7 @@ def test_a_short_log_is_not_asked_for_all_where_noise_alone_leaves_as_much_by_ch
     short, sound = seen(log(2.0)), made_fit(400.0, 2e8, 1e5)
     with all_promise(Promise(0.0, 0.0, 2.0 * OPEN_DELIVERY)):
         for chi_square, wanted in ((1.16, ()), (1.18, HYPOTHESES)):
-            fit = replace(sound, chi_square=(chi_square,))
+            fit = replace(sound, chi_square=(chi_square,), seen=2000.0)
             assert asked_of(short, PAPER, fit, fit, loaded=False, moving=False)[0] == wanted
 
 

@@ -1,0 +1,57 @@
+"""What white noise alone leaves in a fit's residuals by chance: in a short log more than in a long one."""
+
+LARGEST_CHI_SQUARE = 1.2
+"""Mean squared normalised residual above which the model is said to leave something out [dimensionless]."""
+
+MORE_THAN_CHANCE = 7.7
+"""Root of the number of samples times how far the mean squared residual is above one by chance in one log of a
+thousand. The variance of white noise over what `measurement_variances` reads off it scatters by 2.45 over that root
+[dimensionless]."""
+
+ALIKE_BY_CHANCE = 3.3
+"""The same of the correlation of neighbouring residuals, to either side; that of white noise scatters by one over that
+root (Bartlett 1946) [dimensionless]."""
+
+
+def largest_chi_square(samples: float, least: float = LARGEST_CHI_SQUARE) -> float:
+    """Return the mean squared normalised residual above which a model is said to leave something out.
+
+    Parameters
+    ----------
+    samples : float
+        Residuals that count.
+    least : float
+        The same of a long log [dimensionless].
+
+    Returns
+    -------
+    float
+        The same, or what one log of a thousand exceeds by chance, whichever is more [dimensionless].
+
+    Examples
+    --------
+    >>> [round(largest_chi_square(samples), 2) for samples in (400, 1_482, 20_000)]
+    [1.39, 1.2, 1.2]
+    """
+    return max(least, 1.0 + MORE_THAN_CHANCE / samples**0.5)
+
+
+def alike_by_chance(samples: float) -> float:
+    """Return the correlation of neighbouring residuals that one log of a thousand exceeds by chance.
+
+    Parameters
+    ----------
+    samples : float
+        Residuals that count.
+
+    Returns
+    -------
+    float
+        Its size [dimensionless].
+
+    Examples
+    --------
+    >>> [round(alike_by_chance(samples), 2) for samples in (400, 20_000)]
+    [0.17, 0.02]
+    """
+    return ALIKE_BY_CHANCE / samples**0.5
