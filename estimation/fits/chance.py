@@ -5,8 +5,8 @@ LARGEST_CHI_SQUARE = 1.2
 
 MORE_THAN_CHANCE = 7.7
 """Root of the number of samples times how far the mean squared residual is above one by chance in one log of a
-thousand. The variance of white noise over what `measurement_variances` reads off it scatters by 2.45 over that root
-[dimensionless]."""
+thousand. The variance of white noise over what `measurement_variances` reads off it scatters by 2.45 over that root;
+it is skewed, so that of 400 samples four logs of a thousand are above [dimensionless]."""
 
 ALIKE_BY_CHANCE = 3.3
 """The same of the correlation of neighbouring residuals, to either side; that of white noise scatters by one over that

@@ -142,7 +142,7 @@ def fit_flow(
     log = flow_log(record, parameters, uncertainties or {}, variances)
     starts = flow_starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
     explains = partial(fit_explains, noisy=log.passes_on)
-    largest, _ = limits(log.passes_on, np.count_nonzero(np.isfinite(log.measured[:, 0])))
+    largest, _ = limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))
     fitted = partial(balanced, parameters=parameters, starts=starts, valley=valley)
     unturned = with_course(log, fitted, parameters)
     log, fits, teeth, teeth_left = toothed(unturned, fitted, explains, largest, speed_offset)
