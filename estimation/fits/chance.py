@@ -19,7 +19,7 @@ def largest_chi_square(samples: float, least: float = LARGEST_CHI_SQUARE) -> flo
     Parameters
     ----------
     samples : float
-        Residuals that count.
+        Residuals that count [count].
     least : float
         The same of a long log [dimensionless].
 
@@ -42,7 +42,7 @@ def alike_by_chance(samples: float) -> float:
     Parameters
     ----------
     samples : float
-        Residuals that count.
+        Residuals that count [count].
 
     Returns
     -------

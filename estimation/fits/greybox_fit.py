@@ -80,7 +80,7 @@ class GreyBoxFit:
     small_teeth : tuple of Mapping[str, float]
         By how much teeth that are not taken up move each coordinate, and add to its variance [dimensionless].
     seen : float
-        Residuals of the first output that count; without end where they are not counted.
+        Residuals of the first output that count; without end where they are not counted [count].
     """
 
     model: GreyBoxModel

@@ -34,7 +34,7 @@ def limits(noisy: bool, samples: float) -> tuple[float, float]:
     noisy : bool
         Whether the position's noise counts with the slopes.
     samples : float
-        Residuals that are counted.
+        Residuals that are counted [count].
 
     Returns
     -------

@@ -16,7 +16,9 @@ from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import PORTS_DRAIN
 from estimation.fits.tried import Explanation
 from estimation.models.completed_flow import CRACKS
+from experiments.open_benchmark.kinds import make
 from plant.eha.model import EhaParameters
+from plant.log.record import Record
 from tests.estimation.fits.short_logs import PAPER, log
 
 WRONG = 200.0
@@ -109,3 +111,14 @@ def test_a_hypothesis_is_believed_where_it_gains_over_its_own_valley_alone(
     answer = flow_fit.fit_flow(log(1.0), PAPER, PAPER.bulk_modulus)
     assert (answer.explanation is None) == (believed == "plain")
     assert (told[-1] is not None) == (believed == "plain")
+
+
+@pytest.mark.slow
+def test_a_plain_log_whose_plain_form_has_two_valleys_is_explained_by_the_lower_one() -> None:
+    made = make("plain", "training", 667)
+    time, channels = made.log["time_s"], {name: made.log[name].to_numpy() for name in made.log if name != "time_s"}
+    answer = flow_fit.fit_flow(Record(float(time[1] - time[0]), channels), PAPER, PAPER.bulk_modulus)
+    assert answer.explanation is None
+    value, std = answer.parameters["bulk_modulus"]
+    assert value == pytest.approx(made.bulk_modulus[0], abs=2.0 * std)
+    assert answer.parameters["case_leakage"][0] == pytest.approx(made.setup.machine.drain, rel=0.3)
