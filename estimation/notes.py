@@ -20,6 +20,10 @@ class SensorCode(Code):
         "{channel} has a new sample only every {milliseconds:.3g} ms and repeats it for {rows} rows; the repeated "
         "values were left out"
     )
+    SPEED_HELD = (
+        "{channel} has a new sample every {milliseconds:.3g} ms only and is repeated for {rows} rows; what the pump "
+        "delivered in between is not known, so the log was taken at those samples alone: log the speed in every row"
+    )
     BRIDGED = (
         "{channel} has a new sample only every {milliseconds:.3g} ms and was interpolated linearly in between; one row "
         "in {rows} was used"

@@ -89,6 +89,7 @@ def fit_flow(
     loaded: bool = False,
     moving: bool = False,
     filtered: bool = False,
+    speed_held: bool = False,
     speed_offset: float = 0.0,
     valley: Mapping[str, float] | None = None,
 ) -> FormFit:
@@ -118,6 +119,9 @@ def fit_flow(
         Whether the motor turns when it begins: both chambers may then stand at any pressure.
     filtered : bool
         Whether the pressure was filtered: it is then late, and by how much is fitted whatever that gains.
+    speed_held : bool
+        Whether motor speed came slower than the rest: of a log that the plain form does not explain the motor's course
+        is then what is not known, and nothing is asked.
     speed_offset : float
         First guess of how much the logged speed exceeds the shaft's [rad/s].
     valley : Mapping[str, float], optional
@@ -137,7 +141,7 @@ def fit_flow(
     sensed = sensed_play(record)
     if variances is None:
         record, variances = without_strays(record)
-    how = {"loaded": loaded, "moving": moving, "filtered": filtered}
+    how = {"loaded": loaded, "moving": moving, "filtered": filtered, "speed_held": speed_held}
     again = partial(fit_flow, record, uncertainties=uncertainties, variances=variances, **how)
     log = flow_log(record, parameters, uncertainties or {}, variances)
     starts = flow_starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
@@ -158,6 +162,7 @@ def fit_flow(
     log = carried(log, parameters, swinging.values)
     asked, open_ends = asked_of(log, parameters, swinging, best, sensed, loaded=loaded, moving=moving)
     asked = (PRESSURE_LATE, *asked) if filtered and PRESSURE_LATE not in asked else asked
+    asked = () if speed_held and not explains(swinging) else asked
     remarks = (*teeth, *open_ends, *valves_unseen(best))
     softer = parameters.piston_area * sensed.yields / parameters.chamber_volume
     untaken, play = play_untaken(sensed, softer * swinging.values["bulk_modulus"])

@@ -52,6 +52,11 @@ class CleanLog:
         """Whether a pressure was filtered before it was logged."""
         return any(note.code == SensorCode.FILTERED for note in self.left_out)
 
+    @property
+    def speed_held(self) -> bool:
+        """Whether motor speed came slower than the rest, so that the log was taken at its samples."""
+        return any(note.code == SensorCode.SPEED_HELD for note in self.left_out)
+
     def objections_to(self, channels: tuple[str, ...]) -> tuple[Note, ...]:
         """Return what speaks against the sensors of some channels.
 

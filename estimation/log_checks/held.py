@@ -1,7 +1,8 @@
 """Held samples: a slow channel that its logger repeats until the next sample comes, or bridges by straight lines.
 
 Neither is a measurement. It is left out, so that a fit sees a slow sensor and no late or noiseless one. Where all
-channels do so in the same rows, motor speed among them, a slow log was written in the rows of a faster clock.
+channels do so in the same rows, motor speed among them, a slow log was written in the rows of a faster clock. Where the
+speed alone does, or in rows of its own, what the pump delivered is known at its samples: the log is taken there.
 """
 
 from collections.abc import Iterator, Mapping
@@ -11,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.log_checks.channel_names import POSITION, PRESSURES, SPEED, VELOCITY
+from estimation.log_checks.slow_speed import was_repeated
 from estimation.notes import SensorCode
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
 
 HELD = (POSITION, VELOCITY, *PRESSURES)
-"""Channels that are asked: none can jump. A motor speed that is held may be how the motor was driven."""
+"""Channels that are asked: none can jump. A motor speed that is held may be how the motor was driven (`slow_speed`)."""
 
 LEAST_STEPS = 100
 """Steps over its resolution that a channel must make to be judged [count]."""
@@ -54,21 +56,27 @@ def without_held(record: Record) -> tuple[Record, tuple[Note, ...]]:
     -------
     tuple of (Record, tuple of Note)
         The log, and a note for each channel that was held or bridged. A log all of whose channels were, in the same
-        rows, has the clock of its samples.
+        rows, has the clock of its samples, and so has one whose motor speed was repeated.
     """
     slow = {name: one for name in HELD if name in record and (one := _slow(record[name])) is not None}
-    if not slow:
+    turning = _slow_speed(record)
+    if not slow and turning is None:
         return record, ()
-    every = next(iter(slow.values()))
+    every = next(iter(slow.values()), turning)
     asked = [name for name in (SPEED, *HELD) if name in record]
-    if all(_only_at(record[name], every) for name in asked):
+    if every is not None and all(_only_at(record[name], every) for name in asked):
         return record.slice(every.first, None, every.rows), tuple(_notes(record, dict.fromkeys(asked, every)))
     changed: dict[str, Array] = {}
     for name, one in slow.items():
         values = record[name].copy()
         values[~_sampled(record[name], one)] = np.nan
         changed[name] = values
-    return record.replace(**changed), tuple(_notes(record, slow))
+    found, notes = record.replace(**changed) if changed else record, tuple(_notes(record, slow))
+    if turning is None or not was_repeated(found, others=bool(slow)):
+        return found, notes
+    at = {"rows": turning.rows, "milliseconds": 1e3 * turning.rows * record.sample_time}
+    said = SensorCode.SPEED_HELD.note(channel=SPEED, **at)
+    return found.slice(turning.first, None, turning.rows), (said, *notes)
 
 
 def _notes(record: Record, slow: Mapping[str, _Slow]) -> Iterator[Note]:
@@ -76,6 +84,14 @@ def _notes(record: Record, slow: Mapping[str, _Slow]) -> Iterator[Note]:
         yield (SensorCode.BRIDGED if one.bridged else SensorCode.HELD).note(
             channel=name, rows=one.rows, milliseconds=1e3 * one.rows * record.sample_time
         )
+
+
+def _slow_speed(record: Record) -> _Slow | None:
+    """Return how motor speed is held, by motor or logger; nothing where it is not, or over rows of no fixed number."""
+    if SPEED not in record or (rows := held_rows(record[SPEED])) == 1:
+        return None
+    one = _Slow(rows, int(np.argmax(np.diff(record[SPEED]) != 0.0) + 1) % rows, bridged=False)
+    return one if _only_at(record[SPEED], one) else None
 
 
 def _slow(values: Array) -> _Slow | None:

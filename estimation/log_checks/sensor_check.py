@@ -225,11 +225,17 @@ def _quantum(values: Array) -> float:
 
 
 def _dead_pressure(record: Record) -> Note | None:
-    """Look for the load in the pressure: noise and nothing else, while the motor turns, is no live sensor's."""
+    """Look for the load in the pressure: noise and nothing else, while the piston moves, is no live sensor's.
+
+    A pump that turns more slowly than it leaks moves no piston, and raises no pressure.
+    """
     if PRESSURE not in record or SPEED not in record:
         return None
     pressure = record[PRESSURE][np.isfinite(record[PRESSURE])]
     if len(pressure) < FEWEST_HELD or np.ptp(pressure) == 0.0 or np.ptp(record[SPEED]) == 0.0:
+        return None
+    shown = record[POSITION][np.isfinite(record[POSITION])] if POSITION in record else pressure
+    if len(shown) and np.ptp(shown) <= _quantum(shown):
         return None
     white = 0.5 * float(np.var(np.diff(pressure)))
     if white < NOISE_SHARE * float(np.var(pressure)):

@@ -79,6 +79,17 @@ def test_a_pressure_sensor_that_shows_nothing_is_named() -> None:
     assert dead.data["noise"] == pytest.approx(5e3, rel=0.05)
 
 
+@pytest.mark.parametrize("counts", [0, 1])
+def test_a_pump_that_turns_too_slowly_to_move_the_piston_leaves_its_pressure_sensor_alive(counts: int) -> None:
+    log, rng = run(), np.random.default_rng(1)
+    still = 1e-6 * rng.integers(0, counts + 1, len(log))
+    slow = log.replace(
+        motor_speed_rad_s=0.05 * log["motor_speed_rad_s"],
+        **{PRESSURE: rng.normal(0.0, 5e3, len(log)), "position_m": still},
+    )
+    assert SensorCode.SENSOR_NOISE_ONLY not in [one.code for one in sensor_objections(slow, RIG_PARAMETERS)]
+
+
 def clipped(record: Record, share: float) -> tuple[Record, float]:
     limit = 500.0 * round(share * float(np.max(np.abs(record[PRESSURE]))) / 500.0)
     return with_fault(record, SensorFault(channel=PRESSURE, kind="saturation", size=limit)), limit

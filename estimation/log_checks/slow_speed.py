@@ -1,0 +1,54 @@
+"""A motor speed that its logger repeated between slow samples, told from a motor that was driven in steps.
+
+Both look alike. What the oil was compressed by from sample to sample says which it was: pump and piston explain it
+better with speed as it is logged, or on a straight line from one sample to the next.
+"""
+
+import numpy as np
+
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
+from plant.arrays import Array
+from plant.log.record import Record
+
+SURE = 10.0
+"""Gain in log-likelihood by which straight lines must explain the pressure better [dimensionless]: odds of 20,000. Of a
+logger that repeats other channels too it need be more than as much worse."""
+
+
+def was_repeated(record: Record, *, others: bool) -> bool:
+    """Return whether a speed that moves in some rows alone was repeated by its logger, and not held by the motor.
+
+    Parameters
+    ----------
+    record : Record
+        The log, its motor speed held; values that other channels only repeat are missing.
+    others : bool
+        Whether there are such channels.
+
+    Returns
+    -------
+    bool
+        Where no pressure and position say otherwise, the motor is believed.
+    """
+    if PRESSURE not in record or POSITION not in record:
+        return False
+    speed, position, pressure = (record[name] for name in (SPEED, POSITION, PRESSURE))
+    rows, fresh = np.arange(len(record)), np.append(True, np.diff(speed) != 0.0)
+    line = np.interp(rows, rows[fresh], speed[fresh])
+    at = np.flatnonzero(fresh & np.isfinite(position) & np.isfinite(pressure))
+    span, mean = np.diff(at), 0.5 * (pressure[at[1:]] + pressure[at[:-1]])
+    known, rise = np.column_stack([np.diff(position[at]), mean * span, span]), np.diff(pressure[at])
+    if len(rise) <= 2 * known.shape[1]:
+        return False
+    turned = (np.append(0.0, np.cumsum(one)) for one in (speed[:-1], 0.5 * (line[:-1] + line[1:])))
+    as_logged, on_lines = (_left(known, np.diff(one[at]), rise) for one in turned)
+    if min(as_logged, on_lines) <= 0.0:
+        return False
+    return 0.5 * len(rise) * float(np.log(as_logged / on_lines)) > (-SURE if others else SURE)
+
+
+def _left(known: Array, turned: Array, rise: Array) -> float:
+    """Return what pump, piston and leakage leave of the pressure's rise, as a sum of squares [Pa squared]."""
+    pumped = np.column_stack([known, turned, np.sign(turned) * known[:, -1]])  # all that it turns, less what slips
+    pumped /= np.maximum(np.max(np.abs(pumped), axis=0), np.finfo(np.float64).tiny)
+    return float(np.sum((rise - pumped @ np.linalg.lstsq(pumped, rise)[0]) ** 2))
