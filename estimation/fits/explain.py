@@ -75,6 +75,7 @@ def explain(
     *,
     asked: Sequence[Hypothesis] = HYPOTHESES,
     paired: bool = True,
+    hopeless: float = np.inf,
     by_mass: bool = False,
 ) -> Explanation:
     """Return the hypotheses that explain a log best, alone or two together.
@@ -93,6 +94,8 @@ def explain(
         What is tried alone; pairs are with any other.
     paired : bool
         Whether pairs are tried where nothing explains the log alone.
+    hopeless : float
+        Cost from which the best alone counts for so little that no pair is tried [dimensionless].
     by_mass : bool
         Whether mass is balanced while hypotheses are compared, as where the likelier plain fit does; else volume. At
         high pressure the two differ by more than what is strange.
@@ -110,7 +113,7 @@ def explain(
         known = finished[0].cost
         more = _likeliest(wide, _nearing(wide, others, starts, _hopeful(starts, screened), known), known)
         finished = _ranked([*finished, *more])
-    if paired and not _explained(finished[0], accepted):
+    if paired and finished[0].cost < hopeless and not _explained(finished[0], accepted):
         first, second = finished[0], finished[1] if len(finished) > 1 else None
         pairs = _paired(wide, first, starts[0], accepted)
         near = first.fit.chi_square[0] < NEARLY or (pairs and _explained(pairs[0], accepted))

@@ -18,8 +18,10 @@ from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.hypotheses import (
     BEGUN,
     ENCODER_ZERO,
+    HYPOTHESES,
     PLAY,
     PRESSURE_LATE,
+    Hypothesis,
 )
 from estimation.fits.left_open import valves_unseen, wear_open
 from estimation.fits.objections import doubted, fit_explains, fit_explains_all, limits, objections
@@ -62,6 +64,10 @@ motion form does. With `BY_MASS` the likeliest on 876 logs of our plants and of 
 BY_MASS = 2.0
 """Weight of the balance by mass before a log is seen, that of each other being 1 [dimensionless]: oil is denser under
 pressure, but simulators and textbooks balance volumes."""
+
+LITTLE = 0.01
+"""Share of what the plain form leaves beside noise that the best hypothesis must take up before pairs are tried
+[fraction]."""
 
 _cost = attrgetter("cost")
 
@@ -173,7 +179,8 @@ def fit_flow(
         near = [best.values, *near] if best is not swinging and explains(best) else near
         paired = any(one not in (*ALWAYS_ASKED, PLAY) for one in asked)
         by_mass = balances_mass(swinging.model)
-        strange = explain(asked_for_teeth(log), parameters, near, explains, asked=asked, paired=paired, by_mass=by_mass)
+        pairs = {"paired": paired, "hopeless": _hopeless(swinging, asked), "by_mass": by_mass}
+        strange = explain(asked_for_teeth(log), parameters, near, explains, asked=asked, **pairs)
         one = strange.fit
         if (
             _known(strange.names, one)
@@ -204,6 +211,18 @@ def fit_flow(
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
     (value, std), remarks = found["bulk_modulus"], (*remarks, *play)
     return FormFit(believed, std / value, best.chi_square[0], reasons, best.rig_slopes, None, remarks, turning)
+
+
+def _hopeless(swinging: GreyBoxFit, asked: Sequence[Hypothesis]) -> float:
+    """Return the cost from which the best of all hypotheses takes up so little that no two of them explain a log.
+
+    What they all leave alone is then no actuator's: bursts of a few samples that a cable picks up, or a noise that
+    varies.
+    """
+    if len(asked) < len(HYPOTHESES):
+        return np.inf
+    left = swinging.cost * (1.0 - 1.0 / max(swinging.chi_square[0], 1.0))
+    return swinging.cost - max(WORTH, LITTLE * left)
 
 
 def _wanted(names: Sequence[str], best: GreyBoxFit, swinging: GreyBoxFit, *, homed: bool, late: bool) -> float:

@@ -155,18 +155,20 @@ def test_all_else_is_asked_beside_a_hypothesis_where_what_slopes_promise_does_no
 
 
 @pytest.mark.parametrize(
-    ("second", "least", "chi", "beside", "names", "rivals"),
+    ("second", "least", "chi", "hopeless", "beside", "names", "rivals"),
     [
-        (105.0, 60.0, 5.0, "worn relief", ("worn", "late"), 2),
-        (120.0, 60.0, 2.0, "relief", ("relief", "late"), 1),  # it is not about as good
-        (105.0, 40.0, 5.0, "relief", ("relief", "late"), 1),  # nothing explains the log
-        (105.0, 40.0, 2.0, "worn relief", ("worn", "late"), 2),  # nor here, but little is left
+        (105.0, 60.0, 5.0, 101.0, "worn relief", ("worn", "late"), 2),
+        (120.0, 60.0, 2.0, 101.0, "relief", ("relief", "late"), 1),  # it is not about as good
+        (105.0, 40.0, 5.0, 101.0, "relief", ("relief", "late"), 1),  # nothing explains the log
+        (105.0, 40.0, 2.0, 101.0, "worn relief", ("worn", "late"), 2),  # nor here, but little is left
+        (105.0, 60.0, 2.0, 100.0, "", ("relief",), 0),  # the best alone takes up next to nothing
     ],
 )
 def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
     second: float,
     least: float,
     chi: float,
+    hopeless: float,
     beside: str,
     names: tuple[str, ...],
     rivals: int,
@@ -194,7 +196,7 @@ def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
     monkeypatch.setattr(explain, "_delivery_open", lambda *_: 0.0)
     monkeypatch.setattr(explain, "ALIKE", 4.0)
     nothing: Any = None
-    found = explain.explain(nothing, nothing, [{}], lambda fit: fit.cost < least)
+    found = explain.explain(nothing, nothing, [{}], lambda fit: fit.cost < least, hopeless=hopeless)
     assert " ".join(sorted(asked, reverse=True)) == beside
     assert found.names == names
     # the pair of both firsts is found twice and counts once
