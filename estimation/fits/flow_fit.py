@@ -179,8 +179,16 @@ def fit_flow(
         near = [best.values, *near] if best is not swinging and explains(best) else near
         paired = any(one not in (*ALWAYS_ASKED, PLAY) for one in asked)
         by_mass = balances_mass(swinging.model)
-        pairs = {"paired": paired, "hopeless": _hopeless(swinging, asked), "by_mass": by_mass}
-        strange = explain(asked_for_teeth(log), parameters, near, explains, asked=asked, **pairs)
+        strange = explain(
+            asked_for_teeth(log),
+            parameters,
+            near,
+            explains,
+            asked=asked,
+            paired=paired,
+            hopeless=_hopeless(swinging, asked),
+            by_mass=by_mass,
+        )
         one = strange.fit
         if (
             _known(strange.names, one)

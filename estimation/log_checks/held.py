@@ -74,8 +74,8 @@ def without_held(record: Record) -> tuple[Record, tuple[Note, ...]]:
     found, notes = record.replace(**changed) if changed else record, tuple(_notes(record, slow))
     if turning is None or not was_repeated(found, others=bool(slow)):
         return found, notes
-    at = {"rows": turning.rows, "milliseconds": 1e3 * turning.rows * record.sample_time}
-    said = SensorCode.SPEED_HELD.note(channel=SPEED, **at)
+    interval = 1e3 * turning.rows * record.sample_time
+    said = SensorCode.SPEED_HELD.note(channel=SPEED, rows=turning.rows, milliseconds=interval)
     return found.slice(turning.first, None, turning.rows), (said, *notes)
 
 

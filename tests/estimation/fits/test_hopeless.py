@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.fits import explain
-from estimation.fits.flow_fit import _hopeless, fit_flow
+from estimation.fits.flow_fit import _hopeless, fit_flow  # pyright: ignore[reportPrivateUsage]
 from estimation.fits.hypotheses import HYPOTHESES
 from tests.estimation.fits.short_logs import PAPER, PRESSURE, log, made_fit
 
