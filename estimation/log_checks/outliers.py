@@ -35,6 +35,10 @@ ENDS = 3
 PART = 4096
 """Windows that are sorted at a time [samples]: they stay in a processor's own cache; of 1024 to 16,384 the quickest."""
 
+REACH, BESIDE = 10, 3.0
+"""Samples beside a gross outlier in which the burst that it belongs to may still ring, and what counts there as
+standing out, in the measure of `GROSS` [count, dimensionless]; judged."""
+
 CONFIRMING = 5e-3
 """Span over which motion of the encoder confirms a velocity [s]."""
 
@@ -75,6 +79,39 @@ def without_outliers(values: Array, noise: float = 0.0) -> Array:
         seen[distance > spread] = np.nan
         kept[np.isfinite(kept)] = _within_range(seen, noise)
     return kept
+
+
+def without_bursts(values: Array, sound: Array, noise: float) -> Array:
+    """Return a channel without what rings on beside its gross outliers, as what a cable picks up does.
+
+    Parameters
+    ----------
+    values, sound : ndarray, shape (n,)
+        A channel, and the same without its gross outliers [any unit]; NaN where missing.
+    noise : float
+        Standard deviation of its noise [the channel's unit].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        The channel without both.
+
+    Examples
+    --------
+    >>> burst = np.zeros(100)
+    >>> burst[20:23] = 30.0, 5.0, -4.0
+    >>> np.flatnonzero(np.isnan(without_bursts(burst, without_outliers(burst, 1.0), 1.0))).tolist()
+    [20, 21, 22]
+    """
+    lost = np.isnan(sound) & np.isfinite(values)
+    there = np.isfinite(sound)
+    if not np.any(lost) or np.count_nonzero(there) < REACH:
+        return sound
+    window, stands = WINDOWS[-1][0], there.copy()
+    distance = np.abs(sound[there] - _running_ranks(sound[there], window, [window // 2])[0])
+    stands[there] = distance > BESIDE * (percentile(distance, USUAL) + noise)
+    near = np.convolve(lost, np.ones(2 * REACH + 1), "same") > 0.5
+    return np.where(stands & near, np.nan, sound)
 
 
 def _running_ranks(values: Array, window: int, ranks: Sequence[int]) -> Array:
@@ -172,6 +209,8 @@ def without_gross_outliers(record: Record, channels: Sequence[str]) -> tuple[Rec
             span = max(CONFIRMING, 2.0 * record.sample_time)
             moved = differentiated(bridged(record[POSITION]), record.sample_time, span)
             sound = np.where(np.isnan(without_outliers(values - moved, noise)), sound, values)
+        if name in PRESSURES:  # nothing hangs on a sample of what is compared, as it does on one of what drives
+            sound = without_bursts(values, sound, noise)
         lost = _missing(sound) - _missing(values)
         if lost:
             said.append(SensorCode.OUTLIERS_LEFT_OUT.note(channel=name, count=lost, total=len(record)))

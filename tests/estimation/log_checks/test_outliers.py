@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.log_checks.measurement_noise import measurement_variances
-from estimation.log_checks.outliers import without_gross_outliers, without_outliers
+from estimation.log_checks.outliers import without_bursts, without_gross_outliers, without_outliers
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import circuit_of
@@ -99,3 +99,25 @@ def test_missing_samples_stay_missing_and_are_not_counted() -> None:
 def test_of_a_few_samples_none_stands_out() -> None:
     few = np.array([0.0, 1e9, np.nan, 0.0])
     np.testing.assert_array_equal(without_outliers(few), few)
+
+
+def test_a_burst_that_rings_on_in_a_pressure_goes_with_its_gross_outlier() -> None:
+    record = log("normal", "sine")
+    ringing = 3e5 * np.exp(-0.5 * np.arange(8)) * np.cos(2.2 * np.arange(8))
+    burst = np.zeros(len(record))
+    for place in range(300, len(record) - 300, 400):
+        burst[place : place + 8] = ringing
+    spoilt = record.replace(differential_pressure_pa=record["differential_pressure_pa"] + burst)
+    cleaned, (said,) = without_gross_outliers(spoilt, CHANNELS)
+    left = np.where(np.isnan(cleaned["differential_pressure_pa"]), 0.0, burst)
+    assert np.max(np.abs(left)) < 4e4  # of 180 kPa that ring on
+    taken = np.flatnonzero(np.isnan(cleaned["differential_pressure_pa"]))
+    assert np.all(np.abs(burst[taken]) > 0.0)
+    assert said.data["count"] == len(taken)
+
+
+def test_samples_beside_an_outlier_that_ring_no_more_than_elsewhere_stay() -> None:
+    values = np.random.default_rng(2).normal(0.0, 1.0, 2000)
+    values[::100] += 40.0
+    sound = without_outliers(values, 1.0)
+    assert np.array_equal(without_bursts(values, sound, 1.0), sound, equal_nan=True)
