@@ -88,6 +88,17 @@ def extent(one: Quantity) -> float:
     return one.ci95[1] - one.ci95[0]
 
 
+def test_the_ends_of_an_interval_are_those_of_the_covariance_whichever_way_a_severity_goes() -> None:
+    tight, step = np.diag(np.full(7, 1e-4**2)), 1e-5
+    for place in range(len(CONDITIONS)):
+        centre, found = ACTUATOR.conditions[place], severities(fits(tight, place), ACTUATOR)
+        sides = [[severities_at(centre + way * step * one, ACTUATOR) for one in np.eye(7)] for way in (1.0, -1.0)]
+        for name in ("leakage_flow", "velocity_lost", "added_friction", "pressure_rise", "bulk_modulus"):
+            slope = np.array([up[name] - down[name] for up, down in zip(*sides, strict=True)]) / (2.0 * step)
+            expected = 2.0 * 1.96 * 1e-4 * float(np.linalg.norm(slope))
+            assert extent(found[name]) == pytest.approx(expected, rel=0.06), (place, name)
+
+
 def test_a_calibrated_width_stretches_its_own_interval_and_no_other() -> None:
     plain = severities(fits(NARROW), ACTUATOR)
     for name in ("leakage_flow", "velocity_lost", "added_friction", "pressure_rise", "bulk_modulus"):
