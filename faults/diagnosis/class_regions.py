@@ -28,7 +28,7 @@ from faults.diagnosis.class_fit import (
     nominal_runs,
     scales_of,
 )
-from faults.diagnosis.model_doubt import doubt_of, seldom_known_slopes, spreads_of
+from faults.diagnosis.model_doubt import doubt_of, lasting_power, seldom_known_slopes, spreads_of
 from faults.diagnosis.rivals import behind, between_fits, creeps, explains, other_friction
 from plant.arrays import Array
 
@@ -41,9 +41,6 @@ YIELDING = 5.0
 STRUCTURAL = 100.0
 """By how much a residual that no sensor makes widens what is believed [dimensionless], in variance: it lasts, and it is
 not what the derivatives say that it is."""
-
-AVERAGED = 10
-"""Blocks over which residuals are averaged to see what lasts of them [dimensionless]: a tenth of a second."""
 
 ALIKE, ALIKE_COUNT = 0.25, 1.0
 """Squared deviation of actuators of one kind, in units of `WITHIN`, before a log is seen, and how many deviations that
@@ -201,7 +198,7 @@ def spread_of(fit: PointFit, information: Array, blocks: Blocks, centre: Array) 
 
 
 def lasting_misfit(fitted: Array, blocks: Blocks) -> float:
-    """Return how far what a model leaves of a log, averaged over `AVERAGED` blocks, exceeds white noise of the sensors.
+    """Return how far what a model leaves of a log over a tenth of a second exceeds white noise of the sensors.
 
     Parameters
     ----------
@@ -215,11 +212,7 @@ def lasting_misfit(fitted: Array, blocks: Blocks) -> float:
     float
         Ratio of root mean squares, the larger of the outputs' [dimensionless]: 1 or less where noise alone is left.
     """
-    left = (blocks.outputs - fitted)[blocks.first :]
-    size = min(AVERAGED, len(left))
-    left = left[: len(left) // size * size].reshape(-1, size, left.shape[1])
-    there = np.sum(np.isfinite(left), axis=(0, 1))
-    power = np.sum(np.nansum(left, axis=1) ** 2, axis=0) / np.maximum(there, 1)
+    power = lasting_power((blocks.outputs - fitted)[blocks.first :])
     return float(np.max(np.sqrt(power) / least_scales(blocks)))
 
 

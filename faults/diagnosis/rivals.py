@@ -3,7 +3,7 @@
 A piston that creeps on its seals, sticks and slips is followed by no circuit to the sensors' noise: when it breaks
 loose rests on the seals' law, which is known roughly. The misfit has many minima then, and a search that begins at
 one level of friction ends there. What one end explains more than another counts no more often than a wrong model's
-error gives independent looks, as it does in the intervals (`faults.diagnosis.model_doubt`).
+error gives independent looks, much as in the intervals (`faults.diagnosis.model_doubt`).
 """
 
 from collections.abc import Sequence
@@ -16,13 +16,13 @@ from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import SETTLING, Blocks
 from faults.diagnosis.circuit_runs import COORDINATES
 from faults.diagnosis.class_fit import LASTING, PointFit, fit_freely, least_scales, scales_of
-from faults.diagnosis.model_doubt import LOOKS
+from faults.diagnosis.model_doubt import NOISE_ALONE
 from plant.arrays import Array
 from plant.notes import Note
 
-NOISE_ALONE = 1.1
-"""Residuals over the sensors' noise, root mean square, up to which nothing else is left [dimensionless]: the noise is
-known to a twentieth. Searches from other conditions end at the same circuit then, or at one that explains much less."""
+LOOKS = 5.0
+"""Independent looks at a wrong model's error by which one of two circuits that follow a log roughly is preferred
+[dimensionless]: half of those that an interval counts, as both circuits err where the piston sticks and slips."""
 
 ROUGHLY = 0.06
 """Share of velocity, root mean square, that is left where a circuit follows a piston roughly [dimensionless]: half of

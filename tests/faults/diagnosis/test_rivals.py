@@ -12,8 +12,8 @@ from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES
 from faults.diagnosis.class_fit import LASTING, PointFit, misfit
-from faults.diagnosis.model_doubt import LOOKS
-from faults.diagnosis.rivals import NOISE_ALONE, ROUGHLY, behind, between_fits, creeps, doubts_left, other_friction
+from faults.diagnosis.model_doubt import NOISE_ALONE
+from faults.diagnosis.rivals import LOOKS, ROUGHLY, behind, between_fits, creeps, doubts_left, other_friction
 from plant.eha.model import EhaParameters
 
 ACTUATOR = Actuator.of(EhaParameters())
