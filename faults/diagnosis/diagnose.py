@@ -32,11 +32,10 @@ from faults.diagnosis.failed_search import doubts_after
 from faults.diagnosis.load import Loaded, under_load
 from faults.diagnosis.models_verdict import models_verdict, ranked
 from faults.diagnosis.out_of_model import SOFT, reasons_against, sensors_disagree
-from faults.diagnosis.outside import Outside, faults_outside
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import limits_of, severities, severities_at, what_is_not_told, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
-from faults.diagnosis.wear import summed_over_wear, whatever_the_pump_delivers
+from faults.diagnosis.wear import whatever_fault, whatever_the_pump_delivers
 from faults.eha.bank import mathematical_bank
 from faults.notes import ClassCode
 from plant.eha.model import EhaParameters
@@ -274,16 +273,16 @@ def diagnose_clean(
         *sensors_disagree(board.window, board.blocks),
         *reasons_against(board.blocks, board.fits, region, actuator),
     )
-    others = Outside() if against else faults_outside(board.blocks, board.fits, actuator)
-    worn = others.worn
-    probabilities = board.probabilities(numbers) if worn is None else summed_over_wear(board, worn, numbers)
-    found = severities(board.fits, actuator, numbers.widths(pressure))
-    return Diagnosis(
-        probabilities,
-        (*against, *others.against),
-        found,
+    severity = severities(board.fits, actuator, numbers.widths(pressure))
+    found = Diagnosis(
+        board.probabilities(numbers),
+        against,
+        severity,
         severities_at(actuator.conditions[0], actuator),
         limits_of(actuator),
-        (*what_is_not_told(board.fits, found, pressure=pressure), *others.open),
+        what_is_not_told(board.fits, severity, pressure=pressure),
         board,
     )
+    # a log that drifts is diagnosed again, where it does
+    drifts = board.drift is not None or board.blocks.course is not None
+    return found if drifts else whatever_fault(found, actuator, numbers)

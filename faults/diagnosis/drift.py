@@ -14,10 +14,17 @@ from estimation.eha.explained import LEAKAGE_COURSE
 from estimation.finding import Quantity
 from estimation.log_checks.clean import CleanLog
 from estimation.notes import RigCode
+from faults.diagnosis.actuator import Actuator, actuator_of
 from faults.diagnosis.calibration import Calibration, shipped_calibration
+from faults.diagnosis.circuit_runs import COORDINATES
 from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.class_fit import LASTING, misfit
+from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.evidence import Scoreboard, models_scores
 from faults.diagnosis.load import Loaded
+from faults.diagnosis.severity import severities
+from faults.diagnosis.warming import with_course
+from faults.diagnosis.wear import whatever_fault
 from faults.notes import AgainstCode
 from plant.arrays import Array
 from plant.notes import Note
@@ -48,22 +55,64 @@ def over_drift(diagnosed: Callable[[CleanLog], Loaded], log: CleanLog, notes: Se
     Returns
     -------
     Loaded
-        The diagnosis at the end of the log; with the classes of all places where `LEAKAGE_DRIFTS` is among the notes.
+        The diagnosis at the end of the log; with the classes of all places where `LEAKAGE_DRIFTS` is among the notes,
+        or where the diagnosis of a log without pressure found a drift, which then is one of its notes.
     """
     last = diagnosed(log)
+    if (drift := last.diagnosis.scoreboard.drift) is not None:
+        log, note = with_course(log, drift)
+        last, notes = diagnosed(log), (*notes, note)
+        last = last._replace(notes=(note, *last.notes))
+        if note.code is RigCode.LEAKAGE_GROWS:
+            return last._replace(diagnosis=replace(last.diagnosis, against=(note, *last.diagnosis.against)))
     if all(note.code is not RigCode.LEAKAGE_DRIFTS for note in notes):
         return last
     course = log.record[LEAKAGE_COURSE]
     there = [float(course[round(share * (len(course) - 1))]) for share in EARLIER]
     found = [last.diagnosis, *(diagnosed(_with_oil_of(log, one)).diagnosis for one in there)]
-    placed = next((one for one in found if not any(note.code in PLACED for note in one.against)), last.diagnosis)
+    placed = next((one for one in found if _is_placed(one)), found[0])
+    calibration = shipped_calibration()
+    if drift is not None:
+        actuator = actuator_of(last.parameters)
+        found[0] = _followed(found, [1.0, *there], actuator, calibration)
+        likeliest = max(range(len(found)), key=lambda place: _likely(found[place], calibration))
+        placed = found[likeliest] = whatever_fault(found[likeliest], actuator, calibration)
     diagnosis = replace(
-        last.diagnosis,
-        probabilities=weighed(found, shipped_calibration()),
+        found[0],
+        probabilities=weighed(found, calibration),
         against=placed.against,
-        severity={name: _whatever_the_oil(name, found) for name in last.diagnosis.severity},
+        severity={name: _whatever_the_oil(name, found) for name in found[0].severity},
+        not_told=placed.not_told if drift is not None else found[0].not_told,
     )
     return last._replace(diagnosis=diagnosis)
+
+
+def _likely(one: Diagnosis, calibration: Calibration) -> tuple[bool, float]:
+    """Return what a place is chosen by: whether the circuit lies in a condition there, then its evidence."""
+    return _is_placed(one), _evidence(one.scoreboard, calibration)
+
+
+def _is_placed(one: Diagnosis) -> bool:
+    return not any(note.code in PLACED for note in one.against)
+
+
+def _followed(
+    found: Sequence[Diagnosis], courses: Sequence[float], actuator: Actuator, calibration: Calibration
+) -> Diagnosis:
+    """Return the diagnosis at the end of a log, its circuit fitted on from another place's where that follows better.
+
+    A doubled leakage lies far from all conditions, and a search from these may end short.
+    """
+    misfits = [misfit(one.scoreboard.blocks, one.scoreboard.fits.best.fitted) for one in found]
+    best, last = int(np.argmin(misfits)), found[0]
+    if misfits[0] < misfits[best] + LASTING:
+        return last
+    start = found[best].scoreboard.fits.best.coordinates.copy()
+    start[COORDINATES.index("leakage")] -= np.log(courses[best])
+    board = last.scoreboard
+    fits = fit_classes(board.blocks, actuator, start=start)
+    severity = severities(fits, actuator, calibration.widths(board.blocks.pressure is not None))
+    return replace(last, scoreboard=replace(board, fits=fits), severity=severity)
 
 
 def weighed(found: Sequence[Diagnosis], calibration: Calibration) -> Mapping[str, float]:

@@ -16,6 +16,7 @@ from faults.diagnosis.class_regions import ClassFits, is_stuck, told_apart
 from faults.diagnosis.innovation_bank import innovation_scores
 from faults.diagnosis.onset import last_part
 from faults.diagnosis.rmse import score_transfer_functions
+from faults.diagnosis.warming import Drift
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
@@ -52,6 +53,8 @@ class Scoreboard:
         When the condition began, which alone is judged; None if it did so before the log.
     against : tuple of Note
         What changed within the log and is no change of condition.
+    drift : Drift or None
+        How its leakage drifts, which these evidences do not know; without pressure.
     """
 
     log_odds: Mapping[str, Array]
@@ -60,6 +63,7 @@ class Scoreboard:
     window: Record
     onset: Change | None
     against: tuple[Note, ...] = ()
+    drift: Drift | None = None
 
     def choice(self, evidence: str) -> str:
         """Return the condition that one evidence alone names.
@@ -132,7 +136,7 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
     if is_stuck(blocks, actuator):
         found = {name: friction_left_open(scores, blocks, actuator) for name, scores in found.items()}
     odds = {name: bounded(found[name]) for name in EVIDENCES if name in found}
-    return Scoreboard(odds, blocks, fits, part.window, part.onset, part.against)
+    return Scoreboard(odds, blocks, fits, part.window, part.onset, part.against, part.drift)
 
 
 def models_scores(fits: ClassFits) -> Array:

@@ -21,6 +21,7 @@ from faults.diagnosis.class_regions import ClassFits, fit_classes, lasting_misfi
 from faults.diagnosis.end_stop import stopped
 from faults.diagnosis.out_of_model import unexplained
 from faults.diagnosis.rivals import behind
+from faults.diagnosis.warming import Drift, drift_of
 from faults.notes import AgainstCode
 from faults.watch.events import SLOW, Alarm
 from faults.watch.watch import LEAST_LEARNING, SLOWEST, watch_record
@@ -70,6 +71,8 @@ class LastPart:
         When the condition began; None if it did so before the log.
     against : tuple of Note
         What changed within the log and is no change of condition.
+    drift : Drift or None
+        How its leakage drifts, which was not taken up; without pressure.
     """
 
     window: Record
@@ -78,6 +81,7 @@ class LastPart:
     fits: ClassFits
     onset: Change | None
     against: tuple[Note, ...] = ()
+    drift: Drift | None = None
 
 
 class Parted(NamedTuple):
@@ -138,7 +142,9 @@ def last_part(record: Record, actuator: Actuator) -> LastPart:
 def _last_of(window: Record, actuator: Actuator) -> LastPart:
     blocks = blocks_of(window)
     blocks, fits = stopped(blocks, fit_classes(blocks, actuator), actuator)
-    two = parted(blocks, fits, actuator)
+    two, drift = parted(blocks, fits, actuator), drift_of(blocks, fits, actuator)
+    if drift is not None and (two is None or drift.gain > two.gain):
+        return LastPart(window, window, blocks, fits, None, drift=drift)
     found = None if two is None else find_onset(blocks, two, actuator)
     if found is None:
         return LastPart(window, window, blocks, fits, None, () if two is None else softened(two))

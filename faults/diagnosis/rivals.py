@@ -70,9 +70,9 @@ def creeps(blocks: Blocks, fit: PointFit) -> bool:
 
 
 def doubts_left(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[Note, ...]:
-    """Return what speaks against a log: no fit of motion from rest where the log does not begin at rest.
+    """Return what speaks against a log: no fit of motion where the log does not begin at rest, or its leakage drifts.
 
-    A circuit, whose beginning does not count, says how the piston moves.
+    The motion form knows neither. A circuit, whose beginning does not count, says how the piston moves.
 
     Parameters
     ----------
@@ -86,9 +86,9 @@ def doubts_left(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[
     Returns
     -------
     tuple of Note
-        All of them where the log begins at rest, and where the circuit does not follow the piston.
+        All of them where leakage stays and the log begins at rest, or the circuit does not follow the piston.
     """
-    if blocks.settling == SETTLING or creeps(blocks, fit):
+    if blocks.course is None and (blocks.settling == SETTLING or creeps(blocks, fit)):
         return tuple(doubts)
     return tuple(note for note in doubts if note.code != EstimateCode.POSITION_RESIDUALS_LARGE)
 

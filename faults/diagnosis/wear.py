@@ -20,7 +20,7 @@ from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.evidence import Scoreboard, bounded
-from faults.diagnosis.outside import DELIVERIES, presumed_of_wear
+from faults.diagnosis.outside import DELIVERIES, faults_outside, presumed_of_wear
 from faults.notes import AgainstCode
 from plant.arrays import Array
 from plant.notes import Note
@@ -53,6 +53,37 @@ def whatever_the_pump_delivers(diagnosis: Diagnosis, actuator: Actuator, estimat
     if found is None:
         return diagnosis
     return replace(diagnosis, probabilities=found)
+
+
+def whatever_fault(diagnosis: Diagnosis, actuator: Actuator, calibration: Calibration) -> Diagnosis:
+    """Return a diagnosis with what is said of faults outside the nine conditions, without pressure.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Of circuits without such a fault.
+    actuator : Actuator
+        The healthy actuator.
+    calibration : Calibration
+        Weights of the evidences.
+
+    Returns
+    -------
+    Diagnosis
+        With the fault that the log shows, those that it does not tell, and classes weighed over a worn pump where that
+        is one of these; the same with pressure, and where something speaks against all nine already.
+    """
+    if diagnosis.against:
+        return diagnosis
+    board = diagnosis.scoreboard
+    others = faults_outside(board.blocks, board.fits, actuator)
+    worn, alike = others.worn, diagnosis.probabilities
+    return replace(
+        diagnosis,
+        probabilities=alike if worn is None else summed_over_wear(board, worn, calibration),
+        against=others.against,
+        not_told=(*diagnosis.not_told, *others.open),
+    )
 
 
 def known_of_flow(estimate: BulkModulusEstimate) -> frozenset[AgainstCode]:

@@ -92,7 +92,8 @@ def test_a_log_that_does_not_drift_is_diagnosed_once() -> None:
 
     def once(one: CleanLog) -> Loaded:
         asked.append(one)
-        return Loaded(SimpleNamespace(), HEALTHY)  # pyright: ignore[reportArgumentType]
+        steady: Any = SimpleNamespace(scoreboard=SimpleNamespace(drift=None))
+        return Loaded(steady, HEALTHY)
 
     grows = RigCode.LEAKAGE_GROWS.note(factor=5.0, first=1e-11, last=5e-11)
     assert over_drift(once, log, (grows,)).parameters is HEALTHY

@@ -126,10 +126,11 @@ def test_each_other_level_of_friction_is_tried_at_the_leakage_and_the_force_at_r
         np.testing.assert_array_equal(np.delete(start, sliding), np.delete(best.coordinates, sliding))
 
 
-def test_a_fit_of_motion_from_rest_is_no_doubt_of_a_log_that_begins_in_motion_and_is_followed() -> None:
+def test_a_fit_of_motion_is_no_doubt_of_a_followed_log_that_begins_in_motion_or_drifts() -> None:
     resting, size = log(pressure=False), SIZES[0] / NOISE[0]
-    running = replace(resting, settling=1.0)
+    running, warming = replace(resting, settling=1.0), replace(resting, course=np.ones(len(resting.speed)))
     far = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=40.0, motion_percent=20.0)
     froze = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.0, begin_s=0.0, length_s=1.0)
-    for one, share, left in ((running, 0.9, (froze,)), (running, 1.1, (far, froze)), (resting, 0.9, (far, froze))):
+    followed = [(running, 0.9, (froze,)), (warming, 0.9, (froze,)), (resting, 0.9, (far, froze))]
+    for one, share, left in (*followed, (running, 1.1, (far, froze)), (warming, 1.1, (froze,))):
         assert doubts_left((far, froze), one, leaving(share * ROUGHLY * size, 1.0, one)) == left
