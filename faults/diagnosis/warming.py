@@ -89,21 +89,24 @@ def drift_of(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Drift | Non
     Returns
     -------
     Drift or None
-        None with pressure, where the log shows none, and of logs that are longer than what is fitted.
+        None with pressure, where the log shows none, where no circuit with one follows it, and of logs that are longer
+        than what is fitted.
     """
     whole = len(blocks.speed) * blocks.sample_time <= LONGEST
     if blocks.pressure is not None or blocks.course is not None or not whole or is_stuck(blocks, actuator):
         return None
     condition, none = list(CONDITIONS)[int(np.argmax(fits.scores))], Drift(0.0, fits.best, 0.0)
     promised, moved, step = _step(blocks, none, actuator)
+    most = UNEXPLAINED[0] * blocks.sizes[0]
     if promised > PROMISED:
         starts = [(moved, step)]
-    elif none.fit.scales[0] > UNEXPLAINED[0] * blocks.sizes[0]:
+    elif none.fit.scales[0] > most:
         starts = [(way * DOUBLED, 0.5 * way * DOUBLED * _LEAKS_MORE) for way in (1.0, -1.0)]
     else:
         return None
     found = max((_searched(blocks, none, *one, condition, actuator) for one in starts), key=lambda one: one.gain)
-    return found if found.shown else None
+    followed = found.fit.scales[0] <= most  # what follows the log no better than one must explains nothing
+    return found if found.shown and followed else None
 
 
 def drifting(blocks: Blocks, logarithm: float) -> Blocks:

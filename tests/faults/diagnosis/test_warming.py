@@ -10,6 +10,7 @@ from estimation.eha.explained import LEAKAGE_COURSE
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis import warming
 from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.blocks import LONGEST, Blocks, blocks_of
 from faults.diagnosis.class_regions import ClassFits, fit_classes
@@ -78,6 +79,16 @@ def test_slopes_of_a_circuit_that_is_far_off_are_not_all_that_is_asked() -> None
     found = drift_of(replace(blocks, noise=0.0 * blocks.noise), replace(fits, best=lost), ACTUATOR)
     assert found is not None
     assert np.exp(found.logarithm) == pytest.approx(2.0, rel=0.1)
+
+
+def test_a_drift_with_which_no_circuit_follows_the_log_explains_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    blocks, fits = fitted("minor_leakage", 2.0)
+    found = drift_of(blocks, fits, ACTUATOR)
+    assert found is not None
+    left = float(found.fit.scales[0] / blocks.sizes[0])
+    for share, is_one in ((1.1, True), (0.9, False)):
+        monkeypatch.setattr(warming, "UNEXPLAINED", (share * left, 1.0))
+        assert (drift_of(blocks, fits, ACTUATOR) is not None) == is_one
 
 
 def test_no_drift_is_asked_for_with_pressure_beside_one_that_was_found_or_in_part_of_a_log() -> None:
