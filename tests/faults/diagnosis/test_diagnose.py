@@ -11,7 +11,7 @@ from benchmarks.scores import calibration_error, share_interval
 from estimation.log_checks.clean import clean_log
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis import diagnose
+from faults.diagnosis import wear
 from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_runs import coordinates_of
@@ -170,7 +170,7 @@ def test_without_pressure_classes_are_summed_over_what_a_pump_may_deliver(monkey
     place, other = (list(CONDITIONS).index(name) for name in (sound.condition, "major_leakage"))
     worn = np.full((4, 9), -30.0)
     worn[0, place], worn[2, other] = 0.0, 3.0  # a pump at 80 % explains the log better, in another condition
-    monkeypatch.setattr(diagnose, "faults_outside", lambda *_: Outside(worn=worn))
+    monkeypatch.setattr(wear, "faults_outside", lambda *_: Outside(worn=worn))
     found = diagnosed(record, pressure=False)
     assert sound.probabilities[sound.condition] > 0.99
     assert 0.05 < found.probabilities[sound.condition] < 0.9
