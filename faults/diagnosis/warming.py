@@ -38,6 +38,9 @@ PROMISED = 1.0
 """Log-likelihood that a drift must promise by its slope to be searched for [dimensionless], in `LASTING` blocks that
 count as one."""
 
+FIRST = 0.5 * LEAST
+"""Least first step of a search that may come to `LEAST` [dimensionless]."""
+
 DOUBLED = float(np.log(2.0))
 """Drift from which a search begins where slopes lead nowhere [dimensionless]."""
 
@@ -98,7 +101,7 @@ def drift_of(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Drift | Non
     condition, none = list(CONDITIONS)[int(np.argmax(fits.scores))], Drift(0.0, fits.best, 0.0)
     promised, moved, step = _step(blocks, none, actuator)
     most = UNEXPLAINED[0] * blocks.sizes[0]
-    if promised > PROMISED:
+    if promised > PROMISED and abs(moved) >= FIRST:
         starts = [(moved, step)]
     elif none.fit.scales[0] > most:
         starts = [(way * DOUBLED, 0.5 * way * DOUBLED * _LEAKS_MORE) for way in (1.0, -1.0)]
