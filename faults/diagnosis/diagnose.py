@@ -280,7 +280,7 @@ def diagnose_clean(
         severity,
         severities_at(actuator.conditions[0], actuator),
         limits_of(actuator),
-        what_is_not_told(board.fits, severity, pressure=pressure),
+        tuple(what_is_not_told(board.fits, severity, pressure=pressure)),
         board,
     )
     # a log that drifts is diagnosed again, where it does
