@@ -51,7 +51,7 @@ def test_a_table_is_the_log_that_its_file_is(log: hs.Log, file: Path) -> None:
     for channel in log.channels:
         np.testing.assert_array_equal(again[channel], hs.read(file, columns={"position_m": "POS"})[channel])
     assert again.sample_time == pytest.approx(log.sample_time)
-    with pytest.raises(hs.HydrostateError, match=r"^the table: .*a log without time is read with sample_time$"):
+    with pytest.raises(hs.HydrostateError, match=r"^the table: .*to read a log without time, give sample_time$"):
         hs.read(table.reset_index(drop=True), plant="eha")
     assert hs.read(table.reset_index(drop=True), sample_time=1e-3).diagnose().condition == "minor_leakage"
 

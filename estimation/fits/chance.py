@@ -51,7 +51,7 @@ def alike_by_chance(samples: float) -> float:
 
     Examples
     --------
-    >>> [round(alike_by_chance(samples), 2) for samples in (400, 20_000)]
-    [0.17, 0.02]
+    >>> [round(alike_by_chance(samples), 2) for samples in (900, 20_000)]
+    [0.11, 0.02]
     """
     return ALIKE_BY_CHANCE / samples**0.5

@@ -42,7 +42,8 @@ def test_the_page_says_what_reading_the_log_brought_up(tmp_path: Path) -> None:
     log.write_text(log.read_text().replace("differential_pressure_pa", "x").replace("pressure_b_pa", "y"))
     found = work_on(task(log, tmp_path, plant="eha", verb="estimate"))
     assert [one["code"] for one in found.result["notes"]].count("chamber_alone") == 1
-    assert "differential pressure needs pressure_b_pa.</li>" in (tmp_path / "page.html").read_text(encoding="utf-8")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "differential pressure also needs pressure_b_pa.</li>" in page
 
 
 def test_an_estimate_has_no_row_and_no_place_on_the_server_is_told(stack_log: Path, tmp_path: Path) -> None:

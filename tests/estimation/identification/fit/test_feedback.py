@@ -86,4 +86,4 @@ def test_an_adopted_model_that_is_unstable_does_not_run_free() -> None:
     unstable: Any = SimpleNamespace(is_stable=False, structure="arx")
     data: Any = SimpleNamespace(output="speed")
     with pytest.raises(HydrostateError, match="the arx model of 'speed' is unstable and does not run free: use"):
-        other_structures._body(unstable, data, data)
+        other_structures._dynamics(unstable, data, data)
