@@ -241,8 +241,8 @@ def _fit(
     require_flow_channels(log.record)
     doubted, record = {name: max(one) for name, one in spreads.items()}, log.record
     loaded = not chosen and first_load(record, log.variances) != 0.0
-    how = {"moving": begins_in_motion(record), "filtered": log.filtered, "speed_held": log.speed_held}
-    fit = fit_flow(record, parameters, guess, doubted, log.variances, loaded=loaded, valley=None, **how)
+    how: dict[str, Any] = {"loaded": loaded, "moving": begins_in_motion(record), "filtered": log.filtered}
+    fit = fit_flow(record, parameters, guess, doubted, log.variances, speed_held=log.speed_held, **how)
     unexplained = fit.explanation is None or fit.bound > LARGEST_BOUND
     return None if loaded and unexplained else fit  # a filter needs no state at rest
 
