@@ -31,6 +31,7 @@ from faults.diagnosis.evidence import weigh
 from faults.diagnosis.failed_search import doubts_after
 from faults.diagnosis.load import Loaded, under_load
 from faults.diagnosis.models_verdict import models_verdict, ranked
+from faults.diagnosis.open_classes import circuits_left_open
 from faults.diagnosis.out_of_model import SOFT, reasons_against, sensors_disagree
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import limits_of, severities, severities_at, what_is_not_told, with_bulk_modulus
@@ -273,9 +274,11 @@ def diagnose_clean(
         *sensors_disagree(board.window, board.blocks),
         *reasons_against(board.blocks, board.fits, region, actuator),
     )
-    severity = severities(board.fits, actuator, numbers.widths(pressure))
+    probabilities = board.probabilities(numbers)
+    circuits = circuits_left_open(board.blocks, board.fits, actuator, probabilities)
+    severity = severities(board.fits, actuator, numbers.widths(pressure), circuits)
     found = Diagnosis(
-        board.probabilities(numbers),
+        probabilities,
         against,
         severity,
         severities_at(actuator.conditions[0], actuator),

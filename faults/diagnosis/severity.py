@@ -1,6 +1,6 @@
 """How bad is it? A fitted circuit in the units of a shop, each number with a 95 % interval."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows
 from faults.diagnosis.class_fit import WEAK
 from faults.diagnosis.class_regions import ClassFits
+from faults.diagnosis.open_classes import OpenCircuit
 from faults.notes import ClassCode
 from plant.arrays import Array
 from plant.components.friction import quadratic_friction
@@ -85,7 +86,10 @@ def _of_circuits(points: Array, actuator: Actuator) -> Mapping[str, Array]:
 
 
 def severities(
-    fits: ClassFits, actuator: Actuator, widths: Mapping[str, float] | None = None
+    fits: ClassFits,
+    actuator: Actuator,
+    widths: Mapping[str, float] | None = None,
+    circuits: Sequence[OpenCircuit] = (),
 ) -> Mapping[str, Quantity]:
     """Return the severities of a fitted circuit with their intervals.
 
@@ -97,6 +101,9 @@ def severities(
         The healthy actuator.
     widths : Mapping[str, float], optional
         By what each interval is stretched [dimensionless]; 1 if not given.
+    circuits : sequence of OpenCircuit, optional
+        Those that the log leaves open, see `circuits_left_open`; the best alone if not given. Values are those of the
+        likeliest, and intervals hold what all of them may be.
 
     Returns
     -------
@@ -104,8 +111,9 @@ def severities(
         By the names of `UNITS`.
     """
     rng = np.random.default_rng(0)
-    centre = fits.best.coordinates
-    drawn = rng.multivariate_normal(centre, fits.spread, DRAWS, method="cholesky")
+    among = circuits or [OpenCircuit(fits.best.coordinates, 1.0)]
+    centre = max(among, key=lambda one: one.probability).coordinates
+    drawn = _centres(among) + rng.multivariate_normal(np.zeros(len(centre)), fits.spread, DRAWS, method="cholesky")
     with np.errstate(all="ignore"):  # friction that falls faster than leakage holds has no steady state
         table, best = _of_circuits(drawn, actuator), severities_at(centre, actuator)
     found: dict[str, Quantity] = {}
@@ -119,6 +127,13 @@ def severities(
         ends = value - stretch * (value - low), value + stretch * (high - value)
         found[name] = Quantity(value, UNITS[name], ends)
     return found | {"entrained_air": _with_air(found["entrained_air"], found["bulk_modulus"], actuator)}
+
+
+def _centres(circuits: Sequence[OpenCircuit]) -> Array:
+    """Return the circuit about which each draw lies, as often as it is likely, shape (`DRAWS`, 7)."""
+    shares = np.cumsum([one.probability for one in circuits])
+    of = np.searchsorted(shares / shares[-1], (np.arange(DRAWS) + 0.5) / DRAWS)
+    return np.array([one.coordinates for one in circuits])[of]
 
 
 def limits_of(actuator: Actuator) -> Mapping[str, float]:
