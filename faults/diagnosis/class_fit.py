@@ -12,9 +12,10 @@ from faults.diagnosis.blocks import Blocks, root_mean_square
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
 from plant.arrays import Array
 
-STEP = 0.002
-"""Step of the finite differences in the logarithms [dimensionless]. Parts of friction pull against each other, so that 95 %
-of their slopes cancel: a step of 0.02 errs by 4 %, and turned the sign of what was left."""
+STEP = 0.005
+"""Step of the finite differences in the logarithms [dimensionless]. The parts of friction pull against each other, so
+that 95 % of their slopes cancel: a step of 0.02 errs by 4 %, which turned the sign of what was left. Where a piston
+sticks and slips the run jumps, and a step of 0.002 makes slopes of that."""
 
 ROUNDS = 12
 """Gauss-Newton steps at most."""

@@ -9,7 +9,7 @@ from estimation.finding import Quantity
 from estimation.log_checks.order import percentile
 from faults.conditions import CONDITIONS
 from faults.diagnosis.actuator import Actuator
-from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows
+from faults.diagnosis.circuit_runs import COORDINATES, LEAST_FORCE, parameter_rows
 from faults.diagnosis.class_fit import WEAK
 from faults.diagnosis.class_regions import ClassFits
 from faults.diagnosis.open_classes import OpenCircuit
@@ -117,6 +117,7 @@ def severities(
     with np.errstate(all="ignore"):  # friction that falls faster than leakage holds has no steady state
         table, best = _of_circuits(drawn, actuator), severities_at(centre, actuator)
     found: dict[str, Quantity] = {}
+    unresolved = _unresolved(actuator)
     for name, value in best.items():
         if not np.isfinite(value):
             found[name] = Quantity(None, UNITS[name])
@@ -124,9 +125,25 @@ def severities(
         finite = table[name][~np.isnan(table[name])]
         low, high = (percentile(finite, percent) if len(finite) else np.nan for percent in (2.5, 97.5))
         stretch = 1.0 if widths is None else widths.get(name, 1.0)
-        ends = value - stretch * (value - low), value + stretch * (high - value)
+        least = unresolved.get(name, 0.0)
+        ends = value - stretch * (value - low) - least, value + stretch * (high - value) + least
         found[name] = Quantity(value, UNITS[name], ends)
     return found | {"entrained_air": _with_air(found["entrained_air"], found["bulk_modulus"], actuator)}
+
+
+def _unresolved(actuator: Actuator) -> Mapping[str, float]:
+    """Return what no fit resolves of friction, by severity: no logarithm begins at zero (`LEAST_FORCE`).
+
+    It is nothing where the healthy friction has more than that at rest, at rated velocity and in the part between.
+    """
+    p, rated = actuator.circuit, actuator.rated
+    least = LEAST_FORCE * p.relief_pressure * p.piston_area
+    bent = p.friction_quadratic * rated**2
+    if min(p.friction_coulomb, bent, p.friction_coulomb + p.friction_linear * rated + bent) >= least:
+        return {}
+    pressure = steady_state(p.rated_speed, p)[1]
+    rise = 100.0 * least / (p.piston_area * pressure) if pressure > 0.0 else 0.0
+    return {"added_friction": least, "pressure_rise": rise}
 
 
 def _centres(circuits: Sequence[OpenCircuit]) -> Array:

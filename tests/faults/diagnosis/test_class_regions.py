@@ -246,7 +246,7 @@ def test_without_pressure_a_fit_is_moved_along_the_scale_to_its_condition(
 def test_from_a_circuit_that_explains_the_log_no_search_begins_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
     drive = 100.0 * np.sign(np.sin(2.0 * np.pi * np.arange(3001) / 600.0))
     still = Blocks(drive, 1e-3, 10, np.zeros(300), np.zeros(300), np.array([2e-4, 2e4]))
-    truth = 0.6 * ACTUATOR.conditions[0] + 0.4 * ACTUATOR.conditions[3]
+    truth = 0.5 * ACTUATOR.conditions[0] + 0.5 * ACTUATOR.conditions[3]
     run = predicted(still, parameter_rows(truth[None], ACTUATOR.circuit, ACTUATOR.rated))[0]
     noise = still.noise * np.random.default_rng(2).standard_normal(run.shape)
     log = replace(still, velocity=(run + noise)[:, 0], pressure=(run + noise)[:, 1])
