@@ -66,11 +66,18 @@ def test_the_interval_spans_the_circuits_and_the_value_is_the_likeliers() -> Non
 
 @pytest.mark.slow
 def test_friction_at_rated_velocity_is_open_where_the_piston_moves_at_a_fifth_of_it() -> None:
-    log = make("plain", "training", 14).log  # major leakage; in one case of twenty its friction is minor
+    log = make("plain", "training", 14).log  # major leakage, whose friction may be minor
     found = read(log).diagnose()
-    assert 1.0 > found.probabilities["major_leakage"] > 0.9
+    assert 0.97 > found.probabilities["major_leakage"] > 0.5
     friction = found.severities["added_friction"]
     assert friction.ci95 is not None
     limit = severities_at(ACTUATOR.conditions[NAMES.index("minor_friction")], ACTUATOR)["added_friction"]
     assert friction.value == pytest.approx(0.0, abs=0.2 * limit)
     assert friction.ci95[1] > 0.5 * limit
+
+
+@pytest.mark.slow
+def test_a_search_whose_slopes_nearly_cancel_comes_to_the_class_that_is_there() -> None:
+    found = read(make("plain", "training", 3194).log).diagnose()  # was minor leakage alone at 89 %
+    assert found.condition == "minor_leakage_minor_friction"
+    assert found.probabilities[found.condition] > 0.9

@@ -262,12 +262,13 @@ def test_a_speed_sensor_that_is_biased_beyond_its_limit_is_named_with_its_bias(s
     assert not reasons(replace(log, speed=log.speed + np.sign(share) * 0.5 * limit))
 
 
-@pytest.mark.parametrize("gain", [1.2, 0.8])
-def test_a_pump_that_moves_more_or_less_than_the_rig_file_says_is_named(gain: float) -> None:
+def test_a_pump_that_moves_more_than_the_rig_file_says_is_named() -> None:
+    """One that moves less looks like leakage to a circuit: the balance of flows judges it (decisions 220 and 238)."""
     place = tuple(ACTUATOR.conditions[0].tolist())
-    found = reasons(run_of(place, pump=gain))
-    assert found[AgainstCode.PUMP_OFF].data["percent"] == pytest.approx(100.0 * (gain - 1.0), rel=0.35)
-    assert AgainstCode.PUMP_OFF not in reasons(run_of(place, pump=1.0 + 0.15 * (gain - 1.0)))
+    found = reasons(run_of(place, pump=1.2))
+    assert found[AgainstCode.PUMP_OFF].data["percent"] == pytest.approx(20.0, rel=0.35)
+    for near in (0.97, 1.03):
+        assert AgainstCode.PUMP_OFF not in reasons(run_of(place, pump=near))
 
 
 def test_without_pressure_a_pump_that_moves_less_is_left_to_the_search_for_faults_outside() -> None:
