@@ -31,11 +31,26 @@ def growth_note(found: Explanation, _: EhaParameters) -> Note:
         With the factor of the change, and leakage at the start and the end [m^3/(s Pa)].
     """
     begun, ended = leakage_over(found, np.array([0.0, 1.0]))
-    factor, last = float(ended / begun), found.values["leakage_coefficient"][0]
-    warmed = 1.0 / WARMED < factor < WARMED
-    return (RigCode.LEAKAGE_DRIFTS if warmed else RigCode.LEAKAGE_GROWS).note(
-        factor=factor, first=last / factor, last=last
-    )
+    return changed_note(float(ended / begun), found.values["leakage_coefficient"][0])
+
+
+def changed_note(factor: float, last: float) -> Note:
+    """Return what leakage is called that is so many times as large at the end of a log as at its beginning.
+
+    Parameters
+    ----------
+    factor : float
+        Leakage at the end over that at the beginning [dimensionless].
+    last : float
+        That at the end [m^3/(s Pa)].
+
+    Returns
+    -------
+    Note
+        That it drifts, as when oil warms or cools, or that it grows by more than that.
+    """
+    code = RigCode.LEAKAGE_DRIFTS if 1.0 / WARMED < factor < WARMED else RigCode.LEAKAGE_GROWS
+    return code.note(factor=factor, first=last / factor, last=last)
 
 
 def step_note(found: Explanation, _: EhaParameters) -> Note:

@@ -74,30 +74,36 @@ def without_held(record: Record) -> tuple[Record, tuple[Note, ...]]:
     found, notes = record.replace(**changed) if changed else record, tuple(_notes(record, slow))
     if turning is None or not was_repeated(found, others=bool(slow)):
         return found, notes
-    interval = 1e3 * turning.rows * record.sample_time
-    said = SensorCode.SPEED_HELD.note(channel=SPEED, rows=turning.rows, milliseconds=interval)
+    said = _note(SensorCode.SPEED_HELD, record, SPEED, turning)
     return found.slice(turning.first, None, turning.rows), (said, *notes)
 
 
 def _notes(record: Record, slow: Mapping[str, _Slow]) -> Iterator[Note]:
     for name, one in slow.items():
-        yield (SensorCode.BRIDGED if one.bridged else SensorCode.HELD).note(
-            channel=name, rows=one.rows, milliseconds=1e3 * one.rows * record.sample_time
-        )
+        yield _note(SensorCode.BRIDGED if one.bridged else SensorCode.HELD, record, name, one)
+
+
+def _note(code: SensorCode, record: Record, name: str, one: _Slow) -> Note:
+    return code.note(channel=name, rows=one.rows, milliseconds=1e3 * one.rows * record.sample_time)
 
 
 def _slow_speed(record: Record) -> _Slow | None:
     """Return how motor speed is held, by motor or logger; nothing where it is not, or over rows of no fixed number."""
-    if SPEED not in record or (rows := held_rows(record[SPEED])) == 1:
+    one = _repeated(record[SPEED]) if SPEED in record else None
+    return one if one is not None and _only_at(record[SPEED], one) else None
+
+
+def _repeated(values: Array) -> _Slow | None:
+    """Return how the samples of a channel are repeated; nothing where they are not."""
+    if (rows := held_rows(values)) == 1:
         return None
-    one = _Slow(rows, int(np.argmax(np.diff(record[SPEED]) != 0.0) + 1) % rows, bridged=False)
-    return one if _only_at(record[SPEED], one) else None
+    return _Slow(rows, int(np.argmax(np.diff(values) != 0.0) + 1) % rows, bridged=False)
 
 
 def _slow(values: Array) -> _Slow | None:
     """Return how a channel is held or bridged; nothing where it is sampled in every row."""
-    if (rows := held_rows(values)) > 1:
-        return _Slow(rows, int(np.argmax(np.diff(values) != 0.0) + 1) % rows, bridged=False)
+    if (repeated := _repeated(values)) is not None:
+        return repeated
     if len(values) < LEAST_STEPS:
         return None
     straight = _straight(values)

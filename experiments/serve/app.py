@@ -151,9 +151,8 @@ def _answer_errors(app: FastAPI) -> None:
     async def strange(_: Request, error: Exception) -> Response:
         said = unexpected(error)
         note(f"serve: {said}")
-        every = {
-            name.decode(): value.decode() for name, value in HEADERS.items()
-        }  # it does not pass the guard any more
+        # it does not pass the guard any more, which sets them
+        every = {name.decode(): value.decode() for name, value in HEADERS.items()}
         return JSONResponse({"detail": said}, 500, every)
 
     async def left(_: Request, __: Exception) -> Response:

@@ -66,12 +66,30 @@ def coordinates_of(p: EhaParameters, rated: float) -> Array:
     ndarray, shape (7,)
         In the order of `COORDINATES`.
     """
-    a1, a2, a3 = p.friction_quadratic, p.friction_linear, p.friction_coulomb
-    force = LEAST_FORCE * p.relief_pressure * p.piston_area
-    forces = (max(one, force) for one in (a3, a1 * rated**2, a3 + a2 * rated + a1 * rated**2))
+    parts, force = friction_parts(p, rated)
+    forces = (max(one, force) for one in parts)
     least = LEAST_FLOW * p.pump_displacement * p.rated_speed
     leakage, bias = max(p.leakage_coefficient, least / p.relief_pressure), max(p.flow_bias, least)
     return np.log([leakage, bias, *forces, p.bulk_modulus, 1.0])
+
+
+def friction_parts(p: EhaParameters, rated: float) -> tuple[tuple[float, float, float], float]:
+    """Return the three parts of friction that are fitted, and the least of each that a logarithm holds.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+    rated : float
+        Rated velocity [m/s].
+
+    Returns
+    -------
+    tuple of (tuple of float, float)
+        Friction at rest, its quadratic part at rated velocity, all of it there; and the least, see `LEAST_FORCE` [N].
+    """
+    rest, bent = p.friction_coulomb, p.friction_quadratic * rated**2
+    return (rest, bent, rest + p.friction_linear * rated + bent), LEAST_FORCE * p.relief_pressure * p.piston_area
 
 
 def parameter_rows(points: Array, rig: CircuitParameters, rated: float) -> Array:
@@ -141,9 +159,9 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
             return np.concatenate([np.repeat(brought, rows.shape[1], axis=0), gone_on], axis=1)
         before = as_wide(_as_logged(blocks, before[None])[0], rows.shape[-1])
         rows = _after(until, before, rows[0], len(blocks.speed))
-    if blocks.course is not None and blocks.pressure is None and len(rows) == 1:
-        return _in_steps(blocks, blocks.course, rows)
     if blocks.course is not None:
+        if blocks.pressure is None and len(rows) == 1:
+            return _in_steps(blocks, blocks.course, rows)
         rows = rows * _drift(blocks.course, rows.shape[-1])[:, None, :]
     return _run(blocks, _starts(blocks, rows[0]), rows)
 

@@ -114,8 +114,8 @@ def seldom_known_slopes(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Ar
     runs = predicted(blocks, rows)
     slopes = (runs[1:] - runs[0]) / np.array([step for _, step in steps])[:, None, None]
     if case > 0.0:
-        slopes[list(SELDOM_KNOWN).index(_CASE)] += slopes[-1]
-        slopes[list(SELDOM_KNOWN).index(_CASE)] *= 0.5
+        at = list(SELDOM_KNOWN).index(_CASE)
+        slopes[at] = 0.5 * (slopes[at] + slopes[-1])
     return slopes[:unknowns]
 
 

@@ -9,7 +9,7 @@ from estimation.finding import Quantity
 from estimation.log_checks.order import percentile
 from faults.conditions import CONDITIONS
 from faults.diagnosis.actuator import Actuator
-from faults.diagnosis.circuit_runs import COORDINATES, LEAST_FORCE, parameter_rows
+from faults.diagnosis.circuit_runs import COORDINATES, friction_parts, parameter_rows
 from faults.diagnosis.class_fit import WEAK
 from faults.diagnosis.class_regions import ClassFits
 from faults.diagnosis.open_classes import OpenCircuit
@@ -136,10 +136,9 @@ def _unresolved(actuator: Actuator) -> Mapping[str, float]:
 
     It is nothing where the healthy friction has more than that at rest, at rated velocity and in the part between.
     """
-    p, rated = actuator.circuit, actuator.rated
-    least = LEAST_FORCE * p.relief_pressure * p.piston_area
-    bent = p.friction_quadratic * rated**2
-    if min(p.friction_coulomb, bent, p.friction_coulomb + p.friction_linear * rated + bent) >= least:
+    p = actuator.circuit
+    parts, least = friction_parts(p, actuator.rated)
+    if min(parts) >= least:
         return {}
     pressure = steady_state(p.rated_speed, p)[1]
     rise = 100.0 * least / (p.piston_area * pressure) if pressure > 0.0 else 0.0

@@ -10,10 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimation.eha.changing_leakage import WARMED
+from estimation.eha.changing_leakage import changed_note
 from estimation.eha.explained import LEAKAGE_COURSE
 from estimation.log_checks.clean import CleanLog
-from estimation.notes import RigCode
 from faults.conditions import CONDITIONS
 from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import LONGEST, Blocks
@@ -169,10 +168,8 @@ def with_course(log: CleanLog, found: Drift) -> tuple[CleanLog, Note]:
         The log with a `LEAKAGE_COURSE`; that leakage drifts as oil warms or cools, or that it grows by more than that.
     """
     factor, last = float(np.exp(found.logarithm)), float(np.exp(found.fit.coordinates @ _LEAKS_MORE))
-    code = RigCode.LEAKAGE_DRIFTS if 1.0 / WARMED < factor < WARMED else RigCode.LEAKAGE_GROWS
     course = course_of(found.logarithm, len(log.record))
-    note = code.note(factor=factor, first=last / factor, last=last)
-    return replace(log, record=log.record.replace(**{LEAKAGE_COURSE: course})), note
+    return replace(log, record=log.record.replace(**{LEAKAGE_COURSE: course})), changed_note(factor, last)
 
 
 def _searched(blocks: Blocks, none: Drift, moved: float, step: Array, condition: str, actuator: Actuator) -> Drift:
