@@ -6,7 +6,7 @@ speed alone does, or in rows of its own, what the pump delivered is known at its
 """
 
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,17 +74,17 @@ def without_held(record: Record) -> tuple[Record, tuple[Note, ...]]:
     found, notes = record.replace(**changed) if changed else record, tuple(_notes(record, slow))
     if turning is None or not was_repeated(found, others=bool(slow)):
         return found, notes
-    said = _note(SensorCode.SPEED_HELD, record, SPEED, turning)
+    said = SensorCode.SPEED_HELD.note(**_said(record, SPEED, turning))
     return found.slice(turning.first, None, turning.rows), (said, *notes)
 
 
 def _notes(record: Record, slow: Mapping[str, _Slow]) -> Iterator[Note]:
     for name, one in slow.items():
-        yield _note(SensorCode.BRIDGED if one.bridged else SensorCode.HELD, record, name, one)
+        yield (SensorCode.BRIDGED if one.bridged else SensorCode.HELD).note(**_said(record, name, one))
 
 
-def _note(code: SensorCode, record: Record, name: str, one: _Slow) -> Note:
-    return code.note(channel=name, rows=one.rows, milliseconds=1e3 * one.rows * record.sample_time)
+def _said(record: Record, name: str, one: _Slow) -> dict[str, Any]:
+    return {"channel": name, "rows": one.rows, "milliseconds": 1e3 * one.rows * record.sample_time}
 
 
 def _slow_speed(record: Record) -> _Slow | None:

@@ -56,10 +56,10 @@ class Stream:
 
     def close(self) -> None:
         """End the watch and its process; it goes on from where it was when there is one again."""
-        self._closed.set()
-        process = self._process
-        if process is not None and process.is_alive():
-            process.terminate()
+        with self._lock:  # a process is either begun before, and ended here, or not begun
+            self._closed.set()
+            if self._process is not None and self._process.is_alive():
+                self._process.terminate()
         if self._thread.is_alive():
             self._thread.join(AGAIN_AFTER)
 
@@ -102,10 +102,12 @@ class Stream:
         with ours:
             with theirs:
                 asked = (theirs, os.getpid(), self.address, settings.rig, columns, settings.false_alarms, state)
-                self._process = context.Process(target=watch_stream, args=asked, daemon=True)
-                self._process.start()
-            if self._closed.is_set():  # while it was begun, so that `close` found none to end
-                self._process.terminate()
+                with self._lock:
+                    if self._closed.is_set():
+                        return
+                    process = context.Process(target=watch_stream, args=asked, daemon=True)
+                    process.start()
+                    self._process = process
             self._listen(ours)
         self._process.join(AGAIN_AFTER)
         if self._process.is_alive():
