@@ -14,7 +14,7 @@ from estimation.eha.rig_share import fitted_responses, scaled_responses, with_we
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
 from estimation.fits.delivery import delivered
-from estimation.fits.flow_fit import FLOW_CHANNELS, REPORTED, fit_flow, require_flow_channels
+from estimation.fits.flow_fit import FLOW_CHANNELS, REPORTED, LogTraits, fit_flow, require_flow_channels
 from estimation.fits.form_fit import FormFit
 from estimation.fits.motion_fit import MOTION_CHANNELS, fit_motion
 from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED
@@ -241,8 +241,8 @@ def _fit(
     require_flow_channels(log.record)
     doubted, record = {name: max(one) for name, one in spreads.items()}, log.record
     loaded = not chosen and first_load(record, log.variances) != 0.0
-    how: dict[str, Any] = {"loaded": loaded, "moving": begins_in_motion(record), "filtered": log.filtered}
-    fit = fit_flow(record, parameters, guess, doubted, log.variances, speed_held=log.speed_held, **how)
+    traits = LogTraits(loaded, begins_in_motion(record), log.filtered, log.speed_held)
+    fit = fit_flow(record, parameters, guess, doubted, log.variances, traits)
     unexplained = fit.explanation is None or fit.bound > LARGEST_BOUND
     return None if loaded and unexplained else fit  # a filter needs no state at rest
 

@@ -1,47 +1,34 @@
 """`fit_flow(record, parameters, ...) -> FormFit`: bulk modulus, leakage and flow bias of a log, by the flow form."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
-from operator import attrgetter
 
 import numpy as np
 
 from estimation.fits.asked import ALWAYS_ASKED, asked_of, near_starts
-from estimation.fits.between_samples import with_course
 from estimation.fits.delivery import contradicted
 from estimation.fits.explain import WORTH, explain
-from estimation.fits.flow_log import carried, flow_log, homed_at_stop, without_strays
-from estimation.fits.flow_search import balanced, flow_starts, lower_valley
+from estimation.fits.flow_log import homed_at_stop, without_strays
+from estimation.fits.flow_search import lower_valley
 from estimation.fits.form_fit import DISCRETISED, FormFit, weighed, with_structure
 from estimation.fits.greybox_fit import GreyBoxFit
-from estimation.fits.hypotheses import (
-    BEGUN,
-    ENCODER_ZERO,
-    HYPOTHESES,
-    PLAY,
-    PRESSURE_LATE,
-    Hypothesis,
-)
+from estimation.fits.hypotheses import BEGUN, ENCODER_ZERO, HYPOTHESES, PLAY, PRESSURE_LATE, Hypothesis
 from estimation.fits.left_open import valves_unseen, wear_open
-from estimation.fits.objections import doubted, fit_explains, fit_explains_all, limits, objections
-from estimation.fits.play import (
-    NO_PLAY,
-    play_left,
-    play_structure,
-    play_untaken,
-    sensed_play,
-)
+from estimation.fits.objections import doubted, fit_explains_all, objections
+from estimation.fits.plain_flow import FitStart, Logged, PlainFits, plain_fits, stiffer
+from estimation.fits.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
 from estimation.fits.small_teeth import with_small_teeth
 from estimation.fits.speed_instead import speed_instead
-from estimation.fits.teeth import Turning
-from estimation.fits.toothed import asked_for_teeth, toothed
+from estimation.fits.toothed import asked_for_teeth
+from estimation.fits.tried import Explanation
 from estimation.models.completed_flow import CRACKS, balances_mass
 from estimation.models.flow import HELD_FLOW_FORM
 from estimation.notes import EstimateCode
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
 from plant.log.record import Record
+from plant.notes import Note
 
 FLOW_CHANNELS = ("position_m", "differential_pressure_pa")
 """Channels that the flow form needs beside motor speed."""
@@ -69,7 +56,32 @@ LITTLE = 0.01
 """Share of what the plain form leaves beside noise that the best hypothesis must take up before pairs are tried
 [fraction]."""
 
-_cost = attrgetter("cost")
+
+@dataclass(frozen=True)
+class LogTraits:
+    """How a log begins, and how its channels were logged, as far as a fit has to know it.
+
+    Parameters
+    ----------
+    loaded : bool
+        Whether the log begins under load, and not at rest.
+    moving : bool
+        Whether the motor turns when it begins: both chambers may then stand at any pressure.
+    filtered : bool
+        Whether the pressure was filtered: it is then late, and by how much is fitted whatever that gains.
+    speed_held : bool
+        Whether motor speed came slower than the rest: of a log that the plain form does not explain the motor's course
+        is then what is not known, and nothing is asked.
+    """
+
+    loaded: bool = False
+    moving: bool = False
+    filtered: bool = False
+    speed_held: bool = False
+
+
+AT_REST = LogTraits()
+"""A log that begins at rest, each channel sampled in every row and as it is."""
 
 
 def require_flow_channels(record: Record) -> None:
@@ -91,20 +103,15 @@ def fit_flow(
     bulk_modulus: float,
     uncertainties: Mapping[str, float] | None = None,
     variances: Mapping[str, float] | None = None,
-    *,
-    loaded: bool = False,
-    moving: bool = False,
-    filtered: bool = False,
-    speed_held: bool = False,
-    speed_offset: float = 0.0,
-    valley: Mapping[str, float] | None = None,
+    traits: LogTraits = AT_REST,
 ) -> FormFit:
     """Fit the flow form to a log, balanced by volume, by mass, and by volume in held chambers, and weigh the three.
 
     What a pump's teeth deliver is taken up first (`estimation.fits.toothed`). A log that it does not explain is asked
     what is strange about rig, oil or logger (`estimation.fits.explain`).
     Gross outliers are taken out, and what the pump delivered while its speed is missing is read off the pressure after.
-    Where oil is so much stiffer than the rig file's that noise of position counts, a log is fitted anew from there.
+    Where oil is so much stiffer than the rig file's that noise of position counts, a log is fitted anew from there. So
+    it is where what is strange leads to a lower valley of the plain form, or is an offset of speed.
 
     Parameters
     ----------
@@ -119,19 +126,8 @@ def fit_flow(
     variances : Mapping[str, float], optional
         Measurement variances of the channels of a log whose gross outliers are missing already [SI squared]; both are
         done here if not given.
-    loaded : bool
-        Whether the log begins under load, and not at rest.
-    moving : bool
-        Whether the motor turns when it begins: both chambers may then stand at any pressure.
-    filtered : bool
-        Whether the pressure was filtered: it is then late, and by how much is fitted whatever that gains.
-    speed_held : bool
-        Whether motor speed came slower than the rest: of a log that the plain form does not explain the motor's course
-        is then what is not known, and nothing is asked.
-    speed_offset : float
-        First guess of how much the logged speed exceeds the shaft's [rad/s].
-    valley : Mapping[str, float], optional
-        Values of the plain form's unknowns from which searches begin as well, see `lower_valley` [SI].
+    traits : LogTraits
+        How the log begins, and how it was logged.
 
     Returns
     -------
@@ -147,78 +143,120 @@ def fit_flow(
     sensed = sensed_play(record)
     if variances is None:
         record, variances = without_strays(record)
-    how = {"loaded": loaded, "moving": moving, "filtered": filtered, "speed_held": speed_held}
-    again = partial(fit_flow, record, uncertainties=uncertainties, variances=variances, **how)
-    log = flow_log(record, parameters, uncertainties or {}, variances)
-    starts = flow_starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
-    explains = partial(fit_explains, noisy=log.passes_on)
-    largest, _ = limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))
-    fitted = partial(balanced, parameters=parameters, starts=starts, valley=valley)
-    unturned = with_course(log, fitted, parameters)
-    log, fits, teeth, teeth_left = toothed(unturned, fitted, explains, largest, speed_offset)
-    turning = Turning(log.teeth, log.speed_offset)
-    beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in fits]
-    best = min(fits, key=_cost)
-    found = with_small_teeth(weighed(fits, SURER, beforehand), best.small_teeth)
-    swinging = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)
-    stiff = replace(parameters, bulk_modulus=swinging.values["bulk_modulus"])
-    stiffer = not log.passes_on and stiff.bulk_modulus > parameters.bulk_modulus  # noise counts more in stiff oil alone
-    if stiffer and explains(swinging) and flow_log(record, stiff, uncertainties or {}, variances).passes_on:
-        return again(stiff, stiff.bulk_modulus, speed_offset=speed_offset)
-    log = carried(log, parameters, swinging.values)
-    asked, open_ends = asked_of(log, parameters, swinging, best, sensed, loaded=loaded, moving=moving)
-    asked = (PRESSURE_LATE, *asked) if filtered and PRESSURE_LATE not in asked else asked
-    asked = () if speed_held and not explains(swinging) else asked
-    remarks = (*teeth, *open_ends, *valves_unseen(best))
-    softer = parameters.piston_area * sensed.yields / parameters.chamber_volume
-    untaken, play = play_untaken(sensed, softer * swinging.values["bulk_modulus"])
-    if BEGUN in asked:  # so many valleys that one is believed only where sensors' noise is all that it leaves
-        explains = partial(fit_explains_all, noisy=log.passes_on)
-    if asked:
-        near = near_starts(swinging, starts, explains, in_motion=loaded or moving)
-        near = [best.values, *near] if best is not swinging and explains(best) else near
-        paired = any(one not in (*ALWAYS_ASKED, PLAY) for one in asked)
-        by_mass = balances_mass(swinging.model)
-        strange = explain(
-            asked_for_teeth(log),
-            parameters,
-            near,
-            explains,
-            asked=asked,
-            paired=paired,
-            hopeless=_hopeless(swinging, asked),
-            by_mass=by_mass,
-        )
-        one = strange.fit
-        if (
-            _known(strange.names, one)
-            and explains(one)
-            and one.cost < _wanted(strange.names, best, swinging, homed=homed_at_stop(log), late=filtered)
-        ):
-            place = (strange.values, parameters.pump_displacement, one.cost - WORTH)
-            if not speed_offset and (turned := speed_instead(unturned, fitted, *place)):
-                return again(parameters, bulk_modulus, speed_offset=turned)
-            wanted = one.cost + WORTH
-            if valley is None and (lower := lower_valley(log, swinging, strange.values, wanted)):
-                return again(parameters, bulk_modulus, speed_offset=speed_offset, valley=lower)
-            bound = one.std["bulk_modulus"] / one.values["bulk_modulus"]
-            left, open_play = float(np.hypot(FILTERED if filtered else STRUCTURE, untaken)), play
-            if PLAY.name in strange.names:
-                modulus = one.values["bulk_modulus"]
-                moved = abs(modulus / swinging.values["bulk_modulus"] - 1.0)
-                left, open_play = play_structure(moved, softer * modulus), ()
-            believed = with_structure(with_small_teeth(strange.values, one.small_teeth), left)
-            shown = play_left(one.play, NO_PLAY if PLAY.name in strange.names else sensed)
-            reasons = (*shown, *contradicted(strange, parameters))
-            remarks = (*teeth, *wear_open(strange.delivery_open), *open_play)
-            return FormFit(believed, bound, one.chi_square[0], reasons, one.rig_slopes, strange, remarks, turning)
+    logged = Logged(record, variances, uncertainties or {})
+    start = FitStart(parameters, bulk_modulus)
+    while True:
+        plain = plain_fits(logged, start)
+        if (stiff := stiffer(logged, plain)) is not None:
+            start = replace(start, parameters=stiff, bulk_modulus=stiff.bulk_modulus, valley=None)
+            continue
+        asked, open_ends = _asked(plain, sensed, traits)
+        strange = _strange(plain, asked, traits) if asked else None
+        if strange is None:
+            return _plain_fit(plain, sensed, open_ends, begun=BEGUN in asked)
+        if (elsewhere := _elsewhere(plain, strange)) is None:
+            return _explained_fit(plain, strange, sensed, traits)
+        start = elsewhere
+
+
+def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequence[Hypothesis], Sequence[Note]]:
+    """Return what a log is asked beside the plain form, and notes on what it leaves open."""
+    loaded, moving = traits.loaded, traits.moving
+    asked, open_ends = asked_of(
+        plain.log, plain.start.parameters, plain.swinging, plain.best, sensed, loaded=loaded, moving=moving
+    )
+    if traits.speed_held and not plain.explains(plain.swinging):
+        return (), open_ends
+    if traits.filtered and PRESSURE_LATE not in asked:
+        asked = (PRESSURE_LATE, *asked)
+    return asked, open_ends
+
+
+def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> Explanation | None:
+    """Return what is strange about a log, if it is believed rather than the plain form."""
+    explains = _told_by(plain, begun=BEGUN in asked)
+    near = near_starts(plain.swinging, plain.starts, explains, in_motion=traits.loaded or traits.moving)
+    if plain.best is not plain.swinging and explains(plain.best):
+        near = [plain.best.values, *near]
+    strange = explain(
+        asked_for_teeth(plain.log),
+        plain.start.parameters,
+        near,
+        explains,
+        asked=asked,
+        paired=any(one not in (*ALWAYS_ASKED, PLAY) for one in asked),
+        hopeless=_hopeless(plain.swinging, asked),
+        by_mass=balances_mass(plain.swinging.model),
+    )
+    wanted = _wanted(strange.names, plain.best, plain.swinging, homed=homed_at_stop(plain.log), late=traits.filtered)
+    believed = _known(strange.names, strange.fit) and explains(strange.fit) and strange.fit.cost < wanted
+    return strange if believed else None
+
+
+def _told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:
+    """Return what says whether a fit explains the log, given whether it is asked how it begins.
+
+    That has so many valleys that one is believed only where sensors' noise is all that it leaves.
+    """
+    return partial(fit_explains_all, noisy=plain.log.passes_on) if begun else plain.explains
+
+
+def _elsewhere(plain: PlainFits, strange: Explanation) -> FitStart | None:
+    """Return from where the plain form explains the log better than what is strange; None where it does not."""
+    start, cost = plain.start, strange.fit.cost
+    displacement = start.parameters.pump_displacement
+    if not start.speed_offset and (
+        turned := speed_instead(plain.unturned, plain.fitted, strange.values, displacement, cost - WORTH)
+    ):
+        return replace(start, speed_offset=turned, valley=None)
+    if start.valley is None and (lower := lower_valley(plain.log, plain.swinging, strange.values, cost + WORTH)):
+        return replace(start, valley=lower)
+    return None
+
+
+def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, traits: LogTraits) -> FormFit:
+    """Return what a log says under what is strange about it."""
+    one = strange.fit
+    modulus, bound = one.values["bulk_modulus"], one.std["bulk_modulus"] / one.values["bulk_modulus"]
+    if PLAY.name in strange.names:
+        moved = abs(modulus / plain.swinging.values["bulk_modulus"] - 1.0)
+        left, open_play = play_structure(moved, plain.yields(sensed, modulus)), ()
+        shown = play_left(one.play, NO_PLAY)
+    else:
+        untaken, open_play = plain.play_untaken(sensed)
+        left, shown = float(np.hypot(FILTERED if traits.filtered else STRUCTURE, untaken)), play_left(one.play, sensed)
+    return FormFit(
+        parameters=with_structure(with_small_teeth(strange.values, one.small_teeth), left),
+        bound=bound,
+        chi_square=one.chi_square[0],
+        reasons=(*shown, *contradicted(strange, plain.start.parameters)),
+        rig_slopes=one.rig_slopes,
+        explanation=strange,
+        remarks=(*plain.teeth, *wear_open(strange.delivery_open), *open_play),
+        turning=plain.turning,
+    )
+
+
+def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *, begun: bool) -> FormFit:
+    """Return what a log says that is believed to have nothing strange about it."""
+    best = plain.best
+    beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in plain.fits]
+    found = with_small_teeth(weighed(plain.fits, SURER, beforehand), best.small_teeth)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
-    believed = with_structure(found, float(np.hypot(DISCRETISED if sure else STRUCTURE, untaken)))
-    reasons = (*objections(best, log.passes_on), *play_left(swinging.play, sensed)) or teeth_left
-    if BEGUN in asked and not reasons and not explains(best):
+    untaken, open_play = plain.play_untaken(sensed)
+    reasons = (*objections(best, plain.log.passes_on), *play_left(plain.swinging.play, sensed)) or plain.teeth_left
+    if begun and not reasons and not _told_by(plain, begun=begun)(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
-    (value, std), remarks = found["bulk_modulus"], (*remarks, *play)
-    return FormFit(believed, std / value, best.chi_square[0], reasons, best.rig_slopes, None, remarks, turning)
+    value, std = found["bulk_modulus"]
+    return FormFit(
+        parameters=with_structure(found, float(np.hypot(DISCRETISED if sure else STRUCTURE, untaken))),
+        bound=std / value,
+        chi_square=best.chi_square[0],
+        reasons=reasons,
+        rig_slopes=best.rig_slopes,
+        remarks=(*plain.teeth, *open_ends, *valves_unseen(best), *open_play),
+        turning=plain.turning,
+    )
 
 
 def _hopeless(swinging: GreyBoxFit, asked: Sequence[Hypothesis]) -> float:

@@ -15,7 +15,7 @@ from estimation.fits import asked
 from estimation.fits import explain as module
 from estimation.fits.asked import near_starts
 from estimation.fits.descent import Point
-from estimation.fits.flow_fit import _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
+from estimation.fits.flow_fit import LogTraits, _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
 from estimation.fits.flow_search import MAKEUP_TRIED, flow_starts
 from estimation.fits.hypotheses import HYPOTHESES, LATEST
 from estimation.fits.left_open import OPEN_DELIVERY
@@ -288,7 +288,7 @@ def test_a_log_cut_out_of_a_run_where_pressure_crosses_zero_is_fitted_from_sides
 
 def test_where_volume_and_mass_explain_alike_what_they_disagree_on_is_in_the_deviation() -> None:
     clean = clean_log(log("multisine", 4.0).slice(1500, 4000), HEALTHY)
-    fit = fit_flow(clean.record, HEALTHY, HEALTHY.bulk_modulus, {}, clean.variances, loaded=True)
+    fit = fit_flow(clean.record, HEALTHY, HEALTHY.bulk_modulus, {}, clean.variances, LogTraits(loaded=True))
     assert fit.explanation is not None
     alone = fit.explanation.fit
     value, std = fit.explanation.values["bulk_modulus"]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.fits import flow_fit
+from estimation.fits import flow_fit, plain_flow
 from estimation.fits.flow_log import flow_log, without_strays
 from estimation.fits.flow_search import balanced, flow_starts, lower_valley
 from estimation.fits.greybox_fit import GreyBoxFit
@@ -105,7 +105,7 @@ def test_a_hypothesis_is_believed_where_it_gains_over_its_own_valley_alone(
 
     fit = replace(best(), cost=best().cost + cost)
     explanation = Explanation(("port_a_drains",), found(), {}, fit, 0, 1e6)
-    monkeypatch.setattr(flow_fit, "balanced", lost)
+    monkeypatch.setattr(plain_flow, "balanced", lost)
     monkeypatch.setattr(flow_fit, "asked_of", asked)
     monkeypatch.setattr(flow_fit, "explain", lambda *_, **__: explanation)
     answer = flow_fit.fit_flow(log(1.0), PAPER, PAPER.bulk_modulus)

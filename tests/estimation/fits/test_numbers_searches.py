@@ -12,7 +12,7 @@ import pytest
 
 from estimation.fits.descent import Point
 from estimation.fits.explain import explain
-from estimation.fits.flow_fit import fit_flow
+from estimation.fits.flow_fit import LogTraits, fit_flow
 from estimation.fits.flow_log import without_strays
 from estimation.fits.flow_search import balanced, flow_starts
 from estimation.fits.freed_problem import FreedProblem
@@ -115,7 +115,7 @@ def logs_that_no_start_explains() -> dict[str, Any]:
         "reasons": noted(fit.reasons),
         "bound": fit.bound,
     }
-    loaded = fit_flow(record.replace(**{PRESSURE: record[PRESSURE] + 2e5}), PAPER, 2e8, loaded=True)
+    loaded = fit_flow(record.replace(**{PRESSURE: record[PRESSURE] + 2e5}), PAPER, 2e8, traits=LogTraits(loaded=True))
     told["with a load"] = {
         "explained by": list(loaded.explanation.names) if loaded.explanation else None,
         "bound": loaded.bound,

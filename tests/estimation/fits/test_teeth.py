@@ -136,7 +136,7 @@ def test_bulk_modulus_with_teeth_is_what_it_would_be_without_and_is_off_where_th
 ) -> None:
     fitted = partial(fit_flow, parameters=PAPER, bulk_modulus=PAPER.bulk_modulus)
     sound, taken_up = fitted(logged(0.0)), fitted(logged(0.1))
-    monkeypatch.setattr("estimation.fits.flow_fit.toothed", lambda log, fits, *_: Toothed(log, fits(log)))
+    monkeypatch.setattr("estimation.fits.plain_flow.toothed", lambda log, fits, *_: Toothed(log, fits(log)))
     passed_over = fitted(logged(0.1))
     value, std = sound.parameters["bulk_modulus"]
     assert taken_up.parameters["bulk_modulus"][0] == pytest.approx(value, abs=0.3 * std)

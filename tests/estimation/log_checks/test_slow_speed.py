@@ -83,7 +83,7 @@ def test_a_log_that_its_slow_speed_leaves_unexplained_is_asked_nothing(monkeypat
     clean = clean_log(strange, P)
     assert clean.speed_held
     monkeypatch.setattr(flow_fit, "explain", never)
-    fit = flow_fit.fit_flow(clean.record, P, P.bulk_modulus, {}, clean.variances, speed_held=True)
+    fit = flow_fit.fit_flow(clean.record, P, P.bulk_modulus, {}, clean.variances, flow_fit.LogTraits(speed_held=True))
     assert fit.reasons
     with pytest.raises(AssertionError):
         flow_fit.fit_flow(clean.record, P, P.bulk_modulus, {}, clean.variances)
