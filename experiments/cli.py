@@ -41,28 +41,28 @@ VERBS = (
     "circuit.command",
     "piezo_stack.command",
     "diaphragm_motor.command",
-    "command.simulate",
-    "command.estimate",
-    "command.identify",
+    "verbs.simulate",
+    "verbs.estimate",
+    "verbs.identify",
     "library.command",
-    "command.diagnose",
-    "command.inspect",
-    "command.watch",
-    "command.filter_stream",
-    "command.identifiability",
-    "command.isolability",
-    "command.conditions",
-    "command.batch",
-    "command.compare",
-    "command.fleet",
-    "command.serve",
+    "verbs.diagnose",
+    "verbs.inspect",
+    "verbs.watch",
+    "verbs.filter_stream",
+    "verbs.identifiability",
+    "verbs.isolability",
+    "verbs.conditions",
+    "verbs.batch",
+    "verbs.compare",
+    "verbs.fleet",
+    "verbs.serve",
     "motor_paper.command",
     "papers.command",
-    "command.size_cylinder",
+    "verbs.size_cylinder",
 )
 """Modules that hold a verb each, in the order of the help."""
 
-ALONE = {"estimate": "command.estimate", "diagnose": "command.diagnose", "identify": "command.identify"}
+ALONE = {"estimate": "verbs.estimate", "diagnose": "verbs.diagnose", "identify": "verbs.identify"}
 """Verbs of a single log, whose module is imported without the others: these take a twentieth of a short run."""
 
 if TYPE_CHECKING:
@@ -113,8 +113,8 @@ def _of(modules: Sequence[str]) -> typer.Typer:
 
 @cache
 def _whole() -> typer.Typer:
-    from experiments.command import conditions, export
     from experiments.open_benchmark import command as open_benchmark
+    from experiments.verbs import conditions, export
 
     made = _of(VERBS)
     made.add_typer(conditions.rig_commands, name="rig")

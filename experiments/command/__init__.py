@@ -1,1 +1,1 @@
-"""The verbs of the command `hydrostate`, one a file, and what they share."""
+"""What the verbs of the command `hydrostate` share: options, output, and what happens to each of several logs."""

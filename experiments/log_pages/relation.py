@@ -186,7 +186,7 @@ def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: 
         As `identify_outputs` takes them, ``sample_time`` of the model [s], and ``reference``: what drives a loop.
     """
     from estimation.identification.two_stage import identify_columns
-    from experiments.command.identify_any import entries
+    from experiments.identification.of_columns import entries
 
     asked = dict(options)
     columns = [

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from experiments.command.json_output import plain
 from experiments.command.options import load_rig
 from experiments.command.terminal import unexpected
-from experiments.command.watch_events import WatchEvents
-from experiments.command.watching import Asked, watch_network
 from experiments.serve.process import bind_to_server
+from experiments.streams.watch_events import WatchEvents
+from experiments.streams.watching import Asked, watch_network
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:

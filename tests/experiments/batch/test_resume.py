@@ -10,7 +10,7 @@ import pyarrow as pa
 import pytest
 
 from experiments.batch.part_store import PartStore, open_store
-from experiments.command import batch
+from experiments.verbs import batch
 from plant.errors import HydrostateError
 from tests.experiments.batch.conftest import rows_in_parts, run_into, small_plan
 

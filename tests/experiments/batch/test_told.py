@@ -8,7 +8,7 @@ import pytest
 
 from experiments.batch.runner import sources
 from experiments.batch.study_file import parse_study
-from experiments.command import batch
+from experiments.verbs import batch
 from plant.errors import HydrostateError
 
 

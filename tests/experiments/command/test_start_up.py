@@ -36,7 +36,7 @@ DEAR = {
 }
 """Modules that no verb needs for its JSON."""
 
-OTHERS = {"experiments.command.serve", "experiments.command.watch"}
+OTHERS = {"experiments.verbs.serve", "experiments.verbs.watch"}
 """Modules of other verbs, which one of a single log does not import."""
 
 TELLING = """

@@ -103,7 +103,7 @@ def rows(*_: object) -> list[str]:
 def test_a_stream_that_breaks_tells_its_last_gauges_before_its_end(
     bound: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("experiments.command.watching.stream_lines", rows)
+    monkeypatch.setattr("experiments.streams.watching.stream_lines", rows)
     pipe = Pipe()
     run(pipe, tmp_path / "state.npz")
     *_, (kind, last), (_, end) = pipe.sent
@@ -119,7 +119,7 @@ def test_a_server_that_is_gone_is_told_nothing_and_raises_nothing(
     bound: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     del bound
-    monkeypatch.setattr("experiments.command.watching.stream_lines", rows)
+    monkeypatch.setattr("experiments.streams.watching.stream_lines", rows)
     pipe = Pipe(gone=True)
     run(pipe, tmp_path / "state.npz")
     assert pipe.closed

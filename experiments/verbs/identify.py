@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from estimation.identification.structure_names import STRUCTURE_NAMES
-from experiments.command.identify_any import Asked, identify_any, names
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, read_log, run_logs
 from experiments.command.options import (
@@ -26,8 +25,9 @@ from experiments.command.options import (
     require_positive,
 )
 from experiments.command.own_paths import own_paths, require_place
-from experiments.command.simulate_model import simulate_model
 from experiments.command.terminal import note, short_names, table
+from experiments.identification.of_columns import Asked, identify_any, names
+from experiments.identification.simulate_model import simulate_model
 from plant.errors import HydrostateError, require_known
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.command import watching
-from experiments.command.watch_events import WatchEvents
-from experiments.command.watching import SAVED_EVERY, Asked, told_of, watch_rows
+from experiments.streams import watching
+from experiments.streams.watch_events import WatchEvents
+from experiments.streams.watching import SAVED_EVERY, Asked, told_of, watch_rows
 from faults.watch.saved import load_state
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig

@@ -64,8 +64,8 @@ def serve(
         raise HydrostateError(
             f"serve needs FastAPI, uvicorn and pebble: pip install 'hydrostate[serve]' ({error})"
         ) from error
-    from experiments.command.fleet import limits_of_options
     from experiments.fleet.naming import by_pattern
+    from experiments.verbs.fleet import limits_of_options
 
     load_actuator(plant, rig)
     if pattern is not None:

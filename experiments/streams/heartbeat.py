@@ -5,7 +5,7 @@ import time
 from collections.abc import Generator
 from contextlib import contextmanager
 
-from experiments.command.watch_events import WatchEvents
+from experiments.streams.watch_events import WatchEvents
 
 
 @contextmanager

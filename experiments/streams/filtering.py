@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.logs import noted, with_rig_columns
-from experiments.command.streamed import Saving
 from experiments.command.terminal import note
+from experiments.streams.streamed import Saving
 from plant.errors import LogError
 
 if TYPE_CHECKING:

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from experiments.command.heartbeat import beating
 from experiments.command.options import (
     Columns,
     RigFile,
@@ -19,16 +18,17 @@ from experiments.command.options import (
     require_positive,
 )
 from experiments.command.own_paths import require_place
-from experiments.command.streamed import (
+from experiments.streams.heartbeat import beating
+from experiments.streams.streamed import (
     STANDARD_INPUT,
     end_told,
     say_line,
     stop_at_sigterm,
     stream_input,
 )
-from experiments.command.watch_outputs import Watched, metrics_offered, published
-from experiments.command.watch_view import lines_wanted, viewed
-from experiments.command.watching import Asked, watch_file, watch_network, watch_rows
+from experiments.streams.watch_outputs import Watched, metrics_offered, published
+from experiments.streams.watch_view import lines_wanted, viewed
+from experiments.streams.watching import Asked, watch_file, watch_network, watch_rows
 from plant.log.stream_source import is_stream
 
 commands = typer.Typer()

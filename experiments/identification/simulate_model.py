@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from estimation.identification.free_run.data import Channels
     from estimation.identification.free_run.model import FreeRunModel
-    from experiments.command.identify_any import Asked
+    from experiments.identification.of_columns import Asked
     from plant.log.record import Record
 
 

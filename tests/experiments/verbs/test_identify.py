@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.notes import IdentificationCode
 from experiments.cli import app
-from experiments.command.identify import whole_or_auto
+from experiments.verbs.identify import whole_or_auto
 from plant.eha.drives import prbs
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate

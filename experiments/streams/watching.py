@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.command.logs import noted, read_log, with_rig_columns
 from experiments.command.options import PRESSURE
-from experiments.command.streamed import Saving
 from experiments.command.terminal import note
-from experiments.command.watch_events import WatchEvents
+from experiments.streams.streamed import Saving
+from experiments.streams.watch_events import WatchEvents
 from plant.errors import LogError
 from plant.log.stream_source import Received, stream_lines
 

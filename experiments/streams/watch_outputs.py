@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.command.json_output import plain
 from experiments.command.terminal import note
-from experiments.command.watch_events import WatchEvents
 from experiments.serve.metrics import PROMETHEUS_TEXT, exposition
+from experiments.streams.watch_events import WatchEvents
 from plant.errors import HydrostateError, LogError
 from plant.log.stream_source import broker_of, broker_package
 

@@ -9,8 +9,8 @@ from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish, run_logs
 from experiments.command.options import require_positive
 from experiments.command.own_paths import own_paths
-from experiments.command.simulate_model import quality_of, record_of, warn_of_range, write_simulated
 from experiments.command.terminal import clauses, table
+from experiments.identification.simulate_model import quality_of, record_of, warn_of_range, write_simulated
 from plant.errors import HydrostateError, require_known
 
 if TYPE_CHECKING:
@@ -183,7 +183,7 @@ def entries(found: "Identified") -> dict[str, Any]:
         "notes": [note.to_dict() for note in found.notes if note.code not in WARNED],
     }
     if linear is not None:
-        from experiments.command.identify import linear_entries
+        from experiments.verbs.identify import linear_entries
 
         result = {**linear_entries(linear), **result, "order": linear.denominator.size - 1, "offset": model.offset}
         result["dc_gain"] = {"value": linear.dc_gain, "std": linear.dc_gain_std}
@@ -208,7 +208,7 @@ def entries(found: "Identified") -> dict[str, Any]:
 
 def _state_space_entries(model: "FreeRunModel", dynamics: "StateSpaceDynamics") -> dict[str, Any]:
     """Return order, poles, steady gains and dead time of one output of a state space."""
-    from experiments.command.identify import with_std
+    from experiments.verbs.identify import with_std
 
     system, gain = dynamics.system, model.scaling.y_std / model.scaling.u_std
     return {

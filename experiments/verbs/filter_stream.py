@@ -8,7 +8,6 @@ from typing import Annotated, Any
 
 import typer
 
-from experiments.command.filtering import Filtering
 from experiments.command.json_output import plain
 from experiments.command.logs import read_log
 from experiments.command.options import (
@@ -22,15 +21,16 @@ from experiments.command.options import (
     require_positive,
 )
 from experiments.command.own_paths import require_place
-from experiments.command.streamed import (
+from experiments.streams.filtering import Filtering
+from experiments.streams.streamed import (
     STANDARD_INPUT,
     end_told,
     say_line,
     stop_at_sigterm,
     stream_input,
 )
-from experiments.command.watch_outputs import published
-from experiments.command.watching import told_of
+from experiments.streams.watch_outputs import published
+from experiments.streams.watching import told_of
 from plant.errors import HydrostateError
 from plant.log.stream_source import Received, bounded_lines, is_stream, stream_lines
 

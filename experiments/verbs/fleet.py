@@ -133,7 +133,7 @@ def _diagnosed(
     from experiments.batch.cases import plan_study
     from experiments.batch.part_store import open_store
     from experiments.batch.study_file import parse_study
-    from experiments.command.batch import run_plan
+    from experiments.verbs.batch import run_plan
 
     kind, _ = load_actuator(plant, rig)
     if not folder.is_dir():

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from experiments.cli import app
-from experiments.command.watch_events import WatchEvents
+from experiments.streams.watch_events import WatchEvents
 from plant.eha.model import EhaParameters
 from plant.log.files import write_record
 from plant.log.record import Record
@@ -124,9 +124,9 @@ def test_a_stream_on_standard_input_is_read_as_it_comes(log: Path, monkeypatch: 
             return super().readline(size)
 
     printed: list[str] = []
-    monkeypatch.setattr("experiments.command.streamed.emit", lambda line: printed.append(line))
+    monkeypatch.setattr("experiments.streams.streamed.emit", lambda line: printed.append(line))
     monkeypatch.setattr("sys.stdin", Growing(log.read_text()))
-    from experiments.command.watch import watch
+    from experiments.verbs.watch import watch
 
     watch("-", learning=60.0)
     alarm = next(k for k, line in enumerate(printed) if '"alarm"' in line)

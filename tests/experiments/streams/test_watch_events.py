@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from experiments.command.watch_events import WatchEvents
+from experiments.streams.watch_events import WatchEvents
 from faults.watch.events import SLOW, Alarm, Change
 
 

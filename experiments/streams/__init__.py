@@ -1,0 +1,1 @@
+"""Streams: rows as they come, watched or filtered, and where what is told of them goes."""
