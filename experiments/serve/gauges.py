@@ -4,6 +4,7 @@ import contextlib
 import signal
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ from experiments.command.options import load_rig
 from experiments.command.terminal import unexpected
 from experiments.serve.process import bind_to_server
 from experiments.streams.watch_events import WatchEvents
-from experiments.streams.watching import Asked, watch_network
+from experiments.streams.watching import WatchSettings, watch_network
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ class Gauges(WatchEvents):
     def __init__(self, out: Connection) -> None:
         super().__init__(lambda entries: out.send(("event", plain(entries))))
         self._out = out
-        self._whole = self._gaps = 0
+        self._whole = 0
         self._ends: dict[str, tuple[float, float]] = {}
         self._sent = 0.0
 
@@ -55,7 +56,6 @@ class Gauges(WatchEvents):
         import numpy as np
 
         super().saw(channels, last, gap)
-        self._gaps += gap
         missing = 0
         for name, values in channels.items():
             there = values[np.isfinite(values)]
@@ -85,26 +85,42 @@ class Gauges(WatchEvents):
         told = {
             "time_s": last,
             "rows": self._whole,
-            "gaps": self._gaps,
+            "gaps": self.gaps,
             "values": dict(values),
             "low": {name: low for name, (low, _) in self._ends.items()},
             "high": {name: high for name, (_, high) in self._ends.items()},
-            "scores": dict(zip(self.watch.balances, self.watch.scores, strict=True)),
-            "thresholds": dict(zip(self.watch.balances, self.watch.thresholds, strict=True)),
+            **self.nearness(),
         }
         self._out.send(("gauges", plain(told)))
         self._ends = {}
 
 
-def watch_stream(
-    out: Connection,
-    server: int,
-    address: str,
-    rig: Path | None,
-    columns: tuple[tuple[str, str], ...],
-    false_alarms: float,
-    state: Path,
-) -> None:
+@dataclass(frozen=True)
+class StreamTask:
+    """A stream that is to be watched.
+
+    Parameters
+    ----------
+    address : str
+        As `plant.log.stream_source.stream_lines` takes it.
+    rig : Path or None
+        Rig file.
+    columns : tuple of tuple
+        Pairs of channel and foreign column.
+    false_alarms : float
+        Of healthy, moving operation [1/h].
+    state : Path
+        File in which the watch is kept over a restart.
+    """
+
+    address: str
+    rig: Path | None
+    columns: tuple[tuple[str, str], ...]
+    false_alarms: float
+    state: Path
+
+
+def watch_stream(out: Connection, server: int, task: StreamTask) -> None:
     """Watch a stream until it ends, in a process of its own.
 
     Parameters
@@ -113,22 +129,16 @@ def watch_stream(
         To the server.
     server : int
         Process identity of the server, without which this one ends.
-    address : str
-        As `plant.log.stream_source.stream_lines` takes it.
-    columns : tuple of tuple
-        Pairs of channel and foreign column.
-    false_alarms : float
-        Of healthy, moving operation [1/h].
-    state : Path
-        File in which the watch is kept over a restart.
+    task : StreamTask
+        The stream.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     bind_to_server(server)
     told, outcome, said = Gauges(out), "failed", ""
     with contextlib.suppress(BrokenPipeError):
         try:
-            asked = Asked(load_rig(rig), dict(columns), false_alarms, 120.0, None, False)
-            watch_network(told, address, asked, state)
+            settings = WatchSettings(load_rig(task.rig), dict(task.columns), task.false_alarms)
+            watch_network(told, task.address, settings, task.state)
             outcome = "ok"
         except HydrostateError as error:
             said = str(error)

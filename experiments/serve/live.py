@@ -10,9 +10,10 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from experiments.command.terminal import note
-from experiments.serve.gauges import watch_stream
+from experiments.serve.gauges import StreamTask, watch_stream
 from experiments.serve.settings import Settings
 from experiments.serve.store import Store
+from experiments.streams.watch_events import STATES
 from plant.errors import HydrostateError
 
 KEPT = 2400
@@ -98,16 +99,15 @@ class Stream:
         settings, context = self._settings, multiprocessing.get_context("spawn")
         state = settings.folder / f"stream-{self.name}.npz"
         columns = tuple(settings.columns.items())
+        task = StreamTask(self.address, settings.rig, columns, settings.false_alarms, state)
         ours, theirs = context.Pipe(duplex=False)
         with ours:
-            with theirs:
-                asked = (theirs, os.getpid(), self.address, settings.rig, columns, settings.false_alarms, state)
-                with self._lock:
-                    if self._closed.is_set():
-                        return
-                    process = context.Process(target=watch_stream, args=asked, daemon=True)
-                    process.start()
-                    self._process = process
+            with theirs, self._lock:
+                if self._closed.is_set():
+                    return
+                process = context.Process(target=watch_stream, args=(theirs, os.getpid(), task), daemon=True)
+                process.start()
+                self._process = process
             self._listen(ours)
         self._process.join(AGAIN_AFTER)
         if self._process.is_alive():
@@ -138,7 +138,7 @@ class Stream:
 
     def _tell(self, entries: Mapping[str, Any]) -> None:
         event = entries["event"]
-        told = {"start": "learning", "ready": "watching", "end": "ended"}.get(event)
+        told = STATES.get(event)
         failed = event == "end" and entries.get("outcome") == "failed"
         if not (failed and self._state == "failed" and self._said == entries["message"]):
             try:

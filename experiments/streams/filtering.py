@@ -3,14 +3,12 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from functools import partial
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.command.logs import noted, with_rig_columns
 from experiments.command.terminal import note
-from experiments.streams.streamed import Saving
+from experiments.streams.rows import STANDARD_INPUT, open_rows, warn_if_cut
+from experiments.streams.state_file import require_same_rate, state_kept
 from plant.errors import LogError
 
 if TYPE_CHECKING:
@@ -30,9 +28,6 @@ FEWEST = 200
 
 TOGETHER = 0.1
 """Rows are taken up to so long together [s]; what comes of them does not depend on it."""
-
-SAVED_EVERY = 10.0
-"""Time of a stream between two looks at its state file [s]."""
 
 
 @dataclass
@@ -55,7 +50,7 @@ class Filtering:
     every: float
     like: "Record | None" = None
     state: Path | None = None
-    source: str = "standard input"
+    source: str = STANDARD_INPUT
     last: float | None = field(default=None, init=False)
     filtered: "OnlineFilter | None" = field(default=None, init=False)
     _sums: "tuple[NDArray[np.float64], NDArray[np.float64]] | None" = field(default=None, init=False)
@@ -68,12 +63,9 @@ class Filtering:
         HydrostateError
             If a row cannot be read, or the stream is not one that can be filtered.
         """
-        from estimation.eha.online import save_filter
-
-        stream = self._opened(lines)
-        saved = told = stream.start_time
-        saving = Saving()
-        try:
+        stream = open_rows(lines, *self.columns, self.source)
+        told = stream.start_time
+        with state_kept(self.state, self._save, told) as save_if_due:
             for last, rows, gap in self._pieces(stream):
                 filtered = self._ready(stream, rows, last, gap)
                 channels = dict(zip(stream.channels, rows.T, strict=True))
@@ -82,32 +74,21 @@ class Filtering:
                 if last - told >= self.every - 0.5 * stream.sample_time:
                     told += self.every * round((last - told) // self.every or 1)
                     self._estimate(filtered)
-                if self.state is not None and last - saved > SAVED_EVERY:
-                    saved = last
-                    saving.save(partial(save_filter, self.state, self.asked, filtered, last))
-        finally:
-            if self.state is not None and self.filtered is not None and self.last is not None:
-                save_filter(self.state, self.asked, self.filtered, self.last)
+                save_if_due(last)
         if self.filtered is not None and self.last is not None and self.last > told:
             self._estimate(self.filtered)
-        if stream.cut:
-            note(f"{self.source}: warning: the last row is incomplete and was left out")
+        warn_if_cut(stream, self.source)
 
     def end(self, outcome: str, message: str) -> None:
         """Tell that the stream has ended, and how."""
         taken = 0 if self.filtered is None else self.filtered.taken
         self._line("end", outcome=outcome, samples=taken, message=message or f"{taken} samples filtered")
 
-    def _opened(self, lines: Iterable[str]) -> "CsvStream":
-        from plant.log.csv_stream import CsvStream
+    def _save(self, state: Path) -> None:
+        from estimation.eha.online import save_filter
 
-        rest = iter(lines)
-        header = next((line for line in rest if line.strip()), "")
-
-        def opened(mapping: Mapping[str, str]) -> CsvStream:
-            return CsvStream(chain([header], rest), mapping, source=self.source)
-
-        return noted(self.source, lambda: with_rig_columns(opened, *self.columns))
+        if self.filtered is not None and self.last is not None:
+            save_filter(state, self.asked, self.filtered, self.last)
 
     def _pieces(self, stream: "CsvStream") -> "Iterator[tuple[float, NDArray[np.float64], bool]]":
         """Yield rows; together those that a filter begins with, first and after a gap."""
@@ -156,15 +137,12 @@ class Filtering:
         """Go on from the state file; rows that are missing up to here are missing samples."""
         import numpy as np
 
-        from estimation.eha.online import SAME_RATE, load_filter
+        from estimation.eha.online import load_filter
         from plant.log.csv_stream import LONGEST_GAP
 
         filtered, last = load_filter(state, self.asked)
         T = filtered.problem.sample_time
-        if abs(T / sample_time - 1.0) > SAME_RATE:
-            raise LogError(
-                f"{state} was saved at {1.0 / T:g} Hz, but the stream has {1.0 / sample_time:g} Hz", self.source
-            )
+        require_same_rate(state, T, sample_time, self.source)
         missing = round((start - last) / T) - 1
         if not 0 <= missing * T <= LONGEST_GAP:
             note(f"{self.source}: warning: the stream does not continue at {last:g} s, so the filter restarts")

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from faults.watch.watch import Watch
 
 
+STATES: Mapping[str, str] = {"start": "learning", "ready": "watching", "end": "ended"}
+"""What a watch does from an event on."""
+
+
 class WatchEvents:
     """What is told of a watch, one entry after the other, and what has been so far, for the last one.
 
@@ -28,7 +32,7 @@ class WatchEvents:
         self._say = say
         self.watch: Watch | None = None
         self.began = 0.0
-        self.alarms = self.rows = 0
+        self.alarms = self.rows = self.gaps = 0
         self._came = time.monotonic()
 
     def start(self, source: str, watch: "Watch", rig: str, false_alarms: float) -> None:
@@ -65,7 +69,7 @@ class WatchEvents:
         self._line("alive", time_s, samples=self.rows, silent_s=silent, alarms=self.alarms, message="alive")
 
     def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
-        """Take notice of samples that the watch has taken: they are counted.
+        """Take notice of samples that the watch has taken: they and the gaps before them are counted.
 
         Parameters
         ----------
@@ -76,9 +80,23 @@ class WatchEvents:
         gap : bool
             Whether rows are missing before them.
         """
-        del last, gap
+        del last
+        self.gaps += gap
         self.rows += max((len(values) for values in channels.values()), default=0)
         self._came = time.monotonic()
+
+    def nearness(self) -> dict[str, dict[str, float]]:
+        """Return how near each balance is to an alarm.
+
+        Returns
+        -------
+        dict[str, dict[str, float]]
+            ``scores`` and ``thresholds`` by balance [dimensionless]; empty before the watch begins.
+        """
+        if self.watch is None:
+            return {}
+        numbers = {"scores": self.watch.scores, "thresholds": self.watch.thresholds}
+        return {name: dict(zip(self.watch.balances, values, strict=True)) for name, values in numbers.items()}
 
     def events(self, events: "Sequence[Event]") -> None:
         """Tell what has happened."""

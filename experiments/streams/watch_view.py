@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.terminal import visible
-from experiments.streams.watch_outputs import Watched
+from experiments.streams.watched import Watched
 
 if TYPE_CHECKING:
     from rich.console import Console, Group

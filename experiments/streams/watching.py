@@ -2,15 +2,14 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.command.logs import noted, read_log, with_rig_columns
+from experiments.command.logs import noted, read_log
 from experiments.command.options import PRESSURE
 from experiments.command.terminal import note
-from experiments.streams.streamed import Saving
+from experiments.streams.rows import open_rows, warn_if_cut, warn_of_lost
+from experiments.streams.state_file import require_same_rate, state_kept
 from experiments.streams.watch_events import WatchEvents
 from plant.errors import LogError
 from plant.log.stream_source import Received, stream_lines
@@ -23,15 +22,12 @@ if TYPE_CHECKING:
     from plant.eha.rig import Rig
     from plant.log.record import Record
 
-SAME_RATE = 0.01
-"""By how much the rates of a healthy log and of what is watched may differ [fraction]."""
-
-SAVED_EVERY = 10.0
-"""Time of a stream between two looks at its state file [s]."""
+LEARNING = 120.0
+"""Healthy running before alarms can come, unless told otherwise [s]."""
 
 
 @dataclass(frozen=True)
-class Asked:
+class WatchSettings:
     """How a stream is to be watched.
 
     Parameters
@@ -46,12 +42,12 @@ class Asked:
         A healthy log to learn first.
     """
 
-    bench: "Rig"
+    rig: "Rig"
     columns: Mapping[str, str]
     false_alarms: float
-    learning: float
-    healthy: Path | None
-    no_pressure: bool
+    learning: float = LEARNING
+    healthy: Path | None = None
+    no_pressure: bool = False
 
     def watch(self, sample_time: float, pressure: bool, start: float) -> "Watch":
         """Return the watch, with the healthy log learnt.
@@ -72,9 +68,10 @@ class Asked:
         """
         from faults.watch.events import Alarm
         from faults.watch.watch import Watch
+        from plant.log.csv_stream import SAME_RATE
 
         way: Any = {"false_alarms": self.false_alarms, "learning": self.learning, "start": start}
-        made = Watch(self.bench.parameters, sample_time, pressure=pressure and not self.no_pressure, **way)
+        made = Watch(self.rig.parameters, sample_time, pressure=pressure and not self.no_pressure, **way)
         if self.healthy is not None:
             record = _read(self.healthy, self)
             if abs(record.sample_time / sample_time - 1.0) > SAME_RATE:
@@ -93,7 +90,7 @@ class Asked:
         return made
 
 
-def watch_file(told: WatchEvents, path: Path, asked: Asked) -> None:
+def watch_file(told: WatchEvents, path: Path, settings: WatchSettings) -> None:
     """Watch a log as if its rows came now.
 
     Raises
@@ -101,14 +98,14 @@ def watch_file(told: WatchEvents, path: Path, asked: Asked) -> None:
     LogError
         If it cannot be read or watched.
     """
-    record = _read(path, asked)
+    record = _read(path, settings)
     samples, pressure = _samples(record.channels, record.sample_time, str(path))
-    watch = asked.watch(record.sample_time, pressure, record.start_time)
-    told.start(str(path), watch, asked.bench.name, asked.false_alarms)
+    watch = settings.watch(record.sample_time, pressure, record.start_time)
+    told.start(str(path), watch, settings.rig.name, settings.false_alarms)
     told.events(watch.take(samples))
 
 
-def watch_network(told: WatchEvents, address: str, asked: Asked, state: Path | None) -> None:
+def watch_network(told: WatchEvents, address: str, settings: WatchSettings, state: Path | None) -> None:
     """Watch a stream of the network until it ends.
 
     Parameters
@@ -125,23 +122,14 @@ def watch_network(told: WatchEvents, address: str, asked: Asked, state: Path | N
     """
     received = Received()
     try:
-        watch_rows(told, stream_lines(address, received), asked, address, state)
+        watch_rows(told, stream_lines(address, received), settings, address, state)
     finally:
-        told_of(address, received)
+        warn_of_lost(address, received)
 
 
-def told_of(address: str, received: Received) -> None:
-    """Say on standard error what became of the batches of a stream, where one is missing."""
-    for count, said in (
-        (received.lost, "never came"),
-        (received.late, "came late or twice"),
-        (received.dropped, "found no room to wait"),
-    ):
-        if count:
-            note(f"{address}: warning: {count} {received.what} {said} beside {received.batches} that were read")
-
-
-def watch_rows(told: WatchEvents, lines: Iterable[str], asked: Asked, source: str, state: Path | None) -> None:
+def watch_rows(
+    told: WatchEvents, lines: Iterable[str], settings: WatchSettings, source: str, state: Path | None
+) -> None:
     """Watch header and rows as they come.
 
     Parameters
@@ -159,21 +147,17 @@ def watch_rows(told: WatchEvents, lines: Iterable[str], asked: Asked, source: st
     import numpy as np
 
     from faults.watch.saved import save_watch
-    from plant.log.csv_stream import CsvStream
 
-    rest = iter(lines)
-    header = next((line for line in rest if line.strip()), "")
-
-    def opened(mapping: Mapping[str, str]) -> CsvStream:
-        return CsvStream(chain([header], rest), mapping, source=source)
-
-    stream = noted(source, lambda: with_rig_columns(opened, asked.bench.columns, asked.columns))
+    stream = open_rows(lines, settings.rig.columns, settings.columns, source)
     _, pressure = _samples(dict.fromkeys(stream.channels, np.empty(0)), stream.sample_time, source)
-    watch, travelled = _begun(asked, stream.sample_time, pressure, stream.start_time, source, state)
+    watch, travelled = _begun(settings, stream.sample_time, pressure, stream.start_time, source, state)
     T = watch.sample_time
-    told.start(source, watch, asked.bench.name, asked.false_alarms)
-    kept, saving = watch.last, Saving()
-    try:
+    told.start(source, watch, settings.rig.name, settings.false_alarms)
+
+    def save(path: Path) -> None:
+        save_watch(watch, path, travelled)
+
+    with state_kept(state, save, watch.last) as save_if_due:
         for last, rows, gap in stream.samples(watch.block):
             channels = dict(zip(stream.channels, rows.T, strict=True))
             samples, _ = _samples(channels, T, source, travelled)
@@ -185,33 +169,24 @@ def watch_rows(told: WatchEvents, lines: Iterable[str], asked: Asked, source: st
             watch.clock_reads(last - (len(rows) - 1) * T)
             told.events(watch.take(samples))
             told.saw(channels, last, gap)
-            if state is not None and watch.last - kept > SAVED_EVERY:
-                kept = watch.last
-                saving.save(partial(save_watch, watch, state, travelled))
-    finally:
-        if state is not None:
-            save_watch(watch, state, travelled)
-    if stream.cut:
-        note(f"{source}: warning: the last row is incomplete and was left out")
+            save_if_due(watch.last)
+    warn_if_cut(stream, source)
 
 
 def _begun(
-    asked: Asked, sample_time: float, pressure: bool, start: float, source: str, state: Path | None
+    settings: WatchSettings, sample_time: float, pressure: bool, start: float, source: str, state: Path | None
 ) -> "tuple[Watch, float]":
     """Return a watch, continued where there is a state of one, and how far the piston had come [m]."""
     if state is None or not state.exists():
-        return asked.watch(sample_time, pressure, start), 0.0
+        return settings.watch(sample_time, pressure, start), 0.0
     import numpy as np
 
     from faults.watch.saved import load_state
     from plant.log.csv_stream import LONGEST_GAP
 
     remembered, kept_time, travelled = load_state(state)
-    if abs(kept_time / sample_time - 1.0) > SAME_RATE:
-        raise LogError(
-            f"{state} was saved at {1.0 / kept_time:g} Hz, but the stream has {1.0 / sample_time:g} Hz", source
-        )
-    watch = replace(asked, healthy=None).watch(kept_time, pressure, start)
+    require_same_rate(state, kept_time, sample_time, source)
+    watch = replace(settings, healthy=None).watch(kept_time, pressure, start)
     watch.resume(remembered)
     missing = round((start - watch.last) / kept_time)
     if 0 <= missing * kept_time <= LONGEST_GAP:
@@ -233,5 +208,5 @@ def _samples(
         raise LogError(error.message, source) from error
 
 
-def _read(path: Path, asked: Asked) -> "Record":
-    return noted(str(path), lambda: read_log(path, asked.bench.columns, asked.columns))
+def _read(path: Path, settings: WatchSettings) -> "Record":
+    return noted(str(path), lambda: read_log(path, settings.rig.columns, settings.columns))

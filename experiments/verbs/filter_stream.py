@@ -21,16 +21,10 @@ from experiments.command.options import (
     require_positive,
 )
 from experiments.command.own_paths import require_place
+from experiments.streams.broker import published
+from experiments.streams.endings import end_told, say_line, stop_at_sigterm
 from experiments.streams.filtering import Filtering
-from experiments.streams.streamed import (
-    STANDARD_INPUT,
-    end_told,
-    say_line,
-    stop_at_sigterm,
-    stream_input,
-)
-from experiments.streams.watch_outputs import published
-from experiments.streams.watching import told_of
+from experiments.streams.rows import STANDARD_INPUT, stream_input, warn_of_lost
 from plant.errors import HydrostateError
 from plant.log.stream_source import Received, bounded_lines, is_stream, stream_lines
 
@@ -110,7 +104,7 @@ def filter_stream(
             try:
                 told.follow(_lines(stream, received))
             finally:
-                told_of(stream, received)
+                warn_of_lost(stream, received)
 
 
 def _lines(stream: str, received: Received) -> Iterator[str]:

@@ -18,17 +18,14 @@ from experiments.command.options import (
     require_positive,
 )
 from experiments.command.own_paths import require_place
+from experiments.streams.broker import published
+from experiments.streams.endings import end_told, say_line, stop_at_sigterm
 from experiments.streams.heartbeat import beating
-from experiments.streams.streamed import (
-    STANDARD_INPUT,
-    end_told,
-    say_line,
-    stop_at_sigterm,
-    stream_input,
-)
-from experiments.streams.watch_outputs import Watched, metrics_offered, published
+from experiments.streams.metrics_endpoint import metrics_offered
+from experiments.streams.rows import STANDARD_INPUT, stream_input
 from experiments.streams.watch_view import lines_wanted, viewed
-from experiments.streams.watching import Asked, watch_file, watch_network, watch_rows
+from experiments.streams.watched import Watched
+from experiments.streams.watching import LEARNING, WatchSettings, watch_file, watch_network, watch_rows
 from plant.log.stream_source import is_stream
 
 commands = typer.Typer()
@@ -49,7 +46,7 @@ def watch(
     ] = 1.0,
     learning: Annotated[
         float, option("S", "Time of healthy running to learn from before the first alarm [s]; at least 60.")
-    ] = 120.0,
+    ] = LEARNING,
     healthy: Annotated[
         Path | None,
         option("FILE", "A healthy log to learn from first; one hour of log keeps false alarms closest to RATE."),
@@ -91,14 +88,14 @@ def watch(
 
     with ExitStack() as outputs, end_told(told):  # they hear of the end before they are closed
         _opened(told, outputs, publish, metrics, view)
-        asked = Asked(load_rig(rig), load_columns(columns), false_alarms, learning, healthy, no_pressure)
+        settings = WatchSettings(load_rig(rig), load_columns(columns), false_alarms, learning, healthy, no_pressure)
         with beating(told, heartbeat):
             if log == "-":
-                watch_rows(told, stream_input(sys.stdin), asked, STANDARD_INPUT, state)
+                watch_rows(told, stream_input(sys.stdin), settings, STANDARD_INPUT, state)
             elif is_stream(log):
-                watch_network(told, log, asked, state)
+                watch_network(told, log, settings, state)
             else:
-                watch_file(told, Path(log), asked)
+                watch_file(told, Path(log), settings)
 
 
 def _opened(told: Watched, outputs: ExitStack, publish: str | None, metrics: str | None, view: bool) -> None:

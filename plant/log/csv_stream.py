@@ -21,6 +21,9 @@ FIRST_ROWS = 50
 LONGEST_GAP = 1.0
 """Missing rows are filled with missing samples up to here [s]; after a longer gap the stream begins again."""
 
+SAME_RATE = 0.01
+"""By how much the rates of a stream, and of what it is continued or compared with, may differ [fraction]."""
+
 BEHIND = 1e-6
 """Least step in time, as a share of the time between samples, that counts as forward [fraction]."""
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.serve import gauges
-from experiments.serve.gauges import EVERY, Gauges, watch_stream
+from experiments.serve.gauges import EVERY, Gauges, StreamTask, watch_stream
 
 HEADER = "time_s,motor_speed_rad_s,velocity_m_s\n"
 
@@ -92,7 +92,7 @@ def bound(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def run(pipe: Pipe, state: Path, server: int = 41) -> None:
-    watch_stream(pipe, server, "tcp://nowhere:1", None, (), 0.1, state)  # type: ignore[arg-type]
+    watch_stream(pipe, server, StreamTask("tcp://nowhere:1", None, (), 0.1, state))  # type: ignore[arg-type]
 
 
 def rows(*_: object) -> list[str]:

@@ -149,7 +149,7 @@ def test_a_stream_that_ended_is_watched_anew_and_a_process_that_hangs_is_killed(
 
         def __init__(self, target: Any, args: tuple[Any, ...], daemon: bool) -> None:
             assert daemon
-            assert args[2] == stream.address
+            assert args[2].address == stream.address
             self._out, self.alive = args[0], True
             del target
 
@@ -210,7 +210,7 @@ def test_a_server_that_closes_ends_the_process_of_every_stream_and_begins_none_a
 
         def __init__(self, target: Any, args: tuple[Any, ...], daemon: bool) -> None:
             del target, daemon
-            self._out, self._name, self._ended = args[0], args[2], threading.Event()
+            self._out, self._name, self._ended = args[0], args[2].address, threading.Event()
 
         def start(self) -> None:
             self._kept = self._out  # which this process alone holds open

@@ -114,7 +114,7 @@ def test_a_stream_s_process_says_how_it_ended(
     monkeypatch.setattr(gauges, "watch_network", watched)
     monkeypatch.setattr(gauges, "bind_to_server", lambda _: None)
     monkeypatch.setattr(gauges.signal, "signal", lambda *_: None)
-    gauges.watch_stream(out, 1, "tcp://nowhere:1", None, (), 0.1, tmp_path / "state.npz")
+    gauges.watch_stream(out, 1, gauges.StreamTask("tcp://nowhere:1", None, (), 0.1, tmp_path / "state.npz"))
     *_, (kind, last), closed = sent
     assert (kind, last["event"], closed) == ("event", "end", "closed")
     assert last["outcome"] == ("ok" if error is None else "failed")

@@ -9,7 +9,8 @@ import pytest
 from estimation.eha import online
 from estimation.eha.online import Asked
 from estimation.trust.consistency import LARGEST_NIS, MISMATCH_NIS
-from experiments.streams.filtering import FEWEST, SAVED_EVERY, Filtering
+from experiments.streams.filtering import FEWEST, Filtering
+from experiments.streams.state_file import SAVED_EVERY
 from plant.eha.drives import sine
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from experiments.streams import watching
+from experiments.streams.rows import warn_of_lost
+from experiments.streams.state_file import SAVED_EVERY
 from experiments.streams.watch_events import WatchEvents
-from experiments.streams.watching import SAVED_EVERY, Asked, told_of, watch_rows
+from experiments.streams.watching import WatchSettings, watch_rows
 from faults.watch.saved import load_state
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
@@ -35,9 +37,9 @@ def rows(start: float, seconds: float, share: float = 1.0, seed: int = 0, T: flo
     return [f"{t:.3f},{n:.6f},{v:.8f}\n" for t, n, v in told]
 
 
-def asked(**changes: Any) -> Asked:
+def asked(**changes: Any) -> WatchSettings:
     given: dict[str, Any] = {"false_alarms": 1.0, "learning": LEARNT, "healthy": None, "no_pressure": False}
-    return Asked(Rig(), {}, **{**given, **changes})
+    return WatchSettings(Rig(), {}, **{**given, **changes})
 
 
 def watched(
@@ -211,13 +213,13 @@ def test_a_healthy_log_without_the_pressure_of_the_stream_is_refused(tmp_path: P
 
 
 def test_batches_that_are_missing_are_counted_by_their_fate(capsys: pytest.CaptureFixture[str]) -> None:
-    told_of("mqtt://bench/press", Received(batches=7, late=1, lost=2, dropped=3))
+    warn_of_lost("mqtt://bench/press", Received(batches=7, late=1, lost=2, dropped=3))
     assert capsys.readouterr().err.splitlines() == [
         "mqtt://bench/press: warning: 2 batches never came beside 7 that were read",
         "mqtt://bench/press: warning: 1 batches came late or twice beside 7 that were read",
         "mqtt://bench/press: warning: 3 batches found no room to wait beside 7 that were read",
     ]
-    told_of("mqtt://bench/press", Received(batches=7))
+    warn_of_lost("mqtt://bench/press", Received(batches=7))
     assert capsys.readouterr().err == ""
 
 
@@ -240,7 +242,7 @@ def test_a_column_of_the_rig_that_the_stream_has_not_is_said_once_and_one_that_w
 ) -> None:
     bench = Rig(columns={"differential_pressure_pa": "DP:bar"})
     watch_rows(
-        WatchEvents(lambda _: None), [HEADER + "\n", *rows(0.0, 5.0)], replace(asked(), bench=bench), "bench", None
+        WatchEvents(lambda _: None), [HEADER + "\n", *rows(0.0, 5.0)], replace(asked(), rig=bench), "bench", None
     )
     (said,) = capsys.readouterr().err.splitlines()
     assert said.startswith("bench: warning: ")

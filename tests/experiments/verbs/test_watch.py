@@ -124,7 +124,7 @@ def test_a_stream_on_standard_input_is_read_as_it_comes(log: Path, monkeypatch: 
             return super().readline(size)
 
     printed: list[str] = []
-    monkeypatch.setattr("experiments.streams.streamed.emit", lambda line: printed.append(line))
+    monkeypatch.setattr("experiments.streams.endings.emit", lambda line: printed.append(line))
     monkeypatch.setattr("sys.stdin", Growing(log.read_text()))
     from experiments.verbs.watch import watch
 

@@ -1,21 +1,16 @@
-"""What the commands on streams share: lines in, lines out, and a last line that says how the stream ended."""
+"""What the commands on streams print: a JSON object a line, the last of which says how the stream ended."""
 
-import io
 import json
 import signal
 import threading
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
-from typing import Any, Protocol, TextIO
+from typing import Any, Protocol
 
 import typer
 
 from experiments.command.terminal import SOME_FAILED, emit, note, unexpected
 from plant.errors import HydrostateError
-from plant.log.stream_source import bounded_lines
-
-STANDARD_INPUT = "standard input"
-"""What standard input is called in events and errors."""
 
 
 class EventSource(Protocol):
@@ -58,30 +53,6 @@ def end_told(told: EventSource) -> Generator[None]:
     told.end("ok", "")
 
 
-class Saving:
-    """Saves what was learnt while a stream runs; where that fails the stream goes on, and it is said once."""
-
-    def __init__(self) -> None:
-        self._failed = False
-
-    def save(self, write: Callable[[], None]) -> None:
-        """Save now, or say why that is not possible.
-
-        Parameters
-        ----------
-        write : callable
-            Writes the state file, whole or not at all.
-        """
-        try:
-            write()
-        except HydrostateError as error:
-            if not self._failed:
-                note(f"warning: {error}; the stream goes on without")
-            self._failed = True
-        else:
-            self._failed = False
-
-
 def stop_at_sigterm() -> None:
     """Let a signal to end a process interrupt it, so that its last line is written."""
     if threading.current_thread() is threading.main_thread():
@@ -91,16 +62,3 @@ def stop_at_sigterm() -> None:
 def say_line(entries: Mapping[str, Any]) -> None:
     """Print entries as a line of JSON."""
     emit(json.dumps(entries, allow_nan=False))
-
-
-def stream_input(file: TextIO) -> Iterator[str]:
-    """Yield the lines of standard input; bytes that are no text are refused later as no numbers.
-
-    Raises
-    ------
-    LogError
-        If a line does not end.
-    """
-    if isinstance(file, io.TextIOWrapper):
-        file.reconfigure(errors="replace")
-    return bounded_lines(file, STANDARD_INPUT)

@@ -16,8 +16,9 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from experiments.cli import app
-from experiments.streams.watch_outputs import Watched, endpoint, metrics_offered
+from experiments.streams.metrics_endpoint import endpoint, metrics_offered
 from experiments.streams.watch_view import drawn, viewed
+from experiments.streams.watched import Watched
 from plant.errors import HydrostateError
 
 LINE = re.compile(r'[a-z_]+(\{([a-z]+="([^"\\\n]|\\[\\"n])*",?)+\})? [0-9.e+-]+|# (HELP|TYPE) [a-z_]+ .+')

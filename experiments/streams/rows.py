@@ -1,0 +1,76 @@
+"""Rows of a stream: its lines opened by their header, and what is missing of them said on standard error."""
+
+import io
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain
+from typing import TYPE_CHECKING, TextIO
+
+from experiments.command.logs import noted, with_rig_columns
+from experiments.command.terminal import note
+from plant.log.stream_source import Received, bounded_lines
+
+if TYPE_CHECKING:
+    from plant.log.csv_stream import CsvStream
+
+STANDARD_INPUT = "standard input"
+"""What standard input is called in events and errors."""
+
+
+def stream_input(file: TextIO) -> Iterator[str]:
+    """Yield the lines of standard input; bytes that are no text are refused later as no numbers.
+
+    Raises
+    ------
+    LogError
+        If a line does not end.
+    """
+    if isinstance(file, io.TextIOWrapper):
+        file.reconfigure(errors="replace")
+    return bounded_lines(file, STANDARD_INPUT)
+
+
+def open_rows(
+    lines: Iterable[str], rig_columns: Mapping[str, str], columns: Mapping[str, str], source: str
+) -> "CsvStream":
+    """Return the rows below a header.
+
+    Parameters
+    ----------
+    lines : iterable of str
+        Header and rows.
+    rig_columns, columns : Mapping[str, str]
+        Foreign column by channel, from the rig file and from the command line.
+    source : str
+        What the stream is called in errors and warnings.
+
+    Raises
+    ------
+    LogError
+        If they are not the rows of a log.
+    """
+    from plant.log.csv_stream import CsvStream
+
+    rest = iter(lines)
+    header = next((line for line in rest if line.strip()), "")
+
+    def opened(mapping: Mapping[str, str]) -> CsvStream:
+        return CsvStream(chain([header], rest), mapping, source=source)
+
+    return noted(source, lambda: with_rig_columns(opened, rig_columns, columns))
+
+
+def warn_if_cut(stream: "CsvStream", source: str) -> None:
+    """Say that the last row was left out, where it was not whole."""
+    if stream.cut:
+        note(f"{source}: warning: the last row is incomplete and was left out")
+
+
+def warn_of_lost(address: str, received: Received) -> None:
+    """Say what became of the batches of a network stream, where one is missing."""
+    for count, fate in (
+        (received.lost, "never came"),
+        (received.late, "came late or twice"),
+        (received.dropped, "found no room to wait"),
+    ):
+        if count:
+            note(f"{address}: warning: {count} {received.what} {fate} beside {received.batches} that were read")

@@ -1,0 +1,82 @@
+"""The file in which a stream keeps what it has learnt, so that it continues after a restart."""
+
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+from experiments.command.terminal import note
+from plant.errors import HydrostateError, LogError
+
+SAVED_EVERY = 10.0
+"""Time of a stream between two looks at its state file [s]."""
+
+
+@contextmanager
+def state_kept(path: Path | None, write: Callable[[Path], None], start: float) -> Generator[Callable[[float], None]]:
+    """Save what a stream has learnt now and then in this block, and at its end.
+
+    While the stream runs, a file that cannot be written is said once and the stream goes on.
+
+    Parameters
+    ----------
+    path : Path or None
+        The state file; None keeps nothing.
+    write : callable
+        Writes the file, whole or not at all.
+    start : float
+        Time of the stream at which the block begins [s].
+
+    Yields
+    ------
+    callable
+        To be called with the time of the stream [s] after every piece.
+
+    Raises
+    ------
+    HydrostateError
+        If the file cannot be written at the end.
+    """
+    if path is None:
+        yield lambda _: None
+        return
+    saved, failed = start, False
+
+    def save_if_due(now: float) -> None:
+        nonlocal saved, failed
+        if now - saved <= SAVED_EVERY:
+            return
+        saved = now
+        try:
+            write(path)
+        except HydrostateError as error:
+            if not failed:
+                note(f"warning: {error}; the stream goes on without")
+            failed = True
+        else:
+            failed = False
+
+    try:
+        yield save_if_due
+    finally:
+        write(path)
+
+
+def require_same_rate(path: Path, kept: float, sample_time: float, source: str) -> None:
+    """Refuse a state file of another sample rate than the stream's.
+
+    Parameters
+    ----------
+    kept, sample_time : float
+        Time between samples of the state file and of the stream [s].
+    source : str
+        What the stream is called in errors.
+
+    Raises
+    ------
+    LogError
+        If they differ.
+    """
+    from plant.log.csv_stream import SAME_RATE
+
+    if abs(kept / sample_time - 1.0) > SAME_RATE:
+        raise LogError(f"{path} was saved at {1.0 / kept:g} Hz, but the stream has {1.0 / sample_time:g} Hz", source)

@@ -1,0 +1,88 @@
+"""A watch with all its outputs: each event goes to every one, and how it stands is known meanwhile."""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from experiments.command.json_output import plain
+from experiments.streams.watch_events import STATES, WatchEvents
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+SHOWN_EVENTS = 200
+"""Events that are remembered for a view [count]."""
+
+Sink = Callable[[Mapping[str, Any]], None]
+
+
+class Watched(WatchEvents):
+    """What a watch tells, sent to every output, and how it stands meanwhile.
+
+    Parameters
+    ----------
+    source : str
+        Where the rows come from.
+    """
+
+    def __init__(self, source: str) -> None:
+        self._lock = threading.Lock()
+        self._sinks: list[Sink] = []
+        self.source, self.doing = source, "connecting"
+        self.last_events: deque[Mapping[str, Any]] = deque(maxlen=SHOWN_EVENTS)
+        self._seen: tuple[float, float, dict[str, float]] | None = None
+        super().__init__(self._send)
+
+    def to(self, sink: Sink) -> None:
+        """Send every event from here on to one more output, before those that were there.
+
+        Parameters
+        ----------
+        sink : callable
+            Takes the entries of an event.
+        """
+        with self._lock:
+            self._sinks.insert(0, sink)
+
+    def _send(self, entries: dict[str, Any]) -> None:
+        told = plain(entries)
+        with self._lock:  # a line is whole before the next begins
+            self.doing = STATES.get(told["event"], self.doing)
+            if told["event"] == "end" and told["outcome"] != "ok":
+                self.doing = told["outcome"]
+            self.last_events.append(told)
+            for sink in self._sinks:
+                sink(told)
+
+    def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
+        """Take notice of samples: they are counted, and the last of each channel is kept.
+
+        Parameters
+        ----------
+        channels : Mapping[str, ndarray], shape (n,) each
+            Samples by channel [SI].
+        last : float
+            Time of the last one [s].
+        gap : bool
+            Whether rows are missing before them.
+        """
+        super().saw(channels, last, gap)
+        self._seen = last, time.time(), {name: float(values[-1]) for name, values in channels.items() if len(values)}
+
+    def state(self) -> dict[str, Any]:
+        """Return how it stands: ``name``, ``state``, ``gauges``, as `experiments.serve.live.Stream.state` does."""
+        if self.watch is None or self._seen is None:
+            return {"name": self.source, "state": self.doing, "gauges": None}
+        last, received, values = self._seen
+        gauges = {
+            "time_s": last,
+            "received": received,
+            "rows": self.rows,
+            "gaps": self.gaps,
+            "values": values,
+            **self.nearness(),
+        }
+        return {"name": self.source, "state": self.doing, "gauges": plain(gauges)}
