@@ -9,7 +9,8 @@ from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish, run_logs
 from experiments.command.options import require_positive
 from experiments.command.own_paths import own_paths
-from experiments.command.terminal import clauses, table
+from experiments.command.terminal import table
+from experiments.identification.entries import column_entries
 from experiments.identification.simulate_model import quality_of, record_of, warn_of_range, write_simulated
 from plant.errors import HydrostateError, require_known
 
@@ -18,14 +19,12 @@ if TYPE_CHECKING:
 
     from estimation.identification.free_run.data import Channels
     from estimation.identification.free_run.identify import Identified
-    from estimation.identification.free_run.model import FreeRunModel
-    from estimation.identification.state_space.dynamics import StateSpaceDynamics
     from plant.log.record import Record
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What the command line asks of any columns.
+class ColumnFit:
+    """What a fit between any columns is asked for.
 
     Parameters
     ----------
@@ -71,7 +70,7 @@ def names(given: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(part.strip() for text in given or () for part in text.split(",") if part.strip())
 
 
-def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path | None) -> NoReturn:
+def identify_columns(logs: Sequence[Path], fit: ColumnFit, *, as_json: bool, out: Path | None) -> NoReturn:
     """Identify one model an output from all logs together, print what it is worth, and leave with the exit code.
 
     Raises
@@ -82,13 +81,13 @@ def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path
     from estimation.identification.free_run.identify import FREE_STRUCTURES
     from estimation.identification.state_space.identify import STATE_SPACE
 
-    if not asked.inputs or not asked.outputs:
+    if not fit.inputs or not fit.outputs:
         raise HydrostateError("--input and --output go together and need at least one column each")
-    if twice := set(asked.inputs) & set(asked.outputs):
+    if twice := set(fit.inputs) & set(fit.outputs):
         raise HydrostateError(f"--input and --output must be different channels, got {min(twice)!r} for both")
-    require_known("--structure", asked.structure, (*FREE_STRUCTURES, STATE_SPACE))
-    require_positive("--sample-time", asked.sample_time, "s")
-    require_positive("--resample", asked.resampled, "s")
+    require_known("--structure", fit.structure, (*FREE_STRUCTURES, STATE_SPACE))
+    require_positive("--sample-time", fit.sample_time, "s")
+    require_positive("--resample", fit.resampled, "s")
     prepare_output(out)
     read: list[list[Record]] = []
     shared: dict[str, Identified] = {}
@@ -96,57 +95,57 @@ def identify_any(logs: Sequence[Path], asked: Asked, *, as_json: bool, out: Path
     def work(name: Path) -> Result:
         output = columns[name]
         if not read:
-            wanted, references = (*asked.inputs, *asked.outputs), asked.references
-            read.append([record_of(log, (*wanted, *references), asked.sample_time) for log in logs])
-            read.append([record_of(log, wanted, asked.sample_time) for log in asked.validate])
-        together = asked.structure == STATE_SPACE or (asked.structure == "auto" and len(asked.outputs) > 1)
+            wanted, references = (*fit.inputs, *fit.outputs), fit.references
+            read.append([record_of(log, (*wanted, *references), fit.sample_time) for log in logs])
+            read.append([record_of(log, wanted, fit.sample_time) for log in fit.validate])
+        together = fit.structure == STATE_SPACE or (fit.structure == "auto" and len(fit.outputs) > 1)
         if together and not shared:
-            shared.update(_together(read[0], asked, asked.outputs))
-        found = shared.get(output) or _together(read[0], asked, (output,))[output]
-        return _answer(found, read, output, asked, logs)
+            shared.update(_together(read[0], fit, fit.outputs))
+        found = shared.get(output) or _together(read[0], fit, (output,))[output]
+        return _answer(found, read, output, fit, logs)
 
-    columns = {Path(output): output for output in asked.outputs}  # a path drops parts of some names, such as "x/."
+    columns = {Path(output): output for output in fit.outputs}  # a path drops parts of some names, such as "x/."
     batch = run_logs(list(columns), work, BLANK, "identifying")
     named = ", ".join(str(log) for log in logs)
     results = tuple({**result, "file": named} for result in batch.results)
     finish(Batch(results, batch.total), _screen, as_json=as_json, out=out)
 
 
-def _together(records: "Sequence[Record]", asked: Asked, outputs: Sequence[str]) -> "dict[str, Identified]":
+def _together(records: "Sequence[Record]", fit: ColumnFit, outputs: Sequence[str]) -> "dict[str, Identified]":
     """Return what is identified of some outputs, by their names."""
-    from estimation.identification.two_stage import identify_columns
+    from estimation.identification.two_stage import identify_columns as fit_columns
 
-    form = {"order": asked.order, "delay": asked.delay, "n_numerator": asked.numerator, "structure": asked.structure}
-    clock, references = asked.resampled, asked.references
-    found, _ = identify_columns(records, asked.inputs, outputs, references=references, sample_time=clock, options=form)
+    form = {"order": fit.order, "delay": fit.delay, "n_numerator": fit.numerator, "structure": fit.structure}
+    clock, references = fit.resampled, fit.references
+    found, _ = fit_columns(records, fit.inputs, outputs, references=references, sample_time=clock, options=form)
     return dict(zip(outputs, found, strict=True))
 
 
 def _answer(
-    found: "Identified", read: "Sequence[Sequence[Record]]", output: str, asked: Asked, logs: Sequence[Path]
+    found: "Identified", read: "Sequence[Sequence[Record]]", output: str, fit: ColumnFit, logs: Sequence[Path]
 ) -> Result:
     from estimation.identification.free_run.from_records import channels_of
 
     records, tests = read
     test = None
     if tests:
-        held = channels_of(tests, asked.inputs, output, found.model.sample_time, split=True)
+        held = channels_of(tests, fit.inputs, output, found.model.sample_time, split=True)
         warn_of_range(found.model, held)
-        test = {"files": [str(one) for one in asked.validate], **quality_of(found.model, held)}
-    if not (asked.figure or asked.simulated or asked.response):
-        return {**BLANK, **entries(found), "test": test, "frequency_response": None}
-    data = channels_of(records, asked.inputs, output, asked.resampled)
-    figure = own_paths(asked.figure, asked.outputs).get(output)
+        test = {"files": [str(one) for one in fit.validate], **quality_of(found.model, held)}
+    if not (fit.figure or fit.simulated or fit.response):
+        return {**BLANK, **column_entries(found), "test": test, "frequency_response": None}
+    data = channels_of(records, fit.inputs, output, fit.resampled)
+    figure = own_paths(fit.figure, fit.outputs).get(output)
     if figure is not None:
         from experiments.log_pages.free_run_figure import write_free_run
 
         write_free_run(found.model, data, logs[0].name, figure)
-    simulated = own_paths(asked.simulated, asked.outputs).get(output)
+    simulated = own_paths(fit.simulated, fit.outputs).get(output)
     if simulated is not None:
         write_simulated(found.model, data, simulated)
-    response = own_paths(asked.response, asked.outputs).get(output)
+    response = own_paths(fit.response, fit.outputs).get(output)
     answer = None if response is None else _response(data, logs[0].name, response)
-    return {**BLANK, **entries(found), "test": test, "frequency_response": answer}
+    return {**BLANK, **column_entries(found), "test": test, "frequency_response": answer}
 
 
 def _response(data: "Channels", log: str, path: Path) -> dict[str, Any]:
@@ -160,70 +159,6 @@ def _response(data: "Channels", log: str, path: Path) -> dict[str, Any]:
     found = measured_response(data.u[0][:, 0], data.y[0], data.sample_time)
     write_response(found, f"{log}, {sources} to {data.output}", path)
     return found.to_dict()
-
-
-def entries(found: "Identified") -> dict[str, Any]:
-    """Return what was identified by the names of the JSON contract."""
-    from estimation.identification.free_run.identify import WARNED
-    from estimation.identification.state_space.dynamics import StateSpaceDynamics
-
-    model, linear = found.model, found.model.linear
-    result: dict[str, Any] = {
-        "outcome": "ok" if found.sound else "mismatch",
-        "inputs": list(model.inputs),
-        "input": model.inputs[0],
-        "output": model.output,
-        "structure": model.structure,
-        "n_values": model.n_values,
-        "sample_time_s": model.sample_time,
-        **vars(found.quality),
-        "held_back_percent": found.held_back_percent,
-        "candidates": list(found.candidates),
-        "model": model.to_dict(),
-        "notes": [note.to_dict() for note in found.notes if note.code not in WARNED],
-    }
-    if linear is not None:
-        from experiments.verbs.identify import linear_entries
-
-        result = {**linear_entries(linear), **result, "order": linear.denominator.size - 1, "offset": model.offset}
-        result["dc_gain"] = {"value": linear.dc_gain, "std": linear.dc_gain_std}
-    elif model.structure == "output-error":
-        transfer = model.transfer_functions()
-        result |= {"numerator": [b.tolist() for b, _ in transfer], "denominator": transfer[0][1].tolist()}
-        gains = [float(b.sum() / f.sum()) for b, f in transfer]
-        result |= {"order": transfer[0][1].size - 1, "offset": model.offset, "dc_gain": {"value": gains}}
-    elif isinstance(model.dynamics, StateSpaceDynamics):
-        result |= _state_space_entries(model, model.dynamics)
-    result["nonlinearity"] = model.nonlinearity
-    quality = found.quality
-    result["message"] = clauses(
-        [
-            f"{model.structure} with {model.n_values} values: fit {quality.fit_percent:.1f} % running free, "
-            f"{found.held_back_percent:.1f} % on blocks held back, rms error {quality.rmse:.4g}",
-            *map(str, found.notes[:1] if not found.sound else ()),
-        ]
-    )
-    return result
-
-
-def _state_space_entries(model: "FreeRunModel", dynamics: "StateSpaceDynamics") -> dict[str, Any]:
-    """Return order, poles, steady gains and dead time of one output of a state space."""
-    from experiments.verbs.identify import with_std
-
-    system, gain = dynamics.system, model.scaling.y_std / model.scaling.u_std
-    return {
-        "order": system.order,
-        "poles": with_std(system.poles, system.pole_std),
-        "dc_gain": {
-            "value": (system.dc_gain[dynamics.place] * gain).tolist(),
-            "std": (system.dc_gain_std[dynamics.place] * gain).tolist(),
-        },
-        "offset": model.offset,
-        "delay": {
-            "samples": list(system.delays),
-            "seconds": [delay * model.sample_time for delay in system.delays],
-        },
-    }
 
 
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":

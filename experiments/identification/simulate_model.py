@@ -17,11 +17,13 @@ if TYPE_CHECKING:
 
     from estimation.identification.free_run.data import Channels
     from estimation.identification.free_run.model import FreeRunModel
-    from experiments.identification.of_columns import Asked
+    from experiments.identification.of_columns import ColumnFit
     from plant.log.record import Record
 
 
-def simulate_model(logs: Sequence[Path], path: Path, asked: "Asked", *, as_json: bool, out: Path | None) -> NoReturn:
+def simulate_model(
+    logs: Sequence[Path], path: Path, fit: "ColumnFit", *, as_json: bool, out: Path | None
+) -> NoReturn:
     """Simulate a saved model on every log, say how well it follows, and leave with the exit code.
 
     Raises
@@ -32,23 +34,23 @@ def simulate_model(logs: Sequence[Path], path: Path, asked: "Asked", *, as_json:
     from estimation.identification.free_run.from_records import channels_of
     from estimation.identification.free_run.saved import load_models
 
-    models = _models_of(load_models(path), asked.outputs)
+    models = _models_of(load_models(path), fit.outputs)
     prepare_output(out)
-    require_positive("--sample-time", asked.sample_time, "s")
-    simulated = own_paths(asked.simulated, logs)
+    require_positive("--sample-time", fit.sample_time, "s")
+    simulated = own_paths(fit.simulated, logs)
 
     def work(log: Path) -> Result:
         results: list[Result] = []
         for index, model in enumerate(models):
-            own = not asked.inputs or sorted(asked.inputs) == sorted(model.inputs)
-            inputs = model.inputs if own else asked.inputs
-            outputs = asked.outputs or tuple(one.output for one in models)
+            own = not fit.inputs or sorted(fit.inputs) == sorted(model.inputs)
+            inputs = model.inputs if own else fit.inputs
+            outputs = fit.outputs or tuple(one.output for one in models)
             if len(inputs) != len(model.inputs) or len(outputs) != len(models):
                 raise HydrostateError(
                     f"the model goes from {len(model.inputs)} inputs to {len(models)} outputs, got columns for "
                     f"{len(inputs)} and {len(outputs)}"
                 )
-            record = record_of(log, (*inputs, outputs[index]), asked.sample_time)
+            record = record_of(log, (*inputs, outputs[index]), fit.sample_time)
             data = channels_of([record], inputs, outputs[index], model.sample_time)
             warn_of_range(model, data)
             quality = quality_of(model, channels_of([record], inputs, outputs[index], model.sample_time, split=True))

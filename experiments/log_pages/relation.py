@@ -186,7 +186,7 @@ def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: 
         As `identify_outputs` takes them, ``sample_time`` of the model [s], and ``reference``: what drives a loop.
     """
     from estimation.identification.two_stage import identify_columns
-    from experiments.identification.of_columns import entries
+    from experiments.identification.entries import column_entries
 
     asked = dict(options)
     columns = [
@@ -197,4 +197,4 @@ def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: 
     found, data = identify_columns(
         records, sources, targets, references=references, sample_time=sample_time, options=asked
     )
-    return Relation([one.model for one in found], [entries(one) for one in found], data)
+    return Relation([one.model for one in found], [column_entries(one) for one in found], data)

@@ -1,0 +1,102 @@
+"""Entries of the JSON contract for identified models: a transfer function, or a model between columns."""
+
+from typing import TYPE_CHECKING, Any
+
+from experiments.command.terminal import clauses
+
+if TYPE_CHECKING:
+    from estimation.identification.free_run.identify import Identified
+    from estimation.identification.free_run.model import FreeRunModel
+    from estimation.identification.model.linear_model import LinearModel
+    from estimation.identification.state_space.dynamics import StateSpaceDynamics
+
+FORMAT_VERSION = 1
+"""Of a written library: later versions add entries and rename none."""
+
+
+def linear_entries(model: "LinearModel") -> dict[str, Any]:
+    """Return a transfer function by the names of the JSON contract."""
+    bandwidth = model.bandwidth_hz
+    extent = "not below the Nyquist frequency" if bandwidth is None else f"{bandwidth:.3g} Hz"
+    return {
+        "outcome": "ok",
+        **model.to_dict(),
+        "bandwidth_hz": bandwidth,
+        "bandwidth_std_hz": model.bandwidth_std_hz,
+        "poles": with_std(model.poles, model.pole_std),
+        "zeros": with_std(model.zeros, model.zero_std),
+        "format_version": FORMAT_VERSION,
+        "delay": {"samples": model.delay, "seconds": model.delay * model.sample_time},
+        "message": (
+            f"{model.structure} of order {model.denominator.size - 1}, fit {model.fit_percent:.1f} %, "
+            f"gain {model.dc_gain:.4g}, bandwidth {extent}"
+        ),
+    }
+
+
+def with_std(roots: Any, spreads: Any) -> list[dict[str, float]]:
+    """Return complex numbers with their standard deviations, by the names of the JSON contract."""
+    return [
+        {"real": float(r.real), "imag": float(r.imag), "real_std": float(s.real), "imag_std": float(s.imag)}
+        for r, s in zip(roots, spreads, strict=True)
+    ]
+
+
+def column_entries(found: "Identified") -> dict[str, Any]:
+    """Return a model between columns by the names of the JSON contract."""
+    from estimation.identification.free_run.identify import WARNED
+    from estimation.identification.state_space.dynamics import StateSpaceDynamics
+
+    model, linear = found.model, found.model.linear
+    result: dict[str, Any] = {
+        "outcome": "ok" if found.sound else "mismatch",
+        "inputs": list(model.inputs),
+        "input": model.inputs[0],
+        "output": model.output,
+        "structure": model.structure,
+        "n_values": model.n_values,
+        "sample_time_s": model.sample_time,
+        **vars(found.quality),
+        "held_back_percent": found.held_back_percent,
+        "candidates": list(found.candidates),
+        "model": model.to_dict(),
+        "notes": [note.to_dict() for note in found.notes if note.code not in WARNED],
+    }
+    if linear is not None:
+        result = {**linear_entries(linear), **result, "order": linear.denominator.size - 1, "offset": model.offset}
+        result["dc_gain"] = {"value": linear.dc_gain, "std": linear.dc_gain_std}
+    elif model.structure == "output-error":
+        transfer = model.transfer_functions()
+        result |= {"numerator": [b.tolist() for b, _ in transfer], "denominator": transfer[0][1].tolist()}
+        gains = [float(b.sum() / f.sum()) for b, f in transfer]
+        result |= {"order": transfer[0][1].size - 1, "offset": model.offset, "dc_gain": {"value": gains}}
+    elif isinstance(model.dynamics, StateSpaceDynamics):
+        result |= _state_space_entries(model, model.dynamics)
+    result["nonlinearity"] = model.nonlinearity
+    quality = found.quality
+    result["message"] = clauses(
+        [
+            f"{model.structure} with {model.n_values} values: fit {quality.fit_percent:.1f} % running free, "
+            f"{found.held_back_percent:.1f} % on blocks held back, rms error {quality.rmse:.4g}",
+            *map(str, found.notes[:1] if not found.sound else ()),
+        ]
+    )
+    return result
+
+
+def _state_space_entries(model: "FreeRunModel", dynamics: "StateSpaceDynamics") -> dict[str, Any]:
+    """Return order, poles, steady gains and dead time of one output of a state space."""
+    system, gain = dynamics.system, model.scaling.y_std / model.scaling.u_std
+    return {
+        "order": system.order,
+        "poles": with_std(system.poles, system.pole_std),
+        "dc_gain": {
+            "value": (system.dc_gain[dynamics.place] * gain).tolist(),
+            "std": (system.dc_gain_std[dynamics.place] * gain).tolist(),
+        },
+        "offset": model.offset,
+        "delay": {
+            "samples": list(system.delays),
+            "seconds": [delay * model.sample_time for delay in system.delays],
+        },
+    }

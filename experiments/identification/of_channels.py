@@ -1,0 +1,170 @@
+"""`hydrostate identify LOG...`: the transfer function between two channels of a bench, one a log."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from estimation.identification.structure_names import STRUCTURE_NAMES
+from experiments.command.json_output import Result, prepare_output
+from experiments.command.logs import finish, read_log, run_logs
+from experiments.command.options import require_positive
+from experiments.command.own_paths import own_paths
+from experiments.command.terminal import note, short_names, table
+from experiments.identification.entries import FORMAT_VERSION, linear_entries
+from plant.errors import require_known
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from estimation.arrays import Array
+    from estimation.identification.model.linear_model import LinearModel
+    from estimation.identification.structure_names import StructureName
+    from plant.eha.rig import Rig
+
+INPUT, OUTPUT = "motor_speed_rad_s", "velocity_m_s"
+"""Channels that are related where none are named."""
+
+TABLE_6_TIME = 1e-3
+"""Sample time of Table 6 as we read it [s] (errata E14)."""
+
+STRUCTURES: "Mapping[str, StructureName | None]" = {**STRUCTURE_NAMES, "auto": None}
+"""What ``--structure`` takes; auto compares the first four on data held back."""
+
+HIGHEST_ORDER = 4
+"""``--order auto`` compares orders up to this by BIC."""
+
+MOST_PROFILED, MOST_TESTED = 100_000, 50_000
+"""Longest log whose gain is profiled where a pole is nearly cancelled, and samples that residual tests are given."""
+
+NOTHING: Result = {
+    "format_version": FORMAT_VERSION,
+    **dict.fromkeys(("structure", "numerator", "denominator", "sample_time_s", "fit_percent", "covariance")),
+    "dc_gain": {"value": None, "std": None, "ci95": None},
+    **dict.fromkeys(("bandwidth_hz", "bandwidth_std_hz", "poles", "zeros")),
+    "delay": {"samples": None, "seconds": None},
+    "validation": {"whiteness_p": None, "cross_correlation_p": None},
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelFit:
+    """What a fit between two channels is asked for.
+
+    Parameters
+    ----------
+    order, delay : int or None
+        Of the model; None lets the data choose.
+    numerator : int or None
+        Count of numerator coefficients; one more than the order if None.
+    sample_time : float or None
+        Of the model, and of a log without a column of time [s].
+    filter_hz : float or None
+        Cut-off of a low-pass before the fit [Hz].
+    """
+
+    input: str = INPUT
+    output: str = OUTPUT
+    structure: str = "output-error"
+    order: int | None = 2
+    delay: int | None = 0
+    numerator: int | None = None
+    sample_time: float | None = None
+    filter_hz: float | None = None
+    figure: Path | None = None
+    seed: int = 0
+
+
+def identify_channels(
+    logs: Sequence[Path], fit: ChannelFit, rig: "Rig", columns: Mapping[str, str], *, as_json: bool, out: Path | None
+) -> NoReturn:
+    """Identify one model a log, print what it is worth, and leave with the exit code.
+
+    Raises
+    ------
+    HydrostateError
+        If an option is not usable.
+    """
+    from estimation.identification.from_record import identify_record, record_signals
+    from plant.errors import NoChannelError
+
+    form = _form(fit)
+    require_positive("--sample-time", fit.sample_time, "s")
+    require_positive("--filter-hz", fit.filter_hz, "Hz")
+    prepare_output(out)
+    figures = own_paths(fit.figure, logs)
+    chosen = {"input": fit.input, "output": fit.output, "rig": rig.name, "seed": fit.seed}
+
+    def work(log: Path) -> Result:
+        try:
+            record = read_log(log, rig.columns, columns, sample_time=fit.sample_time)
+        except NoChannelError as error:
+            hint = "--input COLUMN --output COLUMN relates any others"
+            raise NoChannelError(f"{error.message}; {hint}", error.source) from error
+        taken: dict[str, Any] = {"output": fit.output, "input": fit.input, "filter_cutoff_hz": fit.filter_hz}
+        taken["sample_time"] = max(TABLE_6_TIME, record.sample_time) if fit.sample_time is None else fit.sample_time
+        model = identify_record(record, **taken, **form)
+        u, y = record_signals(record, **taken)
+        return {**chosen, **linear_entries(model), **_judged(model, u, y, log, figures.get(log))}
+
+    batch = run_logs(logs, work, {**NOTHING, **chosen}, "identifying")
+    finish(batch, _screen, as_json=as_json, out=out)
+
+
+def _form(fit: ChannelFit) -> dict[str, Any]:
+    """Return the form of the model as `identify_record` takes it."""
+    require_known("--structure", fit.structure, list(STRUCTURES))
+    order = fit.order or 2
+    direct = fit.order is None or not fit.delay
+    return {
+        "n_numerator": order + direct if fit.numerator is None else fit.numerator,
+        "n_denominator": order,
+        "delay": fit.delay or 0,
+        "structure": STRUCTURES[fit.structure],
+        "orders": range(1, HIGHEST_ORDER + 1) if fit.order is None else None,
+        "estimate_dead_time": fit.delay is None,
+        "covariance": "auto" if fit.filter_hz is None else "coloured",
+    }
+
+
+def _judged(model: "LinearModel", u: "Array", y: "Array", log: Path, figure: Path | None) -> dict[str, Any]:
+    """Return what the data say of the model: tests of its residual, and the gain's interval; draw both if wanted."""
+    from estimation.finding import interval_95
+    from estimation.identification.fit.profile_interval import dc_gain_interval
+    from estimation.identification.fit.validate import validate
+
+    gain, std = model.dc_gain, model.dc_gain_std
+    fitted = model.structure == "output-error"
+    interval = interval_95(gain, std)
+    if fitted and model.cancellations and u.size <= MOST_PROFILED:
+        interval = dc_gain_interval(model, u, y)
+    entries: dict[str, Any] = {"dc_gain": {"value": gain, "std": std, "ci95": interval}}
+    if not model.is_stable:
+        if figure is not None:
+            note(f"no figure: the model of {log.name} is unstable, so it cannot be simulated")
+        return entries | {"validation": NOTHING["validation"]}
+    part = slice(0, MOST_TESTED)
+    found = validate(model.discretised() if model.continuous else model, u[part], y[part], fitted=fitted)
+    if figure is not None:
+        from experiments.log_pages.identified import write_identified
+
+        write_identified(model, u, y, found, log.name, figure)
+    tests = {"whiteness_p": found.whiteness.p_value, "cross_correlation_p": found.cross_correlation.p_value}
+    return entries | {"validation": tests}
+
+
+def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
+    shown = table("log", "fit [%]", "gain", "bandwidth [Hz]", "coefficients, q^0 q^-1 ...")
+    for name, result in zip(short_names(results), results, strict=True):
+        gain = result["dc_gain"]
+        bandwidth = "-" if result["bandwidth_hz"] is None else f"{result['bandwidth_hz']:.3g}"
+        coefficients = f"b {_spaced(result['numerator'])}\nf {_spaced(result['denominator'])}"
+        said = (f"{result['fit_percent']:.2f}", f"{gain['value']:.4g} ± {gain['std']:.1g}", bandwidth)
+        shown.add_row(name, *said, coefficients)
+    yield shown
+    ends = f"From {results[0]['input']} to {results[0]['output']}"
+    yield f"{ends}, ± one standard deviation; sample times are in --json and --out."
+
+
+def _spaced(values: Sequence[float]) -> str:
+    return "  ".join(f"{value:.5g}" for value in values)
