@@ -8,8 +8,8 @@ import typer
 
 from experiments.command.json_output import Result, prepare_output, write_whole
 from experiments.command.logs import finish, overheard, read_log, run_logs, with_said
-from experiments.command.options import load_actuator, load_columns, require_png, understood
-from experiments.command.own_paths import own_paths, require_place
+from experiments.command.options import load_actuator, load_columns, understood
+from experiments.command.output_paths import own_paths, page_place, require_place
 from experiments.command.terminal import clauses, note
 from plant.errors import HydrostateError, require_known
 
@@ -40,15 +40,11 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     diagnosing = verb == "diagnose"
     kind, bench = load_actuator(asked["plant"], asked["rig"])
     options = understood(context, asked, kind, verb, COMMON | ({"condition"} if diagnosing else set()))
-    require_png("--figure", options.get("figure"))
-    require_place("--figure", options.get("figure"))
+    require_place("--figure", options.get("figure"), ".png")
     chosen: LogVerb = getattr(kind, verb)
     logs, mapping = asked["logs"], load_columns(asked["columns"])
     expected: str | None = asked["condition"] if diagnosing else None
-    report: Path | None = asked.get("report")
-    if report is not None:
-        require_place("--report", report)
-        report = report.with_suffix(".html")
+    report = page_place(asked.get("report"))
     if expected is not None:
         require_known("--condition", expected, kind.conditions)
 

@@ -195,25 +195,6 @@ def require_positive(option: str, value: float | None, unit: str) -> None:
         raise HydrostateError(f"{option} must be positive and finite, got {value:g} {unit}")
 
 
-def require_png(option: str, path: Path | None) -> None:
-    """Refuse a figure that is asked for under the name of another kind of file.
-
-    Parameters
-    ----------
-    option : str
-        As the command line has it.
-    path : Path or None
-        Where the figure goes; None where none is wanted.
-
-    Raises
-    ------
-    HydrostateError
-        If the name does not end in ``.png``.
-    """
-    if path is not None and path.suffix.lower() != ".png":
-        raise HydrostateError(f"{option} must end in .png, got {str(path)!r}")
-
-
 def refuse_given(options: Mapping[str, object], why: str) -> None:
     """Refuse options that would change nothing, rather than ignore them.
 

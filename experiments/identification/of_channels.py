@@ -9,7 +9,7 @@ from estimation.identification.structure_names import STRUCTURE_NAMES
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, read_log, run_logs
 from experiments.command.options import require_positive
-from experiments.command.own_paths import own_paths
+from experiments.command.output_paths import own_paths
 from experiments.command.terminal import note, short_names, table
 from experiments.identification.entries import FORMAT_VERSION, linear_entries
 from plant.errors import require_known

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish, run_logs
 from experiments.command.options import require_positive
-from experiments.command.own_paths import own_paths
+from experiments.command.output_paths import own_paths
 from experiments.command.terminal import table
 from experiments.identification.entries import column_entries
 from experiments.identification.simulate_model import quality_of, record_of, warn_of_range, write_simulated

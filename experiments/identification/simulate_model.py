@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, run_logs
 from experiments.command.options import require_positive
-from experiments.command.own_paths import own_paths
+from experiments.command.output_paths import own_paths
 from experiments.command.terminal import clauses, table
 from plant.errors import HydrostateError, LogWarning
 
@@ -21,9 +21,7 @@ if TYPE_CHECKING:
     from plant.log.record import Record
 
 
-def simulate_model(
-    logs: Sequence[Path], path: Path, fit: "ColumnFit", *, as_json: bool, out: Path | None
-) -> NoReturn:
+def simulate_model(logs: Sequence[Path], path: Path, fit: "ColumnFit", *, as_json: bool, out: Path | None) -> NoReturn:
     """Simulate a saved model on every log, say how well it follows, and leave with the exit code.
 
     Raises

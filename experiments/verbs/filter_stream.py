@@ -20,7 +20,7 @@ from experiments.command.options import (
     option,
     require_positive,
 )
-from experiments.command.own_paths import require_place
+from experiments.command.output_paths import require_place
 from experiments.streams.broker import published
 from experiments.streams.endings import end_told, say_line, stop_at_sigterm
 from experiments.streams.filtering import Filtering

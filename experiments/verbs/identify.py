@@ -17,9 +17,8 @@ from experiments.command.options import (
     load_rig,
     option,
     refuse_given,
-    require_png,
 )
-from experiments.command.own_paths import require_place
+from experiments.command.output_paths import require_place
 from experiments.identification.of_channels import INPUT, OUTPUT, STRUCTURES, ChannelFit, identify_channels
 from experiments.identification.of_columns import ColumnFit, identify_columns, names
 from experiments.identification.simulate_model import simulate_model
@@ -127,10 +126,9 @@ def identify(
     Differential pressure is not used, so its absence costs nothing. Nothing is random, so the seed changes nothing.
     `--out library.json` writes one entry per log at full precision; `LinearModel.from_dict` reads it.
     """
-    for name, place in (("--figure", figure), ("--response", response)):
-        require_png(name, place)
-    for name, place in (("--figure", figure), ("--response", response), ("--simulated", simulated)):
-        require_place(name, place)
+    require_place("--figure", figure, ".png")
+    require_place("--response", response, ".png")
+    require_place("--simulated", simulated)
     related = any(one is not None for one in (inputs, outputs, references, simulate))
     if (related and rig is None and not columns) or structure in ONLY_BETWEEN_COLUMNS:
         of_channels = {"--rig": rig, "--columns": columns, "--filter-hz": filter_hz}

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.command.json_output import Result, plain, write_whole
+from experiments.command.json_output import Result, plain, prepare_output, write_whole
 from experiments.command.logs import caught, finish, read_log, run_logs
 from experiments.command.options import Beside, Json, Out, Plant, SampleTime, argument, load_actuator, option
-from experiments.command.own_paths import own_paths, require_place
+from experiments.command.output_paths import own_paths, page_place, require_place
 from experiments.command.terminal import note, sparkline, table, visible
 from plant.errors import HydrostateError
 
@@ -76,9 +76,9 @@ def inspect(
 
     if (write is not None or beside) and len(logs) > 1:
         raise HydrostateError("--write and --with go with one file, got several")
-    require_place("--report", report)
+    pages = own_paths(page_place(report), logs)
     require_place("--write", write)
-    pages = own_paths(report, logs, ".html")
+    prepare_output(out)
     batch = run_logs(logs, work, BLANK, "looking")
     finish(batch, _screen, as_json=as_json, out=out)
 

@@ -64,6 +64,13 @@ def test_the_page_draws_every_column(strange: Path, tmp_path: Path) -> None:
     assert "image/svg+xml" in page
 
 
+def test_page_and_results_go_where_those_of_other_verbs_would(strange: Path, tmp_path: Path) -> None:
+    done = invoke(strange, "--report", tmp_path / "page", "--out", tmp_path / "new" / "results")
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "page.html").is_file()
+    assert (tmp_path / "new" / "results" / "results.json").is_file()
+
+
 def test_a_file_that_cannot_be_opened_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "x.xls").write_bytes(b"\xd0\xcf\x11\xe0" + bytes(600))
     done = invoke(tmp_path / "x.xls")

@@ -1,4 +1,4 @@
-"""Where the figure or page of each of several logs goes: no two of them may share a file."""
+"""Files that a command writes beside its results: refused before the work, and one of its own for each log."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -10,7 +10,7 @@ from plant.errors import HydrostateError
 Owner = TypeVar("Owner", Path, str)
 
 
-def own_paths(target: Path | None, owners: Sequence[Owner], ending: str = ".png") -> dict[Owner, Path]:
+def own_paths(target: Path | None, owners: Sequence[Owner]) -> dict[Owner, Path]:
     """Return the file of each log or output; with several, the name of each goes into that of its file.
 
     Parameters
@@ -19,8 +19,6 @@ def own_paths(target: Path | None, owners: Sequence[Owner], ending: str = ".png"
         As given to an option such as ``--figure``; None where nothing is to be written.
     owners : sequence of Path or of str
         Logs, or names of outputs.
-    ending : str
-        Of files where `target` has none.
 
     Returns
     -------
@@ -38,13 +36,12 @@ def own_paths(target: Path | None, owners: Sequence[Owner], ending: str = ".png"
     distinct = list(dict.fromkeys(owners))
     if len(distinct) == 1:
         return {distinct[0]: target}
-    ending = target.suffix or ending
-    names = (f"{target.stem}-{label}{ending}" for label in _labels(distinct))
+    names = (f"{target.stem}-{label}{target.suffix}" for label in _labels(distinct))
     return {one: target.with_name(name) for one, name in zip(distinct, names, strict=True)}
 
 
-def require_place(option: str, path: Path | None) -> None:
-    """Refuse a file in a folder that is not there before the work, not after it.
+def require_place(option: str, path: Path | None, ending: str = "") -> None:
+    """Refuse a file that cannot be written, or not under this name, before the work and not after it.
 
     Parameters
     ----------
@@ -52,18 +49,39 @@ def require_place(option: str, path: Path | None) -> None:
         As the command line has it.
     path : Path or None
         Where the file goes; None, not given, passes.
+    ending : str
+        How its name must end, such as ``.png``; any ending if empty.
+
+    Raises
+    ------
+    HydrostateError
+        If it names a folder, a file in a folder that is not there, or another kind of file.
+    """
+    if path is None:
+        return
+    if ending and path.suffix.lower() != ending:
+        raise HydrostateError(f"{option} must end in {ending}, got {str(path)!r}")
+    if not path.name or path.is_dir():
+        raise HydrostateError(f"{option} must be a file, got the folder {str(path)!r}")
+    if not path.parent.is_dir():
+        raise HydrostateError(f"{option} {path}: there is no such folder")
+
+
+def page_place(report: Path | None) -> Path | None:
+    """Return where the page of ``--report`` goes, with the ending ``.html`` whatever is given.
+
+    Parameters
+    ----------
+    report : Path or None
+        As the command line has it; None, not given, stays None.
 
     Raises
     ------
     HydrostateError
         If it names a folder, or a file in a folder that is not there.
     """
-    if path is None:
-        return
-    if not path.name or path.is_dir():
-        raise HydrostateError(f"{option} must be a file, got the folder {str(path)!r}")
-    if not path.parent.is_dir():
-        raise HydrostateError(f"{option} {path}: there is no such folder")
+    require_place("--report", report)
+    return None if report is None else report.with_suffix(".html")
 
 
 def _labels(owners: Sequence[Owner]) -> list[str]:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.command.own_paths import own_paths, require_place
+from experiments.command.output_paths import own_paths, page_place, require_place
 from plant.errors import HydrostateError
 
 
@@ -42,8 +42,23 @@ def test_outputs_have_names_that_a_file_may_have_and_are_numbered_where_these_ar
     assert names == ["s-flow_l_min.csv", "s-flow_l_min-2.csv", "s-p.1.csv", "s-p.2.csv"]
 
 
-def test_a_file_without_an_ending_gets_one() -> None:
-    assert own_paths(Path("fit"), ["a", "b"], ".csv")["a"] == Path("fit-a.csv")
+def test_several_files_end_as_one_alone_would() -> None:
+    assert own_paths(Path("fit"), ["a", "b"])["a"] == Path("fit-a")
+    assert own_paths(Path("fit.csv"), ["a", "b"])["a"] == Path("fit-a.csv")
+
+
+def test_a_page_ends_in_html_whatever_is_given(tmp_path: Path) -> None:
+    assert page_place(None) is None
+    assert page_place(tmp_path / "run") == tmp_path / "run.html"
+    assert page_place(tmp_path / "run.htm") == tmp_path / "run.html"
+    with pytest.raises(HydrostateError, match="--report"):
+        page_place(tmp_path)
+
+
+def test_a_figure_is_not_written_under_the_name_of_another_kind_of_file(tmp_path: Path) -> None:
+    require_place("--figure", tmp_path / "a.PNG", ".png")
+    with pytest.raises(HydrostateError, match=r"--figure must end in \.png, got"):
+        require_place("--figure", tmp_path / "a.pdf", ".png")
 
 
 def test_a_place_that_is_not_there_is_refused_first(tmp_path: Path) -> None:
