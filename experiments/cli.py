@@ -54,6 +54,7 @@ VERBS = (
     "verbs.conditions",
     "verbs.batch",
     "verbs.compare",
+    "verbs.report",
     "verbs.fleet",
     "verbs.serve",
     "motor_paper.command",
@@ -114,10 +115,10 @@ def _of(modules: Sequence[str]) -> typer.Typer:
 @cache
 def _whole() -> typer.Typer:
     from experiments.open_benchmark import command as open_benchmark
-    from experiments.verbs import conditions, export
+    from experiments.verbs import export, rig
 
     made = _of(VERBS)
-    made.add_typer(conditions.rig_commands, name="rig")
+    made.add_typer(rig.commands, name="rig")
     made.add_typer(export.commands, name="export")
     made.add_typer(open_benchmark.commands, name="benchmark")
     return made

@@ -30,7 +30,7 @@ def inspect_page(result: Mapping[str, Any], tables: "Sequence[TableFacts]") -> s
     tables : sequence of TableFacts
         The tables of the log.
     """
-    from experiments.verbs.inspect import block_of
+    from experiments.log_pages.inspected import block_of
 
     drawn = [one for facts in tables for one in facts.columns if len(one.present) > 1][:MOST_COLUMNS]
     with styled():

@@ -136,7 +136,7 @@ def _found(task: Task) -> Worked:
 
 def _inspected(task: Task) -> Worked:
     from experiments.log_pages.inspect_page import inspect_page
-    from experiments.verbs.inspect import looked_into
+    from experiments.log_pages.inspected import looked_into
 
     kind, bench = load_actuator(task.plant, None)
     found, tables = looked_into(task.log, kind, bench)
@@ -158,7 +158,7 @@ def _prepared(
 
 def _blank(task: Task) -> Mapping[str, Any]:
     if task.verb == "inspect":
-        from experiments.verbs.inspect import BLANK
+        from experiments.log_pages.inspected import BLANK
 
         return BLANK
     kind, bench, chosen, *_ = _prepared(task.plant, task.rig, task.verb)

@@ -1,4 +1,4 @@
-"""`hydrostate compare A B` and `hydrostate report STORE`: what stores of batch studies say."""
+"""`hydrostate compare A B`: what got better and what got worse between two batch studies."""
 
 from pathlib import Path
 from typing import Annotated
@@ -58,21 +58,3 @@ def compare(
     single = found.loc[found["condition"] != "all", "verdict"]
     better, worse = (int((single == verdict).sum()) for verdict in ("better", "worse"))
     emit(rendered(*changed, shown, f"by condition: {better} better, {worse} worse, of {len(single)}"))
-
-
-@commands.command(epilog="Example: hydrostate report results/eha-paper --out report")
-def report(
-    store: Annotated[str, argument("STORE", "Store of a batch study.")],
-    out: Annotated[
-        str | None, option("DIR", "Folder of the report; by default that of the store.", "--out", "-o")
-    ] = None,
-) -> None:
-    """Write the report of a batch study from its store, also while the study still runs.
-
-    The last line of standard output is the report's path.
-    """
-    from experiments.batch.folder import open_folder
-    from experiments.batch.part_store import open_store
-    from experiments.batch.reporting import write_report
-
-    emit(write_report(open_store(store), open_folder(out or store)))

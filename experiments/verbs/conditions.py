@@ -1,27 +1,21 @@
-"""`hydrostate conditions`: the nine conditions; `hydrostate rig init`: a rig file to fill in."""
+"""`hydrostate conditions`: the nine conditions and the parameters of each."""
 
 from dataclasses import asdict
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeAlias
+from typing import TYPE_CHECKING
 
 import typer
 
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import Batch, finish
-from experiments.command.options import SEED, Json, Out, Plant, RigFile, Seed, load_actuator, load_rig
-from experiments.command.terminal import emit, table
+from experiments.command.options import SEED, Json, Out, RigFile, Seed, load_rig
+from experiments.command.terminal import table
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from rich.console import RenderableType
 
-RigPath: TypeAlias = Annotated[
-    Path, typer.Argument(metavar="PATH", help="File to write; an existing file is not overwritten.")
-]
-
 commands = typer.Typer()
-rig_commands = typer.Typer(no_args_is_help=True, help="Write a file that describes your own actuator.")
 
 
 @commands.command(epilog="Example: hydrostate conditions --rig rig.toml")
@@ -62,17 +56,3 @@ def _screen(results: "Sequence[Result]") -> "Iterable[RenderableType]":
         numbers = [f"{result['parameters'][name]:.4g}" for name in shown_names]
         shown.add_row(result["condition"], result["leakage"], result["friction"], *numbers)
     yield shown
-
-
-@rig_commands.command("init", epilog="Example: hydrostate rig init bench2.toml")
-def rig_init(
-    path: RigPath = Path("rig.toml"),
-    plant: Plant = None,
-) -> None:
-    """Write a commented rig file (TOML, SI) of the paper's actuator, for you to change into yours."""
-    from plant.eha.rig import EHA, rig_template, write_rig_template
-
-    kind, _ = load_actuator(plant, None)
-    columns = {name: f"NAME:{unit}" for name, unit in kind.channels.items()}
-    write_rig_template(path, None if kind.name == EHA else rig_template(kind.parameters, kind.name, columns))
-    emit(f"{path}: fill in your actuator's parameters, then pass it as --rig {path}")

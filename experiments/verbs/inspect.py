@@ -1,31 +1,23 @@
 """`hydrostate inspect FILE...`: what a strange log holds, which column is which, and the block that names them."""
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.command.json_output import Result, plain, prepare_output, write_whole
-from experiments.command.logs import caught, finish, read_log, run_logs
+from experiments.command.json_output import Result, prepare_output, write_whole
+from experiments.command.logs import finish, run_logs
 from experiments.command.options import Beside, Json, Out, Plant, SampleTime, argument, load_actuator, option
 from experiments.command.output_paths import own_paths, page_place, require_place
-from experiments.command.terminal import note, sparkline, table, visible
+from experiments.command.terminal import note, table, visible
+from experiments.log_pages.inspected import BLANK, block_of, looked_into
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from estimation.log_checks.channel_guess import ChannelGuess
     from experiments.actuator_kind import ActuatorKind
-    from plant.eha.rig import Rig
-    from plant.log.inspection import TableFacts
-
-BLANK: Result = dict.fromkeys(("tables", "columns", "options", "reads"))
-
-PLOTTED = 24
-"""Characters of a plot on the terminal."""
 
 commands = typer.Typer()
 
@@ -81,155 +73,6 @@ def inspect(
     prepare_output(out)
     batch = run_logs(logs, work, BLANK, "looking")
     finish(batch, _screen, as_json=as_json, out=out)
-
-
-def looked_into(
-    log: Path, kind: "ActuatorKind", rig: "Rig[Any]", sample_time: float | None = None, beside: Sequence[Path] = ()
-) -> "tuple[dict[str, Any], list[TableFacts]]":
-    """Return what a log holds, as entries of the JSON contract, and its tables.
-
-    Parameters
-    ----------
-    sample_time : float, optional
-        Time between rows [s] of a log that has no time.
-    beside : sequence of Path
-        Files of other loggers of the same test.
-
-    Raises
-    ------
-    LogError
-        If a file cannot be opened.
-    """
-    tables, guesses = _looked_at([log, *beside], kind, rig)
-    columns = {one.guess.channel: one.guess.spec for one in guesses if one.guess.sure >= 0.5}
-    reads = _reads(log, columns, kind, sample_time, beside)
-    found = _entries(tables, guesses, columns) | {"reads": reads["reads"], "message": reads["message"]}
-    found["options"] = _options(columns, sample_time, beside)
-    return found, tables
-
-
-def _looked_at(
-    paths: Sequence[Path], kind: "ActuatorKind", rig: "Rig[Any]"
-) -> "tuple[list[TableFacts], list[ChannelGuess]]":
-    """Return what the files hold, and the surest guess of each channel over all their tables."""
-    from estimation.log_checks.channel_guess import guess_channels
-    from plant.eha.model import EhaParameters
-    from plant.log.columns import TIME
-    from plant.log.formats import open_tables
-    from plant.log.inspection import inspect_table
-
-    p = rig.parameters if isinstance(rig.parameters, EhaParameters) else EhaParameters()
-    tables = [inspect_table(one) for path in paths for one in open_tables(path)]
-    best: dict[str, ChannelGuess] = {}
-    for facts in tables:
-        headings = [one.heading for one in facts.columns]
-        for one in guess_channels(headings, facts.numbers, p, (TIME, *kind.channels)):
-            known = best.get(one.guess.channel)
-            if known is None or one.guess.sure > known.guess.sure:
-                best[one.guess.channel] = one
-    return tables, list(best.values())
-
-
-def inspected(paths: Sequence[Path], plant: str | None = None) -> dict[str, Any]:
-    """Return what files of one test hold, as JSON values.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        The files, one a logger.
-    plant : str, optional
-        The kind of actuator; the gear-pump actuator if not given.
-
-    Raises
-    ------
-    LogError
-        If one cannot be opened.
-    """
-    kind, rig = load_actuator(plant, None)
-    tables, guesses = _looked_at(paths, kind, rig)
-    return plain(_entries(tables, guesses, {one.guess.channel: one.guess.spec for one in guesses}))
-
-
-def _reads(
-    log: Path, columns: Mapping[str, str], kind: "ActuatorKind", sample_time: float | None, beside: Sequence[Path]
-) -> dict[str, Any]:
-    """Return whether the log is read by the block of columns, and what is said then."""
-    try:
-        with caught() as said:
-            record = read_log(log, {}, columns, kind.required, sample_time=sample_time, beside=beside)
-    except HydrostateError as error:
-        return {"reads": False, "message": f"with these columns the log cannot be read: {error.message}"}
-    notes = "; ".join(dict.fromkeys(str(one.note) for one in said))
-    about = f"{record.duration:g} s at {1.0 / record.sample_time:g} Hz, {', '.join(record)}"
-    return {"reads": True, "message": f"with these columns the log reads: {about}" + (f"; {notes}" if notes else "")}
-
-
-def _entries(
-    tables: "Sequence[TableFacts]", guesses: "Sequence[ChannelGuess]", columns: Mapping[str, str]
-) -> dict[str, Any]:
-    from plant.log.columns import TIME
-    from plant.log.inspection import clock_facts
-
-    by_name = {one.guess.name: one for one in guesses}
-    shown: list[dict[str, Any]] = []
-    for facts in tables:
-        rows: list[dict[str, Any]] = []
-        for number, one in enumerate(facts.columns, start=1):
-            guess = by_name.get(one.heading.name)
-            rows.append(
-                {
-                    "number": number,
-                    "name": one.heading.name,
-                    "unit": one.heading.unit,
-                    "range": one.span,
-                    "missing": one.missing,
-                    "kind": "text" if one.values is None else "times" if one.heading.stamped else "numbers",
-                    "plot": sparkline(one.present.tolist(), PLOTTED),
-                    "channel": None if guess is None else guess.guess.channel,
-                    "probability": None if guess is None else guess.guess.sure,
-                    "why": [] if guess is None else [one.to_dict() for one in guess.why],
-                }
-            )
-        time = next((one for one in guesses if one.guess.channel == TIME), None)
-        stamps = None if time is None else facts.numbers.get(time.guess.place)
-        clock = None if stamps is None else clock_facts(stamps)
-        shown.append(
-            {
-                "label": facts.table.label,
-                "rows": facts.rows,
-                "step_s": facts.table.step,
-                "clock": None if clock is None else vars(clock),
-                "columns": rows,
-            }
-        )
-    return {"tables": shown, "columns": dict(columns)}
-
-
-def _options(columns: Mapping[str, str], sample_time: float | None, beside: Sequence[Path]) -> str:
-    """Return the options that read the log as the block does."""
-    import shlex
-
-    parts = [shlex.quote(f"{channel}={spec}") for channel, spec in columns.items()]
-    told = [f"--columns {part}" for part in parts] + [f"--with {shlex.quote(str(one))}" for one in beside]
-    return " ".join(told + ([] if sample_time is None else [f"--sample-time {sample_time:g}"]))
-
-
-def block_of(columns: Mapping[str, str]) -> str:
-    """Return the ``[columns]`` block of a rig file.
-
-    Parameters
-    ----------
-    columns : Mapping[str, str]
-        Column with its unit, by channel.
-
-    Returns
-    -------
-    str
-        TOML.
-    """
-    return "\n".join(
-        ["[columns]", *(f"{channel} = {json.dumps(spec, ensure_ascii=True)}" for channel, spec in columns.items())]
-    )
 
 
 def _write_rig(path: Path, columns: Mapping[str, str], kind: "ActuatorKind") -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments.command.logs import read_log
-from experiments.verbs.inspect import inspected
+from experiments.log_pages.inspected import inspected
 from tests.fuzz.guard import limited
 from tests.fuzz.mutations import CELLS, mutated
 from tests.fuzz.seeds import seeds
