@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 from estimation.engine.kernels import LANES
 from experiments.actuators import DEFAULT, actuator
-from experiments.batch.of_kind import simulated_of
+from experiments.batch.other_actuators import simulated_of
 from experiments.batch.series import Group, Log, Series, Simulated, Work, content_of
 from experiments.batch.study_file import Logs, Method, Runs, Study, StudyError
 from faults.conditions import CONDITIONS, LEVELS

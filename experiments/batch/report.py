@@ -1,148 +1,48 @@
-"""The report of a batch study, and that of two beside each other: one HTML file each, from stored rows alone."""
+"""The report of a batch study, with figures and tables, written from its store alone."""
 
-import json
-from collections.abc import Mapping, Sequence
-from functools import partial
-from typing import Any
-
-import pandas as pd
-
-from experiments.batch.compare import in_sentences
-from experiments.batch.figures import way_in_words
-from experiments.batch.summary import MOST_LISTED, NEAR_PERCENT
+from experiments.batch.figures import BATCH_FIGURES
+from experiments.batch.folder import Folder
+from experiments.batch.pages import render_batch_report
+from experiments.batch.part_store import PartStore
+from experiments.batch.summary import frame_of, summary_tables
+from experiments.page.figure_files import figure_files
+from experiments.page.folder import csv_files
 from experiments.page.frames import Tables
-from experiments.page.numbers import MISSING, number, pretty_unit
-from experiments.page.render import render_page
-from experiments.page.tables import Cell, Column, decimals
-from experiments.page.words import in_words
+from experiments.running.refusal import refused
+from plant.errors import HydrostateError
+
+REPORT = "report.html"
 
 
-def _or_dash(value: Any) -> str:
-    return MISSING if pd.isna(value) or value == "" else str(value)
-
-
-def _quantities(text: Any) -> str:
-    """Return what was found of an actuator that is not the gear-pump one: every quantity with its interval."""
-    if pd.isna(text):
-        return MISSING
-    told = {name: one for name, one in json.loads(text).items() if one["value"] is not None}
-    return "; ".join(
-        f"{name.replace('_', ' ')} {number(one['value'])} {pretty_unit(one['unit']).removeprefix('1')}"
-        + (f" ({number(one['ci95'][0])} to {number(one['ci95'][1])})" if one["ci95"] else "")
-        for name, one in told.items()
-    )
-
-
-_text = partial(Column, words=_or_dash)
-_condition = partial(Column, words=lambda value: in_words(_or_dash(value)))
-_percent = partial(Column, unit="%", words=decimals(2))
-_whole = partial(Column, unit="%", words=decimals(0))
-
-COLUMNS: Mapping[str, Sequence[Column]] = {
-    "outcomes": (
-        _text("way", "how"),
-        *(Column(name) for name in ("cases", "ok", "not_observable", "mismatch", "diverged", "failed")),
-    ),
-    "bulk modulus": (
-        _text("way", "how"),
-        _condition("condition"),
-        Column("estimates"),
-        _percent("low_percent", "5 %"),
-        _percent("median_percent", "median error"),
-        _percent("high_percent", "95 %"),
-        _percent("rms_percent", "RMS error"),
-        _whole("near_percent", f"within {NEAR_PERCENT:g} %"),
-        _whole("covered_percent", "interval covers"),
-    ),
-    "diagnosis": (
-        _text("way", "how"),
-        _condition("condition", "true class"),
-        Column("cases"),
-        _whole("right_percent", "right"),
-        Column("median_margin", "times as probable as runner-up, median", digits=3),
-    ),
-    "classes": (_condition("class"), Column("logs"), Column("percent", "of logs", "%", words=decimals(1))),
-    "logs": (
-        _text("file", "log"),
-        _text("verb", "asked"),
-        _text("outcome"),
-        _condition("found_condition", "class"),
-        _condition("runner_up", "runner-up"),
-        Column("margin", "best is so many times as probable", digits=3),
-        Column("bulk_modulus_pa"),
-        Column("bulk_modulus_std_pa", "std", digits=2),
-        Column("quantities", "found", words=_quantities),
-        _text("reason", "why, or what speaks against it"),
-    ),
-    "failures": (
-        *(_text("plant"), _text("file", "log"), _text("condition"), _text("seed"), _text("verb", "asked")),
-        _text("reason"),
-    ),
-}
-
-VERDICT_TONES: Mapping[str, str] = {"better": "good", "worse": "bad"}
-
-
-def render_batch_report(manifest: Mapping[str, Any], tables: Tables, files: Mapping[str, bytes], done: int) -> str:
-    """Return the report of a batch study as one HTML page.
+def write_report(store: PartStore, folder: Folder) -> str:
+    """Write a study's report, its figures and its tables.
 
     Parameters
     ----------
-    manifest : Mapping[str, Any]
-        Of its store.
-    tables : Mapping[str, pandas.DataFrame]
-        From `experiments.batch.summary.summary_tables`.
-    files : Mapping[str, bytes]
-        Its figures, by path.
+    store : PartStore
+        The store; it may be growing.
 
-    Returns
-    -------
-    str
-        The page; it loads nothing.
+    Raises
+    ------
+    HydrostateError
+        If there is no store, or the folder cannot be written.
     """
-    shown = {name: _shown(tables[name]) for name in COLUMNS if name in tables}
-    columns = {
-        name: [column for column in COLUMNS[name] if table[column.source].notna().any()]
-        for name, table in shown.items()
-    }
-    facts = {
-        "manifest": manifest,
-        "done": done,
-        "shown": shown,
-        "rows": {name: len(table) for name, table in tables.items()},
-        "most_listed": MOST_LISTED,
-        "pictures": {path.removeprefix("figures/").removesuffix(".svg") for path in files},
-        **shown,
-    }
-    return render_page("batch/report.html", facts, columns, files)
+    manifest = store.manifest()
+    if manifest is None:
+        raise HydrostateError(f"store {store.name}: there is no batch study there")
+    rows = store.rows()
+    tables = summary_tables(frame_of(rows))
+    drawings = {name: draw for name, draw in BATCH_FIGURES.items() if _drawable(name.replace("_", " "), tables)}
+    figures = figure_files(drawings, tables)
+    page = render_batch_report(manifest, tables, figures, len(rows)).encode()
+    numbered = {name: table.reset_index() if table.index.name else table for name, table in tables.items()}
+    with refused(f"report {folder.name} cannot be written"):
+        for name, content in {**figures, **csv_files("tables", numbered), REPORT: page}.items():
+            folder.write(name, content)
+    return f"{folder.name.rstrip('/')}/{REPORT}"
 
 
-def _shown(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows that the page lists, each with its way of doing it in words."""
-    head = table.head(MOST_LISTED)
-    return head.assign(way=[way_in_words(row) for row in head.to_dict("records")]) if "pressure" in head else head
-
-
-def render_comparison(table: pd.DataFrame, names: Sequence[str]) -> str:
-    """Return the comparison of two studies as one HTML page.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        From `experiments.batch.compare.compare_studies`.
-    names : sequence of str
-        What the first and the second study are called.
-
-    Returns
-    -------
-    str
-        The page; it loads nothing.
-    """
-    columns = (
-        *(_text("verb", "asked"), _text("measure"), _condition("condition"), "cases", "series"),
-        *(_percent("first", names[0]), _percent("second", names[1]), _percent("difference")),
-        *(_percent("low", "95 % from"), _percent("high", "to")),
-        Column("verdict", words=lambda said: Cell(said, VERDICT_TONES.get(said, "none"))),
-    )
-    facts = {"first": names[0], "second": names[1], "sentences": in_sentences(table, names), "comparison": table}
-    return render_page("batch/comparison.html", facts, {"comparison": columns}, {})
+def _drawable(name: str, tables: Tables) -> bool:
+    if name not in tables:
+        return False
+    return name != "bulk modulus" or bool(tables[name]["median_percent"].notna().any())

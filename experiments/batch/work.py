@@ -33,7 +33,7 @@ from experiments.actuators import DEFAULT, actuator
 from experiments.batch.cases import Task
 from experiments.batch.diagnosis import diagnosed
 from experiments.batch.lanes import Lanes, Waiting, write_filtered
-from experiments.batch.of_kind import found_of, simulated_run
+from experiments.batch.other_actuators import found_of, simulated_run
 from experiments.batch.rows import NIS, TRUTH, Row, Rows, error_percent
 from experiments.batch.series import Log, Series, Simulated, Work, content_of
 from experiments.command.logs import caught, read_log

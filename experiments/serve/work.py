@@ -130,7 +130,7 @@ def _found(task: Task) -> Worked:
     if kind.name == "eha":
         from experiments.batch.diagnosis import class_row as row
     else:
-        from experiments.batch.of_kind import row_of as row
+        from experiments.batch.other_actuators import row_of as row
     return Worked(result, dict(row(found)))
 
 

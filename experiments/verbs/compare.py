@@ -26,8 +26,8 @@ def compare(
     throughout and the two studies differ in it, that difference is compared. The seed draws the bootstrap.
     """
     from experiments.batch.compare import compare_studies
+    from experiments.batch.pages import render_comparison
     from experiments.batch.part_store import open_store
-    from experiments.batch.report import render_comparison
     from experiments.batch.summary import frame_of
     from plant.errors import HydrostateError
 

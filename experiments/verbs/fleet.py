@@ -132,8 +132,8 @@ def _diagnosed(
     """Diagnose the logs of a folder into a store beside the page."""
     from experiments.batch.cases import plan_study
     from experiments.batch.part_store import open_store
+    from experiments.batch.run_on_terminal import RunSettings, run_plan
     from experiments.batch.study_file import parse_study
-    from experiments.verbs.batch import run_plan
 
     kind, _ = load_actuator(plant, rig)
     if not folder.is_dir():
@@ -155,7 +155,7 @@ def _diagnosed(
     plan = plan_study(parse_study(content, f"{folder}"), folder)
     store = open_store(out / "store")
     with store.writing():
-        run_plan(plan, store, "fleet", workers)
+        run_plan(plan, store, "fleet", RunSettings(workers=workers))
     return store
 
 

@@ -23,6 +23,6 @@ def report(
     """
     from experiments.batch.folder import open_folder
     from experiments.batch.part_store import open_store
-    from experiments.batch.reporting import write_report
+    from experiments.batch.report import write_report
 
     emit(write_report(open_store(store), open_folder(out or store)))

@@ -9,8 +9,8 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
+from experiments.batch import run_on_terminal
 from experiments.batch.part_store import PartStore, open_store
-from experiments.verbs import batch
 from plant.errors import HydrostateError
 from tests.experiments.batch.conftest import rows_in_parts, run_into, small_plan
 
@@ -92,7 +92,7 @@ def test_an_interruption_after_the_last_case_stops_nothing(tmp_path: Path) -> No
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_first_request_to_end_is_a_wish_and_the_second_is_obeyed(number: int) -> None:
     before = signal.getsignal(number)
-    with batch._interruptible() as stop:
+    with run_on_terminal._interruptible() as stop:
         signal.raise_signal(number)
         assert stop.is_set()
         with pytest.raises(KeyboardInterrupt):

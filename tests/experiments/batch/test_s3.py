@@ -8,7 +8,7 @@ import pyarrow as pa
 import pytest
 
 from experiments.batch.part_store import open_store
-from experiments.batch.reporting import write_report
+from experiments.batch.report import write_report
 from tests.experiments.batch.conftest import run_into, small_plan
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]

@@ -28,7 +28,7 @@ LONGER: dict[str, Any] = {**RUNS, "seeds": 240, "duration_s": 0.1}
 
 DRIVER = """
 import os, sys
-from experiments.batch import cases, reporting, work
+from experiments.batch import cases, report, work
 from experiments.cli import app
 cases.MOST_CASES = 4
 for line in sys.stdin:

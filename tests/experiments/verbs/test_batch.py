@@ -121,7 +121,7 @@ def test_a_long_study_speaks_now_and_then_where_nobody_sees_its_bar(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     quiet = invoke("batch", study, "--out", tmp_path / "quiet", "--workers", 1).stderr
-    monkeypatch.setattr("experiments.verbs.batch.QUIET_SECONDS", 0.0)
+    monkeypatch.setattr("experiments.batch.run_on_terminal.QUIET_SECONDS", 0.0)
     told = invoke("batch", study, "--out", tmp_path / "told", "--workers", 1).stderr
     assert len(told.splitlines()) > len(quiet.splitlines())
     assert "18 of 18" in told

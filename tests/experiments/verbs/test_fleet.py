@@ -115,7 +115,7 @@ def test_the_logs_of_another_rig_are_diagnosed_with_it(tmp_path: Path, monkeypat
         asked.append(plan)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("experiments.verbs.batch.run_plan", ran)
+    monkeypatch.setattr("experiments.batch.run_on_terminal.run_plan", ran)
     invoke("fleet", logs, "--rig", rig, "--columns", "position_m=POS:mm", "--out", tmp_path / "fleet")
     (plan,) = asked
     assert plan.study.rig == str(rig.resolve())

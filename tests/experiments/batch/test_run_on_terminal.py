@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from experiments.batch import run_on_terminal
 from experiments.batch.runner import sources
 from experiments.batch.study_file import parse_study
 from experiments.verbs import batch
@@ -15,13 +16,13 @@ from plant.errors import HydrostateError
 @pytest.fixture
 def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     notes: list[str] = []
-    monkeypatch.setattr(batch, "note", notes.append)
+    monkeypatch.setattr(run_on_terminal, "note", notes.append)
     return notes
 
 
 def test_kept_rows_of_other_software_are_said_with_what_made_them(said: list[str]) -> None:
     old = {"versions": {"numpy": "1.0", "scipy": "2.0"}, "commit": "0123456789abcdef"}
-    batch._say_differences(old, {"versions": {"numpy": "1.1", "scipy": "2.0"}, "commit": "fedcba"})
+    run_on_terminal._say_differences(old, {"versions": {"numpy": "1.1", "scipy": "2.0"}, "commit": "fedcba"})
     (one,) = said
     assert "numpy 1.0, commit 0123456789;" in one
     assert "scipy" not in one
@@ -29,7 +30,7 @@ def test_kept_rows_of_other_software_are_said_with_what_made_them(said: list[str
 
 def test_kept_rows_of_code_that_was_edited_since_are_said(said: list[str]) -> None:
     old = {"versions": {}, "commit": "a", "sources": "one"}
-    batch._say_differences(old, {**old, "sources": "two"})
+    run_on_terminal._say_differences(old, {**old, "sources": "two"})
     (one,) = said
     assert "other code in plant, estimation, faults; --no-resume" in one
 
@@ -51,23 +52,23 @@ def test_an_edit_of_the_code_or_of_its_numbers_changes_the_hash_of_the_sources(t
 
 @pytest.mark.parametrize("old", [None, {"versions": {"numpy": "1.0"}, "commit": "a"}])
 def test_nothing_is_said_of_the_same_software_or_of_a_new_store(old: Any, said: list[str]) -> None:
-    batch._say_differences(old, {"versions": {"numpy": "1.0"}, "commit": "a"})
+    run_on_terminal._say_differences(old, {"versions": {"numpy": "1.0"}, "commit": "a"})
     assert said == []
 
 
 def test_only_the_first_failures_are_named(said: list[str]) -> None:
-    failures = [(f"case {k}", "no log") for k in range(batch.MOST_NAMED + 3)]
-    with batch._shown(len(failures), 0) as advance:
+    failures = [(f"case {k}", "no log") for k in range(run_on_terminal.MOST_NAMED + 3)]
+    with run_on_terminal._shown(len(failures), 0) as advance:
         advance(len(failures), SimpleNamespace(failures=failures))  # type: ignore[arg-type]
     named = [one for one in said if one.startswith("case ")]
-    assert named == [f"case {k}: no log" for k in range(batch.MOST_NAMED)]
+    assert named == [f"case {k}: no log" for k in range(run_on_terminal.MOST_NAMED)]
     assert said.count("more cases failed; the report names all") == 1
 
 
 def test_pace_counts_only_what_this_run_did(monkeypatch: pytest.MonkeyPatch) -> None:
     now = iter([100.0, 110.0, 110.0, 110.0, 110.0, 110.0])
-    monkeypatch.setattr(batch.time, "monotonic", lambda: next(now))
-    pace = batch.Pace(total=60, before=20)
+    monkeypatch.setattr(run_on_terminal.time, "monotonic", lambda: next(now))
+    pace = run_on_terminal.Pace(total=60, before=20)
     pace.done += 20
     assert pace.rate == pytest.approx(2.0)
     assert str(pace).startswith("40 of 60 cases, 2 a second")

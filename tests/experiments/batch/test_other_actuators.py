@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.actuators import actuator
-from experiments.batch.of_kind import found_of, simulated_of, simulated_run
+from experiments.batch.other_actuators import found_of, simulated_of, simulated_run
 from experiments.batch.study_file import Runs, parse_study
 
 

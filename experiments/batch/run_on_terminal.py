@@ -1,0 +1,196 @@
+"""A plan run into its store, with progress, failures and interruptions told on standard error."""
+
+import signal
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from threading import Event
+from typing import TYPE_CHECKING, Any
+
+from experiments.command.terminal import note
+
+if TYPE_CHECKING:
+    from experiments.batch.cases import Plan
+    from experiments.batch.part_store import PartStore
+    from experiments.batch.runner import Tally
+    from experiments.batch.work import Part
+
+QUIET_SECONDS = 30.0
+"""Time between lines of progress where standard error is no terminal [s]."""
+
+MOST_NAMED = 20
+"""So many failed cases are named as they come; the store and the report name all."""
+
+ENDINGS = (signal.SIGINT, signal.SIGTERM)
+"""Signals that ask a batch to end: Ctrl-C, and that of a system that shuts down."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunSettings:
+    """Where the cases of a study run, which of them, and when they stop.
+
+    Parameters
+    ----------
+    workers : int
+        Processes on this machine.
+    cluster : str or None
+        Scheduler of a Dask cluster, instead of them.
+    max_failures : int or None
+        The run stops once more cases have failed.
+    resume : bool
+        Whether cases that the store has are kept.
+    retry_failed : bool
+        Whether failed ones run again.
+    """
+
+    workers: int
+    cluster: str | None = None
+    max_failures: int | None = None
+    resume: bool = True
+    retry_failed: bool = False
+
+
+def run_plan(plan: "Plan", store: "PartStore", source: str, settings: RunSettings) -> "tuple[Tally, int]":
+    """Run what a store does not have yet, with progress on standard error.
+
+    Parameters
+    ----------
+    source : str
+        What the study is called in the manifest.
+    settings : RunSettings
+        Where it runs, and when it stops.
+
+    Returns
+    -------
+    tuple of Tally and int
+        What was run, and how many cases the store had before.
+    """
+    from experiments.batch.runner import manifest_of, run_batch
+    from experiments.running.executors import open_executor
+
+    manifest = manifest_of(plan, source)
+    if settings.resume:
+        _say_differences(store.manifest(), manifest)
+    else:
+        store.clear()
+    done, broken = store.done(again=settings.retry_failed)
+    for name in broken:
+        note(f"part {name} of {store.name} cannot be read: it is set aside, and its cases are run again")
+    wanted = plan.keys
+    store.describe(manifest, wanted)
+    before = len(done.intersection(wanted))
+    if before:
+        note(f"{before} of {len(wanted)} cases are in {store.name} already")
+    with _shown(len(wanted), before) as advance, _interruptible() as stop:
+        opener = partial(open_executor, settings.workers, settings.cluster)
+        most = settings.max_failures
+        tally = run_batch(plan, store, done, opener, stop=stop, on_part=advance, max_failures=most)
+    return tally, before
+
+
+def _say_differences(old: Any, new: Any) -> None:
+    """Say where kept rows were made by other software than what is to be made now."""
+    from experiments.batch.runner import METHODS
+
+    if old is None:
+        return
+    then = old["versions"]
+    changed = [f"{name} {then.get(name)}" for name, now in new["versions"].items() if then.get(name) != now]
+    if old.get("commit") != new["commit"]:
+        changed.append(f"commit {str(old.get('commit'))[:10]}")
+    elif old.get("sources") != new.get("sources"):
+        changed.append(f"other code in {', '.join(METHODS)}")
+    if changed:
+        note(f"rows that are kept may have been made with {', '.join(changed)}; --no-resume makes all of them again")
+
+
+@contextmanager
+def _interruptible() -> Generator[Event]:
+    """Turn the first Ctrl-C, or the system's request to end, into a wish to stop; a second one stops at once."""
+    stop = Event()
+
+    def wish(number: int, frame: object) -> None:
+        del number, frame
+        stop.set()
+        for one in ENDINGS:
+            signal.signal(one, signal.default_int_handler)
+        note("interrupted: finishing the running cases; press Ctrl-C again to stop at once")
+
+    before = {one: signal.signal(one, wish) for one in ENDINGS}
+    try:
+        yield stop
+    finally:
+        for one, was in before.items():
+            signal.signal(one, was)
+
+
+@contextmanager
+def _shown(total: int, before: int) -> "Generator[Callable[[int, Part], None]]":
+    """Show cases done, their rate and the time left; failures are named as they come."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    quiet = not console.is_terminal
+    columns = (TextColumn("cases"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}"))
+    bar = Progress(*columns, TimeRemainingColumn(), console=console, transient=True, disable=quiet)
+    task = bar.add_task("cases", total=total, completed=before, rate="")
+    pace, named, spoken = Pace(total, before), 0, time.monotonic()
+
+    def advance(count: int, part: "Part") -> None:
+        nonlocal named, spoken
+        for case, reason in part.failures:
+            named += 1
+            if named <= MOST_NAMED:
+                note(f"{case}: {reason}")
+            elif named == MOST_NAMED + 1:
+                note("more cases failed; the report names all")
+        pace.done += count
+        bar.update(task, advance=count, rate=f"{pace.rate:.3g}/s")
+        if quiet and time.monotonic() - spoken > QUIET_SECONDS:
+            spoken = time.monotonic()
+            note(str(pace))
+
+    with bar:
+        yield advance
+
+
+class Pace:
+    """How fast cases are done, and how long the rest will take."""
+
+    def __init__(self, total: int, before: int) -> None:
+        self.total, self.done, self._before, self._begin = total, before, before, time.monotonic()
+
+    @property
+    def rate(self) -> float:
+        """Cases a second since the beginning [1/s]."""
+        return (self.done - self._before) / max(time.monotonic() - self._begin, 1e-9)
+
+    def __str__(self) -> str:
+        left = (self.total - self.done) / self.rate if self.rate > 0.0 else 0.0
+        return f"{self.done} of {self.total} cases, {self.rate:.3g} a second, {duration(left)} left"
+
+
+def duration(seconds: float) -> str:
+    """Return a length of time as a person says it.
+
+    Parameters
+    ----------
+    seconds : float
+        The time [s].
+
+    Returns
+    -------
+    str
+        In seconds, minutes or hours.
+
+    Examples
+    --------
+    >>> duration(5.2), duration(300.0), duration(40_000.0)
+    ('5 s', '5 min', '11.1 h')
+    """
+    if seconds < 90.0:
+        return f"{max(1.0, seconds):.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
