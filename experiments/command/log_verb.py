@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 from experiments.command.json_output import Result, prepare_output, write_whole
-from experiments.command.logs import finish, overheard, read_log, run_logs, with_said
+from experiments.command.logs import finish, overheard, read_log, run_logs, with_remarks
 from experiments.command.options import load_actuator, load_columns, understood
 from experiments.command.output_paths import own_paths, page_place, require_place
 from experiments.command.terminal import clauses, note
@@ -74,7 +74,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
         if log in figures and chosen.figure is not None:
             chosen.figure(found, log.name, figures[log])
         if log in pages:
-            page = page_of(chosen, with_said({"file": str(log), **result}, said), found, record)
+            page = page_of(chosen, with_remarks({"file": str(log), **result}, said), found, record)
             write_whole(pages[log], page, "--report")
         return result
 

@@ -122,7 +122,7 @@ def noted(source: str, read: Callable[[], T]) -> T:
     return found
 
 
-def with_said(result: Result, said: Iterable[LogWarning]) -> dict[str, Any]:
+def with_remarks(result: Result, said: Iterable[LogWarning]) -> dict[str, Any]:
     """Return the entries of a log with what reading it brought up, in front of its other warnings and notes.
 
     Parameters
@@ -145,7 +145,7 @@ def _one(log: Path, work: Work, blank: Result) -> Result:
             result = _failure(blank, error.message if error.source == str(log) else str(error))
         except Exception as error:  # whatever a log brings up must not cost the others their results
             result = _failure(blank, unexpected(error))
-    result = with_said(result, said_of_it)
+    result = with_remarks(result, said_of_it)
     for sentence in result["warnings"]:
         note(f"{log}: warning: {sentence}")
     if result["outcome"] in {"failed", "diverged"}:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from experiments.eha.plain_verdict import sureness, verdict, what_to_do
-from experiments.eha.verdict_words import SHOWN, amount, library_said
+from experiments.eha.verdict_words import SHOWN, amount, library_sentence
 from experiments.log_pages.channels import channel_charts
 from experiments.page.charts import Charts
-from experiments.page.numbers import percent_said
+from experiments.page.numbers import percent_text
 from experiments.page.panels import Curve, Mark, Panel
 from experiments.page.render import render_page
 from experiments.page.severity_rows import severity_rows
@@ -44,11 +44,11 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "title": verdict(result),
         "to_do": what_to_do(result),
         "sureness": sureness(result),
-        "library": library_said(result),
+        "library": library_sentence(result),
         "not_told": [sentence(said) for said in result["not_told"]],
         "warnings": [sentence(said) for said in result.get("warnings", [])],
         "shares": [
-            (in_words(condition), 100.0 * share, percent_said(share), share < LEAST_SHARE)
+            (in_words(condition), 100.0 * share, percent_text(share), share < LEAST_SHARE)
             for condition, share in shares
         ],
         "rows": severity_rows(found.severities, found.healthy, found.evidence.diagnosis.limits, SHOWN),

@@ -99,7 +99,7 @@ def diagnosis_entries(found: "Finding") -> dict[str, Any]:
         ``since_s``, ``since_ci95_s`` and ``condition_before`` say when; else they are None.
     """
     from estimation.finding import Outcome
-    from experiments.eha.verdict_words import headline, models_said
+    from experiments.eha.verdict_words import headline, models_sentence
     from faults.diagnosis.models_verdict import margin, ranked
 
     evidence: EhaEvidence = found.evidence
@@ -127,7 +127,7 @@ def diagnosis_entries(found: "Finding") -> dict[str, Any]:
     if not judged and found.outcome is Outcome.MISMATCH:
         return {**entries, "message": clauses(str(note) for note in found.against)}
     if not judged:
-        return {**entries, "message": models_said(entries)}
+        return {**entries, "message": models_sentence(entries)}
     since = found.since
     entries |= {
         "probabilities": dict(found.probabilities),

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from experiments.page.condition_names import in_words
-from experiments.page.numbers import percent_said, shop_unit
+from experiments.page.numbers import percent_text, shop_unit
 
 SHOWN = {
     "leakage_flow": "leakage at rated pressure",
@@ -36,7 +36,7 @@ def verdict_lines(result: Mapping[str, Any]) -> list[str]:
         What it is, how bad in leakage, in friction and oil, whether it is reliable, what to measure next, and what the
         library of transfer functions says where it says anything.
     """
-    library = library_said(result)
+    library = library_sentence(result)
     return [
         f"{result['file']}: {headline(result)}",
         f"  leakage   {amounts(result, ('leakage_flow', 'velocity_lost'))}",
@@ -59,9 +59,9 @@ def headline(result: Mapping[str, Any]) -> str:
     ranked = sorted(result["probabilities"].items(), key=lambda item: -item[1])
     (best, first), (second, other) = ranked[:2]
     parts = [
-        f"{_said(best)}, probability {percent_said(first)} %",
+        f"{_spaced(best)}, probability {percent_text(first)} %",
         since(result),
-        f"second most likely {_said(second)}, {percent_said(other)} %",
+        f"second most likely {_spaced(second)}, {percent_text(other)} %",
     ]
     named = "; ".join(part for part in parts if part)
     return f"{NEAREST}{named}" if result["unknown"] else named
@@ -82,7 +82,7 @@ def since(result: Mapping[str, Any]) -> str:
     """
     if result["since_s"] is not None:
         low, high = result["since_ci95_s"]
-        before = _said(result["condition_before"])
+        before = _spaced(result["condition_before"])
         return f"since {result['since_s']:.2f} s ({low:.2f} to {high:.2f} s), {before} before"
     return "" if result["condition"] == "normal" else "present since before the log began"
 
@@ -152,7 +152,7 @@ def next_step(result: Mapping[str, Any]) -> str:
     return "; ".join(result["advice"])
 
 
-def library_said(result: Mapping[str, Any]) -> str:
+def library_sentence(result: Mapping[str, Any]) -> str:
     """Return whether the library of transfer functions agrees with the verdict, which it never changes.
 
     Returns
@@ -165,7 +165,7 @@ def library_said(result: Mapping[str, Any]) -> str:
     --------
     >>> errors = {"normal": 0.0012, "minor_leakage": 0.0019}
     >>> found = {"condition": "normal", "unknown": False, "since_s": None, "transfer_function_scores": errors}
-    >>> library_said(found)
+    >>> library_sentence(found)
     'The library of transfer functions agrees: normal has the smallest error in velocity, 1.20 mm/s; the next, minor \
 leakage, has 1.90 mm/s.'
     """
@@ -209,7 +209,7 @@ def margin_word(margin: float) -> str:
     return next(word for bound, word in MARGINS if margin < bound or bound == math.inf)
 
 
-def models_said(result: Mapping[str, Any]) -> str:
+def models_sentence(result: Mapping[str, Any]) -> str:
     """Return what nine nominal models alone say of a log, in one sentence.
 
     Parameters
@@ -235,5 +235,5 @@ def models_said(result: Mapping[str, Any]) -> str:
     return f"{NEAREST}{named}" if result["unknown"] else named
 
 
-def _said(condition: str) -> str:
+def _spaced(condition: str) -> str:
     return condition.replace("_", " ")

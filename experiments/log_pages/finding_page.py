@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from experiments.log_pages.channels import channel_charts
-from experiments.page.numbers import MISSING, number, percent_said, pretty_unit
+from experiments.page.numbers import MISSING, number, percent_text, pretty_unit
 from experiments.page.render import render_page
 from experiments.page.tables import Column
 from experiments.page.words import left_unread, sentence
@@ -57,7 +57,7 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
         "notes": [one for one in noted if one not in to_do],
         "quantities": pd.DataFrame([_row(name, one) for name, one in shown.items()]),
         "probabilities": pd.DataFrame(
-            [(name.replace("_", " "), percent_said(share)) for name, share in shares if share >= LEAST_SHARE],
+            [(name.replace("_", " "), percent_text(share)) for name, share in shares if share >= LEAST_SHARE],
             columns=["condition", "percent"],
         ),
         "charts": {"measured": channel_charts(record, found, Path(file).stem)},

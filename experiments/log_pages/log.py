@@ -297,10 +297,10 @@ class Log(Shown):
 
         def page(title: str) -> str:
             from experiments.command.log_verb import page_of
-            from experiments.command.logs import with_said
+            from experiments.command.logs import with_remarks
 
             about = {"file": title, "plant": self.plant, "rig": rig.name, "seed": 2024, "expected": None}
-            return page_of(chosen, with_said({**about, **entries}, self._said), found, record)
+            return page_of(chosen, with_remarks({**about, **entries}, self._said), found, record)
 
         return Answer(found, entries, lambda rows: chosen.screen(rows, asked), page)
 

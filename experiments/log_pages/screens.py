@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.command.json_output import Result
 from experiments.command.terminal import table
-from experiments.page.numbers import percent_said
+from experiments.page.numbers import percent_text
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -35,7 +35,7 @@ def quantities_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "
             shown.add_row(name.replace("_", " "), value, *said, entry["unit"])
         yield shown
         sure = result.get("probabilities", {}).get(result.get("condition"))
-        probable = "" if sure is None else f", probability {percent_said(sure)} %"
+        probable = "" if sure is None else f", probability {percent_text(sure)} %"
         yield f"{about}: {result['outcome'].replace('_', ' ')}: {result['message']}{probable}"
         yield from (f"{about}: next: {one}" for one in result.get("advice", ()))
 

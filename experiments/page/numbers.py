@@ -44,7 +44,7 @@ def number(value: float | None, digits: int = 4) -> str:
     return f"{mantissa}{TIMES}10{str(exponent).translate(SUPERSCRIPTS)}"
 
 
-def percent_said(probability: float) -> str:
+def percent_text(probability: float) -> str:
     """Return a probability in percent, never nought and never a hundred.
 
     Parameters
@@ -54,7 +54,7 @@ def percent_said(probability: float) -> str:
 
     Examples
     --------
-    >>> percent_said(0.99995), percent_said(0.873), percent_said(0.0)
+    >>> percent_text(0.99995), percent_text(0.873), percent_text(0.0)
     ('> 99.9', '87.3', '< 0.1')
     """
     if probability > 0.999:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
+from functools import partial
 
 import pandas as pd
 
@@ -231,49 +232,52 @@ def _to_the_letter(frame: pd.DataFrame) -> Iterator[Row]:
 def _library(frame: pd.DataFrame) -> Iterator[Row]:
     ours = frame.set_index("condition")
     for condition in CONDITIONS:
-        low, high = (cell(ours, condition, f"published_gain_{end}") for end in ("low", "high"))
-        gain, spread = cell(ours, condition, "dc_gain"), 1.96 * cell(ours, condition, "dc_gain_std")
-        yield Row(
-            paper=PAPER,
-            where="Table 6",
-            claim=f"gain at z = 1, {in_words(condition)}; the digits leave it open between the two",
-            printed=f"{low:.3g} to {high:.3g}",
-            value=None,
-            unit="m/s per rad/s",
-            accept=f"{low!r} to {high!r}",
-            basis="model",
-            ours=Ours(gain, gain - spread, gain + spread),
-            shown_by="hydrostate library",
-            note=FREE_NOTE,
-        )
-        published = cell(ours, condition, "published_bandwidth_hz")
-        width, spread = cell(ours, condition, "bandwidth_hz"), 1.96 * cell(ours, condition, "bandwidth_std_hz")
-        there = published == published  # NaN where the printed model never falls 3 dB
-        yield Row(
-            paper=PAPER,
-            where="Table 6",
-            claim=f"3 dB down, {in_words(condition)}, of the printed model at the inferred 1 ms",
-            printed=f"{published:.3g}" if there else "never falls 3 dB",
-            value=published if there else "never falls 3 dB",
-            unit="Hz",
-            accept="± 10 %" if there else "same",
-            basis="model",
-            ours=Ours(width, width - spread, width + spread),
-            shown_by="hydrostate library",
-            note=FREE_NOTE,
-        )
-        jump = cell(ours, condition, "published_jump_ratio")
-        yield Row(
-            paper=PAPER,
-            where="Table 6",
-            claim=f"share of the gain that acts at once, b_0 over gain, {in_words(condition)}, of the printed model",
-            printed=f"{jump:.2g}",
-            value=jump,
-            unit="",
-            accept="± 0.05",
-            basis="model",
-            ours=Ours(cell(ours, condition, "jump_ratio")),
-            errata="E15",
-            shown_by="hydrostate library",
-            note="A mass cannot jump.",
-        )
+        yield _library_gain(ours, condition)
+        yield _library_bandwidth(ours, condition)
+        yield _library_jump(ours, condition)
+
+
+_library_row = partial(Row, paper=PAPER, where="Table 6", basis="model", shown_by="hydrostate library")
+
+
+def _library_gain(ours: pd.DataFrame, condition: str) -> Row:
+    low, high = (cell(ours, condition, f"published_gain_{end}") for end in ("low", "high"))
+    gain, spread = cell(ours, condition, "dc_gain"), 1.96 * cell(ours, condition, "dc_gain_std")
+    return _library_row(
+        claim=f"gain at z = 1, {in_words(condition)}; the digits leave it open between the two",
+        printed=f"{low:.3g} to {high:.3g}",
+        value=None,
+        unit="m/s per rad/s",
+        accept=f"{low!r} to {high!r}",
+        ours=Ours(gain, gain - spread, gain + spread),
+        note=FREE_NOTE,
+    )
+
+
+def _library_bandwidth(ours: pd.DataFrame, condition: str) -> Row:
+    published = cell(ours, condition, "published_bandwidth_hz")
+    width, spread = cell(ours, condition, "bandwidth_hz"), 1.96 * cell(ours, condition, "bandwidth_std_hz")
+    there = published == published  # NaN where the printed model never falls 3 dB
+    return _library_row(
+        claim=f"3 dB down, {in_words(condition)}, of the printed model at the inferred 1 ms",
+        printed=f"{published:.3g}" if there else "never falls 3 dB",
+        value=published if there else "never falls 3 dB",
+        unit="Hz",
+        accept="± 10 %" if there else "same",
+        ours=Ours(width, width - spread, width + spread),
+        note=FREE_NOTE,
+    )
+
+
+def _library_jump(ours: pd.DataFrame, condition: str) -> Row:
+    jump = cell(ours, condition, "published_jump_ratio")
+    return _library_row(
+        claim=f"share of the gain that acts at once, b_0 over gain, {in_words(condition)}, of the printed model",
+        printed=f"{jump:.2g}",
+        value=jump,
+        unit="",
+        accept="± 0.05",
+        ours=Ours(cell(ours, condition, "jump_ratio")),
+        errata="E15",
+        note="A mass cannot jump.",
+    )

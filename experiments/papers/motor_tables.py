@@ -114,6 +114,12 @@ def _relations(ours: pd.DataFrame) -> Iterator[Row]:
             value = base * off if ratio == "piston_area_cm2" else base / off
             claim, note = f"{words}, row {k + 1}", notes.get(ratio, "")
             yield _row("Table 2", claim, text, unit, accept, Ours(float(value)), errata=errata, note=note)
+    yield from _layers(printed, accept)
+    yield from _no_frequency(printed)
+
+
+def _layers(printed: pd.DataFrame, accept: str) -> Iterator[Row]:
+    """Yield the columns of Table 2 that Table 1 gives: diameter and thickness."""
     size = PlateParameters()
     total = 1e3 * size.thickness
     for k, row in enumerate(printed.to_dict("records")):
@@ -129,7 +135,6 @@ def _relations(ours: pd.DataFrame) -> Iterator[Row]:
             errata="M23",
         )
         yield _row("Table 2", f"(2) thickness, {here} two layers", thick, "mm", accept, Ours(total), errata="M14")
-    yield from _no_frequency(printed)
 
 
 def _no_frequency(printed: pd.DataFrame) -> Iterator[Row]:

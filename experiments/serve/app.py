@@ -20,13 +20,13 @@ from starlette.types import Scope
 
 from experiments.command.terminal import note, unexpected
 from experiments.serve.answers import Comparison, Health, Log, Logs, Said, StreamHistory, StreamState, Verb, log_of
+from experiments.serve.comparison import compared
 from experiments.serve.events import MOST_LOOKING, event_stream
 from experiments.serve.limits import HEADERS, MOST_UPLOADS, Guard, RefusedError, receive_file, require_size
 from experiments.serve.metrics import PROMETHEUS_TEXT, exposition
 from experiments.serve.pages import home_page, live_page, policy_of, policy_of_file
 from experiments.serve.service import Service
 from experiments.serve.settings import Settings
-from experiments.serve.views import compared
 from plant.errors import HydrostateError
 
 Identity = Annotated[str, Path(pattern=r"^[0-9a-f]{16}$", description="The id from the list of logs.")]
@@ -110,6 +110,7 @@ def make_app(settings: Settings, refused: Callable[[HydrostateError], None] | No
     app.add_middleware(Guard, settings=settings)
     _answer_errors(app)
     _offer_logs(app, service)
+    _offer_state(app, service)
     _offer_comparison(app, service)
     _offer_streams(app, service)
     _offer_pages(app, service)
@@ -211,6 +212,8 @@ def _offer_logs(app: FastAPI, service: Service) -> None:
         """Delete a log with its page and result; if it is running, it stops at once."""
         service.delete(id)
 
+
+def _offer_state(app: FastAPI, service: Service) -> None:
     @app.get("/api/health", tags=["server"])
     def health() -> Health:
         """Return whether the server has room for more."""

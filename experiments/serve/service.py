@@ -10,12 +10,13 @@ from typing import Any, TextIO
 from pebble import ProcessExpired
 
 from experiments.running.refusal import refused
+from experiments.serve.comparison import compare_view
+from experiments.serve.fleet_view import fleet_view
 from experiments.serve.jobs import BusyError, Jobs, log_file, page_file, phase_file
 from experiments.serve.limits import RefusedError, Room
 from experiments.serve.live import Stream, Streams
 from experiments.serve.settings import Settings
 from experiments.serve.store import FAILED, INTERRUPTED, UNFINISHED, Kept, Store
-from experiments.serve.views import compare_view, fleet_view
 from plant.errors import HydrostateError
 
 LOCK = "in-use"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.command.json_output import plain
 from experiments.command.log_verb import page_of
-from experiments.command.logs import caught, overheard, read_log, with_said
+from experiments.command.logs import caught, overheard, read_log, with_remarks
 from experiments.command.options import load_actuator
 from experiments.command.terminal import clauses, unexpected
 from experiments.serve.process import bind_to_server
@@ -112,7 +112,7 @@ def work_on(task: Task) -> Worked:
             worked = _failed(task, blank, error.message if error.source == str(task.log) else str(error))
         except Exception as error:  # whatever a log brings up is told to whoever sent it
             worked = _failed(task, blank, unexpected(error))
-    result = plain({"file": task.name, **with_said(worked.result, said)})
+    result = plain({"file": task.name, **with_remarks(worked.result, said)})
     return Worked(_without_path(result, task), plain(worked.entries))
 
 
@@ -124,7 +124,7 @@ def _found(task: Task) -> Worked:
     found = chosen.run(record, rig, prepared)
     result = {**chosen.blank, "plant": kind.name, "rig": bench.name, **chosen.entries(found)}
     task.phase.write_text(WRITING, encoding="utf-8")
-    _write(task, page_of(chosen, with_said({"file": task.name, **result}, said), found, record))
+    _write(task, page_of(chosen, with_remarks({"file": task.name, **result}, said), found, record))
     if task.verb != "diagnose":
         return Worked(result, None)
     if kind.name == "eha":

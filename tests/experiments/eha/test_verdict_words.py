@@ -11,8 +11,8 @@ from experiments.eha.verdict_words import (
     amount,
     believed,
     headline,
-    library_said,
-    models_said,
+    library_sentence,
+    models_sentence,
     next_step,
     since,
     verdict_lines,
@@ -90,7 +90,7 @@ def test_a_verdict_that_something_speaks_against_says_so_first_and_why() -> None
 @pytest.mark.parametrize(("against", "begins"), [((), "minor_leakage, by a wide margin"), (AGAINST, "UNKNOWN")])
 def test_nominal_models_alone_name_the_nearest_with_its_margin(against: tuple[Note, ...], begins: str) -> None:
     entries = diagnosis_entries(found_as("minor_leakage", against=against, judged=False))
-    assert entries["message"] == models_said(entries)
+    assert entries["message"] == models_sentence(entries)
     assert entries["message"].startswith(begins)
     assert "the error of normal is 2.0 times as large" in entries["message"]
     assert (entries["condition"], entries["runner_up"]) == ("minor_leakage", "normal")
@@ -121,13 +121,13 @@ def test_the_library_agrees_or_names_another_and_changes_no_verdict() -> None:
     alone = {**diagnosis_entries(found_as("minor_leakage")), "severity": None}
     agrees = diagnosis_entries(with_library(found_as("minor_leakage"), "minor_leakage"))
     differs = diagnosis_entries(with_library(found_as("minor_leakage"), "major_friction"))
-    assert "agrees: minor leakage has the smallest error in velocity, 1.00 mm/s" in library_said(agrees)
+    assert "agrees: minor leakage has the smallest error in velocity, 1.00 mm/s" in library_sentence(agrees)
     assert "names major friction instead: its error in velocity is 1.00 mm/s, that of minor leakage is 2.00 mm/s" in (
-        library_said(differs)
+        library_sentence(differs)
     )
     for entries in (agrees, differs):
         said = verdict_lines({"file": "run.csv", **entries})
-        assert said[-1].strip() == library_said(entries)
+        assert said[-1].strip() == library_sentence(entries)
         assert len(said) == 7
         assert {key for key in alone if alone[key] != entries[key]} == {
             "severity",
@@ -144,22 +144,22 @@ def test_the_library_agrees_or_names_another_and_changes_no_verdict() -> None:
     ],
 )
 def test_the_library_is_silent_where_the_log_is_not_of_one_known_condition(found: Finding) -> None:
-    assert library_said(diagnosis_entries(with_library(found, "normal"))) == ""
-    assert library_said(diagnosis_entries(found_as("minor_leakage"))) == ""
+    assert library_sentence(diagnosis_entries(with_library(found, "normal"))) == ""
+    assert library_sentence(diagnosis_entries(found_as("minor_leakage"))) == ""
 
 
 def test_a_library_in_which_one_condition_alone_ran_says_nothing() -> None:
     errors = {"normal": 0.0012, "minor_leakage": 0.0019}
     found = {"condition": "normal", "unknown": False, "since_s": None, "transfer_function_scores": errors}
-    assert "agrees" in library_said(found)
-    assert library_said({**found, "transfer_function_scores": {**errors, "minor_leakage": float("inf")}}) == ""
+    assert "agrees" in library_sentence(found)
+    assert library_sentence({**found, "transfer_function_scores": {**errors, "minor_leakage": float("inf")}}) == ""
 
 
 def test_how_far_the_runner_up_of_nine_models_is_behind_is_told_in_the_words_of_its_size() -> None:
     about = {"condition": "normal", "runner_up": "minor_leakage", "unknown": False}
-    said = {margin: models_said({**about, "margin": margin}) for margin in (1.001, 1.5, 3.0, float("inf"))}
+    said = {margin: models_sentence({**about, "margin": margin}) for margin in (1.001, 1.5, 3.0, float("inf"))}
     assert "only 0.1 % larger" in said[1.001]
     assert "50 % larger" in said[1.5]
     assert "3.0 times as large" in said[3.0]
     assert said[float("inf")] == "normal, which fits exactly, as minor_leakage does not"
-    assert models_said({**about, "margin": 1.5, "unknown": True}).endswith(said[1.5])
+    assert models_sentence({**about, "margin": 1.5, "unknown": True}).endswith(said[1.5])

@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from experiments.page.numbers import TIMES, exact, fixed, number, percent_said, pretty_unit
+from experiments.page.numbers import TIMES, exact, fixed, number, percent_text, pretty_unit
 from experiments.page.tables import Cell, Column, html_table
 
 
@@ -66,4 +66,4 @@ def test_a_cell_carries_its_tone() -> None:
     ("probability", "said"), [(1.0, "> 99.9"), (0.9991, "> 99.9"), (0.999, "99.9"), (0.001, "0.1"), (0.0009, "< 0.1")]
 )
 def test_a_probability_is_never_nought_and_never_a_hundred(probability: float, said: str) -> None:
-    assert percent_said(probability) == said
+    assert percent_text(probability) == said

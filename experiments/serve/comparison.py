@@ -1,51 +1,20 @@
-"""Pages over several logs, made in a process that can be killed: the fleet, and two logs side by side."""
+"""Two logs side by side: their quantities, what changed, and the page, made in a process that can be killed."""
 
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from experiments.page.numbers import MISSING, number, percent_said, pretty_unit
+from experiments.page.numbers import MISSING, number, percent_text, pretty_unit, shop_unit
 from experiments.page.words import in_words, sentence
-from plant.errors import HydrostateError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+LEAST_SHARE = 1e-3
+"""Conditions that are less likely in both logs are not shown [probability]."""
 
 DEVIATIONS = 1.96
 """Standard deviations from an estimate to the end of its 95 % interval [dimensionless]."""
-
-
-def fleet_view(
-    rows: Sequence[tuple[str, str, Mapping[str, Any]]], pattern: str | None, limits: Mapping[str, float], source: str
-) -> str:
-    """Return the page of the fleet.
-
-    Parameters
-    ----------
-    rows : sequence of tuple
-        Identity, name and entries of a row of each log that was diagnosed.
-    pattern : str or None
-        How logs are named.
-    limits : Mapping[str, float]
-        Limits of severities [their units].
-    """
-    from experiments.fleet.actuators import actuator_rows
-    from experiments.fleet.naming import UNNAMED, Named, by_pattern
-    from experiments.fleet.page import fleet_page
-    from experiments.fleet.rows import log_rows
-
-    counts = Counter(name for _, name, _ in rows)
-    files = {identity: name if counts[name] == 1 else f"{name} ({identity[:6]})" for identity, name, _ in rows}
-    names: dict[str, Named] = {}
-    for identity, name, _ in rows if pattern else ():
-        try:
-            names[files[identity]] = by_pattern([name], pattern or "")[name]
-        except HydrostateError:  # a date that is none
-            names[files[identity]] = UNNAMED
-    blank = dict.fromkeys(("outcome", "found_condition", "reason", "quantities"))
-    table = [{**blank, **entries, "verb": "diagnose", "file": files[identity]} for identity, _, entries in rows]
-    found = actuator_rows(log_rows(table, names, limits))
-    by_file = {file: identity for identity, file in files.items()}
-    links = {row.name: f"logs/{by_file[row.last.file]}" for row in found if row.last.state != "failed"}
-    return fleet_page(found, links, source)
 
 
 def compare_view(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
@@ -56,44 +25,18 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
     first, second : Mapping
         Their entries of the JSON contract.
     """
-    import pandas as pd
-
     from experiments.page.render import render_page
     from experiments.page.tables import Column
 
     rows = compared(first, second)
-    changed = [row["quantity"] for row in rows if row["changed"]]
-    shown = [
-        {
-            "quantity": row["quantity"].replace("_", " "),
-            **_in_a_readers_unit(row),
-            "says": "changed" if row["changed"] else "no certain change" if row["interval"] else "not in both logs",
-        }
-        for row in rows
-    ]
-    shares = {
-        name: tuple((one.get("probabilities") or {}).get(name, 0.0) for one in (first, second))
-        for name in {**(first.get("probabilities") or {}), **(second.get("probabilities") or {})}
-    }
-    likely = sorted(((name, pair) for name, pair in shares.items() if max(pair) >= 1e-3), key=lambda one: -max(one[1]))
+    logs = [{"file": one["file"], "message": sentence(one.get("message") or "")} for one in (first, second)]
     facts = {
-        "logs": [
-            {
-                "file": one["file"],
-                "message": sentence(one.get("message") or ""),
-            }
-            for one in (first, second)
-        ],
-        "title": _title(changed),
-        "quantities": pd.DataFrame(shown),
-        "probabilities": pd.DataFrame(
-            [
-                {"condition": in_words(name), "first": percent_said(a), "second": percent_said(b)}
-                for name, (a, b) in likely
-            ]
-        ),
+        "logs": logs,
+        "title": _title([row["quantity"] for row in rows if row["changed"]]),
+        "quantities": _quantities_shown(rows),
+        "probabilities": _probabilities_shown(first.get("probabilities") or {}, second.get("probabilities") or {}),
     }
-    names = [first["file"], second["file"]]
+    names = [log["file"] for log in logs]
     headed = {
         "quantities": (
             "quantity",
@@ -107,6 +50,33 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
         "probabilities": ("condition", Column("first", names[0], "%"), Column("second", names[1], "%")),
     }
     return render_page("serve/compare.html", facts, headed, {})
+
+
+def _quantities_shown(rows: Sequence[Mapping[str, Any]]) -> "pd.DataFrame":
+    import pandas as pd
+
+    shown = [
+        {
+            "quantity": row["quantity"].replace("_", " "),
+            **_in_a_readers_unit(row),
+            "says": "changed" if row["changed"] else "no certain change" if row["interval"] else "not in both logs",
+        }
+        for row in rows
+    ]
+    return pd.DataFrame(shown)
+
+
+def _probabilities_shown(first: Mapping[str, float], second: Mapping[str, float]) -> "pd.DataFrame":
+    """Return the conditions that are likely enough in one of two logs, the likeliest first."""
+    import pandas as pd
+
+    shares = {name: (first.get(name, 0.0), second.get(name, 0.0)) for name in {**first, **second}}
+    likely = sorted(
+        ((name, pair) for name, pair in shares.items() if max(pair) >= LEAST_SHARE), key=lambda one: -max(one[1])
+    )
+    return pd.DataFrame(
+        [{"condition": in_words(name), "first": percent_text(a), "second": percent_text(b)} for name, (a, b) in likely]
+    )
 
 
 def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -169,7 +139,7 @@ def std_of(one: Mapping[str, Any]) -> float | None:
 
 
 def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:
-    scale, unit = (1e-6, "MPa") if row["unit"] == "Pa" else (1.0, row["unit"])
+    scale, unit = shop_unit(row["unit"])
 
     def ends(interval: Sequence[float]) -> str:
         return " to ".join(number(scale * end, 3) for end in interval)

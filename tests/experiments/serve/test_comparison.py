@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from experiments.serve.views import compare_view, compared, fleet_view, quantities_of
+from experiments.serve.comparison import compare_view, compared, quantities_of
+from experiments.serve.fleet_view import fleet_view
 
 
 def result(value: float | None, half: float | None, **more: Any) -> dict[str, Any]:
