@@ -26,7 +26,7 @@ from experiments.open_benchmark.logger import PLAIN
 from experiments.running.executors import side_by_side
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.severity import severities_at
@@ -147,7 +147,7 @@ def _bulk_modulus(case: Case, log: Log) -> Iterator[tuple[str, float, str]]:
 
 
 def _severities(log: Log) -> Iterator[tuple[str, float, str]]:
-    actuator = Actuator.of(log.rig)
+    actuator = actuator_of(log.rig)
     exact = severities_at(coordinates_of(log.true, actuator.rated), actuator)
     found = diagnose_log(log.record, Rig(parameters=log.rig))
     for name, one in found.severities.items():

@@ -27,7 +27,7 @@ from benchmarks.population import TEST, Drawn, draw_logs
 from benchmarks.scores import calibration_error, share_interval
 from benchmarks.targets import Check, printed
 from estimation.finding import Finding
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import Actuator, actuator_of
 from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.rmse import score_mathematical
@@ -59,7 +59,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--seeds", type=int, default=50)
     parser.add_argument("--draws", type=int, default=2000)
     options = parser.parse_args(arguments)
-    actuator = Actuator.of(EhaParameters())
+    actuator = actuator_of(EhaParameters())
     checks: list[Check] = []
 
     for pressure, wanted in ((True, 98.0), (False, 94.0)):

@@ -27,7 +27,7 @@ from experiments.open_benchmark.loaders import read_truth, rows_of
 from experiments.open_benchmark.score import COEFFICIENTS
 from experiments.published.library import read_library
 from faults.conditions import CONDITIONS
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import Actuator, actuator_of
 from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.class_regions import ClassFits
 from faults.diagnosis.evidence import EVIDENCES, weigh
@@ -87,7 +87,7 @@ def main(arguments: list[str]) -> int:
 
 def _only_widths(seeds: int, out: Path) -> int:
     """Fit the widths with pressure and write them beside what is there; return 0."""
-    actuator = Actuator.of(EhaParameters())
+    actuator = actuator_of(EhaParameters())
     ratios = _no_ratios()
     for _, log in _training(range(TRAINING, TRAINING + seeds)):
         _add_ratios(ratios, last_part(log.record, actuator).fits, log.parameters, actuator)
@@ -121,7 +121,7 @@ def _widths(ratios: dict[str, list[float]]) -> dict[str, float]:
 
 def gathered(seeds: Sequence[int], *, pressure: bool) -> tuple[Array, NDArray[np.int64], dict[str, list[float]]]:
     """Return log-odds (logs, evidences, 9), true conditions, and errors over half-widths by severity."""
-    actuator, library = Actuator.of(EhaParameters()), read_library()
+    actuator, library = actuator_of(EhaParameters()), read_library()
     odds: list[Array] = []
     truths: list[int] = []
     ratios = _no_ratios()

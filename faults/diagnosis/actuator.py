@@ -34,32 +34,6 @@ class Actuator:
     conditions: Array
     load_doubt: float = 0.0
 
-    @staticmethod
-    def of(rig: EhaParameters) -> "Actuator":
-        """Return the actuator of a rig.
-
-        Parameters
-        ----------
-        rig : EhaParameters
-            The healthy actuator.
-
-        Returns
-        -------
-        Actuator
-            It, and its conditions.
-
-        Raises
-        ------
-        RigError
-            If no circuit fits around it.
-        """
-        rated = steady_state(rig.rated_speed, rig)[0]
-        points = [coordinates_of(parameters_for(condition, rig), rated) for condition in CONDITIONS.values()]
-        circuit = circuit_of(rig)
-        if rig.stroke is None:
-            circuit = replace(circuit, stroke=float(longest_stroke(circuit)))
-        return Actuator(circuit, rated, np.array(points))
-
 
 @lru_cache(maxsize=8)
 def actuator_of(parameters: EhaParameters) -> Actuator:
@@ -80,4 +54,9 @@ def actuator_of(parameters: EhaParameters) -> Actuator:
     RigError
         If no circuit fits around it.
     """
-    return Actuator.of(parameters)
+    rated = steady_state(parameters.rated_speed, parameters)[0]
+    points = [coordinates_of(parameters_for(condition, parameters), rated) for condition in CONDITIONS.values()]
+    circuit = circuit_of(parameters)
+    if parameters.stroke is None:
+        circuit = replace(circuit, stroke=float(longest_stroke(circuit)))
+    return Actuator(circuit, rated, np.array(points))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.blocks import Blocks, blocks_of
 from faults.diagnosis.class_fit import (
     PointFit,
@@ -28,10 +28,10 @@ from plant.sensors.sensors import RIG
 PAPER = EhaParameters()
 
 
-ACTUATOR = Actuator.of(PAPER)
+ACTUATOR = actuator_of(PAPER)
 
 
-SHORT = Actuator.of(replace(PAPER, stroke=0.2, load_force=200.0, leakage_coefficient=9e-12))
+SHORT = actuator_of(replace(PAPER, stroke=0.2, load_force=200.0, leakage_coefficient=9e-12))
 
 
 PRESSURE = "differential_pressure_pa"

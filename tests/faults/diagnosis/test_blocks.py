@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.blocks import FORGOTTEN, SETTLING, blocks_of
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.rivals import creeps
@@ -46,7 +46,7 @@ def test_a_beginning_in_motion_does_not_count_where_no_pressure_says_with_what(
 
 
 def test_a_circuit_from_rest_follows_a_running_test_once_its_beginning_is_forgotten() -> None:
-    actuator, blocks = Actuator.of(HEALTHY), blocks_of(running(6.0, 60.0).replace(**{PRESSURE: None}))
+    actuator, blocks = actuator_of(HEALTHY), blocks_of(running(6.0, 60.0).replace(**{PRESSURE: None}))
     fits = fit_classes(blocks, actuator)
     assert list(CONDITIONS)[int(np.argmax(fits.scores))] == "major_friction"
     assert not creeps(blocks, fits.best)

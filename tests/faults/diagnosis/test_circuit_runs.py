@@ -8,7 +8,7 @@ import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import circuit_runs
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.blocks import BLOCK, Blocks, blocks_of
 from faults.diagnosis.circuit_runs import COLUMN, _between_stops, coordinates_of, parameter_rows, predicted
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
@@ -19,7 +19,7 @@ from plant.errors import LogError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
-ACTUATOR = Actuator.of(EhaParameters())
+ACTUATOR = actuator_of(EhaParameters())
 CENTRE = ACTUATOR.conditions[0]
 SPEED = 100.0 * np.sign(np.sin(np.arange(3000) * 2e-3))
 
@@ -102,7 +102,7 @@ def test_a_log_of_a_few_samples_is_refused() -> None:
 def test_a_circuit_has_the_stops_that_the_log_shows_and_no_others(stroke: float, given: float | None) -> None:
     speed = np.repeat([100.0, -60.0], 4000)
     log = simulate(CIRCUIT, speed, 1e-3, EhaParameters(stroke=stroke))
-    actuator = Actuator.of(EhaParameters(stroke=given))
+    actuator = actuator_of(EhaParameters(stroke=given))
     blocks = blocks_of(log)
     (found,) = predicted(blocks, parameter_rows(actuator.conditions[:1], actuator.circuit, actuator.rated))
     off = (found - blocks.outputs)[blocks.first :]

@@ -9,14 +9,14 @@ import pytest
 
 from faults.conditions import CONDITIONS
 from faults.diagnosis import class_fit
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import parameter_rows, predicted
 from faults.diagnosis.class_fit import FARTHEST, LASTING, WEAK, _most_gained, fit_freely, misfit
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
-ACTUATOR = Actuator.of(EhaParameters())
+ACTUATOR = actuator_of(EhaParameters())
 PULL = np.asarray(LASTING * np.linalg.inv(WEAK))
 CENTRE = ACTUATOR.conditions[0]
 APART = np.array([0.05, -0.05, 0.08, 0.04, 0.03, 0.05, 0.02])

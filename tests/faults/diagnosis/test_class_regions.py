@@ -7,7 +7,7 @@ import pytest
 
 from faults.conditions import CONDITIONS
 from faults.diagnosis import class_regions
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import Actuator, actuator_of
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.class_fit import WITHIN, PointFit
@@ -24,7 +24,7 @@ from faults.diagnosis.class_regions import (
 )
 from plant.eha.model import EhaParameters
 
-ACTUATOR = Actuator.of(EhaParameters())
+ACTUATOR = actuator_of(EhaParameters())
 INFORMATION = 1e4 * np.eye(7)
 
 

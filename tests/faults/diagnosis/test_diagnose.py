@@ -12,7 +12,7 @@ from estimation.log_checks.clean import clean_log
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import wear
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.circuit_verdict import Diagnosis
@@ -28,7 +28,7 @@ from plant.log.record import Record
 from plant.sensors.sensors import BENCH, RIG
 
 HEALTHY = EhaParameters()
-ACTUATOR = Actuator.of(HEALTHY)
+ACTUATOR = actuator_of(HEALTHY)
 PRESSURE = "differential_pressure_pa"
 PRESSURES = pytest.mark.parametrize("pressure", [True, False], ids=["with pressure", "without"])
 
@@ -71,7 +71,7 @@ def test_an_actuator_whose_friction_is_all_coulombs_gets_its_class_and_severitie
     record = simulate(
         CIRCUIT, speed, 1e-3, parameters_for(CONDITIONS[condition], rig), sensors=BENCH, rng=np.random.default_rng(1)
     )
-    found = diagnose_clean(clean_log(record, rig), Actuator.of(rig))
+    found = diagnose_clean(clean_log(record, rig), actuator_of(rig))
     assert (found.condition, found.against) == (condition, ())
     assert found.severity["added_friction"].covers(0.0)
     assert all(one.value is not None for one in found.severity.values())

@@ -9,7 +9,7 @@ import pytest
 
 from faults.conditions import CONDITIONS
 from faults.diagnosis import end_stop
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.class_regions import fit_classes
@@ -23,7 +23,7 @@ from plant.eha.simulate import CIRCUIT, simulate
 from plant.sensors.sensors import BENCH
 
 RIG = EhaParameters()
-ACTUATOR = Actuator.of(RIG)
+ACTUATOR = actuator_of(RIG)
 OUT_AND_BACK = np.repeat([100.0, 60.0, 0.0, -100.0, -60.0, 0.0], 600)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from estimation.identification import LinearModel
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.calibration import Calibration
 from faults.diagnosis.circuit_runs import COORDINATES
@@ -21,7 +21,7 @@ from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
-ACTUATOR = Actuator.of(EhaParameters())
+ACTUATOR = actuator_of(EhaParameters())
 NAMES = list(CONDITIONS)
 WEIGHTS = {"transfer_functions": 0.0, "models": 0.5, "innovations": 0.0, "parameters": 1.0}
 

@@ -12,7 +12,7 @@ from estimation.models.motion import UNKNOWNS
 from estimation.notes import EstimateCode, SensorCode
 from faults.conditions import CONDITIONS
 from faults.diagnosis import failed_search
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.evidence import Scoreboard
 from faults.diagnosis.failed_search import doubts_after, values_of
@@ -21,7 +21,7 @@ from plant.log.record import Record
 from tests.faults.diagnosis.test_rivals import leaving, log
 
 PAPER = EhaParameters()
-ACTUATOR = Actuator.of(PAPER)
+ACTUATOR = actuator_of(PAPER)
 FAR = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=40.0, motion_percent=20.0)
 LAWS = EstimateCode.FRICTION_LAWS_DISAGREE.note(least_pa=1e8, most_pa=2e8)
 FROZE = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.0, begin_s=0.0, length_s=1.0)

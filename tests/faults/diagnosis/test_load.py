@@ -14,7 +14,7 @@ from estimation.log_checks.clean import clean_log
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import load
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.diagnose import diagnose_clean, diagnose_log
 from faults.diagnosis.force_balance import Loads
 from faults.diagnosis.load import Loaded, first_guesses, under_load
@@ -206,7 +206,7 @@ def test_the_doubt_of_a_force_widens_what_is_said_of_friction_where_a_piston_sli
     speed = 60.0 + 40.0 * np.sin(2.0 * np.pi * 1.3e-3 * np.arange(3000))
     record = simulate(CIRCUIT, speed, 1e-3, p, sensors=BENCH, rng=np.random.default_rng(2))
     known, doubted = (
-        diagnose_clean(clean_log(record, HEALTHY), replace(Actuator.of(p), load_doubt=std)).severity
+        diagnose_clean(clean_log(record, HEALTHY), replace(actuator_of(p), load_doubt=std)).severity
         for std in (0.0, 200.0)
     )
     narrow, wide = (ends[1] - ends[0] for one in (known, doubted) if (ends := one["added_friction"].ci95))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COLUMN, COORDINATES, parameter_rows, predicted
 from faults.diagnosis.class_fit import WEAK, PointFit
@@ -24,7 +24,7 @@ from faults.diagnosis.model_doubt import (
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 
-ACTUATOR = Actuator.of(EhaParameters())
+ACTUATOR = actuator_of(EhaParameters())
 CENTRE, SURE, ALL = ACTUATOR.conditions[:1], np.zeros(1), np.ones(7)
 SPREADS = spreads_of(ACTUATOR)
 NOISE = np.array([1e-4, 1e3])

@@ -13,7 +13,7 @@ from estimation.log_checks.clean import clean_log
 from experiments.open_benchmark.kinds import make
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import onset
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import Actuator, actuator_of
 from faults.diagnosis.blocks import Blocks, blocks_of
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.class_fit import PointFit
@@ -43,7 +43,7 @@ from plant.log.record import Record
 from plant.sensors.sensors import RIG
 
 HEALTHY = EhaParameters()
-ACTUATOR = Actuator.of(HEALTHY)
+ACTUATOR = actuator_of(HEALTHY)
 AT = 3.2
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, severity
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.blocks import Blocks, blocks_of
 from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.class_fit import PointFit, scales_of
@@ -29,7 +29,7 @@ from plant.log.record import Record
 from plant.notes import Note
 
 RIG = EhaParameters()
-ACTUATOR = Actuator.of(RIG)
+ACTUATOR = actuator_of(RIG)
 INFORMATION = 1e4 * np.eye(len(COORDINATES))
 LEVELS = [60.0, 120.0, 90.0, 120.0, -120.0, -70.0, -120.0, -100.0]
 NOISE = np.array([1e-4, 2e3])

@@ -9,7 +9,7 @@ import pytest
 from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import outside
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import Actuator, actuator_of
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.class_regions import fit_classes
@@ -23,7 +23,7 @@ from plant.eha.simulate import simulate
 from plant.notes import Code
 from plant.sensors.sensors import RIG
 
-ACTUATOR = Actuator.of(EhaParameters())
+ACTUATOR = actuator_of(EhaParameters())
 SOUND = ACTUATOR.circuit
 NOISE = np.array([1e-4])
 LEVELS = [120.0, -120.0, 60.0, -90.0, 110.0, 40.0, -110.0, -50.0]

@@ -8,7 +8,7 @@ import pytest
 from estimation.notes import EstimateCode, SensorCode
 from faults.conditions import CONDITIONS
 from faults.diagnosis import rivals
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import Actuator, actuator_of
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES
 from faults.diagnosis.class_fit import LASTING, PointFit, misfit
@@ -16,7 +16,7 @@ from faults.diagnosis.model_doubt import NOISE_ALONE
 from faults.diagnosis.rivals import LOOKS, ROUGHLY, behind, between_fits, creeps, doubts_left, other_friction
 from plant.eha.model import EhaParameters
 
-ACTUATOR = Actuator.of(EhaParameters())
+ACTUATOR = actuator_of(EhaParameters())
 NOISE = np.array([1e-4, 1e3])
 SIZES = np.array([1e-2, 1e6])
 

@@ -7,7 +7,7 @@ import pytest
 
 from estimation.finding import Quantity
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of
 from faults.diagnosis.class_fit import WEAK, PointFit
 from faults.diagnosis.class_regions import ClassFits
@@ -27,7 +27,7 @@ from plant.eha.model import EhaParameters
 from plant.eha.steady_state import steady_state
 
 RIG = EhaParameters()
-ACTUATOR = Actuator.of(RIG)
+ACTUATOR = actuator_of(RIG)
 
 
 def severities_of(p: EhaParameters) -> dict[str, float]:
