@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from estimation.equations.definition import Parameter as Parameter
     from estimation.finding import Finding as Finding
     from estimation.identification.model.linear_model import LinearModel as LinearModel
-    from experiments.log_pages.own_equations import GreyBox as GreyBox
-    from experiments.log_pages.own_features import features as features
-    from experiments.log_pages.relation import Relation
     from experiments.published import load as published_table
+    from experiments.python_user.own_equations import GreyBox as GreyBox
+    from experiments.python_user.own_features import features as features
+    from experiments.python_user.relation import Relation
     from faults.conditions import CONDITIONS as conditions  # noqa: N811 - a face has plain names
     from faults.conditions import Condition as Condition
     from faults.own_classes.face import Classifier as Classifier
@@ -88,8 +88,8 @@ def _refuse_shadows() -> None:
 
 _refuse_shadows()
 
-from experiments.log_pages.answers import Answer, Model, no_such  # noqa: E402 - after the check
-from experiments.log_pages.log import Log, known_options, options_by_name, refuse  # noqa: E402 - likewise
+from experiments.python_user.answers import Answer, Model, no_such  # noqa: E402 - after the check
+from experiments.python_user.log import Log, known_options, options_by_name, refuse  # noqa: E402 - likewise
 from plant.lazy import lazily  # noqa: E402 - likewise
 
 _late = lazily("hydrostate", __file__)
@@ -183,8 +183,8 @@ def read(
     """
     from experiments.actuators import DEFAULT, actuator
     from experiments.command.logs import read_log
-    from experiments.log_pages.log import ANY, options_by_name
-    from experiments.log_pages.reading import read_whole_or_sparse
+    from experiments.python_user.log import ANY, options_by_name
+    from experiments.python_user.reading import read_whole_or_sparse
     from plant.errors import NoChannelError
     from plant.log.any_columns import read_any
     from plant.log.frames import frame_table, is_frame
@@ -233,7 +233,7 @@ def load_model(path: "str | Path") -> "Relation":
         If the file cannot be read or holds no such model.
     """
     from estimation.identification.free_run.saved import load_models
-    from experiments.log_pages.relation import Relation
+    from experiments.python_user.relation import Relation
 
     return Relation(load_models(path))
 

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from experiments.actuators import ACTUATORS as ACTUATORS
     from experiments.actuators import actuator as actuator
     from experiments.cli import main as main
-    from experiments.log_pages.answers import Answer as Answer
-    from experiments.log_pages.log import Log as Log
     from experiments.published import load as load
+    from experiments.python_user.answers import Answer as Answer
+    from experiments.python_user.log import Log as Log
 
 __getattr__ = lazily(__name__, __file__)

@@ -6,10 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from experiments.circuit.curves import steady_runs
 from experiments.circuit.doubted_breaks import doubted_breaks
-from experiments.circuit.experiments import AMPLITUDE_INPUTS, MEAN_INPUTS, frequency_responses, low_frequency_gains
+from experiments.circuit.dynamic_experiments import (
+    AMPLITUDE_INPUTS,
+    MEAN_INPUTS,
+    frequency_responses,
+    low_frequency_gains,
+)
 from experiments.circuit.passes import in_condition
+from experiments.circuit.steady_experiments import steady_runs
 from experiments.page.frames import Rows, tabled
 from experiments.published import SCALARS
 from experiments.running.random_streams import stream
@@ -29,7 +34,7 @@ WITHIN_DOUBTS = "break frequency within the parameters' uncertainty"
 """What the two rows of `doubted_breaks` are called."""
 
 ROOMY_STROKE = 2.0
-"""Stroke in which the piston settles at 8 V [m], as that of `experiments.circuit.curves` at 4 V."""
+"""Stroke in which the piston settles at 8 V [m], as that of `experiments.circuit.steady_experiments` at 4 V."""
 
 _COUNTS = 5.0
 _MOVED = 5.0
@@ -111,8 +116,8 @@ def break_frequency(response: pd.DataFrame) -> float:
 def dead_zone(p: CircuitParameters, rng: np.random.Generator, highest_v: float = 4.0) -> float:
     """Return the smallest voltage that moves the piston from rest, by halving.
 
-    It moves if, held as long as `experiments.circuit.curves.steady_runs` does, the encoder shows several times
-    the deflection at which the seals break loose.
+    It moves if, held as long as `experiments.circuit.steady_experiments.steady_runs` does, the encoder shows several
+    times the deflection at which the seals break loose.
 
     Parameters
     ----------

@@ -5,17 +5,7 @@ from dataclasses import asdict
 
 import pandas as pd
 
-from experiments.circuit.curves import (
-    FRICTION_SWEEP,
-    LEAKAGE_SWEEP,
-    friction_points,
-    friction_refit,
-    leakage_points,
-    leakage_refit,
-    points_table,
-    throttle_curve,
-)
-from experiments.circuit.experiments import (
+from experiments.circuit.dynamic_experiments import (
     AMPLITUDE_INPUTS,
     MEAN_INPUTS,
     bulk_modulus_on_circuit,
@@ -26,6 +16,16 @@ from experiments.circuit.experiments import (
 from experiments.circuit.figures import CIRCUIT_FIGURES
 from experiments.circuit.first_tests import first_tests
 from experiments.circuit.modelled_chambers import modelled_chambers
+from experiments.circuit.steady_experiments import (
+    FRICTION_SWEEP,
+    LEAKAGE_SWEEP,
+    friction_points,
+    friction_refit,
+    leakage_points,
+    leakage_refit,
+    points_table,
+    throttle_curve,
+)
 from experiments.nine_conditions.settings import StudySettings
 from experiments.page.tables import Column, Columns, interval, spaced
 from experiments.page.words import CONDITION

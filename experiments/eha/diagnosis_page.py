@@ -8,7 +8,7 @@ import numpy as np
 
 from experiments.eha.plain_verdict import sureness, verdict, what_to_do
 from experiments.eha.verdict_words import SHOWN, amount, library_sentence
-from experiments.log_pages.channels import channel_charts
+from experiments.log_pages.channel_charts import channel_charts
 from experiments.page.charts import Charts
 from experiments.page.numbers import percent_text
 from experiments.page.panels import Curve, Mark, Panel

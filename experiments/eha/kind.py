@@ -108,7 +108,7 @@ def _estimated(record: "Record", rig: "Rig[Any]", asked: "tuple[EstimateOptions,
 
 def _innovations(found: "Finding", log: str, path: Path) -> None:
     """Write the figure of a filtered log."""
-    from experiments.log_pages.innovations import write_innovations
+    from experiments.log_pages.innovations_figure import write_innovations
 
     if found.evidence.estimate is None:
         note(f"no figure: {log} was not filtered; ask for one with --method ekf")

@@ -146,7 +146,7 @@ def _judged(model: "LinearModel", u: "Array", y: "Array", log: Path, figure: Pat
     part = slice(0, MOST_TESTED)
     found = validate(model.discretised() if model.continuous else model, u[part], y[part], fitted=fitted)
     if figure is not None:
-        from experiments.log_pages.identified import write_identified
+        from experiments.log_pages.identified_figure import write_identified
 
         write_identified(model, u, y, found, log.name, figure)
     tests = {"whiteness_p": found.whiteness.p_value, "cross_correlation_p": found.cross_correlation.p_value}

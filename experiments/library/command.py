@@ -9,7 +9,7 @@ import typer
 from experiments.command.json_output import Result
 from experiments.command.logs import Batch, finish
 from experiments.command.options import SEED, Json, Seed, argument, option
-from experiments.command.studies import finish_study
+from experiments.command.study_verb import finish_study
 from experiments.command.terminal import table
 from plant.errors import HydrostateError
 

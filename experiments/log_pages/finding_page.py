@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from experiments.log_pages.channels import channel_charts
+from experiments.log_pages.channel_charts import channel_charts
 from experiments.page.numbers import MISSING, number, percent_text, pretty_unit
 from experiments.page.render import render_page
 from experiments.page.tables import Column

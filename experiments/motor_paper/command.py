@@ -5,7 +5,7 @@ from pathlib import Path
 import typer
 
 from experiments.command.options import SEED, Json, Seed
-from experiments.command.studies import Folder, finish_study
+from experiments.command.study_verb import Folder, finish_study
 
 commands = typer.Typer()
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from experiments.command.options import SEED, Json, Seed, flag
-from experiments.command.studies import Folder, finish_study
+from experiments.command.study_verb import Folder, finish_study
 
 commands = typer.Typer()
 

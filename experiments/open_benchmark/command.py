@@ -7,7 +7,7 @@ import typer
 
 from experiments.command.json_output import json_text
 from experiments.command.options import Json, option, require_positive
-from experiments.command.studies import Folder, finish_study
+from experiments.command.study_verb import Folder, finish_study
 from experiments.command.terminal import emit
 
 commands = typer.Typer(no_args_is_help=True, help="Logs with their truth, to compare methods on.")

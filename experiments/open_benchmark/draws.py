@@ -5,7 +5,7 @@ import numpy as np
 from experiments.open_benchmark.drives import CLOSED, DRIVES, Room
 from experiments.open_benchmark.machine import Machine, machine_of
 from experiments.open_benchmark.run import TICK
-from experiments.open_benchmark.setups import Setup
+from experiments.open_benchmark.setup import Setup
 from faults.conditions import CONDITIONS, parameters_for
 from plant.arrays import Array
 from plant.eha.model import EhaParameters

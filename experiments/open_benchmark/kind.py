@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.open_benchmark.drives import OPEN
-from experiments.open_benchmark.setups import Setup
+from experiments.open_benchmark.setup import Setup
 from faults.conditions import CONDITIONS
 
 OWN = "condition"

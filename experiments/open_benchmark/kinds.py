@@ -11,15 +11,15 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from experiments.open_benchmark.draws import course_of, draw_plain
-from experiments.open_benchmark.faulty import FAULTY
+from experiments.open_benchmark.fault_kinds import FAULTY
 from experiments.open_benchmark.kind import Kind
-from experiments.open_benchmark.loggers import LOGGERS
+from experiments.open_benchmark.logger_kinds import LOGGERS
 from experiments.open_benchmark.machine import Machine
 from experiments.open_benchmark.oil import stiffness
 from experiments.open_benchmark.pairs import BOTH, collide, pair_of
-from experiments.open_benchmark.rigs import RIGS
+from experiments.open_benchmark.rig_kinds import RIGS
 from experiments.open_benchmark.run import run
-from experiments.open_benchmark.setups import Setup
+from experiments.open_benchmark.setup import Setup
 from plant.errors import HydrostateError, require_known
 
 VERSION = "1.0"

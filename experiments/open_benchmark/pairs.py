@@ -10,7 +10,7 @@ import numpy as np
 from experiments.open_benchmark.draws import draw_plain
 from experiments.open_benchmark.drives import OPEN
 from experiments.open_benchmark.kind import OWN, UNKNOWN, Kind
-from experiments.open_benchmark.setups import Setup
+from experiments.open_benchmark.setup import Setup
 from plant.errors import HydrostateError
 
 BOTH = "+"

@@ -7,9 +7,9 @@ from typing import Any
 
 import pandas as pd
 
-from experiments.log_pages.log import Log
 from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class, named
 from experiments.open_benchmark.loaders import read_truth, rows_of
+from experiments.python_user.log import Log
 from faults.diagnosis.actuator import actuator_of
 from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.severity import severities_at

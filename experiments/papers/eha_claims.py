@@ -9,8 +9,8 @@ from scipy.constants import psi
 
 from estimation.eha.named import PRINTED_Q, PRINTED_R, PUBLISHED_TIME
 from estimation.identification.signals.preprocess import zero_phase_filter
-from experiments.circuit.curves import FIGURE_9_VOLTS
 from experiments.circuit.first_tests import WITHIN_DOUBTS
+from experiments.circuit.steady_experiments import FIGURE_9_VOLTS
 from experiments.nine_conditions.bulk_modulus import (
     PRESSURE_STEPS,
     PUBLISHED_WAY,

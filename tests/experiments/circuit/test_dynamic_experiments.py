@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.circuit.experiments import (
+from experiments.circuit.dynamic_experiments import (
     AMPLITUDE_INPUTS,
     AMPLITUDE_V,
     CIRCUIT_FORMS,

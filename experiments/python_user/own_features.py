@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from experiments.log_pages.fitted_equations import record_of
+from experiments.python_user.fitted_equations import record_of
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.circuit.curves import (
+from experiments.circuit.steady_experiments import (
     FRICTION_SWEEP,
     LEAKAGE_SWEEP,
     friction_refit,

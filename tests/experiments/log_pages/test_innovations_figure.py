@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.eha.bulk_modulus import BulkModulusEstimate, estimate_bulk_modulus
-from experiments.log_pages.innovations import draw_innovations, write_innovations
+from experiments.log_pages.innovations_figure import draw_innovations, write_innovations
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate

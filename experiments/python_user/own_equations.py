@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from estimation.equations.definition import Equations, Parameter
-from experiments.log_pages.answers import Shown
-from experiments.log_pages.fitted_equations import FittedGreyBox, record_of, times_of
+from experiments.python_user.answers import Shown
+from experiments.python_user.fitted_equations import FittedGreyBox, record_of, times_of
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:

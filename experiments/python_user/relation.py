@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.log_pages.answers import Shown
+from experiments.python_user.answers import Shown
 
 if TYPE_CHECKING:
     import numpy as np

@@ -6,7 +6,7 @@ import numpy as np
 
 from experiments.open_benchmark.friction import steady_friction
 from experiments.open_benchmark.kind import MAYBE, UNKNOWN, Draw, Kind
-from experiments.open_benchmark.setups import Setup
+from experiments.open_benchmark.setup import Setup
 from faults.conditions import LEAKAGE_TABLE
 
 OUTSIDE = (UNKNOWN,)

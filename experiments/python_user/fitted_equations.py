@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from experiments.log_pages.answers import Shown
+from experiments.python_user.answers import Shown
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -182,7 +182,7 @@ def record_of(log: Any) -> "Record":
     """
     import pandas as pd
 
-    from experiments.log_pages.log import Log
+    from experiments.python_user.log import Log
     from plant.log.record import Record
 
     if isinstance(log, pd.DataFrame):

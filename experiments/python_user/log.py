@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from experiments.log_pages.answers import Answer, Model, Shown, no_such
+from experiments.python_user.answers import Answer, Model, Shown, no_such
 
 if TYPE_CHECKING:
     import numpy as np
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from estimation.finding import Finding
-    from experiments.log_pages.relation import Relation
+    from experiments.python_user.relation import Relation
     from plant.eha.rig import Rig
     from plant.errors import LogWarning
     from plant.log.record import Record
@@ -252,7 +252,7 @@ class Log(Shown):
         return Model(identify_record(self.whole(), **known_options(options, known, "identify")))
 
     def _relation(self, logs: "list[Log]", options: dict[str, Any]) -> "Relation":
-        from experiments.log_pages.relation import identified
+        from experiments.python_user.relation import identified
 
         if not {"input", "output"} <= options.keys():
             refuse(f"input and output are needed, channels among {', '.join(self.channels)}")

@@ -8,8 +8,8 @@ import pytest
 
 from estimation.identification.free_run.saved import load_models
 from estimation.identification.model.recursion import filtered
-from experiments.log_pages.log import ANY, Log
-from experiments.log_pages.relation import Relation, identified
+from experiments.python_user.log import ANY, Log
+from experiments.python_user.relation import Relation, identified
 from plant.eha.rig import Rig
 from plant.errors import NoSuchNameError
 from plant.log.record import Record

@@ -7,7 +7,7 @@ import numpy as np
 from experiments.open_benchmark.draws import draw_plain
 from experiments.open_benchmark.drives import CLOSED
 from experiments.open_benchmark.kind import MAYBE, Draw, Kind
-from experiments.open_benchmark.setups import Setup
+from experiments.open_benchmark.setup import Setup
 from plant.eha.model import EhaParameters
 
 PAPER = EhaParameters()
