@@ -178,6 +178,22 @@ def load_columns(texts: Sequence[str] | None) -> dict[str, str]:
     return parse_columns([part for text in texts or () for part in re.split(r",(?=\s*[A-Za-z]\w*=)", text)])
 
 
+def listed(*texts: str) -> tuple[str, ...]:
+    """Return the names in texts that separate them by commas.
+
+    Parameters
+    ----------
+    *texts : str
+        As an option has them, which may be given several times.
+
+    Examples
+    --------
+    >>> listed("leakage, friction", "air")
+    ('leakage', 'friction', 'air')
+    """
+    return tuple(part.strip() for text in texts for part in text.split(",") if part.strip())
+
+
 def require_positive(option: str, value: float | None, unit: str) -> None:
     """Refuse an option whose number is not positive and finite; None, not given, passes.
 

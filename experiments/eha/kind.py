@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.actuator_kind import ActuatorKind, Experiment, LogVerb, Options, Simulation
 from experiments.command.json_output import Result
-from experiments.command.options import PRESSURE, require_positive
+from experiments.command.options import PRESSURE, listed, require_positive
 from experiments.command.terminal import note
 from experiments.eha.entries import NO_DIAGNOSIS, NO_ESTIMATE, diagnosis_entries, estimate_entries
 from experiments.eha.identifiability import CHANNELS as SENSORS
@@ -73,7 +73,7 @@ def _how(options: Options) -> "EstimateOptions":
     require_known("--robust", robust, list(ROBUST))
     if options["smooth"] and method not in ("auto", "ekf", "smoother"):
         raise HydrostateError(f"--smooth smooths the ekf, got --method {method}")
-    wanted = _listed(options["states"])
+    wanted = listed(options["states"])
     for name in wanted:
         require_known("--states", name, [*GROUPS, *AUGMENTABLE])
     require_positive("--start-std", options["start_std"], "Pa")
@@ -85,15 +85,11 @@ def _how(options: Options) -> "EstimateOptions":
 
 def _unused(sensors: str, no_pressure: bool) -> frozenset[str]:
     """Return the channels that are not to be used."""
-    used = _listed(sensors)
+    used = listed(sensors)
     for name in used:
         require_known("--sensors", name, list(SENSORS))
     left_out = {channel for name, channel in SENSORS.items() if used and name not in used}
     return frozenset(left_out | ({PRESSURE} if no_pressure else set()))
-
-
-def _listed(names: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in names.split(",") if name.strip())
 
 
 def _estimated(record: "Record", rig: "Rig[Any]", asked: "tuple[EstimateOptions, frozenset[str], bool]") -> "Finding":

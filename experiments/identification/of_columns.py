@@ -59,17 +59,6 @@ BLANK: Result = {
 """Entries of a log that could not be used."""
 
 
-def names(given: Sequence[str] | None) -> tuple[str, ...]:
-    """Return channel names, given one by one or with commas between.
-
-    Examples
-    --------
-    >>> names(["u1, u2", "u3"])
-    ('u1', 'u2', 'u3')
-    """
-    return tuple(part.strip() for text in given or () for part in text.split(",") if part.strip())
-
-
 def identify_columns(logs: Sequence[Path], fit: ColumnFit, *, as_json: bool, out: Path | None) -> NoReturn:
     """Identify one model an output from all logs together, print what it is worth, and leave with the exit code.
 

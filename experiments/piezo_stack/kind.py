@@ -10,6 +10,7 @@ from estimation.finding import Finding
 from estimation.piezo_stack.finding import stack_finding, stack_prospect
 from experiments.actuator_kind import ActuatorKind, Experiment, LogVerb, Options, Run, Simulation
 from experiments.command.json_output import Result
+from experiments.command.options import listed
 from experiments.command.terminal import short_names, table
 from experiments.log_pages.entries import BLANK, finding_entries
 from faults.conditions import CONDITIONS
@@ -91,7 +92,7 @@ def _prepared(rig: Rig[Any], options: Options) -> tuple[Rig[Any], tuple[str, ...
 
 
 def _channels(sensors: str) -> tuple[str, ...]:
-    names = [name.strip() for name in sensors.split(",") if name.strip()]
+    names = listed(sensors)
     for name in names:
         if name not in SENSORS:
             raise HydrostateError(f"--sensors must be of {', '.join(SENSORS)}, got {name!r}")

@@ -7,21 +7,22 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import typer
 
 from experiments.command.json_output import json_text, prepare_output
-from experiments.command.logs import caught, read_log
+from experiments.command.logs import noted, read_log
 from experiments.command.options import (
     Columns,
     Json,
     RigFile,
     argument,
     flag,
+    listed,
     load_columns,
     load_rig,
     option,
     require_positive,
 )
 from experiments.command.terminal import emit, note
+from experiments.running.refusal import refused
 from plant.errors import HydrostateError
-from plant.notes import distinct
 
 if TYPE_CHECKING:
     from plant.eha.rig import Rig
@@ -89,7 +90,7 @@ def c(
         files, about = _plant(bench, plant, 1e-4 if sample_time is None else sample_time, name, precision)
     else:
         record = _bench_log(log, bench, load_columns(columns), sample_time, no_pressure=no_pressure)
-        files, about = _filter(bench, record, form, method, _listed(states), name, precision, tune=tune)
+        files, about = _filter(bench, record, form, method, listed(states), name, precision, tune=tune)
     written = write_files(out, files)
     found: dict[str, Any] = {"outcome": "ok", "folder": str(out), "files": written, **about}
     emit(json_text([found]) if as_json else f"{out}: {', '.join(written)}")
@@ -128,7 +129,7 @@ def fmu(
         from estimation.export.task import filter_task
 
         record = _bench_log(log, bench, load_columns(columns), sample_time, no_pressure=no_pressure)
-        problem = filter_task(record, bench.parameters, form, states=_listed(states), tuned=tune)
+        problem = filter_task(record, bench.parameters, form, states=listed(states), tuned=tune)
         content = filter_fmu(problem, method, fmi, name=name if name is not None else f"{form}_{method}")
     write_files(out.parent, {out.name: content})
     found = {"outcome": "ok", "file": str(out), "fmi": fmi}
@@ -185,10 +186,6 @@ def model(
     )
 
 
-def _listed(text: str) -> tuple[str, ...]:
-    return tuple(one for one in text.split(",") if one)
-
-
 def _filter(
     bench: "Rig",
     record: "Record",
@@ -231,10 +228,7 @@ def _bench_log(
     if log is None:
         record = _simulated_bench(bench, 1e-4 if sample_time is None else sample_time)
     else:
-        with caught() as said:
-            record = read_log(log, bench.columns, columns, sample_time=sample_time)
-        for one in distinct(warning.note for warning in said):
-            note(f"{log}: warning: {one}")
+        record = noted(str(log), lambda: read_log(log, bench.columns, columns, sample_time=sample_time))
     if not no_pressure:
         return record
     kept = {name: values for name, values in record.channels.items() if name != "differential_pressure_pa"}
@@ -275,9 +269,6 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[str]:
     from plant.atomic import replacing
 
     for name, content in files.items():
-        try:
-            with replacing(folder / name) as file:
-                file.write(content if isinstance(content, bytes) else content.encode())
-        except OSError as error:
-            raise HydrostateError(f"{folder / name}: it cannot be written: {error.strerror or error}") from error
+        with refused(f"{folder / name}: it cannot be written"), replacing(folder / name) as file:
+            file.write(content if isinstance(content, bytes) else content.encode())
     return list(files)

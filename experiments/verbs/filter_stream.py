@@ -15,17 +15,18 @@ from experiments.command.options import (
     RigFile,
     argument,
     flag,
+    listed,
     load_columns,
     load_rig,
     option,
     require_positive,
 )
 from experiments.command.output_paths import require_place
+from experiments.running.refusal import refused
 from experiments.streams.broker import published
 from experiments.streams.endings import end_told, say_line, stop_at_sigterm
 from experiments.streams.filtering import Filtering
 from experiments.streams.rows import STANDARD_INPUT, stream_input, warn_of_lost
-from plant.errors import HydrostateError
 from plant.log.stream_source import Received, bounded_lines, is_stream, stream_lines
 
 commands = typer.Typer()
@@ -93,7 +94,7 @@ def filter_stream(
 
     with ExitStack() as outputs:
         bench, named = load_rig(rig), load_columns(columns)
-        asked = Asked(bench.parameters, form, method, tuple(one for one in states.split(",") if one), tune)
+        asked = Asked(bench.parameters, form, method, listed(states), tune)
         log = None if like is None else read_log(like, bench.columns, named)
         source = STANDARD_INPUT if stream == "-" else stream
         told = Filtering(say, asked, (bench.columns, named), every, log, state, source)
@@ -113,8 +114,8 @@ def _lines(stream: str, received: Received) -> Iterator[str]:
     elif stream == "-":
         yield from stream_input(sys.stdin)
     else:
-        try:
-            with Path(stream).open(encoding="utf-8", errors="replace", newline="\n") as file:
-                yield from bounded_lines(file, stream)
-        except OSError as error:
-            raise HydrostateError(f"{stream}: it cannot be read: {error.strerror or error}") from error
+        with (
+            refused(f"{stream}: it cannot be read"),
+            Path(stream).open(encoding="utf-8", errors="replace", newline="\n") as file,
+        ):
+            yield from bounded_lines(file, stream)

@@ -13,6 +13,7 @@ from experiments.command.options import (
     Out,
     RigFile,
     Seed,
+    listed,
     load_columns,
     load_rig,
     option,
@@ -20,7 +21,7 @@ from experiments.command.options import (
 )
 from experiments.command.output_paths import require_place
 from experiments.identification.of_channels import INPUT, OUTPUT, STRUCTURES, ChannelFit, identify_channels
-from experiments.identification.of_columns import ColumnFit, identify_columns, names
+from experiments.identification.of_columns import ColumnFit, identify_columns
 from experiments.identification.simulate_model import simulate_model
 from plant.errors import HydrostateError
 
@@ -134,9 +135,9 @@ def identify(
         of_channels = {"--rig": rig, "--columns": columns, "--filter-hz": filter_hz}
         refuse_given(of_channels, "does not go with --input and --output, which take columns as they stand in the log")
         between = ColumnFit(
-            names(inputs),
-            names(outputs),
-            names(references),
+            listed(*(inputs or ())),
+            listed(*(outputs or ())),
+            listed(*(references or ())),
             structure=structure,
             order=whole_or_auto("--order", "auto" if order is None else order, 1),
             delay=whole_or_auto("--delay", "auto" if delay is None else delay, 0),
@@ -172,7 +173,7 @@ def identify(
 
 
 def _one_channel(option: str, given: list[str] | None, default: str) -> str:
-    channel, *others = names(given) or (default,)
+    channel, *others = listed(*(given or ())) or (default,)
     if others:
         raise HydrostateError(f"{option} takes one channel with --rig or --columns, got {channel}, {', '.join(others)}")
     return channel

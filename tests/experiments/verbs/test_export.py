@@ -41,6 +41,16 @@ def test_a_filter_gets_the_rate_and_channels_of_a_log_and_compiles(log: Path, tm
     compiled(tmp_path, read(tmp_path))
 
 
+def test_blanks_between_states_are_no_part_of_their_names(log: Path, tmp_path: Path) -> None:
+    asked = ("leakage_coefficient,flow_bias", "leakage_coefficient, flow_bias")
+    sources: list[dict[str, str]] = []
+    for number, states in enumerate(asked):
+        done = export("c", log, "--states", states, "--name", "mine", "--out", tmp_path / str(number))
+        assert done.exit_code == 0, done.output
+        sources.append(read(tmp_path / str(number)))
+    assert sources[0] == sources[1]
+
+
 def test_without_a_log_it_is_made_for_a_simulated_bench_and_a_plant_for_none(tmp_path: Path) -> None:
     assert export("c", "--out", tmp_path / "filter", "--method", "imm", "--precision", "float").exit_code == 0
     assert "float" in (tmp_path / "filter" / "pressure_imm.h").read_text()
