@@ -115,7 +115,7 @@ class Experiment:
 
 @dataclass(frozen=True, kw_only=True)
 class ActuatorKind:
-    """A kind of actuator; a verb that it has not is None.
+    """A kind of actuator. A verb that it does not offer is None.
 
     Parameters
     ----------

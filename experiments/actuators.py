@@ -51,7 +51,7 @@ def actuator(name: str) -> "ActuatorKind":
 
 
 def actuators() -> "Iterator[ActuatorKind]":
-    """Yield every kind, those that come along first."""
+    """Yield every kind of actuator, the project's own first."""
     yield from (_loaded(name, place) for name, place in ACTUATORS.items())
     installed = {one.name: one.value for one in entry_points(group=ENTRY_POINTS)}
     yield from (_loaded(name, place) for name, place in installed.items() if name not in ACTUATORS)
@@ -69,7 +69,7 @@ def _loaded(name: str, place: str) -> "ActuatorKind":
 
 
 def offered(kind: "ActuatorKind", verb: str) -> Any:
-    """Return what a kind does at a verb.
+    """Return what a kind of actuator does for a verb.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def offered(kind: "ActuatorKind", verb: str) -> Any:
     Raises
     ------
     HydrostateError
-        If it does not.
+        If it does not offer the verb.
     """
     found = getattr(kind, verb)
     if found is None:

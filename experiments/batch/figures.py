@@ -38,7 +38,7 @@ FARTHEST_PERCENT = 30.0
 
 
 def way_in_words(row: Mapping[Any, Any]) -> str:
-    """Return what a way of doing it is called.
+    """Return the name of a method with plant and drive.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def way_in_words(row: Mapping[Any, Any]) -> str:
 
 
 def draw_errors(table: pd.DataFrame) -> Figure:
-    """Draw the error of bulk modulus of every way of doing it in every condition.
+    """Draw the error of bulk modulus of every method in every condition.
 
     Parameters
     ----------

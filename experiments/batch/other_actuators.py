@@ -37,7 +37,7 @@ def simulated_of(kind: ActuatorKind, runs: Runs) -> Iterator[Simulated]:
 
 
 def simulated_run(kind: ActuatorKind, series: Simulated, rig: Rig) -> Record:
-    """Return what the bench would have logged.
+    """Simulate a run and return its log.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def simulated_run(kind: ActuatorKind, series: Simulated, rig: Rig) -> Record:
 
 
 def found_of(kind: ActuatorKind, verb: str, record: Record, rig: Rig) -> Row:
-    """Return what a log says.
+    """Estimate or diagnose a log, and return what was found as entries of a row.
 
     Parameters
     ----------

@@ -118,7 +118,7 @@ def render_batch_report(manifest: Mapping[str, Any], tables: Tables, files: Mapp
 
 
 def _shown(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows that the page lists, each with its way of doing it in words."""
+    """Return the rows that the page lists, each with its method in words."""
     head = table.head(MOST_LISTED)
     return head.assign(way=[way_in_words(row) for row in head.to_dict("records")]) if "pressure" in head else head
 

@@ -80,7 +80,7 @@ class Rows:
         self._series[series] |= entries
 
     def put(self, places: Sequence[int], columns: Mapping[str, Sequence[Any]]) -> None:
-        """Write what came of some cases.
+        """Write the results of some cases.
 
         Parameters
         ----------

@@ -74,7 +74,7 @@ Series: TypeAlias = Simulated | Log
 
 @dataclass(frozen=True)
 class Work:
-    """What is done with a series.
+    """One analysis of a series.
 
     Parameters
     ----------

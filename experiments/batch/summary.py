@@ -12,7 +12,7 @@ from faults.conditions import CONDITIONS
 from faults.scores import confusion_matrix
 
 METHOD = ["plant", "drive", "sensors", "verb", "form", "method", "pressure"]
-"""What tells one way of doing it from another."""
+"""Columns that tell one method from another."""
 
 LOG_COLUMNS = [
     *("file", "verb", "outcome", "found_condition", "runner_up", "margin", "bulk_modulus_pa", "bulk_modulus_std_pa"),
@@ -88,7 +88,7 @@ def outcome_table(frame: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        One row a way of doing it: counts of cases, and of each outcome.
+        One row a method: counts of cases, and of each outcome.
     """
 
     def entries(group: pd.DataFrame) -> dict[str, object]:
@@ -109,7 +109,7 @@ def bulk_modulus_table(frame: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        One row a way of doing it and condition: count of cases and of estimates, errors [%], share within
+        One row a method and condition: count of cases and of estimates, errors [%], share within
         `NEAR_PERCENT` and share of 95 % intervals that cover the truth [%].
     """
     known = frame[frame["verb"].isin(["filter", "estimate"]) & frame["true_bulk_modulus_pa"].notna()]
@@ -131,7 +131,7 @@ def _errors(group: pd.DataFrame) -> dict[str, object]:
 
 
 def _each(frame: pd.DataFrame, by: list[str], entries: Callable[[pd.DataFrame], dict[str, object]]) -> pd.DataFrame:
-    """Return a row a group, with each way of doing it in one block, in the order of first appearance."""
+    """Return a row a group, each method in one block, in the order of first appearance."""
     groups = frame.groupby(by, sort=False)
     rows = [{**dict(zip(by, cast(tuple[object, ...], keys), strict=True)), **entries(group)} for keys, group in groups]
     first: dict[tuple[object, ...], int] = {}
@@ -149,7 +149,7 @@ def diagnosis_table(frame: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        One row a way of doing it and condition: counts, share that is right [%], and the ratio of the best probability
+        One row a method and condition: counts, share that is right [%], and the ratio of the best probability
         to the runner-up's, at the median [dimensionless].
     """
 
@@ -162,7 +162,7 @@ def diagnosis_table(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def confusion_table(frame: pd.DataFrame) -> pd.DataFrame:
-    """Count which class was found for which, over all ways of doing it.
+    """Count which class was found for which, over all methods.
 
     Parameters
     ----------

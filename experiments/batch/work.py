@@ -64,7 +64,7 @@ _one_at_a_time = threading.Lock()
 
 @dataclass(frozen=True)
 class Part:
-    """What a task gave.
+    """The result of a task.
 
     Parameters
     ----------

@@ -68,7 +68,7 @@ def run_logs(logs: Sequence[Path], work: Work, blank: Result, what: str) -> Batc
     try:
         with progress(len(logs), what) as advance:
             for log in logs:
-                results.append(_one(log, work, blank))
+                results.append(_worked(log, work, blank))
                 advance()
     except KeyboardInterrupt:
         note(f"interrupted after {len(results)} of {len(logs)} logs")
@@ -137,7 +137,7 @@ def with_remarks(result: Result, said: Iterable[LogWarning]) -> dict[str, Any]:
     return {**result, "warnings": told, "notes": [*(one.to_dict() for one in raised), *result.get("notes", ())]}
 
 
-def _one(log: Path, work: Work, blank: Result) -> Result:
+def _worked(log: Path, work: Work, blank: Result) -> Result:
     with caught() as said_of_it:
         try:
             result = dict(work(log))

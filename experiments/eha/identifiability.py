@@ -29,7 +29,7 @@ MOST_SAMPLES = 2_000_000
 
 
 class LookedAt(NamedTuple):
-    """An experiment behind a finding.
+    """An experiment with its card: the evidence of a finding.
 
     Parameters
     ----------

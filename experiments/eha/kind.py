@@ -59,7 +59,7 @@ def _prepared_estimation(
 
 
 def _how(options: Options) -> "EstimateOptions":
-    """Return how a log is to be estimated, checked."""
+    """Check the options, and return them as the estimate takes them."""
     from estimation.eha.bulk_modulus import FITTED, LEAST_SQUARES, EstimateOptions
     from estimation.eha.by_filter import GROUPS
     from estimation.eha.named import NAMED

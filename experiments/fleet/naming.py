@@ -15,7 +15,7 @@ FIELDS: Mapping[str, str] = {"actuator": r"(?P<actuator>.+)", "date": r"(?P<date
 
 @dataclass(frozen=True)
 class Named:
-    """What is known of a log.
+    """The actuator and the date of a log.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def place_of(date: str, source: str) -> float:
 
 
 def by_pattern(files: Iterable[str], pattern: str) -> dict[str, Named]:
-    """Return what file names say.
+    """Read actuator and date of logs from the names of their files.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def by_pattern(files: Iterable[str], pattern: str) -> dict[str, Named]:
 
 
 def by_table(files: Iterable[str], table: Path) -> dict[str, Named]:
-    """Return what a table says of logs.
+    """Read actuator and date of logs from a table.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ ALL_TOLD = "every quantity is determined, and the model describes the log"
 
 
 def finding_entries(found: "Finding") -> dict[str, Any]:
-    """Return what a log says.
+    """Return a finding as entries of the JSON contract.
 
     Returns
     -------

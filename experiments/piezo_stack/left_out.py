@@ -60,7 +60,7 @@ STEP, TURNS = 0.02, 8
 
 
 def changed(p: PiezoStackParameters, logs: Array) -> PiezoStackParameters:
-    """Return parameters whose freed values are times the exponentials of `logs`.
+    """Return parameters whose freed values are multiplied by the exponentials of `logs`.
 
     Parameters
     ----------

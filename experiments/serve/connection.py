@@ -80,7 +80,7 @@ class PatientProtocol(H11Protocol):
             cycle.message_event.set()
 
     def _look(self) -> None:
-        """Wait for headers, or for the end of a body after its answer, for so long and no longer."""
+        """Start or stop the timer for headers, or for the rest of a body after its answer."""
         unread = self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY
         if self.conn.their_state is h11.IDLE or unread:
             if self._headers_due is None:

@@ -28,7 +28,7 @@ def message(event: str, data: Any) -> bytes:
 
 
 async def event_stream(stream: Stream, streams: Streams, gone: Callable[[], Awaitable[bool]]) -> AsyncIterator[bytes]:
-    """Yield what a stream tells.
+    """Yield the server-sent events of a stream.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ HEAD = 4096
 
 
 def policy_of(page: str) -> str:
-    """Return what a page allows itself, for the header: a page without a policy may do nothing.
+    """Return the content security policy of a page, for the header; a page without one may do nothing.
 
     Examples
     --------
@@ -29,7 +29,7 @@ def policy_of(page: str) -> str:
 
 
 def policy_of_file(path: Path) -> str:
-    """Return the same of a page that is kept."""
+    """Return the content security policy of a page on disk."""
     with path.open(encoding="utf-8", errors="replace") as file:
         return policy_of(file.read(HEAD))
 

@@ -133,7 +133,7 @@ class Service:
         return found
 
     def result(self, identity: str) -> dict[str, Any]:
-        """Return what came of a log.
+        """Return the result of a log.
 
         Raises
         ------

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from plant.log.record import Record
 
 LEARNING = 1.0
-"""What a stream begins with from which noise and first belief are read [s], where no log is named."""
+"""Time at the start of a stream from which noise and first belief are taken, if no log is named [s]."""
 
 FEWEST = 200
-"""Rows that this takes at the least."""
+"""Least count of rows that a filter starts from."""
 
 TOGETHER = 0.1
-"""Rows are taken up to so long together [s]; what comes of them does not depend on it."""
+"""Longest piece of a stream that is filtered at once [s]; results do not depend on it."""
 
 
 @dataclass

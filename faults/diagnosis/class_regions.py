@@ -288,7 +288,7 @@ def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Arra
 
 
 def told_apart(spread: Array, actuator: Actuator) -> Array:
-    """Return how far a log tells each condition from each other: the log-likelihood ratio that it leads to expect.
+    """Return how well a log tells each condition from each other one, as an expected log-likelihood ratio.
 
     Parameters
     ----------

@@ -104,7 +104,7 @@ def with_loads(p: EhaParameters, seen: Loads, names: Sequence[str]) -> EhaParame
 def first_guesses(
     blocks: Blocks, parameters: EhaParameters, estimate: BulkModulusEstimate, seen: Loads | None
 ) -> Iterator[EhaParameters]:
-    """Yield the actuator under the loads that a log may show of which the force balance is not sure.
+    """Yield the actuator under each load that a log may show and that the force balance is not sure of.
 
     Parameters
     ----------

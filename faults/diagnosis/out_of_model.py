@@ -158,7 +158,7 @@ def unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Not
 
 
 def sticks_and_slips(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
-    """Return whether what a circuit leaves of the velocity is when a piston yields and jumps, and not how far.
+    """Return whether a circuit misses only when the piston breaks loose and jumps, and not how far it goes.
 
     Minor friction falls with speed, so that a piston pushed slowly sticks and slips: some twenty jumps a second, each
     of a tenth of a millimetre. When one begins rests on seals that no circuit describes to the last digit, and the next

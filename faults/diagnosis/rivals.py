@@ -94,7 +94,7 @@ def doubts_left(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[
 
 
 def other_friction(blocks: Blocks, actuator: Actuator, best: PointFit, condition: str) -> list[PointFit]:
-    """Return what searches end at that begin with the friction of the other levels, all else being as in a fit.
+    """Return the ends of searches that begin with the friction of another level, and with all else as in a fit.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def _holding(ends: tuple[float, float] | None, one: Quantity) -> Quantity:
 
 
 def _laws(lost: float, actuator: Actuator, *, pressure: bool) -> Mapping[str, Responses]:
-    """Return responses of severities, to the whole of which they are a part."""
+    """Return how severities respond to errors of the rig file, each as a share of what `_whole` gives for it."""
     healthy = actuator.circuit
     swept = healthy.piston_area * actuator.rated * (1.0 - lost / 100.0)
     pumped = healthy.pump_displacement * healthy.rated_speed
@@ -73,7 +73,7 @@ def _laws(lost: float, actuator: Actuator, *, pressure: bool) -> Mapping[str, Re
 
 
 def _whole(found: Mapping[str, Quantity], actuator: Actuator) -> Mapping[str, float]:
-    """Return what each severity is the excess or the lack of, in its unit."""
+    """Return the whole that each severity adds to or takes from, in the severity's unit."""
     p = actuator.circuit
     sound = float(quadratic_friction(actuator.rated, 1.0, p.friction_quadratic, p.friction_linear, p.friction_coulomb))
     value = {name: one.value or 0.0 for name, one in found.items()}
