@@ -28,7 +28,7 @@ MOST_SAMPLES = 2_000_000
 """Longest experiment that is looked at."""
 
 
-class LookedAt(NamedTuple):
+class ExperimentCard(NamedTuple):
     """An experiment with its card: the evidence of a finding.
 
     Parameters
@@ -56,7 +56,7 @@ def cards_of(rig: "Rig[Any]", options: Mapping[str, Any]) -> "list[Finding]":
     Returns
     -------
     list of Finding
-        One an experiment, its evidence a `LookedAt`.
+        One an experiment, its evidence a `ExperimentCard`.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def cards_of(rig: "Rig[Any]", options: Mapping[str, Any]) -> "list[Finding]":
             },
             gate=Gate(True, ()),
             channels=cards[name].channels,
-            evidence=LookedAt(name, place + 1, cards[name], about),
+            evidence=ExperimentCard(name, place + 1, cards[name], about),
         )
         for place, name in enumerate(rank_drives(cards))
     ]

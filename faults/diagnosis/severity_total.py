@@ -57,7 +57,7 @@ def _holding(ends: tuple[float, float] | None, one: Quantity) -> Quantity:
 
 
 def _laws(lost: float, actuator: Actuator, *, pressure: bool) -> Mapping[str, Responses]:
-    """Return how severities respond to errors of the rig file, each as a share of what `_whole` gives for it."""
+    """Return how severities respond to errors of the rig file, each as a share of its whole (`_whole`) or of itself."""
     healthy = actuator.circuit
     swept = healthy.piston_area * actuator.rated * (1.0 - lost / 100.0)
     pumped = healthy.pump_displacement * healthy.rated_speed
