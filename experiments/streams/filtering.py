@@ -40,8 +40,16 @@ class Filtering:
         Takes the entries of a line.
     asked : Asked
         The filter.
+    columns : tuple of two Mapping[str, str]
+        Foreign column by channel, from the rig file and from the command line.
     every : float
         Time of the stream between two estimates [s].
+    like : Record or None
+        A log of the same bench that gives the noise levels; the beginning of the stream if None.
+    state : Path or None
+        File in which the filter is kept over a restart.
+    source : str
+        What the stream is called in lines, errors and warnings.
     """
 
     say: Callable[[dict[str, Any]], None]

@@ -185,18 +185,12 @@ def blocks_of(record: Record) -> Blocks:
     slow, rows = filled(record[PRESSURE]) if PRESSURE in record else (None, 1)
     given = record if slow is None or rows == 1 else record.replace(**{PRESSURE: slow})
     whole = {name: _pooled(given[name], pooled)[: count * block + 1] for name in record if name in _NEEDED}
-    if "position_m" in whole and np.any(np.isfinite(whole["position_m"])):
-        velocity = np.diff(bridged(whole["position_m"])[::block]) / (block * sample_time)
-    elif "velocity_m_s" in whole and np.any(np.isfinite(whole["velocity_m_s"])):
-        velocity = _mean(whole["velocity_m_s"], block)
-    else:
+    velocity = _velocity(whole, block, sample_time)
+    if velocity is None:
         raise LogError(f"velocity_m_s or position_m is needed; the log has {', '.join(record)}")
-    pressure = whole.get(PRESSURE)
-    if pressure is not None:
-        pressure = _mean(pressure, block)
-        if not np.any(np.isfinite(pressure[round(SETTLING / (block * sample_time)) :])):
-            pressure = None  # a sensor that was out for all of the stretch
-            del whole[PRESSURE]
+    pressure = _pressure(whole, block, sample_time)
+    if pressure is None:
+        whole.pop(PRESSURE, None)
     speed = bridged(whole["motor_speed_rad_s"])
     blind = _with_gaps(whole["motor_speed_rad_s"], block, round(SETTLING / sample_time))
     velocity = np.where(blind | _with_gaps(whole.get("position_m"), block), np.nan, velocity)
@@ -219,6 +213,23 @@ def blocks_of(record: Record) -> Blocks:
         place=_place(whole),
         settling=_settling(record, whole),
     )
+
+
+def _velocity(whole: Mapping[str, Array], block: int, sample_time: float) -> Array | None:
+    """Return the mean velocity over each block [m/s], None where no motion is logged; position goes first."""
+    if "position_m" in whole and np.any(np.isfinite(whole["position_m"])):
+        return np.diff(bridged(whole["position_m"])[::block]) / (block * sample_time)
+    if "velocity_m_s" in whole and np.any(np.isfinite(whole["velocity_m_s"])):
+        return _mean(whole["velocity_m_s"], block)
+    return None
+
+
+def _pressure(whole: Mapping[str, Array], block: int, sample_time: float) -> Array | None:
+    """Return the mean pressure over each block [Pa], None where none is logged or its sensor was out throughout."""
+    if PRESSURE not in whole:
+        return None
+    pressure = _mean(whole[PRESSURE], block)
+    return pressure if np.any(np.isfinite(pressure[round(SETTLING / (block * sample_time)) :])) else None
 
 
 def _with_gaps(values: Array | None, block: int, behind: int = 0) -> NDArray[np.bool_]:
