@@ -46,7 +46,13 @@ class Logged:
     uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def seen_at(self, parameters: EhaParameters) -> GreyBoxLog:
-        """Return the log as the flow form sees it in an actuator."""
+        """Return the log as the flow form sees it in an actuator.
+
+        Parameters
+        ----------
+        parameters : EhaParameters
+            The actuator.
+        """
         return flow_log(self.record, parameters, self.uncertainties, self.variances)
 
 
@@ -119,12 +125,36 @@ class PlainFits:
         return _swinging(self.fits)
 
     def yields(self, sensed: ShownPlay, bulk_modulus: float) -> float:
-        """Return what the piston yields unseen, over what the oil does [fraction]."""
+        """Return what the piston yields unseen, over what the oil does.
+
+        Parameters
+        ----------
+        sensed : ShownPlay
+            The play that a velocity sensor shows.
+        bulk_modulus : float
+            Of the oil [Pa].
+
+        Returns
+        -------
+        float
+            The ratio [fraction].
+        """
         softness = self.start.parameters.piston_area * sensed.yields / self.start.parameters.chamber_volume
         return softness * bulk_modulus
 
     def play_untaken(self, sensed: ShownPlay) -> tuple[float, tuple[Note, ...]]:
-        """Return what a play leaves open that no fit took up; see `estimation.fits.play.play_untaken`."""
+        """Return what a play leaves open that no fit took up; see `estimation.fits.play.play_untaken`.
+
+        Parameters
+        ----------
+        sensed : ShownPlay
+            The play that a velocity sensor shows.
+
+        Returns
+        -------
+        tuple of (float, tuple of Note)
+            Relative deviation of bulk modulus [fraction], and a remark where the gate is not shut for it.
+        """
         return play_untaken(sensed, self.yields(sensed, self.swinging.values["bulk_modulus"]))
 
 
