@@ -14,6 +14,7 @@ from estimation.finding import Gate, Outcome
 from estimation.log_checks.channel_names import POSITION, PRESSURE
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, first_belief
+from estimation.log_checks.told_once import told_once
 from estimation.models.augment import AUGMENTABLE, augmented, augmented_prior
 from estimation.models.eha_forms import BULK_MODULUS
 from estimation.models.model import ProcessModel
@@ -106,7 +107,8 @@ def estimate_by_filter(
     """
     require_known("method", options.method, ["auto", *METHODS, *NAMED])
     record = log.record
-    if options.tuned:
+    if options.tuned:  # the noise that is told of any rig is wide enough for an encoder at rest
+        record = told_once(record)
         model = replace(model, longest_step=min(model.longest_step, record.sample_time / STEPS_A_SAMPLE))
     named = NAMED.get(options.method, NamedMethod(model.name, options.method))
     method = named.method if named.method != "auto" else chosen_method(record, model, options.tuned)
@@ -154,7 +156,7 @@ def estimate_by_filter(
     value, _ = estimate.settled(BULK_MODULUS)
     nominal = parameters.bulk_modulus
     bound = max(bound_at(nominal), bound_at(max(value, 1e-3 * nominal))) if np.isfinite(value) else float("inf")
-    concluded = conclude(estimate, record, bound, model.name, names)
+    concluded = conclude(estimate, log.record, bound, model.name, names)
     return replace(concluded, first_pass=first, tuning=found, method=options.method if named.noise else method)
 
 
