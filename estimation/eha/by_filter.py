@@ -120,13 +120,14 @@ def estimate_by_filter(
     found: Tuning | None = None
     if options.tuned:
         found = tune(
-            record,
+            log.record,
             model,
             first_belief(model, record, guess, start_std),
             parameters,
             channels=channels,
             variances=variances,
             noise=noise,
+            told=record,
         )
         variances, noise = found.tuned.variances, found.tuned.noise
         guess = float(found.prior.mean[model.index(BULK_MODULUS)])

@@ -1,7 +1,7 @@
 """`told_once(record) -> Record`: what an encoder repeats while the piston rests counts once, and not in every row.
 
-An encoder rounds. While the piston moves through many of its steps a row, what it is off by is as good as noise. While
-it rests, all rows are off by the same, and a filter that takes them for samples of their own believes their mean.
+An encoder rounds. While the piston moves, what it is off by changes from row to row and cancels over each of its steps.
+While it rests, all rows are off by the same, and a filter that takes them for samples of their own believes their mean.
 """
 
 import numpy as np
@@ -14,6 +14,10 @@ from plant.log.record import Record
 
 ROUNDED = 2.0
 """Noise over that of rounding alone below which equal readings are one, and no chance [dimensionless]."""
+
+REST = 10
+"""Rows of one reading that are a rest [samples]. Of two rows, as at 10 kHz, neither is the middle: with the first of them
+alone bulk modulus was 15 deviations off."""
 
 
 def told_once(record: Record) -> Record:
@@ -31,9 +35,9 @@ def told_once(record: Record) -> Record:
 
     Examples
     --------
-    >>> turned = np.array([0.0, 0.0, 1e-6, 1e-6, 1e-6, 2e-6, 4e-6])
-    >>> told_once(Record(1e-3, {"position_m": turned}))["position_m"] * 1e6
-    array([ 0., nan, nan,  1., nan,  2.,  4.])
+    >>> turned = np.array([0.0, 0.0, 1e-6, 3e-6] + 100 * [4e-6])
+    >>> int(np.count_nonzero(np.isfinite(told_once(Record(1e-3, {"position_m": turned}))["position_m"])))
+    5
     """
     if POSITION not in record:
         return record
@@ -43,7 +47,7 @@ def told_once(record: Record) -> Record:
 
 
 def middles(values: Array) -> Array:
-    """Return values of which each that is repeated stands in the middle of its rows alone.
+    """Return values of which each that is repeated for long stands in the middle of its rows alone.
 
     That is where a slow motion is nearest to it: at both ends it is half a step away. The first row stays: there a
     filter begins.
@@ -60,7 +64,8 @@ def middles(values: Array) -> Array:
     """
     first = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
     after = np.append(first[1:], len(values))
-    rows = np.append((first + after - 1) // 2, 0)
-    once = np.full_like(values, np.nan)
+    rests = after - first >= REST
+    once = np.where(np.repeat(rests, after - first), np.nan, values)
+    rows = np.append((first + after - 1)[rests] // 2, 0)
     once[rows] = values[rows]
     return once

@@ -8,6 +8,7 @@ that says nothing about one of them leaves it where it was.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -117,6 +118,7 @@ def tune(
     channels: tuple[str, ...] | None = None,
     variances: Mapping[str, float] | None = None,
     noise: Mapping[str, float] | None = None,
+    told: Record | None = None,
 ) -> Tuning:
     """Tune a filter's noise levels on a log.
 
@@ -134,6 +136,9 @@ def tune(
         Sensor variances to begin from, and that of motor speed [SI squared]; by default read off the log.
     noise : Mapping[str, float], optional
         Process-noise densities to begin from that replace the model's [SI squared a second].
+    told : Record, optional
+        What the filter is told of the log, as `estimation.log_checks.told_once` has it; all of it if not given. What
+        the sensors resolve is read off the log itself.
 
     Returns
     -------
@@ -145,7 +150,8 @@ def tune(
     LogError
         If the record lacks a drive, or has no channel that the model predicts.
     """
-    problem = filter_problem(model, prior, record, parameters, channels=channels, variances=variances, noise=noise)
+    how: dict[str, Any] = {"channels": channels, "variances": variances, "noise": noise}
+    problem = filter_problem(model, prior, record if told is None else told, parameters, **how)
     coordinates = noise_coordinates(problem, record, parameters, (variances or {}).get("motor_speed_rad_s"))
     problem, guesses = _likeliest_start(problem, coordinates)
     found = maximise(problem, guesses)

@@ -5,15 +5,17 @@ import pytest
 
 from benchmarks.coverage import Case, logged
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
-from estimation.log_checks.told_once import middles, told_once
+from estimation.log_checks.told_once import REST, middles, told_once
 from plant.log.record import Record
 
 NAN = np.nan
 
 
 def test_a_repeated_value_stands_in_the_middle_of_its_rows_and_what_is_missing_stays_so() -> None:
-    told = middles(np.array([3.0, 3.0, 3.0, NAN, NAN, 4.0, 4.0, 4.0, 5.0]))
-    np.testing.assert_array_equal(told, [3.0, 3.0, NAN, NAN, NAN, NAN, 4.0, NAN, 5.0])
+    told = middles(np.repeat([3.0, NAN, 4.0, 5.0], [REST + 1, 2, REST, REST - 1]))
+    at_rest = np.full(2 * REST + 3, NAN)
+    at_rest[[0, REST // 2, REST + 3 + (REST - 1) // 2]] = 3.0, 3.0, 4.0
+    np.testing.assert_array_equal(told, np.append(at_rest, np.full(REST - 1, 5.0)))
 
 
 def test_readings_that_are_equal_by_chance_all_count() -> None:
