@@ -16,8 +16,8 @@ ROUNDED = 2.0
 """Noise over that of rounding alone below which equal readings are one, and no chance [dimensionless]."""
 
 REST = 10
-"""Rows of one reading that are a rest [samples]. Of two rows, as at 10 kHz, neither is the middle: with the first of them
-alone bulk modulus was 15 deviations off."""
+"""Rows of one reading that are a rest [samples]. Of two rows, as at 10 kHz, neither is the middle: with the first of
+them alone bulk modulus was 15 deviations off."""
 
 
 def told_once(record: Record) -> Record:
