@@ -66,6 +66,9 @@ class LogVerb:
     ----------
     run : callable
         ``run(record, rig, options) -> Finding``, with rig and options as `prepare` returned them.
+    run_beside : callable, optional
+        ``run_beside(record, rig, options, kept) -> Finding``, the same for one log of which several verbs are asked:
+        in the dictionary ``kept``, empty at first, a verb leaves what another begins with too.
     options : Options
         Options that it understands, with what they are where they are not given. ``healthy`` comes as a Record.
     prepare : callable
@@ -84,6 +87,7 @@ class LogVerb:
     """
 
     run: "Callable[[Record, Rig[Any], Any], Finding]"
+    run_beside: "Callable[[Record, Rig[Any], Any, dict[Any, Any]], Finding] | None" = None
     options: Options = field(default_factory=dict[str, Any])
     prepare: "Callable[[Rig[Any], Options], tuple[Rig[Any], Any]]" = lambda rig, options: (rig, options)
     entries: "Callable[[Finding], dict[str, Any]]" = finding_entries

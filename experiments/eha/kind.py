@@ -24,8 +24,10 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     from estimation.eha.bulk_modulus import EstimateOptions
+    from estimation.eha.result import BulkModulusEstimate
     from estimation.finding import Finding
     from estimation.identification.model.linear_model import LinearModel
+    from estimation.log_checks.clean import CleanLog
     from faults.diagnosis.rmse import Scores
     from plant.eha.rig import Rig
     from plant.log.record import Record
@@ -92,14 +94,34 @@ def _unused(sensors: str, no_pressure: bool) -> frozenset[str]:
     return frozenset(left_out | ({PRESSURE} if no_pressure else set()))
 
 
-def _estimated(record: "Record", rig: "Rig[Any]", asked: "tuple[EstimateOptions, frozenset[str], bool]") -> "Finding":
-    from estimation.eha.estimate import estimate_log
+def _estimated(
+    record: "Record",
+    rig: "Rig[Any]",
+    asked: "tuple[EstimateOptions, frozenset[str], bool]",
+    kept: "dict[Any, Any] | None" = None,
+) -> "Finding":
+    from estimation.eha.bulk_modulus import DEFAULT_OPTIONS
+    from estimation.eha.estimate import estimate_log, finding_of
 
     how, unused, open_choice = asked
     record = record.replace(**{channel: None for channel in unused if channel in record})
     if open_choice and PRESSURE in record:
         how = replace(how, tuned=True)
-    return estimate_log(record, rig, how)
+    if kept is None or how != DEFAULT_OPTIONS:
+        return estimate_log(record, rig, how)
+    if (seen := _seen(record, rig, kept)) is not None:
+        return finding_of(*seen, rig)
+    found = estimate_log(record, rig)
+    kept[tuple(record)] = rig, found.evidence
+    return found
+
+
+def _seen(record: "Record", rig: "Rig[Any]", kept: "dict[Any, Any]") -> "tuple[CleanLog, BulkModulusEstimate] | None":
+    """Return a log with its estimate, all automatic, with which both verbs begin; None where none is kept."""
+    from estimation.log_checks.clean import clean_log
+
+    of_rig, estimate = kept.get(tuple(record), (None, None))
+    return None if estimate is None or of_rig != rig else (clean_log(record, rig.parameters), estimate)
 
 
 def _innovations(found: "Finding", log: str, path: Path) -> None:
@@ -146,7 +168,9 @@ def _identified(parameters: EhaParameters, seed: int) -> "Mapping[str, LinearMod
         return identify_bank(parameters, np.random.default_rng(seed), duration=LIBRARY_DURATION)
 
 
-def _diagnosed(record: "Record", rig: "Rig[Any]", asked: "tuple[bool, Linear]") -> "Finding":
+def _diagnosed(
+    record: "Record", rig: "Rig[Any]", asked: "tuple[bool, Linear]", kept: "dict[Any, Any] | None" = None
+) -> "Finding":
     from faults.diagnosis.diagnose import diagnose_log
     from faults.diagnosis.rmse import score_transfer_functions
     from plant.spare_processors import begun
@@ -154,20 +178,20 @@ def _diagnosed(record: "Record", rig: "Rig[Any]", asked: "tuple[bool, Linear]") 
     no_pressure, linear = asked
     if no_pressure:
         record = record.replace(**{PRESSURE: None})
-    if linear is None:
-        return diagnose_log(record, rig)
 
-    def scored() -> "Scores":
-        return score_transfer_functions(record, linear())
+    def scored() -> "Scores | None":
+        return None if linear is None else score_transfer_functions(record, linear())
 
-    waiting = begun(scored) or scored
-    found = diagnose_log(record, rig)
+    waiting = scored if linear is None else begun(scored) or scored
+    found = diagnose_log(record, rig, None if kept is None else _seen(record, rig, kept))
+    if kept is not None:
+        kept[tuple(record)] = rig, found.evidence.estimate
     try:
         scores = waiting()
     except LogError as error:
         note(f"the transfer functions are left out: {error}")
         return found
-    return replace(found, evidence=replace(found.evidence, transfer_functions=scores))
+    return found if scores is None else replace(found, evidence=replace(found.evidence, transfer_functions=scores))
 
 
 def _page(result: Result, found: "Finding", record: "Record") -> str:
@@ -194,6 +218,7 @@ EHA = ActuatorKind(
     ),
     estimate=LogVerb(
         run=_estimated,
+        run_beside=_estimated,
         prepare=_prepared_estimation,
         options=AS_THE_LOG_ALLOWS | OF_A_FILTER | FIRST_GUESS,
         entries=estimate_entries,
@@ -204,6 +229,7 @@ EHA = ActuatorKind(
     ),
     diagnose=LogVerb(
         run=_diagnosed,
+        run_beside=_diagnosed,
         prepare=_prepared_diagnosis,
         options={"no_pressure": False, "scores": False, "transfer_functions": None},
         entries=diagnosis_entries,

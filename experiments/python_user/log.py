@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from estimation.finding import Finding
+    from experiments.actuator_kind import LogVerb
     from experiments.python_user.relation import Relation
     from plant.eha.rig import Rig
     from plant.errors import LogWarning
@@ -108,6 +109,10 @@ class Log(Shown):
     ) -> None:
         self.record, self.rig, self.plant, self._said = record, rig, plant, tuple(said)
         self._sparse, self._refusal = sparse, refusal
+        self._kept: tuple[Record, dict[Any, Any]] = record, {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_kept": (self.record, {})}  # copies find anew what verbs left for each other
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -292,7 +297,7 @@ class Log(Shown):
             asked["healthy"] = asked["healthy"].whole()
         with options_by_name():
             rig, prepared = chosen.prepare(self.rig, {**asked, "seed": 2024})
-            found: Finding = chosen.run(record, rig, prepared)
+            found = self._found(chosen, record, rig, prepared)
         entries = {**chosen.blank, **chosen.entries(found)}
 
         def page(title: str) -> str:
@@ -303,6 +308,14 @@ class Log(Shown):
             return page_of(chosen, with_remarks({**about, **entries}, self._said), found, record)
 
         return Answer(found, entries, lambda rows: chosen.screen(rows, asked), page)
+
+    def _found(self, chosen: "LogVerb", record: "Record", rig: "Rig[Any]", prepared: Any) -> "Finding":
+        """Return what a verb finds, with what another verb of this log has left for it."""
+        if chosen.run_beside is None:
+            return chosen.run(record, rig, prepared)
+        if self._kept[0] is not record:
+            self._kept = record, {}
+        return chosen.run_beside(record, rig, prepared, self._kept[1])
 
     def to_frame(self) -> "pd.DataFrame":
         """Return the channels as a table.

@@ -99,7 +99,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
         If the log has neither position nor velocity, or cannot be estimated.
     """
     log = clean_log(record, rig.parameters) if seen is None else seen[0]
-    plain = _Plain(log, rig.parameters, begun(partial(_of_clean, log, rig.parameters)))
+    plain = _Plain(log, rig.parameters, None if seen is not None else begun(partial(_of_clean, log, rig.parameters)))
     estimate = estimated(log, rig, EstimateOptions())[1] if seen is None else seen[1]
     found, strange = finding_of(log, estimate, rig), explained(estimate, rig.parameters)
     outside = tuple(note for note in strange if note.code in OUTSIDE)
@@ -155,7 +155,8 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
 class _Plain(NamedTuple):
     """A diagnosis of the log as it came and around the rig as its file says: most logs need no other.
 
-    It is begun beside the estimate of bulk modulus, which may set log and rig right; then it is not asked for.
+    It is begun beside the estimate of bulk modulus, which may set log and rig right; then it is not asked for. Where
+    that is known already, there is nothing to begin it beside.
     """
 
     log: CleanLog

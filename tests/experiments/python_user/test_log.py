@@ -1,12 +1,16 @@
 """A log in the hands of a Python user: as a table, and drawn."""
 
+import pickle
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 import hydrostate as hs
+from estimation.eha.result import BulkModulusEstimate
 
 
 @pytest.fixture(scope="module")
@@ -92,3 +96,48 @@ def test_a_diagnosis_writes_the_page_of_its_actuator(log: hs.Log, tmp_path: Path
     page = log.diagnose().report(tmp_path / "page.html").read_text(encoding="utf-8")
     assert "leakage" in page
     assert "<canvas" in page or "uPlot" in page
+
+
+@pytest.fixture
+def fits(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
+    """Channels of each log that bulk modulus is estimated from."""
+    from estimation.eha import estimate as module
+
+    asked, estimated = list[tuple[str, ...]](), module.estimate_clean
+
+    def counted(*given: Any) -> BulkModulusEstimate:
+        asked.append(tuple(given[0].record))
+        return estimated(*given)
+
+    monkeypatch.setattr(module, "estimate_clean", counted)
+    return asked
+
+
+@pytest.mark.parametrize("verbs", [("estimate", "diagnose"), ("diagnose", "estimate")])
+def test_both_verbs_of_a_log_share_its_estimate_and_say_what_each_says_alone(
+    log: hs.Log, fits: list[tuple[str, ...]], verbs: tuple[str, str]
+) -> None:
+    alone = [getattr(hs.Log(log.record, log.rig), verb)().to_dict() for verb in verbs]
+    assert len(fits) == 2
+    both = hs.Log(log.record, log.rig)
+    assert [getattr(both, verb)().to_dict() for verb in verbs] == alone
+    assert len(fits) == 3
+    copied = pickle.loads(pickle.dumps(both))  # noqa: S301 - our own
+    assert copied.estimate().to_dict() == both.estimate().to_dict()
+    assert len(fits) == 4
+
+
+def test_an_estimate_is_shared_only_where_channels_rig_and_method_are_the_same(
+    log: hs.Log, fits: list[tuple[str, ...]]
+) -> None:
+    both = hs.Log(log.record, log.rig)
+    both.estimate()
+    both.diagnose(no_pressure=True)
+    both.estimate(condition="major_leakage")
+    both.estimate(start=3e8)
+    assert ["differential_pressure_pa" in channels for channels in fits] == [True, False, True, True]
+    both.rig = replace(both.rig, parameters=replace(both.rig.parameters, piston_area=1.6e-3))
+    both.diagnose()
+    both.record = log.between(0.0, 0.4).record
+    both.diagnose()
+    assert len(fits) == 6
