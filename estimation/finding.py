@@ -182,7 +182,8 @@ class Finding:
     alike : tuple of str
         Conditions that the log does not tell from it.
     probabilities : Mapping[str, float]
-        Of each condition, should the log be in one of them [probability].
+        Of each condition [probability]. Where another fault is as likely and a note names it, they sum to less than 1
+        by its probability; else they are those of a log that is in one of them.
     unknown : bool
         Whether something speaks against all of them.
     against : tuple of Note

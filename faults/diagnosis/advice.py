@@ -106,7 +106,7 @@ def advice_for(
     if ClassCode.LEAKAGE_AND_BIAS_ALIKE in unclear:
         speeds = speeds_held(record)
         found.append((AdviceCode.MORE_SPEEDS if speeds < 2 else AdviceCode.CLOSER_SPEEDS).note(speeds=speeds))
-    if probabilities and max(probabilities.values()) < SURE:
+    if probabilities and max(probabilities.values()) < SURE * sum(probabilities.values()):
         short = record.duration < LONG_ENOUGH
         found.append(
             AdviceCode.LOG_LONGER.note(duration_s=record.duration) if short else AdviceCode.CONDITIONS_OPEN.note()

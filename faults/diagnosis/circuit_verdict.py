@@ -15,7 +15,7 @@ class Diagnosis:
     Parameters
     ----------
     probabilities : Mapping[str, float]
-        Of each of the nine conditions, should the log be in one of them [probability].
+        Of each of the nine conditions, see `estimation.finding.Finding` [probability].
     against : tuple of Note
         What speaks against all nine.
     severity : Mapping[str, Quantity]

@@ -52,6 +52,9 @@ LIKELIER = 10.0
 strong from there on (Jeffreys, Theory of Probability, 1961, appendix B). Of 16 sound training logs under major leakage
 and friction none comes to more than 1.4."""
 
+WORTH_SAYING = 0.01
+"""Probability of a worn pump from which it is said beside the fault's name [probability]."""
+
 WELL_WORN = 0.8
 """Share up to which a pump is a worn one whatever the rig file's displacement is worth [dimensionless]: an entry may be
 off by 5 %, and what is presumed of wear has a deviation of 15 %."""
@@ -78,11 +81,14 @@ class Outside(NamedTuple):
     worn : ndarray, shape (1 + pumps, 9), optional
         How well each condition holds it with a sound pump, then with one that delivers each of `DELIVERIES`:
         log-likelihoods [dimensionless]; None where a worn pump is excluded.
+    wear : float
+        How much likelier a well worn pump is than a sound one, by `odds_of_wear` [dimensionless].
     """
 
     against: tuple[Note, ...] = ()
     open: tuple[Note, ...] = ()
     worn: Array | None = None
+    wear: float = -math.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,23 +146,53 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
         worn += [tried] if fault.name == WORN else []
         if found is None or gain > found[0]:
             found = gain, fault, tried
-    likely = odds_of_wear([one.score for one in worn], sound.score) > math.log(LIKELIER)
-    if found is not None and (found[0] > GAIN or likely):
+    best, delivered = sound.fits.scores, [one.score for one in worn]
+    wear = odds_of_wear(delivered, sound.score)
+    if found is not None and (found[0] > GAIN or wear > math.log(LIKELIER)):
         # a search may end short of the best: the sound circuit is asked again from where the faulty one ended, and anew
         _, fault, tried = found
         starts = (tried.fits.best.coordinates, None)
         again = [fit_classes(blocks, sound.actuator, runs=runs, start=start).scores for start in starts]
-        best = max(sound.score, float(np.max(again)))
-        gains[fault.name] = tried.score - best
+        best = max([best, *again], key=lambda scores: float(np.max(scores)))
+        gains[fault.name] = tried.score - float(np.max(best))
         if gains[fault.name] > GAIN:
             return Outside((fault.note,))
-        if odds_of_wear([one.score for one in worn], best) > math.log(LIKELIER):
-            return Outside((_delivering(DELIVERIES[int(np.argmax([one.score for one in worn]))]),))
+        wear = odds_of_wear(delivered, float(np.max(best)))
+        if wear > math.log(LIKELIER):
+            return Outside((_delivering(DELIVERIES[int(np.argmax(delivered))]),))
     # a setting just under the largest pressure leaves no trace: no log excludes it, and saying so tells nothing
     open_ = [name for name, gain in gains.items() if gain > NOT_EXCLUDED and name != EARLY]
-    note = (ClassCode.NOT_EXCLUDED.note(faults=", ".join(open_)),) if open_ else ()
-    scores = [sound.fits.scores, *(one.fits.scores for one in worn)]
-    return Outside((), note, np.array(scores) if WORN in open_ else None)
+    if WORN not in open_:
+        return Outside((), _not_excluded(open_))
+    scores = np.array([best, *(one.fits.scores for one in worn)])
+    return Outside((), _not_excluded(open_, probability_of(wear)), scores, wear)
+
+
+def _not_excluded(faults: Sequence[str], worn: float = 0.0) -> tuple[Note, ...]:
+    """Return a note that names the faults that a log does not exclude, a worn pump with its probability."""
+    named = [f"{one} ({100.0 * worn:.0f} %)" if one == WORN and worn > WORTH_SAYING else one for one in faults]
+    return (ClassCode.NOT_EXCLUDED.note(faults=", ".join(named)),) if named else ()
+
+
+def probability_of(odds: float) -> float:
+    """Return the probability of what is so much likelier than its opposite.
+
+    Parameters
+    ----------
+    odds : float
+        Logarithm of their ratio [dimensionless].
+
+    Returns
+    -------
+    float
+        Between 0 and 1 [probability].
+
+    Examples
+    --------
+    >>> probability_of(0.0), probability_of(-math.inf)
+    (0.5, 0.0)
+    """
+    return 0.5 * (1.0 + math.tanh(0.5 * odds))
 
 
 def odds_of_wear(scores: Sequence[float], sound: float) -> float:

@@ -20,7 +20,7 @@ from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.evidence import Scoreboard, bounded
-from faults.diagnosis.outside import DELIVERIES, faults_outside, presumed_of_wear
+from faults.diagnosis.outside import DELIVERIES, faults_outside, presumed_of_wear, probability_of
 from faults.notes import AgainstCode
 from plant.arrays import Array
 from plant.notes import Note
@@ -71,16 +71,20 @@ def whatever_fault(diagnosis: Diagnosis, actuator: Actuator, calibration: Calibr
     -------
     Diagnosis
         With the fault that the log shows, those that it does not tell, and classes weighed over a worn pump where that
-        is one of these; the same with pressure, and where something speaks against all nine already.
+        is one of these: they sum to the probability that the pump is not well worn, which is none of the nine. The same
+        with pressure, and where something speaks against all nine already.
     """
     if diagnosis.against:
         return diagnosis
     board = diagnosis.scoreboard
     others = faults_outside(board.blocks, board.fits, actuator)
-    worn, alike = others.worn, diagnosis.probabilities
+    worn, probabilities = others.worn, diagnosis.probabilities
+    if worn is not None:
+        summed, sound = summed_over_wear(board, worn, calibration), probability_of(-others.wear)
+        probabilities = {name: sound * share for name, share in summed.items()}
     return replace(
         diagnosis,
-        probabilities=alike if worn is None else summed_over_wear(board, worn, calibration),
+        probabilities=probabilities,
         against=others.against,
         not_told=(*diagnosis.not_told, *others.open),
     )

@@ -14,7 +14,7 @@ from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.diagnose import diagnose_clean
-from faults.diagnosis.outside import DELIVERIES, faults_outside, largest_pressure, odds_of_wear
+from faults.diagnosis.outside import DELIVERIES, Outside, faults_outside, largest_pressure, odds_of_wear
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.model import EhaParameters
@@ -44,7 +44,7 @@ def log_of(circuit: CircuitParameters = SOUND, condition: str = "minor_friction"
 
 def said(blocks: Blocks) -> tuple[list[tuple[Code, dict[str, object]]], str]:
     """Return what speaks against all nine, and the faults that are not excluded."""
-    against, open_, worn = faults_outside(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
+    against, open_, worn, _ = faults_outside(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
     assert [note.code for note in open_] in ([], [ClassCode.NOT_EXCLUDED])
     assert (worn is not None) == any("worn pump" in note.data["faults"] for note in open_)
     return [(note.code, dict(note.data)) for note in against], "".join(str(note.data["faults"]) for note in open_)
@@ -124,7 +124,7 @@ def test_with_pressure_and_where_the_piston_sticks_nothing_is_asked(monkeypatch:
     fits = [fit_classes(blocks, ACTUATOR) for blocks in (seen, still)]
     monkeypatch.setattr(outside, "fit_classes", lambda *_, **__: pytest.fail("a circuit was fitted"))
     for blocks, one in zip((seen, still), fits, strict=True):
-        assert faults_outside(blocks, one, ACTUATOR) == ((), (), None)
+        assert faults_outside(blocks, one, ACTUATOR) == Outside()
 
 
 @pytest.mark.parametrize("anew", [False, True], ids=["from where the faulty one ended", "anew"])

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS
-from faults.diagnosis import outside
+from faults.diagnosis import outside, wear
+from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_runs import COORDINATES
+from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.evidence import Scoreboard
 from faults.diagnosis.outside import Outside, faults_outside
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import CircuitParameters
@@ -97,6 +100,40 @@ def test_what_worn_pumps_leave_of_the_conditions_is_told_where_they_are_not_excl
         assert found.worn.tolist() == [[score - 9.0, score] for score in (0.0, -8.0, best, -5.0)]
     else:
         assert found.worn is None
+
+
+@pytest.mark.parametrize("gain", [-2.9, -1.0, 1.0, 3.0])
+def test_a_well_worn_pump_that_is_not_excluded_takes_its_probability_from_the_conditions(
+    gain: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scores = {1.0: 0.0, 0.7: -9.0, 0.8: gain, 0.9: -9.0}
+    found, _ = looked(monkeypatch, lambda one: scores[worn(one)] if type(one) is type(SOUND) else -9.0)
+    odds = np.exp(gain - 0.5 * (np.log(0.8) / 0.15) ** 2) + np.exp(-9.0 - 0.5 * (np.log(0.7) / 0.15) ** 2)
+    assert found.wear == pytest.approx(np.log(odds))
+    share = odds / (1.0 + odds)
+    assert found.open[0].data["faults"] == f"a worn pump ({100.0 * share:.0f} %)"
+    monkeypatch.setattr(wear, "faults_outside", lambda *_: found)
+    nothing = {name: np.zeros(9) for name in ("models", "innovations", "parameters")}
+    board = Scoreboard(nothing, LOG, SimpleNamespace(), None, None)  # type: ignore[arg-type]
+    told = Diagnosis({}, (), {}, {}, {}, (), board)
+    monkeypatch.setattr(wear, "summed_over_wear", lambda *_: {"normal": 0.75, "minor_leakage": 0.25})
+    probabilities = wear.whatever_fault(told, ACTUATOR, shipped_calibration()).probabilities
+    assert probabilities == pytest.approx({"normal": 0.75 * (1.0 - share), "minor_leakage": 0.25 * (1.0 - share)})
+
+
+def test_a_worn_pump_is_weighed_against_the_sound_one_as_it_is_found_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    scores, asked = {1.0: 0.0, 0.7: -9.0, 0.8: 5.0, 0.9: -9.0}, list[float]()
+
+    def score(one: CircuitParameters) -> float:
+        if type(one) is not type(SOUND):
+            return -9.0
+        asked.append(worn(one))
+        return 3.0 if worn(one) == 1.0 and 0.9 in asked else scores[worn(one)]
+
+    found, _ = looked(monkeypatch, score)
+    assert found.worn is not None
+    assert found.worn[:, 1].tolist() == [3.0, -9.0, 5.0, -9.0]
+    assert found.wear == pytest.approx(2.0 - 0.5 * (np.log(0.8) / 0.15) ** 2, abs=1e-3)
 
 
 @pytest.mark.parametrize(("rough", "thorough"), [(-19.9, True), (-20.1, False)])
