@@ -22,6 +22,7 @@ from estimation.fits.motion_search import (
     HOPELESS,
     NEAR_ENOUGH,
     NEARING,
+    SCREENED,
     SLIGHT_SHARE,
     WAYS,
     Ended,
@@ -34,6 +35,7 @@ from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from estimation.models.motion import MOTION_FORMS, MotionParameters
 from estimation.notes import EstimateCode
+from estimation.trust.consistency import MISMATCH_NIS
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
@@ -80,6 +82,13 @@ much as noise may (`estimation.eha.result.LARGEST_BOUND`)."""
 
 UNLIKELY = 72.0
 """Difference of log-likelihood from which a structure counts for nothing beside the other [dimensionless]."""
+
+SPARED_NIS, SPARED_SHARE = 0.5 * MISMATCH_NIS, 0.03
+"""Mean squared normalised residual, and share of the motion, up to which what is left of a log refuses no class
+[dimensionless, fraction]: half of what does."""
+
+BEGINNING = 0.2
+"""Share of these that counts on a beginning of the log [fraction]: the rest may be followed less well."""
 
 ALIKE = 5.0
 """Difference of log-likelihood up to which two structures are said to explain a log alike [dimensionless]."""
@@ -274,18 +283,35 @@ def _fitted(ended: list[Ended]) -> tuple[list[GreyBoxFit], list[float]]:
     search, best, others = first.search, first.point, list[float]()
     part, whole, bounds = search.part, search.whole, search.bounds
     if not first.explains:
-        best = descend(part.at, best.theta, FINISHING, bounds, least_share=SLIGHT_SHARE)
+        wanted = _wanted(part, best, BEGINNING)
+        best = descend(part.at, best.theta, FINISHING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
     asked = best.cost < explained(part)
     if asked:
         best, others = _rescaled(part, best, search)
     hopeful = asked and not disagree([bulk_modulus(part, best), *others])
-    best = descend(whole.at, best.theta, FINISHING, bounds, least_share=0.0 if hopeful else SLIGHT_SHARE)
+    if hopeful:
+        best = descend(whole.at, best.theta, FINISHING, bounds)
+    else:
+        wanted = _wanted(whole, best)
+        best = descend(whole.at, best.theta, FINISHING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
     if not asked and best.cost < explained(whole):
         best, others = _rescaled(whole, best, search)
     told = best.cost < explained(whole) and not disagree([bulk_modulus(whole, best), *others])
     if told and not hopeful:
         best = descend(whole.at, best.theta, FINISHING, bounds)
     return [concluded(whole, best), *_rival(second, best, told=told)], others
+
+
+def _wanted(problem: FreedProblem, begun: Point, share: float = 1.0) -> float:
+    """Return the misfit that a search from a point has to come to, or it need not go on.
+
+    What explains the log, where the point leaves so little that no class is refused for it: how much exactly decides
+    nothing then. Any else, and on a log so short that its searches take little.
+    """
+    samples = len(problem.log.measured)
+    chi_square = 2.0 * problem.at(begun.theta).cost / samples  # where the search begins: it is not run twice
+    spared = chi_square < share * SPARED_NIS or share_of_motion(chi_square, problem.log) < share * SPARED_SHARE
+    return explained(problem) if spared and samples > SCREENED else np.inf
 
 
 def _rival(second: Ended, best: Point, *, told: bool) -> list[GreyBoxFit]:
