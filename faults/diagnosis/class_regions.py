@@ -289,6 +289,33 @@ def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Arra
     return -0.5 * np.einsum("ci,ij,cj->c", off, weight, off)
 
 
+def how_near(fits: ClassFits, blocks: Blocks, actuator: Actuator) -> float:
+    """Return how well the condition that is nearest to a log holds it.
+
+    Without pressure searches from several conditions end at circuits that follow a log nearly alike, some within a
+    condition and some far from all. A log is outside only where each is, or explains so much less.
+
+    Parameters
+    ----------
+    fits : ClassFits
+        The circuits fitted to the log.
+    blocks : Blocks
+        The log.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    float
+        Log-likelihood of the region that holds the best circuit [dimensionless], 0 at its middle; without pressure of
+        any circuit, less what the best explains more.
+    """
+    best = float(np.max(region_scores(fits.best, fits.told, actuator)))
+    if blocks.pressure is not None:
+        return best
+    return max(best, float(np.max(fits.scores)) + misfit(blocks, fits.best.fitted) / LASTING)
+
+
 def told_apart(spread: Array, actuator: Actuator) -> Array:
     """Return how well a log tells each condition from each other one, as an expected log-likelihood ratio.
 

@@ -9,8 +9,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
-import numpy as np
-
 from estimation.eha.bulk_modulus import EstimateOptions
 from estimation.eha.estimate import estimated, explained, finding_of, refused
 from estimation.eha.explained import OUTSIDE, at_pump_speed, rig_set_right, set_right
@@ -25,7 +23,7 @@ from faults.diagnosis.advice import advice_for, oil_advice
 from faults.diagnosis.another_oil import whatever_the_oil
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
-from faults.diagnosis.class_regions import region_scores
+from faults.diagnosis.class_regions import how_near
 from faults.diagnosis.drift import over_drift
 from faults.diagnosis.evidence import weigh
 from faults.diagnosis.failed_search import doubts_after
@@ -268,7 +266,7 @@ def diagnose_clean(
     numbers = shipped_calibration() if calibration is None else calibration
     board = weigh(log.record, actuator, library)
     pressure = board.blocks.pressure is not None
-    region = float(np.max(region_scores(board.fits.best, board.fits.told, actuator)))
+    region = how_near(board.fits, board.blocks, actuator)
     against = (
         *log.objections,
         *board.against,

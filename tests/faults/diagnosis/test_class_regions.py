@@ -16,6 +16,7 @@ from faults.diagnosis.class_regions import (
     PRESSURE_SCALE,
     believed_information,
     fit_classes,
+    how_near,
     is_stuck,
     lasting_misfit,
     region_scores,
@@ -281,3 +282,26 @@ def test_conditions_are_told_apart_by_what_the_log_tells_of_that_in_which_they_d
     assert unsure[normal, leaks] == pytest.approx(apart[normal, leaks])
     off = ACTUATOR.conditions[leaks] - ACTUATOR.conditions[normal]
     assert apart[normal, leaks] == pytest.approx(0.5 * off @ np.linalg.solve(WITHIN, off))
+
+
+@pytest.mark.parametrize("pressure", [True, False])
+def test_a_log_is_outside_all_conditions_only_where_every_circuit_that_follows_it_as_well_is(
+    pressure: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log, far = blocks(pressure=False), np.eye(7)[COORDINATES.index("leakage")]
+    left = 0.02 * (-1.0) ** np.arange(100)[:, None]
+    outside, inside = (
+        replace(
+            fit(0, outputs=1), coordinates=ACTUATOR.conditions[0] - off, fitted=log.outputs - size * left, cost=cost
+        )
+        for off, size, cost in ((far, 1.0, 0.0), (0.0 * far, 1.1, 1.0))
+    )
+    outside, inside = (replace(one, scales=class_regions.scales_of(log, one.fitted)) for one in (outside, inside))
+    ends = iter((outside, inside, inside))
+    monkeypatch.setattr(class_regions, "fit_freely", lambda *_: next(ends))
+    fits = fit_classes(log, ACTUATOR, runs=np.zeros((9, 100, 1)))
+    alone = float(np.max(region_scores(fits.best, fits.told, ACTUATOR)))
+    assert alone < -10.0
+    seen = blocks(pressure=True) if pressure else log
+    behind = float(log.counts[0]) / class_regions.LASTING * np.log(1.1)
+    assert how_near(fits, seen, ACTUATOR) == pytest.approx(alone if pressure else -behind)

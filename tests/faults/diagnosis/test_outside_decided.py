@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS
-from faults.diagnosis import outside, wear
+from faults.diagnosis import diagnose, outside, wear
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_runs import COORDINATES
 from faults.diagnosis.circuit_verdict import Diagnosis
@@ -16,7 +17,7 @@ from faults.diagnosis.evidence import Scoreboard
 from faults.diagnosis.outside import Outside, faults_outside
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import CircuitParameters
-from tests.faults.diagnosis.short_logs import ACTUATOR, blocks
+from tests.faults.diagnosis.short_logs import ACTUATOR, PAPER, PRESSURE, blocks, log
 
 SOUND = ACTUATOR.circuit
 LOG = blocks(pressure=False)
@@ -175,3 +176,12 @@ def test_faults_are_tried_on_the_sound_circuit_that_explains_most(monkeypatch: p
     assert seats == {(side, size) for side in "ab" for size in (0.4, 1.0)}
     shut = {side for one in faulty for side in "ab" if getattr(one, f"makeup_shut_{side}", 0.0) == 1.0}
     assert shut == {"a", "b"}
+
+
+@pytest.mark.parametrize("near", [-1.0, -1e3])
+def test_a_diagnosis_asks_every_circuit_whether_a_log_is_outside(near: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(diagnose, "how_near", lambda *_: near)
+    monkeypatch.setattr(diagnose, "whatever_fault", lambda found, *_: found)
+    clean = clean_log(log().replace(**{PRESSURE: None}), PAPER)
+    codes = {note.code for note in diagnose.diagnose_clean(clean, ACTUATOR).against}
+    assert bool(codes & {AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS}) == (near < -100.0)
