@@ -1,13 +1,19 @@
 """C compilers of this machine, and what they make of exported files."""
 
+import hashlib
+import os
+import platform
 import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
+PROGRAMS = Path(__file__).resolve().parents[1] / ".pytest_cache" / "programs"
+"""Beside compiled kernels, which outlive a run too."""
 SANITIZED = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
@@ -19,16 +25,31 @@ def compiler(name: str) -> str:
     return found
 
 
+@cache
+def _version(path: str) -> bytes:
+    return subprocess.run([path, "--version"], capture_output=True, check=True).stdout  # noqa: S603
+
+
+def _kept_as(files: Mapping[str, str], command: Sequence[str]) -> Path:
+    """Where the program is kept that this compiler makes of these files, from one run of the tests to the next."""
+    made_by = repr((_version(command[0]), command, sorted(files.items()), platform.machine()))
+    return PROGRAMS / hashlib.sha256(made_by.encode()).hexdigest()[:32]
+
+
 def compiled(folder: Path, files: Mapping[str, str], *flags: str, using: str = "gcc") -> Path:
-    """The program that exported files make, compiled without a warning."""
+    """The program that exported files make, compiled without a warning; once, however often tests ask for it."""
     for file, text in files.items():
         (folder / file).write_text(text, encoding="utf-8")
-    sources = [str(folder / file) for file in files if file.endswith(".c")]
-    program = folder / "program"
-    command = [compiler(using), *STRICT, *flags, "-I", str(folder), "-o", str(program), *sources, "-lm"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - our own files
-    assert (done.returncode, done.stderr) == (0, "")
-    return program
+    sources = [file for file in files if file.endswith(".c")]
+    command = [compiler(using), *STRICT, *flags, "-o", "program", *sources, "-lm"]
+    kept = _kept_as(files, command)
+    if not kept.is_file() or "-march=native" in flags:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)  # noqa: S603 - our own files
+        assert (done.returncode, done.stderr) == (0, "")
+        PROGRAMS.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(folder / "program", beside := kept.with_suffix(f".{os.getpid()}"))
+        beside.replace(kept)
+    return kept
 
 
 def ran(program: Path, lines: Sequence[str]) -> tuple[str, str]:

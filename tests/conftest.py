@@ -6,12 +6,15 @@ import shutil
 import socket
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pytest
+import typer.testing
+from _pytest.doctest import DoctestModule
 from hypothesis import settings
 from threadpoolctl import threadpool_limits
 
@@ -35,10 +38,32 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     return WholeFiles(config, log) if config.getvalue("dist") == "loadfile" else None
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(file_path: Path) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
+    """Look for no examples in files of claims, which have none: looking takes a second of each worker's start."""
+    found = yield
+    return [one for one in found if not (file_path.name.startswith("test_") and isinstance(one, DoctestModule))]
+
+
 def pytest_collection_finish() -> None:
     """Leave what was imported and collected, millions of objects, out of every later search for garbage."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _one_parser_of_commands() -> Iterator[None]:
+    """Typer makes all verbs' parsers anew each time that a test invokes one, which is most of a short answer's work."""
+    made = WeakKeyDictionary[typer.Typer, Any]()
+
+    def once(app: typer.Typer) -> Any:
+        if app not in made:
+            made[app] = typer.main.get_command(app)
+        return made[app]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(typer.testing, "_get_command", once)
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -13,6 +13,7 @@ from experiments.motor_paper.study import MOTOR_PAPER
 from experiments.nine_conditions.figures import FIGURES
 from experiments.nine_conditions.settings import StudySettings
 from experiments.nine_conditions.study import NINE_CONDITIONS
+from experiments.page import figure_files
 from experiments.page.frames import Tables
 from experiments.page.style import styled
 from experiments.piezo_stack.study import PIEZO_STACK, StackSettings
@@ -30,6 +31,10 @@ SMALL = StudySettings(
 )
 
 
+FEW_DOTS = 20
+"""Resolution of PNG figures [1/inch]: what is asked of them is asked of few pixels too."""
+
+
 @pytest.fixture(scope="session")
 def study() -> Found:
     return NINE_CONDITIONS.find(SMALL, untracked)
@@ -39,7 +44,9 @@ def study() -> Found:
 def written(study: Found, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of the written study."""
     folder = tmp_path_factory.mktemp("results") / "study"
-    write_result(NINE_CONDITIONS, SMALL, study, folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figure_files, "PNG_DOTS_PER_INCH", FEW_DOTS)
+        write_result(NINE_CONDITIONS, SMALL, study, folder)
     return folder
 
 

@@ -153,6 +153,7 @@ def test_every_outcome_is_explained() -> None:
     assert all(sentence.endswith(".") for sentence in OUTCOMES.values())
 
 
+@cache
 def foreign_logs(folder: Path) -> list[tuple[Record, Condition, float]]:
     truth = pd.read_csv(folder / "bench" / "truth.csv")
     by_levels = {(condition.leakage, condition.friction): condition for condition in CONDITIONS.values()}

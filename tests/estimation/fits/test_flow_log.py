@@ -27,7 +27,7 @@ NOISY = replace(BENCH, position_noise=3e-5, position_quantum=1e-5)
 """A sensor of position as many rigs have it, where the reference bench has an encoder of 1 um."""
 
 
-def log(condition: str, seed: int, duration: float = 10.0) -> tuple[Record, float]:
+def log(condition: str, seed: int, duration: float = 6.0) -> tuple[Record, float]:
     rng = np.random.default_rng(seed)
     p = circuit_of(parameters_for(CONDITIONS[condition]))
     record = simulate(CIRCUIT, make_drive("steps", duration, 1e-3, p, rng), 1e-3, p, sensors=NOISY, rng=rng)
@@ -85,7 +85,7 @@ def lagging(values: np.ndarray, lag: float) -> np.ndarray:
 def test_a_position_sensor_that_lags_is_named_and_its_number_is_right(condition: str) -> None:
     rng = np.random.default_rng(9)
     p = circuit_of(parameters_for(CONDITIONS[condition]))
-    drive = make_drive("prbs", 5.0, 1e-3, p, rng)
+    drive = make_drive("prbs", 3.0, 1e-3, p, rng)
     record = simulate(CIRCUIT, drive, 1e-3, p, sensors=BENCH, rng=rng)
     assert fit_flow(record, HEALTHY, 2e8).reasons == ()
     fit = fit_flow(record.replace(position_m=lagging(record["position_m"], 3e-3)), HEALTHY, 2e8)

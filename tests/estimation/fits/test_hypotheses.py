@@ -165,7 +165,7 @@ def test_a_delay_is_sought_no_longer_than_a_sensor_may_have(monkeypatch: pytest.
 
 
 def test_an_encoder_that_was_homed_at_the_end_stop_is_named_and_shifted() -> None:
-    record = log("steps", 6.0)
+    record = log("steps", 4.0)
     found = explained(record.replace(position_m=record["position_m"] + 0.12))
     assert "encoder_zero" in found.names
     shifted = set_right(clean_log(record.replace(position_m=record["position_m"] + 0.12), HEALTHY), found)
@@ -174,7 +174,7 @@ def test_an_encoder_that_was_homed_at_the_end_stop_is_named_and_shifted() -> Non
 
 @pytest.mark.parametrize(("share", "code"), [(1.04, RigCode.AREA_TO_DISPLACEMENT), (0.8, RigCode.PUMP_WORN)])
 def test_a_pump_that_delivers_otherwise_is_named_by_the_ratio(share: float, code: RigCode) -> None:
-    record = log("steps", 6.0, replace(HEALTHY, pump_displacement=share * HEALTHY.pump_displacement))
+    record = log("steps", 4.0, replace(HEALTHY, pump_displacement=share * HEALTHY.pump_displacement))
     found = explained(record)
     note = notes_of(found, HEALTHY)[0]
     assert note.code is code
@@ -226,7 +226,7 @@ def test_a_single_rod_whose_rig_file_gives_one_area_is_named_with_both() -> None
 
 
 def test_play_of_the_encoder_is_named_and_taken_up() -> None:
-    record, play = log("prbs", 6.0), 3e-5
+    record, play = log("prbs", 4.0), 3e-5
     read = record["position_m"].copy()
     for i in range(1, len(read)):
         read[i] = min(max(read[i - 1], read[i] - 0.5 * play), read[i] + 0.5 * play)
@@ -259,11 +259,14 @@ def test_the_lag_of_a_filtered_pressure_is_believed_whatever_it_gains() -> None:
     assert wanted(("pressure_late", "air"), late=True) == wanted(("volume",), late=True) == 100.0 - module.WORTH
 
 
-@pytest.mark.parametrize("seed", thinned([2, 3], [2]))
-def test_a_plant_that_holds_its_volumes_is_not_said_to_have_another_zero(seed: int) -> None:
-    """Both explain its log alike; an encoder homed at a stop would read one sign only, and not zero in mid-stroke."""
+@pytest.mark.parametrize(("seed", "seconds"), thinned([(2, 8.0), (2, 20.0), (3, 20.0)], [(2, 8.0)]))
+def test_a_plant_that_holds_its_volumes_is_not_said_to_have_another_zero(seed: int, seconds: float) -> None:
+    """Both explain its log alike; an encoder homed at a stop would read one sign only, and not zero in mid-stroke.
+
+    What a zero must gain where no stop was seen is claimed above; on the longer logs it is asked for.
+    """
     rng = np.random.default_rng(seed)
-    drive = make_drive("steps", 20.0, 1e-3, HEALTHY, rng)
+    drive = make_drive("steps", seconds, 1e-3, HEALTHY, rng)
     found = fit_flow(simulate(LUMPED, drive, 1e-3, HEALTHY, sensors=BENCH, rng=rng), HEALTHY, HEALTHY.bulk_modulus)
     assert found.explanation is None
     value, std = found.parameters["bulk_modulus"]
@@ -329,6 +332,6 @@ def test_absent_additions_leave_the_plain_form() -> None:
 
 def test_a_worn_pump_that_passes_for_leakage_is_found_all_the_same() -> None:
     worn = replace(HEALTHY, pump_displacement=0.8 * HEALTHY.pump_displacement, leakage_coefficient=2e-11)
-    (note, *_) = notes_of(explained(log("multisine", 4.0, worn)), HEALTHY)
+    (note, *_) = notes_of(explained(log("multisine", 2.5, worn)), HEALTHY)
     assert note.code is RigCode.PUMP_WORN
     assert note.data["percent"] == pytest.approx(80.0, abs=2.0)

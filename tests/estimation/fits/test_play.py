@@ -111,7 +111,7 @@ def test_without_a_movement_there_is_no_course() -> None:
 def logged(condition: str, drive: str, play: float) -> Record:
     rng = np.random.default_rng(7)
     true = circuit_of(parameters_for(CONDITIONS[condition]))
-    signal = make_drive(drive, 8.0, 1e-3, PAPER, rng)
+    signal = make_drive(drive, 5.0, 1e-3, PAPER, rng)
     record = simulate(CIRCUIT, signal, 1e-3, true, sensors=BENCH, rng=rng)
     position = record["position_m"].copy()
     for i in range(1, len(position)):

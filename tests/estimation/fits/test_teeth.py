@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ import pytest
 from estimation.fits.flow_fit import fit_flow
 from estimation.fits.flow_log import flow_log, without_strays
 from estimation.fits.flow_search import balanced, flow_starts
+from estimation.fits.form_fit import FormFit
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.teeth import COUNTS, LIKELIEST, ShownTeeth, Teeth, with_teeth
@@ -131,13 +132,17 @@ def test_teeth_that_a_log_holds_leave_more_open() -> None:
     assert added == pytest.approx(free.teeth[11].opened[place] * free.values["bulk_modulus"] ** 2, rel=0.01)
 
 
+@cache
+def fitted(ripple: float) -> FormFit:
+    return fit_flow(logged(ripple), PAPER, PAPER.bulk_modulus)
+
+
 def test_bulk_modulus_with_teeth_is_what_it_would_be_without_and_is_off_where_they_are_not_taken_up(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    fitted = partial(fit_flow, parameters=PAPER, bulk_modulus=PAPER.bulk_modulus)
-    sound, taken_up = fitted(logged(0.0)), fitted(logged(0.1))
+    sound, taken_up = fitted(0.0), fitted(0.1)
     monkeypatch.setattr("estimation.fits.plain_flow.toothed", lambda log, fits, *_: Toothed(log, fits(log)))
-    passed_over = fitted(logged(0.1))
+    passed_over = fit_flow(logged(0.1), PAPER, PAPER.bulk_modulus)
     value, std = sound.parameters["bulk_modulus"]
     assert taken_up.parameters["bulk_modulus"][0] == pytest.approx(value, abs=0.3 * std)
     assert abs(passed_over.parameters["bulk_modulus"][0] - value) > std
@@ -189,8 +194,7 @@ def test_an_offset_is_read_off_the_residuals_and_leaves_more_open() -> None:
 
 @pytest.mark.parametrize("ripple", [0.0, 0.1])
 def test_bulk_modulus_is_as_good_with_an_offset_of_speed_as_without(ripple: float) -> None:
-    fitted = partial(fit_flow, parameters=PAPER, bulk_modulus=PAPER.bulk_modulus)
-    sound, off = fitted(logged(ripple)), fitted(shifted(ripple))
+    sound, off = fitted(ripple), fit_flow(shifted(ripple), PAPER, PAPER.bulk_modulus)
     value, std = sound.parameters["bulk_modulus"]
     assert off.parameters["bulk_modulus"][0] == pytest.approx(value, abs=0.5 * std)
     assert not off.reasons

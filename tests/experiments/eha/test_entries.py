@@ -2,11 +2,13 @@
 
 import json
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from estimation.eha.estimate import estimate_log
+from estimation.finding import Finding
 from estimation.notes import EstimateCode, SensorCode
 from experiments.command.json_output import plain
 from experiments.eha.entries import (
@@ -36,9 +38,20 @@ TOLD_BY_THE_VERB = {"condition"}
 """What estimate was told, and is no part of what it found."""
 
 
+@cache
 def log(condition: str = "minor_leakage", duration: float = 3.0) -> Record:
     p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(8)
     return simulate(LUMPED, make_drive("steps", duration, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+
+
+@cache
+def diagnosed() -> Finding:
+    return diagnose_log(log(), Rig())
+
+
+@cache
+def diagnosed_at_rest() -> Finding:
+    return diagnose_log(at_rest(), Rig())
 
 
 def at_rest() -> Record:
@@ -86,7 +99,7 @@ def test_notes_are_codes_with_data_that_json_takes() -> None:
 
 
 def test_a_diagnosis_has_the_entries_that_it_promises() -> None:
-    entries = diagnosis_entries(diagnose_log(log(), Rig()))
+    entries = diagnosis_entries(diagnosed())
     assert set(entries) == set(NO_DIAGNOSIS) | ALWAYS
     assert (entries["condition"], entries["unknown"]) == ("minor_leakage", False)
     for one in entries["severity"].values():
@@ -97,7 +110,7 @@ def test_a_diagnosis_has_the_entries_that_it_promises() -> None:
 
 
 def test_a_log_at_rest_is_in_no_class_and_its_message_alone_says_why() -> None:
-    entries = diagnosis_entries(diagnose_log(at_rest(), Rig()))
+    entries = diagnosis_entries(diagnosed_at_rest())
     assert (entries["outcome"], entries["condition"], entries["runner_up"]) == ("not_observable", None, None)
     assert (entries["unknown"], entries["reasons"], entries["advice"]) == (None, [], [])
     assert entries["message"] == str(ClassCode.MODELS_ALIKE.note())
@@ -152,7 +165,7 @@ def test_what_an_absent_channel_costs_is_a_note_and_said_once_of_all_logs() -> N
     entries = diagnosis_entries(diagnose_log(log().replace(position_m=None, **{PRESSURE: None}), Rig()))
     assert ClassCode.PRESSURE_ABSENT_CLASS in codes(entries)
     assert str(ClassCode.PRESSURE_ABSENT_CLASS.note()) not in entries["warnings"]
-    sound = diagnosis_entries(diagnose_log(log(), Rig()))
+    sound = diagnosis_entries(diagnosed())
     said = costs([entries, sound, entries])
     assert f"2 of 3 logs: {ClassCode.PRESSURE_ABSENT_CLASS.note()}" in said
     assert f"note: {ClassCode.PRESSURE_ABSENT_CLASS.note()}" in costs([entries])
@@ -193,7 +206,7 @@ def test_nominal_models_that_miss_a_log_are_named_beside_what_the_circuit_says()
 
 
 def test_a_log_in_no_class_names_the_frozen_sensor_first() -> None:
-    found = diagnose_log(at_rest(), Rig())
+    found = diagnosed_at_rest()
     froze = SensorCode.SENSOR_FROZE.note(channel=PRESSURE, value=4e5, begin_s=1.0, length_s=3.0)
     entries = diagnosis_entries(replace(found, gate=replace(found.gate, passed=False, reasons=(froze,))))
     assert entries["condition"] is None

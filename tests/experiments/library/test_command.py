@@ -25,6 +25,7 @@ from experiments.published.library import read_library
 from experiments.running.study import Seeded, run_study
 from faults.conditions import CONDITIONS
 from plant.eha.circuit_parameters import CircuitParameters
+from tests.experiments.conftest import FEW_DOTS
 
 SHOWN = ("normal", "minor_friction")
 
@@ -90,7 +91,7 @@ def test_the_sentences_say_what_the_table_holds(tables: Mapping[str, pd.DataFram
 def test_the_page_needs_nothing_beside_it_and_shows_every_figure(
     tables: Mapping[str, pd.DataFrame], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(figure_files_module, "PNG_DOTS_PER_INCH", 20)  # what is asked is asked of few pixels too
+    monkeypatch.setattr(figure_files_module, "PNG_DOTS_PER_INCH", FEW_DOTS)
     figures = figure_files(LIBRARY_FIGURES, tables)
     facts = {**tables, **LIBRARY.facts(tables, Seeded(7)), "settings": Seeded(7)}
     page = render_page(LIBRARY.template, facts, LIBRARY.columns, figures)

@@ -1,5 +1,6 @@
 """The page of a filtered log: titled, labelled, and written whole."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +15,13 @@ from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
 
+@cache
 def log() -> Record:
     p, rng = EhaParameters(), np.random.default_rng(1)
     return simulate(LUMPED, make_drive("steps", 4.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
 
 
+@cache
 def filtered() -> BulkModulusEstimate:
     return estimate_bulk_modulus(log(), EhaParameters(), form="pressure", method="ekf")
 
