@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
 os.environ["MPLBACKEND"] = "Agg"
 os.environ.setdefault("HYDROSTATE_CACHE", str(ROOT / ".pytest_cache" / "hydrostate-kernels"))
 
-gc.set_threshold(20_000, 20, 20)  # objects: a search each 700 takes a tenth of what reads or draws much
+gc.disable()  # until all is collected
 
 settings.register_profile("ci", derandomize=True, deadline=None, max_examples=50, print_blob=False)
 settings.load_profile("ci")
@@ -49,6 +49,8 @@ def pytest_collection_finish() -> None:
     """Leave what was imported and collected, millions of objects, out of every later search for garbage."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000, 20, 20)  # objects: a search each 700 takes a tenth of what reads or draws much
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)

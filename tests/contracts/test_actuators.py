@@ -29,7 +29,10 @@ from plant.units import notes, unit_registry
 KINDS = {kind.name: kind for kind in actuators()}
 EVERY_KIND = pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
 
-SHORT: Mapping[str, Mapping[str, Any]] = {"eha": {"duration": 4.0, "sample_time": 1e-3}}
+SHORT: Mapping[str, Mapping[str, Any]] = {
+    "eha": {"duration": 4.0, "sample_time": 1e-3},
+    "diaphragm-motor": {"duration": 0.15},
+}
 """What makes a run short, where the kind's own is long."""
 
 FOREIGN = {"eha": ("--load", "3")}

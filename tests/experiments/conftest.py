@@ -31,8 +31,13 @@ SMALL = StudySettings(
 )
 
 
-FEW_DOTS = 20
-"""Resolution of PNG figures [1/inch]: what is asked of them is asked of few pixels too."""
+@pytest.fixture(scope="session", autouse=True)
+def _few_dots() -> Iterator[None]:
+    """Draw PNG figures of few pixels: what is asked of them is asked of these too."""
+    with pytest.MonkeyPatch.context() as patch:
+        for resolution in ("PNG_DOTS_PER_INCH", "LOG_DOTS_PER_INCH"):
+            patch.setattr(figure_files, resolution, 20)
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -44,9 +49,7 @@ def study() -> Found:
 def written(study: Found, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of the written study."""
     folder = tmp_path_factory.mktemp("results") / "study"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(figure_files, "PNG_DOTS_PER_INCH", FEW_DOTS)
-        write_result(NINE_CONDITIONS, SMALL, study, folder)
+    write_result(NINE_CONDITIONS, SMALL, study, folder)
     return folder
 
 

@@ -104,7 +104,7 @@ def test_the_interval_is_the_value_and_two_deviations() -> None:
 
 
 def test_filterpy_gives_the_same_number() -> None:
-    log, parameters = bench_log("lumped", "steps", "normal").slice(0, 4_000), EhaParameters()
+    log, parameters = bench_log("lumped", "steps", "normal").slice(0, 2_500), EhaParameters()
     ours, theirs = (
         estimate_bulk_modulus(log, parameters, form="pressure", method=method, start=1e8)
         for method in ("ekf", "filterpy-ekf")

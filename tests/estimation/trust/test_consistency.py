@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -77,9 +78,10 @@ def test_the_band_narrows_with_the_count_and_holds_what_it_says() -> None:
     assert np.mean((draws > wide[0]) & (draws < wide[1])) == pytest.approx(0.95, abs=0.015)
 
 
+@cache
 def bench_log(parameters: EhaParameters, drive: str = "steps") -> Record:
     rng = np.random.default_rng(3)
-    speed = make_drive(drive, 10.0, 1e-3, parameters, rng)
+    speed = make_drive(drive, 6.0, 1e-3, parameters, rng)
     return simulate(LUMPED, speed, 1e-3, parameters, sensors=BENCH, rng=rng)
 
 

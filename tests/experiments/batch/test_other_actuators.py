@@ -48,7 +48,7 @@ def test_a_row_says_what_the_kind_s_verb_found() -> None:
 def test_a_condition_among_several_has_a_runner_up_and_says_by_how_much_it_leads() -> None:
     kind = actuator("diaphragm-motor")
     rig = kind.rig
-    (one,) = simulated_of(kind, runs_of("diaphragm-motor"))
+    (one,) = simulated_of(kind, runs_of("diaphragm-motor", duration_s=0.15))
     assert one.condition == kind.conditions[0]
     row = found_of(kind, "diagnose", simulated_run(kind, one, rig), rig)
     assert row["found_condition"] == "healthy"

@@ -10,13 +10,11 @@ from matplotlib.figure import Figure
 
 from experiments.circuit.figures import CIRCUIT_FIGURES
 from experiments.circuit.study import CIRCUIT, circuit_studies
-from experiments.page import figure_files as figure_files_module
 from experiments.page.figure_files import figure_files
 from experiments.page.render import render_page
 from experiments.page.style import styled
 from experiments.running.study import Seeded
 from plant.eha.circuit_parameters import CircuitParameters
-from tests.experiments.conftest import FEW_DOTS
 
 UNIT = re.compile(r"\[[^\[\]]+\]")
 TRUTH = 2.07e8
@@ -111,10 +109,7 @@ def test_what_is_not_observable_is_said(drawn: Mapping[str, Figure]) -> None:
     assert [text.get_text() for text in last.texts] == ["not observable"]
 
 
-def test_the_page_needs_nothing_beside_it_and_shows_every_figure(
-    tables: Mapping[str, pd.DataFrame], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(figure_files_module, "PNG_DOTS_PER_INCH", FEW_DOTS)
+def test_the_page_needs_nothing_beside_it_and_shows_every_figure(tables: Mapping[str, pd.DataFrame]) -> None:
     figures = figure_files(CIRCUIT_FIGURES, tables)
     page = render_page(CIRCUIT.template, {**tables, "settings": Seeded(7)}, CIRCUIT.columns, figures)
     assert page.count("data:image/svg+xml;base64,") == len(CIRCUIT_FIGURES)

@@ -24,7 +24,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_an_estimate_is_drawn_and_written_as_a_page_where_asked(log: Path, tmp_path: Path) -> None:
     wanted = ("--figure", tmp_path / "run.png", "--report", tmp_path / "run")
-    done = invoke("estimate", log, "--form", "pressure", "--method", "ekf", *wanted)
+    done = invoke("estimate", log, "--form", "pressure", "--method", "ekf", "--no-tune", *wanted)
     assert done.exit_code == 0, done.output
     assert (tmp_path / "run.png").read_bytes()[:4] == b"\x89PNG"
     page = (tmp_path / "run.html").read_text("utf-8")

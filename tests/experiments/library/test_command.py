@@ -18,14 +18,12 @@ from experiments.library.sentences import structure_sentences
 from experiments.library.structures import clock_table, order_and_bandwidth, structure_table
 from experiments.library.study import LIBRARY
 from experiments.library.tables import library_table, response_table, root_table
-from experiments.page import figure_files as figure_files_module
 from experiments.page.figure_files import figure_files
 from experiments.page.render import render_page
 from experiments.published.library import read_library
 from experiments.running.study import Seeded, run_study
 from faults.conditions import CONDITIONS
 from plant.eha.circuit_parameters import CircuitParameters
-from tests.experiments.conftest import FEW_DOTS
 
 SHOWN = ("normal", "minor_friction")
 
@@ -88,10 +86,7 @@ def test_the_sentences_say_what_the_table_holds(tables: Mapping[str, pd.DataFram
     assert f"{arx['weight_above_percent'].mean():.0f} % of that of ARX" in why
 
 
-def test_the_page_needs_nothing_beside_it_and_shows_every_figure(
-    tables: Mapping[str, pd.DataFrame], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(figure_files_module, "PNG_DOTS_PER_INCH", FEW_DOTS)
+def test_the_page_needs_nothing_beside_it_and_shows_every_figure(tables: Mapping[str, pd.DataFrame]) -> None:
     figures = figure_files(LIBRARY_FIGURES, tables)
     facts = {**tables, **LIBRARY.facts(tables, Seeded(7)), "settings": Seeded(7)}
     page = render_page(LIBRARY.template, facts, LIBRARY.columns, figures)

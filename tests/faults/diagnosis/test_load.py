@@ -38,7 +38,7 @@ ROD = {"area_difference": 0.15, "volume_difference": 0.15, "pilot_share": 1.0}
 def log(condition: str, seed: int = 5, **changed: float) -> Record:
     rng = np.random.default_rng(seed)
     p = replace(circuit_of(parameters_for(CONDITIONS[condition])), **changed)
-    return simulate(CIRCUIT, make_drive("prbs", 6.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    return simulate(CIRCUIT, make_drive("prbs", 4.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
 
 
 def loads_of(found: Finding) -> dict[str, Note]:

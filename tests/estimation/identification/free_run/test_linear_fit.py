@@ -61,7 +61,7 @@ def test_sensitivities_are_the_derivatives_of_the_output() -> None:
 
 
 def test_order_delay_and_offset_come_back_beside_a_mean_that_is_not_zero() -> None:
-    found = identify_channels(one_log())
+    found = identify_channels(one_log(300))
     linear = found.model.linear
     assert linear is not None
     assert (linear.denominator.size - 1, linear.delay) == (2, 3)
@@ -162,8 +162,8 @@ def test_a_model_no_better_than_the_mean_is_not_sound() -> None:
 
 
 def test_an_integrating_plant_is_believed_and_said_to_be_one() -> None:
-    u = steps(400, 8, hold=20)
-    y = np.cumsum(0.1 * u) + 0.02 * np.random.default_rng(8).normal(size=400)
+    u = steps(200, 8, hold=10)
+    y = np.cumsum(0.1 * u) + 0.02 * np.random.default_rng(8).normal(size=200)
     with pytest.warns(LogWarning, match="integrates its input"):
         found = identify_channels(channels_from([u[:, None]], [y], 1.0, ["u"], "y"))
     assert found.sound
