@@ -24,8 +24,6 @@ ROOT = Path(__file__).resolve().parents[1]
 os.environ["MPLBACKEND"] = "Agg"
 os.environ.setdefault("HYDROSTATE_CACHE", str(ROOT / ".pytest_cache" / "hydrostate-kernels"))
 
-gc.disable()  # until all is collected
-
 settings.register_profile("ci", derandomize=True, deadline=None, max_examples=50, print_blob=False)
 settings.load_profile("ci")
 
@@ -45,12 +43,16 @@ def pytest_collect_file(file_path: Path) -> Generator[None, list[pytest.Collecto
     return [one for one in found if not (file_path.name.startswith("test_") and isinstance(one, DoctestModule))]
 
 
-def pytest_collection_finish() -> None:
-    """Leave what was imported and collected, millions of objects, out of every later search for garbage."""
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Leave what is imported and collected, millions of objects, out of every search for garbage, then and later."""
+    gc.disable()
+    collected = yield
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)  # objects: a search each 700 takes a tenth of what reads or draws much
     gc.enable()
+    return collected
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -37,14 +37,11 @@ def results(*arguments: object) -> list[dict[str, Any]]:
     return json.loads(done.stdout, parse_constant=_no_constant)
 
 
-@cache
-def asked(*arguments: object) -> list[dict[str, Any]]:
-    """Return what was said of a log, asked once however many claims rest on it."""
-    return results(*arguments)
-
-
 def _no_constant(name: str) -> None:
     raise AssertionError(f"JSON has no {name}")
+
+
+asked = cache(results)  # of one log, however many claims rest on it
 
 
 def codes(result: dict[str, Any]) -> list[str]:
