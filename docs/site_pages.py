@@ -5,6 +5,7 @@ import importlib
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from html import escape
 from pathlib import Path
 
@@ -27,6 +28,7 @@ def room_of(path: Path) -> str:
     return ".".join(parts[:2]) if len(parts) > 2 else parts[0]
 
 
+@cache
 def house() -> House:
     """Read all packages: files and lines of each room, and imports between rooms."""
     files = {path: path.read_text("utf-8") for layer in LAYERS for path in sorted((ROOT / layer).rglob("*.py"))}

@@ -90,15 +90,17 @@ def _targets(node: ast.AST, source: Source) -> list[str]:
 
 
 def _imports_below(node: ast.AST, source: Source, *, eager: bool) -> Iterator[Import]:
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.stmt | ast.expr):
-            yield from (Import(target, child.lineno, eager) for target in _targets(child, source))
-        if isinstance(child, ast.If) and _is_type_checking(child.test):
-            yield from _imports_below(ast.Module(child.body, []), source, eager=False)
-            yield from _imports_below(ast.Module(child.orelse, []), source, eager=eager)
-        else:
-            deferred = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
-            yield from _imports_below(child, source, eager=eager and not deferred)
+    waiting = [(node, eager)]
+    while waiting:
+        above, at_once = waiting.pop()
+        for child in ast.iter_child_nodes(above):
+            if isinstance(child, ast.Import | ast.ImportFrom | ast.Call):
+                yield from (Import(target, child.lineno, at_once) for target in _targets(child, source))
+            if isinstance(child, ast.If) and _is_type_checking(child.test):
+                waiting += [(ast.Module(child.orelse, []), at_once), (ast.Module(child.body, []), False)]
+            else:
+                deferred = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+                waiting.append((child, at_once and not deferred))
 
 
 def _doctest_imports(source: Source) -> Iterator[Import]:
