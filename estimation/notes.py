@@ -60,6 +60,10 @@ class ChannelCode(Code):
         "{channel}: the values are {factor:.3g} times what {against} would give, which looks like {slip}; give the "
         "column's unit (--columns CHANNEL=NAME:UNIT)"
     )
+    NOTHING_CHANGES = (
+        "{channel}: no value changes from the first row to the last, so the log shows nothing; the logger repeats one "
+        "row, or no sensor is connected"
+    )
 
 
 class GuessCode(Code):

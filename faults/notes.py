@@ -92,6 +92,7 @@ class AdviceCode(Code):
 
     CHECK_SENSOR = "check the sensor and the wiring of {channels}, then log again"
     MEND_COLUMNS = "correct the sign, unit or name of {channels} with --columns, then read the same log again"
+    CHECK_LOGGER = "check the logger and its wiring, then log again while the motor turns and the piston moves"
     CHECK_RIG = "compare rig file and actuator (geometry, pump, relief, healthy leakage and friction), then log again"
     STOP_LEAKAGE = "stop, and check pump and piston seal before the next run: leakage grew during this log"
     CHECK_PUMP = "measure the pump's flow at low pressure; compare displacement and piston area with the rig file"

@@ -7,7 +7,42 @@ Programs decide by code and data alone; no sentence is read back.
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from string import Formatter
 from typing import Any
+
+WRITTEN_OUT = 1e7
+"""Size below which a reader is spared a power of ten."""
+
+
+def in_words(value: float, spec: str) -> str:
+    """Return a number in significant digits as a reader writes it: 100, not 1e+02.
+
+    Parameters
+    ----------
+    value : float
+        The number.
+    spec : str
+        How many digits, as `format` has it: ``.2g``.
+
+    Examples
+    --------
+    >>> in_words(100.0, ".2g"), in_words(123456.0, ".3g"), in_words(1.5e-5, ".3g")
+    ('100', '123000', '1.5e-05')
+    """
+    said = format(value, spec)
+    return f"{float(said):.0f}" if "e+" in said and abs(value) < WRITTEN_OUT else said
+
+
+class _Sentence(Formatter):
+    """Fills a template; a number in significant digits is written out."""
+
+    def format_field(self, value: Any, format_spec: str) -> Any:
+        if format_spec.endswith("g") and isinstance(value, int | float):
+            return in_words(value, format_spec)
+        return super().format_field(value, format_spec)
+
+
+_SENTENCE = _Sentence()
 
 
 class Code(Enum):
@@ -63,7 +98,7 @@ class Note:
     data: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def __str__(self) -> str:
-        return self.code.template.format(**self.data)
+        return _SENTENCE.format(self.code.template, **self.data)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the note for JSON.

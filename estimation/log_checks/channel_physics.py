@@ -22,8 +22,13 @@ from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOC
 from estimation.log_checks.measurement_noise import position_variance
 from estimation.notes import ChannelCode
 from plant.eha.model import EhaParameters
+from plant.log.columns import TIME
+from plant.log.plausibility import SAMPLE_TIME
 from plant.log.record import Record
 from plant.notes import Note
+
+MEASURED = (SPEED, POSITION, VELOCITY, PRESSURE)
+"""Channels of which at least one changes in a log that shows anything."""
 
 SHORT, MIDDLE, LONG = 0.01, 0.02, 0.05
 """Blocks over which velocity is compared with position, flows are balanced, and the piston follows the pump [s]."""
@@ -90,16 +95,31 @@ def channel_mistakes(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     tuple of Note
         None for a sound log, however leaky or stuck the actuator.
     """
+    if all(np.nanmax(record[name]) == np.nanmin(record[name]) for name in MEASURED if name in record):
+        return (ChannelCode.NOTHING_CHANGES.note(channel=" and ".join(one for one in MEASURED if one in record)),)
     short, middle, long = (channel_blocks(record, p, length) for length in (SHORT, MIDDLE, LONG))
     found = _swapped(short) or _motions_disagree(short, long, p)
     if found:
-        return found
+        return tuple(_or_of_time(one, record.sample_time) for one in found)
     balance = flow_balance(middle, p)
     if balance is not None and balance.explained < EXPLAINED:
         balance = None
-    return (
-        _reversed(record, long, balance) or _pump_units(record, long, p, balance) or _pressure_units(middle, p, balance)
-    )
+    units = tuple(_or_of_time(one, record.sample_time) for one in _pump_units(record, long, p, balance))
+    return _reversed(record, long, balance) or units or _pressure_units(middle, p, balance)
+
+
+def _or_of_time(note: Note, sample_time: float) -> Note:
+    """Return a note on time where that alone explains a position that went a thousandfold too far or too short.
+
+    A rate needs no clock to agree with another rate; a position does.
+    """
+    if note.code != ChannelCode.CHANNEL_UNIT or note.data["channel"] != POSITION:
+        return note
+    if sample_time > SAMPLE_TIME[1] and note.data["slip"] == LENGTHS[1e-3]:
+        return _unit(TIME, POSITION, 1e3, "ms read as s")
+    if sample_time < SAMPLE_TIME[0] and note.data["slip"] == LENGTHS[1e3]:
+        return _unit(TIME, POSITION, 1e-3, "s read as ms")
+    return note
 
 
 def _near(ratio: float, slips: Mapping[float, str], least: float = 1.0 / NEAR, most: float = NEAR) -> float | None:

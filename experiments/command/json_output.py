@@ -126,7 +126,7 @@ def prepare_output(out: Path | None) -> None:
     if not os.access(folder, os.W_OK | os.X_OK):
         raise HydrostateError(f"--out {out}: there is no permission to write there")
     if out != folder and out.is_dir():
-        raise HydrostateError(f"--out {out}: a file is needed, got a directory")
+        raise HydrostateError(f"--out {out}: a file is needed, got a folder")
 
 
 def write_results(results: Sequence[Result], out: Path) -> list[Path]:

@@ -7,6 +7,9 @@ from typing import TypeVar
 
 from plant.errors import HydrostateError
 
+PAGES = (".html", ".htm", "")
+"""What the name of a page ends in."""
+
 Owner = TypeVar("Owner", Path, str)
 
 
@@ -78,10 +81,15 @@ def page_place(report: Path | None) -> Path | None:
     Raises
     ------
     HydrostateError
-        If it names a folder, or a file in a folder that is not there.
+        If it names a folder, a file in a folder that is not there, or another kind of file.
     """
     require_place("--report", report)
-    return None if report is None else report.with_suffix(".html")
+    if report is None:
+        return None
+    if report.suffix.lower() not in PAGES:
+        print_it = "; a browser prints the page as PDF" if report.suffix.lower() == ".pdf" else ""
+        raise HydrostateError(f"--report must end in .html, got {report.name!r}{print_it}")
+    return report.with_suffix(".html")
 
 
 def _labels(owners: Sequence[Owner]) -> list[str]:

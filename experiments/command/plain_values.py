@@ -12,6 +12,9 @@ from typing import Any, get_args, get_origin
 NO_PLAIN = object()
 """What is given back for a value that a validator has to see."""
 
+UNPARSED = "unable to parse string as a"
+"""What pydantic says of a text that is no number, without the text."""
+
 ITS_PLACE = "_runtime_param"
 """Where a parameter of Typer keeps what turns values into what a command takes; None until it is asked for."""
 
@@ -45,7 +48,14 @@ class _Taken:
         if value is None:
             return () if several else None
         found = NO_PLAIN if several and isinstance(value, str) else self._plain(value, about.annotation, param, ctx)
-        return self._checked(about).coerce(value, param=param, ctx=ctx) if found is NO_PLAIN else found
+        if found is not NO_PLAIN:
+            return found
+        try:
+            return self._checked(about).coerce(value, param=param, ctx=ctx)
+        except Exception as error:
+            if isinstance(value, str) and UNPARSED in getattr(error, "message", ""):
+                error.message = f"a {'whole ' if 'integer' in error.message else ''}number is needed, got {value!r}"
+            raise
 
     def _plain(self, value: Any, annotation: Any, param: Any, ctx: Any) -> Any:
         """Return a value as it is taken, or `NO_PLAIN`."""

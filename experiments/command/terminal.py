@@ -299,7 +299,10 @@ def _usage_sentence(error: Exception) -> str | None:
     if message is None:
         return None
     command = getattr(getattr(error, "ctx", None), "command_path", "hydrostate")
-    return f"{command}: {said}" if (said := str(message())) else ""
+    said = str(message())
+    if command == "hydrostate" and said.startswith("No such option"):
+        said += " (a command's options stand after its name)"
+    return f"{command}: {said}" if said else ""
 
 
 class HydrostateGroup(TyperGroup):

@@ -40,8 +40,11 @@ def looked_into(
     LogError
         If a file cannot be opened.
     """
+    from plant.log.guess import in_order
+
     tables, guesses = _looked_at([log, *beside], kind, rig)
-    columns = {one.guess.channel: one.guess.spec for one in guesses if one.guess.sure >= 0.5}
+    sure = {one.guess.channel: one.guess.spec for one in guesses if one.guess.sure >= 0.5}
+    columns = {channel: sure[channel] for channel in in_order(sure)}
     reads = _reads(log, columns, kind, sample_time, beside)
     found = _entries(tables, guesses, columns) | {"reads": reads["reads"], "message": reads["message"]}
     found["options"] = _options(columns, sample_time, beside)

@@ -50,6 +50,8 @@ class Service:
             If it cannot be written, another server has it, or it holds something else.
         """
         settings = self.settings
+        if settings.folder.is_file():
+            raise HydrostateError(f"{settings.folder}: a folder is needed, got a file")
         with refused(f"{settings.folder}: the server's folder cannot be made"):
             for folder in (settings.folder, settings.logs, settings.pages, settings.work):
                 folder.mkdir(parents=True, exist_ok=True, mode=0o700)

@@ -130,7 +130,7 @@ def _prepare(out: Path) -> None:
     with refused(f"--out {out}: the folder cannot be made"):
         out.parent.mkdir(parents=True, exist_ok=True)
     if out.is_dir():
-        raise HydrostateError(f"--out {out}: a file is needed, got a directory")
+        raise HydrostateError(f"--out {out}: a file is needed, got a folder")
 
 
 def _versions() -> dict[str, str]:

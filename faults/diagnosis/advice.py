@@ -139,6 +139,8 @@ def oil_advice(
 
 def _mended(doubts: list[Note]) -> tuple[Note, ...]:
     """Return what to mend before the next log: the sensors that are accused, else rig file and units."""
+    if any(note.code == ChannelCode.NOTHING_CHANGES for note in doubts):
+        return (AdviceCode.CHECK_LOGGER.note(),)
     if any(isinstance(note.code, ChannelCode) for note in doubts):
         named = dict.fromkeys(str(note.data["channel"]) for note in doubts if isinstance(note.code, ChannelCode))
         return (AdviceCode.MEND_COLUMNS.note(channels=" and ".join(named)),)

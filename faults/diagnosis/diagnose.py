@@ -21,6 +21,7 @@ from estimation.notes import RigCode
 from faults.diagnosis.actuator import Actuator, actuator_of
 from faults.diagnosis.advice import advice_for, oil_advice
 from faults.diagnosis.another_oil import whatever_the_oil
+from faults.diagnosis.blocks import LONGEST
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.class_regions import how_near
@@ -97,7 +98,8 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
         If the log has neither position nor velocity, or cannot be estimated.
     """
     log = clean_log(record, rig.parameters) if seen is None else seen[0]
-    plain = _Plain(log, rig.parameters, None if seen is not None else begun(partial(_of_clean, log, rig.parameters)))
+    asked = seen is None and not log.mistakes  # else it is not wanted, or known what is wrong
+    plain = _Plain(log, rig.parameters, begun(partial(_of_clean, log, rig.parameters)) if asked else None)
     estimate = estimated(log, rig, EstimateOptions())[1] if seen is None else seen[1]
     found, strange = finding_of(log, estimate, rig), explained(estimate, rig.parameters)
     outside = tuple(note for note in strange if note.code in OUTSIDE)
@@ -109,7 +111,8 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     if (other := _another_oil(estimate, healthy)) is not None:
         strange = (*strange, other)
         rig = replace(rig, parameters=replace(healthy, bulk_modulus=estimate.value))
-    scores = score_mathematical(log.record, mathematical_bank(rig.parameters))
+    scored = log.record.slice(0, round(LONGEST / log.record.sample_time) + 1) if log.mistakes else log.record
+    scores = score_mathematical(scored, mathematical_bank(rig.parameters))
     verdict = models_verdict(scores, log.record)
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
     unsure = (*_healthy_of_the_paper(plain.parameters), *estimate.rig_notes)

@@ -120,9 +120,21 @@ def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
     apart = (other.velocity - blocks.velocity)[blocks.first :]
     there = np.isfinite(apart)
     size = float(np.sqrt(np.nanmean(blocks.velocity**2)))
-    allowed = max(AGREEMENT * size, BREAK * float(np.hypot(blocks.noise[0], other.noise[0])))
+    noise = BREAK * float(np.hypot(blocks.noise[0], other.noise[0]))
+    allowed = max(AGREEMENT * size, float(np.hypot(noise, _between_samples(record, other))))
     differs = float(np.sqrt(np.mean(apart[there] ** 2))) if np.any(there) else 0.0
     return () if differs <= allowed else (SensorCode.SENSORS_DISAGREE.note(difference_m_s=differs),)
+
+
+def _between_samples(record: Record, blocks: Blocks) -> float:
+    """Return how far the means of sampled velocities are off those of velocity itself, root mean square [m/s].
+
+    Between two samples velocity changes at a moment that no sample tells, so that a sample stands for too much or too
+    little of it: by a share of the change that is even between 0 and 1. Changes that are noise count there already.
+    """
+    rows = round(blocks.block * blocks.sample_time / record.sample_time)
+    changes = float(np.nanmean(np.diff(record["velocity_m_s"]) ** 2)) - 2.0 * rows * float(blocks.noise[0]) ** 2
+    return (max(changes, 0.0) / (3.0 * rows)) ** 0.5
 
 
 def unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:

@@ -36,7 +36,7 @@ def check_drive(speed: NDArray[np.float64], sample_time: float, parameters: EhaP
     >>> check_drive(np.full(100_000, 125.66), 1e-4, EhaParameters())
     Traceback (most recent call last):
         ...
-    plant.errors.DriveError: the drive needs 0.4605 m of stroke, the actuator has 0.25 m
+    plant.errors.DriveError: the drive needs 0.4605 m of stroke, the actuator has 0.25 m: shorten or reverse it
     """
     require_positive("sample_time", sample_time, "s")
     if speed.ndim != 1 or len(speed) == 0:
@@ -53,4 +53,6 @@ def check_drive(speed: NDArray[np.float64], sample_time: float, parameters: EhaP
     needed = float(np.ptp(position))
     stroke = parameters.stroke or JUDGED_STROKE
     if needed > stroke * (1.0 + LIMIT_SLACK):
-        raise DriveError(f"the drive needs {needed:.4g} m of stroke, the actuator has {stroke:g} m")
+        raise DriveError(
+            f"the drive needs {needed:.4g} m of stroke, the actuator has {stroke:g} m: shorten or reverse it"
+        )

@@ -158,9 +158,9 @@ def _content(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(small_file(path).decode("utf-8-sig"))
     except OSError as error:
-        raise RigError(f"{path}: cannot be read: {error.strerror or error}") from error
+        raise RigError(f"{path}: cannot be read as a rig file: {error.strerror or error}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise RigError(f"{path}: a TOML file is needed: {error}") from error
+        raise RigError(f"{path}: a rig file (TOML) is needed: {error}") from error
 
 
 def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> Rig[Any]:

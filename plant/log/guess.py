@@ -1,7 +1,7 @@
 """Which column is which channel, guessed by what it is called and in what unit; what it does is looked at later."""
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -220,7 +220,9 @@ def guess_by_name(headings: Sequence[Heading], channels: Collection[str] = (TIME
     return guessed(points, headings)
 
 
-def missing_channels(wanted: Sequence[str], headings: Sequence[Heading], source: str) -> NoChannelError:
+def missing_channels(
+    wanted: Sequence[str], headings: Sequence[Heading], source: str, found: Collection[str] = ()
+) -> NoChannelError:
     """Return the error for channels that a log lacks: what it has, what may be meant, and what shows more.
 
     Parameters
@@ -231,11 +233,14 @@ def missing_channels(wanted: Sequence[str], headings: Sequence[Heading], source:
         What the columns of the log are called.
     source : str
         The log.
+    found : collection of str
+        Channels that it has; the hint names the others that an estimate gains by, too.
     """
     names = listed([one.name for one in headings])
-    timeless = "; to read a log without time, give --sample-time" if TIME in wanted else ""
-    hint = hint_of([name for one in wanted for name in one.split(" or ")], headings)
-    return NoChannelError(f"{absent(wanted)}; the log has {names}{hint}{timeless}", source)
+    asked = [name for one in wanted for name in one.split(" or ")]
+    more = [name for name in _gained_by(found) if name not in asked]
+    hint = hint_of(asked, headings, more)
+    return NoChannelError(f"{absent(wanted)}; the log has {names}{hint}", source)
 
 
 def absent(wanted: Sequence[str]) -> str:
@@ -261,17 +266,18 @@ def overlooked(headings: Sequence[Heading], found: Collection[str]) -> tuple[Not
     found : collection of str
         Channels that were.
     """
-    pressures = () if tells_difference(found) else (PRESSURE, *CHAMBERS)
-    wanted = [one for one in (*pressures, "position_m", "velocity_m_s") if one not in found]
     return tuple(
-        LogCode.COLUMN_OVERLOOKED.note(
-            column=one.name[:60], channel=one.channel, option=option if one.unit is not None else f"{option}:UNIT"
-        )
-        for one, option in _shown(headings, wanted)
+        LogCode.COLUMN_OVERLOOKED.note(column=one.name[:60], channel=one.channel, option=option)
+        for one, option in _shown(headings, _gained_by(found))
     )
 
 
-def hint_of(channels: Sequence[str], headings: Sequence[Heading]) -> str:
+def _gained_by(found: Collection[str]) -> list[str]:
+    pressures = () if tells_difference(found) else (PRESSURE, *CHAMBERS)
+    return [one for one in (*pressures, "position_m", "velocity_m_s") if one not in found]
+
+
+def hint_of(channels: Sequence[str], headings: Sequence[Heading], more: Sequence[str] = ()) -> str:
     """Return which columns may be meant, as an option, and the command that shows more.
 
     Parameters
@@ -280,14 +286,35 @@ def hint_of(channels: Sequence[str], headings: Sequence[Heading]) -> str:
         Channels that are missing.
     headings : sequence of Heading
         What the columns are called.
+    more : sequence of str
+        Channels that could do without, but are better named with the others.
     """
-    option = ",".join(option for _, option in _shown(headings, [one for one in channels if one in UNITS]))
-    may = f"; perhaps --columns '{option}'" if option else ""
-    return f"{may}; `hydrostate inspect FILE` shows its columns and guesses which is which"
+    shown = {one.channel: option for one, option in _shown(headings, [*channels, *more])}
+    options = [shown[name] for name in in_order(shown)] if set(shown) & set(channels) else []
+    may = f"; perhaps --columns '{','.join(options)}'" if options else ""
+    put = ", with the unit of each for UNIT" if any(one.endswith(":UNIT") for one in options) else ""
+    inspect = "`hydrostate inspect FILE --write rig.toml` guesses which column is which and in what unit"
+    timeless = "; to read a log without time, give --sample-time" if TIME in channels and TIME not in shown else ""
+    other = "" if options or TIME in channels else "; if a second logger's file has it, add --with FILE"
+    return f"{may}{put}; {inspect}, for --rig rig.toml{other}{timeless}"
+
+
+def in_order(channels: Iterable[str]) -> list[str]:
+    """Return channels as a log is usually written: time, motor speed, motion, pressures.
+
+    Examples
+    --------
+    >>> in_order(["velocity_m_s", "time_s", "position_m"])
+    ['time_s', 'position_m', 'velocity_m_s']
+    """
+    usual = (TIME, *CHANNELS)
+    return sorted(channels, key=lambda one: usual.index(one) if one in usual else len(usual))
 
 
 def _shown(headings: Sequence[Heading], channels: Sequence[str]) -> Iterator[tuple[Guess, str]]:
     """Yield the guesses that are sure enough to be shown, each with the option that reads it."""
-    for one in guess_by_name(headings, channels):
+    for one in guess_by_name(headings, [name for name in channels if name in UNITS]):
         if one.sure >= SHOWN and one.spec.isprintable():
-            yield one, f"{one.channel}={one.spec[:60]}"
+            told = one.unit is not None or one.channel == TIME or one.name == one.channel
+            unit = "" if told else ":UNIT"
+            yield one, f"{one.channel}={one.spec[:60]}{unit}"

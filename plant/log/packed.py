@@ -34,7 +34,7 @@ def require_regular(path: Path) -> None:
     except ValueError as error:  # a zero in the name
         raise LogError("there is no such file", repr(str(path))) from error
     if stat.S_ISDIR(mode):
-        raise LogError("a file is needed, got a directory; `hydrostate fleet FOLDER` reads all logs of one", str(path))
+        raise LogError("a file is needed, got a folder; `hydrostate fleet FOLDER` reads all logs of one", str(path))
     if not stat.S_ISREG(mode):
         got = "pipe" if stat.S_ISFIFO(mode) else "socket" if stat.S_ISSOCK(mode) else "device"
         raise LogError(f"a file is needed, got a {got}; a stream is read by `hydrostate watch -`", str(path))

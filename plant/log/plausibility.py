@@ -115,7 +115,7 @@ def implausible(sample_time: float, channels: Mapping[str, Array]) -> list[Note]
     --------
     >>> speed = 100.0 * np.sin(np.arange(100.0))
     >>> print(implausible(1e-3, {"motor_speed_rad_s": 1e3 * speed})[0])
-    motor_speed_rad_s reaches 1e+05 rad/s, but at most 2000 rad/s is usual: check the unit (mrad/s read as rad/s?)
+    motor_speed_rad_s reaches 100000 rad/s, but at most 2000 rad/s is usual: check the unit (mrad/s read as rad/s?)
     """
     still = _still(channels)
     slips: list[Note] = []

@@ -78,7 +78,7 @@ class Received:
 
 def is_stream(address: str) -> bool:
     """Return whether a text is an address of a stream."""
-    return urlsplit(address).scheme in SCHEMES
+    return urlsplit(address).scheme in SCHEMES or "://" in address
 
 
 def stream_lines(address: str, received: Received) -> Iterator[str]:

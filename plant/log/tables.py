@@ -81,7 +81,7 @@ def gathered(
     timeless = TIME not in found and sample_time is None and not any(table.step for table, _ in chosen)
     if timeless or lacking:
         wanted = [TIME] * timeless + lacking
-        raise missing_channels(wanted, headings, source)
+        raise missing_channels(wanted, headings, source, found)
     with np.errstate(over="ignore", invalid="ignore"):  # what is no finite number is refused or noted later
         parts = [(table, _read(table, columns)) for table, columns in chosen]
     timed = [_timed(table, values, parts, sample_time, source) for table, values in parts]

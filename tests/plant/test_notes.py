@@ -1,10 +1,18 @@
 """Notes that say the same are told once."""
 
 from plant.log.notes import LogCode
-from plant.notes import distinct
+from plant.notes import Code, distinct
 
 
 def test_a_note_is_kept_once_where_it_came_first() -> None:
     one, other = LogCode.CLOCK_ASSUMED.note(sample_time_s=1.0), LogCode.CLOCK_ASSUMED.note(sample_time_s=2.0)
     assert distinct([one, other, LogCode.CLOCK_ASSUMED.note(sample_time_s=1.0)]) == (one, other)
     assert distinct([]) == ()
+
+
+def test_a_sentence_writes_no_powers_of_ten_where_a_reader_would_not() -> None:
+    class Size(Code):
+        SHARE = "missing in {percent:.2g} %, {factor:.3g} times too large, {tiny:.2g} m, {huge:.2g} Pa"
+
+    said = str(Size.SHARE.note(percent=100.0, factor=123456.0, tiny=2.5e-6, huge=2e9))
+    assert said == "missing in 100 %, 123000 times too large, 2.5e-06 m, 2e+09 Pa"

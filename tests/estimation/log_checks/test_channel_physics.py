@@ -196,3 +196,21 @@ def test_a_piston_that_hardly_moves_is_no_proof_of_a_unit(share: float, *, told:
     record = Record(1e-3, {SPEED: held, VELOCITY: velocity, PRESSURE: leaked + 1e4 * rng.standard_normal(len(flow))})
     codes = [note.code for note in channel_mistakes(record, HEALTHY)]
     assert codes == ([ChannelCode.CHANNEL_UNIT] if told else [])
+
+
+@pytest.mark.parametrize("absent", [(), (VELOCITY,), (PRESSURE,)])
+def test_milliseconds_read_as_seconds_are_time_s_mistake_not_the_positions(absent: tuple[str, ...]) -> None:
+    log = run().replace(**dict.fromkeys(absent))
+    (said,) = channel_mistakes(replace(log, sample_time=1e3 * log.sample_time), HEALTHY)
+    assert (said.code, said.data["channel"]) == (ChannelCode.CHANNEL_UNIT, "time_s")
+    assert said.data["slip"] == "ms read as s"
+
+
+def test_a_logger_that_repeats_one_row_is_named_at_once() -> None:
+    log = run()
+    stuck = log.replace(**{name: np.full(len(log), log[name][3000]) for name in log})
+    (said,) = channel_mistakes(stuck, HEALTHY)
+    assert said.code == ChannelCode.NOTHING_CHANGES
+    found = diagnose_log(stuck, Rig("rig", HEALTHY))
+    assert found.outcome is Outcome.MISMATCH
+    assert [note.code for note in found.advice] == [AdviceCode.CHECK_LOGGER]

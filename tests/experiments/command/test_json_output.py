@@ -72,7 +72,7 @@ def test_a_folder_that_may_not_be_written_and_a_folder_in_a_file_s_place_are_ref
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "model.json").mkdir()
-    with pytest.raises(HydrostateError, match=r"model\.json: a file is needed, got a directory"):
+    with pytest.raises(HydrostateError, match=r"model\.json: a file is needed, got a folder"):
         prepare_output(tmp_path / "model.json")
     monkeypatch.setattr("os.access", lambda *_: False)
     with pytest.raises(HydrostateError, match="there is no permission to write there"):

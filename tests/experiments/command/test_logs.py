@@ -51,7 +51,7 @@ def hostile(folder: Path, good: Path) -> dict[str, Path]:
         paths[sentence] = folder / f"hostile{number}.csv"
         paths[sentence].write_bytes(content)
     paths["there is no such file"] = folder / "none.csv"
-    paths["a file is needed, got a directory; `hydrostate fleet FOLDER` reads all logs of one"] = folder
+    paths["a file is needed, got a folder; `hydrostate fleet FOLDER` reads all logs of one"] = folder
     return paths
 
 

@@ -321,3 +321,17 @@ def test_sensors_that_never_spoke_at_once_do_not_disagree() -> None:
     early = np.where(np.arange(len(record)) < 60, record["velocity_m_s"], np.nan)
     apart = record.replace(velocity_m_s=early)
     assert not sensors_disagree(apart, blocks_of(apart))
+
+
+@pytest.mark.parametrize("rows", [1, 20])
+def test_a_coarse_log_of_fast_motion_accuses_no_sensor(rows: int) -> None:
+    """Velocity that changes between two samples is not seen there, but moves the piston."""
+    rng, time = np.random.default_rng(2), 1e-3 * np.arange(12_001)
+    steps = 0.04 * np.repeat(rng.choice([-1.0, 1.0], 1 + len(time) // 150), 150)[: len(time)]
+    velocity = np.convolve(steps, 0.1 * np.exp(-0.1 * np.arange(100)))[: len(time)]  # 10 ms late
+    position = np.concatenate(([0.0], np.cumsum(velocity[:-1]) * 1e-3))
+    channels = {"motor_speed_rad_s": 2e3 * velocity, "position_m": position, "velocity_m_s": velocity}
+    record = Record(rows * 1e-3, {name: values[::rows] for name, values in channels.items()})
+    assert not sensors_disagree(record, blocks_of(record))
+    wrong = record.replace(velocity_m_s=-record["velocity_m_s"])
+    assert sensors_disagree(wrong, blocks_of(wrong))

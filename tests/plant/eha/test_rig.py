@@ -117,8 +117,8 @@ def test_every_parameter_refuses_text(tmp_path: Path, field: str) -> None:
         ('[columns]\nposition = "P"', r"channel 'position' is unknown, did you mean 'position_m'"),
         ('[columns]\nposition_m = "P:bar"', r"unit 'bar' does not convert to 'm'"),
         ("[columns]\nposition_m = 3", r"columns\.position_m must be a valid string, got 3"),
-        ("[parameters", r"a TOML file is needed"),
-        ("a = 1\na = 2", r"a TOML file is needed"),
+        ("[parameters", r"a rig file \(TOML\) is needed"),
+        ("a = 1\na = 2", r"a rig file \(TOML\) is needed"),
     ],
 )
 def test_what_a_rig_cannot_hold_is_refused_with_file_and_field(tmp_path: Path, text: str, message: str) -> None:
@@ -129,7 +129,7 @@ def test_what_a_rig_cannot_hold_is_refused_with_file_and_field(tmp_path: Path, t
 
 
 def test_a_rig_that_is_not_there_or_no_text_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RigError, match="cannot be read: No such file"):
+    with pytest.raises(RigError, match="cannot be read as a rig file: No such file"):
         read_rig(tmp_path / "rig.toml")
     with pytest.raises(RigError, match="cannot be read: a regular file is needed"):
         read_rig(tmp_path)

@@ -51,8 +51,8 @@ def test_a_missing_column_is_refused_with_headers_guess_and_the_command(tmp_path
         read_record(path)
     said = str(caught.value)
     assert "columns motor_speed_rad_s, and position_m or velocity_m_s are missing; the log has 'Zeit [s]'" in said
-    assert "perhaps --columns 'position_m=Weg [mm]:mm,motor_speed_rad_s=n_Mot [rpm]:rpm'" in said
-    assert "`hydrostate inspect FILE`" in said
+    assert "perhaps --columns 'motor_speed_rad_s=n_Mot [rpm]:rpm,position_m=Weg [mm]:mm'" in said
+    assert "`hydrostate inspect FILE --write rig.toml`" in said
 
 
 def test_a_column_that_was_asked_for_and_is_not_there_is_refused_likewise(tmp_path: Path) -> None:
@@ -91,3 +91,22 @@ def test_other_columns_are_left_unread_without_a_word(tmp_path: Path, name: str)
     assert LogCode.COLUMN_OVERLOOKED not in [
         one.code for one in notes_of(tmp_path, f"time_s,motor_speed_rad_s,position_m,{name}")
     ]
+
+
+def test_the_option_that_is_offered_reads_pressure_too_and_asks_for_units_that_no_name_says(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    rows = "\n".join(f"{0.001 * k:.3f},{k % 7},{k % 5},{k % 3}" for k in range(20))
+    path.write_text(f"Zeit,Drehzahl,Weg,Druck\n{rows}")
+    with pytest.raises(LogError) as caught:
+        read_record(path)
+    said = str(caught.value)
+    option = "time_s=Zeit,motor_speed_rad_s=Drehzahl:UNIT,position_m=Weg:UNIT,differential_pressure_pa=Druck:UNIT"
+    assert f"perhaps --columns '{option}', with the unit of each for UNIT;" in said
+    assert "--sample-time" not in said  # there is a time
+
+
+def test_a_log_of_one_logger_says_how_the_other_is_merged(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("time_s,motor_speed_rpm,pressure_bar\n" + ROWS)
+    with pytest.raises(LogError, match="if a second logger's file has it, add --with FILE"):
+        read_record(path)

@@ -181,7 +181,7 @@ def test_two_columns_for_one_channel_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["run.csv", "run.parquet", "run.mat"])
 def test_a_directory_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()
-    refused(tmp_path / name, "a file is needed, got a directory")
+    refused(tmp_path / name, "a file is needed, got a folder")
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.parquet", "run.mat", "no\0name.csv", "x" * 300 + ".csv"])
