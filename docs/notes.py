@@ -135,7 +135,8 @@ def page() -> str:
         ]
         for name, member in enum.__members__.items():
             where = ", ".join(f"`{path}`" for path in sorted(raised.get(f"{enum.__name__}.{name}", ())))
-            parts.append(f"| `{member}` | {member.template.replace('|', chr(92) + '|')} | {where} |")
+            said = member.template.replace("|", r"\|").replace("!w}", "}")
+            parts.append(f"| `{member}` | {said} | {where} |")
         parts.append("")
     return "\n".join(parts)
 

@@ -96,7 +96,7 @@ class EstimateCode(Code):
         "observable"
     )
     KNOWN_AS_THE_RIG = (
-        "the uncertainty of {entry} in the rig file causes {percent:.0f} % of the total variance of {quantity}: a "
+        "the uncertainty of {entry} in the rig file causes {percent:.0f} % of the total variance of {quantity!w}: a "
         "better value of {entry} narrows the interval"
     )
     DIVERGED = "the estimate stopped being finite; check units, rig parameters and the form of the model"

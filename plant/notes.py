@@ -41,6 +41,10 @@ class _Sentence(Formatter):
             return in_words(value, format_spec)
         return super().format_field(value, format_spec)
 
+    def convert_field(self, value: Any, conversion: Any) -> Any:
+        """Return a name without underscores where a template says so: ``{quantity!w}``."""
+        return str(value).replace("_", " ") if conversion == "w" else super().convert_field(value, conversion)
+
 
 _SENTENCE = _Sentence()
 

@@ -67,7 +67,7 @@ def class_row(found: Finding) -> dict[str, Any]:
     (best, first), (second, other) = sorted(found.probabilities.items(), key=lambda item: -item[1])[:2]
     margin, severities = first / max(other, 1e-300), {"quantities": json.dumps(_severities(found))}
     if found.unknown:
-        said = f"in none of the nine conditions, the nearest is {best}: {'; '.join(map(str, found.against))}"
+        said = f"{'; '.join(map(str, found.against))}; in none of the nine conditions, the nearest is {best}"
         return {"outcome": "mismatch", "reason": said, "trusted": False, **severities}
     if margin < TOLD_APART:
         said = f"no class: under this drive {best} and {second} move alike; drive the actuator, at best with steps"

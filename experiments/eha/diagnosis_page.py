@@ -46,7 +46,11 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "sureness": sureness(result),
         "library": library_sentence(result),
         "not_told": [sentence(said) for said in result["not_told"]],
-        "warnings": [sentence(said) for said in result.get("warnings", [])],
+        "warnings": [
+            sentence(said)
+            for said in result.get("warnings", [])
+            if not result["unknown"] or said not in result["reasons"]
+        ],
         "shares": [
             (in_words(condition), 100.0 * share, percent_text(share), share < LEAST_SHARE)
             for condition, share in shares

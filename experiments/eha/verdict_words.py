@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from experiments.page.condition_names import in_words
-from experiments.page.numbers import percent_text, shop_unit
+from experiments.page.numbers import decimals_of, percent_text, shop_unit
 
 SHOWN = {
     "leakage_flow": "leakage at rated pressure",
@@ -20,7 +20,7 @@ SHOWN = {
 MARGINS = ((1.05, "too close to call"), (1.25, "narrow"), (2.0, "clear"), (math.inf, "wide"))
 """Words for the ratio of the runner-up's score to the best, up to each bound [dimensionless]."""
 
-MOST_DECIMALS = 4
+MOST_DECIMALS = 3
 """Decimals that a severity is given at most [count]."""
 
 NEAREST = "UNKNOWN: none of the nine conditions fits; the nearest is "
@@ -59,9 +59,9 @@ def headline(result: Mapping[str, Any]) -> str:
     ranked = sorted(result["probabilities"].items(), key=lambda item: -item[1])
     (best, first), (second, other) = ranked[:2]
     parts = [
-        f"{_spaced(best)}, probability {percent_text(first)} %",
+        f"{in_words(best)}, probability {percent_text(first)} %",
         since(result),
-        f"second most likely {_spaced(second)}, {percent_text(other)} %",
+        f"second most likely {in_words(second)}, {percent_text(other)} %",
     ]
     named = "; ".join(part for part in parts if part)
     return f"{NEAREST}{named}" if result["unknown"] else named
@@ -82,7 +82,7 @@ def since(result: Mapping[str, Any]) -> str:
     """
     if result["since_s"] is not None:
         low, high = result["since_ci95_s"]
-        before = _spaced(result["condition_before"])
+        before = in_words(result["condition_before"])
         return f"since {result['since_s']:.2f} s ({low:.2f} to {high:.2f} s), {before} before"
     return "" if result["condition"] == "normal" else "present since before the log began"
 
@@ -114,30 +114,26 @@ def amount(one: Mapping[str, Any]) -> str:
     '207.0 MPa (205.0 to 209.0; with rig error 150 to 280)'
     >>> amount({"value": -0.01, "unit": "N", "ci95": [-3.0, 4.0]})
     '0.0 N (-3.0 to 4.0)'
-    >>> amount({"value": 1e-7, "unit": "%", "ci95": [0.0, 2e-7]})
-    'under 0.0001 %'
+    >>> amount({"value": 1e-7, "unit": "%", "ci95": [0.0, 2e-7], "ci95_total": [0.0, 0.15]})
+    'under 0.001 % (with rig error 0.00 to 0.15)'
     """
     if any(number is None or not math.isfinite(number) for number in (one["value"], *one["ci95"])):
         return "not determined"
     scale, unit = shop_unit(one["unit"])
     value, low, high = (scale * float(number) for number in (one["value"], *one["ci95"]))
-    if max(abs(value), abs(low), abs(high)) < 0.5 * 10.0**-MOST_DECIMALS:
-        return f"under {10.0**-MOST_DECIMALS:.{MOST_DECIMALS}f} {unit}"
-    said = _interval(low, high)
-    total = one.get("ci95_total", [None])
-    if None not in total and (wider := _interval(*(scale * end for end in total))) != said:
-        said += f"; with rig error {wider}"
-    return f"{value:z.{_decimals(low, high)}f} {unit} ({said})"
+    said, least = _interval(low, high), 10.0**-MOST_DECIMALS
+    total = [scale * end for end in one.get("ci95_total", ()) if end is not None]
+    wider = f"with rig error {_interval(*total)}" if len(total) == 2 and _interval(*total) != said else ""
+    if max(map(abs, (value, low, high))) < 0.5 * least:
+        beyond = f" ({wider})" if wider and max(map(abs, total)) >= 0.5 * least else ""
+        return f"under {least:.{MOST_DECIMALS}f} {unit}{beyond}"
+    said += f"; {wider}" if wider else ""
+    return f"{value:z.{decimals_of(low, high, MOST_DECIMALS)}f} {unit} ({said})"
 
 
 def _interval(low: float, high: float) -> str:
-    decimals = _decimals(low, high)
+    decimals = decimals_of(low, high, MOST_DECIMALS)
     return f"{low:z.{decimals}f} to {high:z.{decimals}f}"
-
-
-def _decimals(low: float, high: float) -> int:
-    """Return the decimals that leave two digits of an interval's width."""
-    return min(max(1 - math.floor(math.log10(high - low)), 0), MOST_DECIMALS) if high > low else 2
 
 
 def believed(result: Mapping[str, Any]) -> str:
@@ -233,7 +229,3 @@ def models_sentence(result: Mapping[str, Any]) -> str:
         error = f"{100.0 * (margin - 1.0):.0f} % larger" if margin < 2.0 else f"{margin:.1f} times as large"
         named = f"{best}, by a {margin_word(margin)} margin: the error of {second} is {error}"
     return f"{NEAREST}{named}" if result["unknown"] else named
-
-
-def _spaced(condition: str) -> str:
-    return condition.replace("_", " ")

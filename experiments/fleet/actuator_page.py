@@ -8,10 +8,11 @@ import pandas as pd
 from estimation.finding import NORMAL_95
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.outlook import Outlook, outlook_of
-from experiments.fleet.page import SHOWN, found_in
+from experiments.fleet.page import found_in
 from experiments.fleet.rows import STATES
 from experiments.page.charts import Charts
-from experiments.page.numbers import MISSING, number, shop_unit
+from experiments.page.names_shown import SHOWN
+from experiments.page.numbers import MISSING, decimals_of, fixed, number, shop_unit
 from experiments.page.panels import Curve, Mark, Panel
 from experiments.page.render import render_page
 from experiments.page.tables import Column
@@ -77,16 +78,18 @@ def _changed(one: Outlook) -> str:
 def _forecast(one: Outlook) -> dict[str, str]:
     scale, unit = shop_unit(one.unit)
     (level, std), (growth, growth_std) = one.trend.level, one.trend.growth
-    low, high = (number(scale * (level + sign * NORMAL_95 * std), 3) for sign in (-1.0, 1.0))
+    ends = [scale * (level + sign * NORMAL_95 * std) for sign in (-1.0, 1.0)]
+    decimals = decimals_of(*ends)
+    shown, low, high = (fixed(each, decimals) for each in (scale * level, *ends))
     growth = growth if abs(growth) > ROUNDING * growth_std else 0.0
     crossing = one.trend.crossing
-    ends = None if crossing is None else [float(end) for end in crossing.quantiles]
+    reached = None if crossing is None else [float(end) for end in crossing.quantiles]
     return {
         "severity": SHOWN[one.name],
-        "level": f"{number(scale * level, 3)} {unit} ({low} to {high})",
+        "level": f"{shown} {unit} ({low} to {high})",
         "growth": f"{number(scale * growth, 2)} ± {number(scale * growth_std, 2)} {unit}",
-        "half": MISSING if ends is None else _to(ends[1], ends[3]),
-        "most": MISSING if ends is None else _to(ends[0], ends[4]),
+        "half": MISSING if reached is None else _to(reached[1], reached[3]),
+        "most": MISSING if reached is None else _to(reached[0], reached[4]),
         "outlook": one.words,
     }
 

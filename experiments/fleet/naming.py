@@ -41,7 +41,8 @@ def place_of(date: str, source: str) -> float:
     Parameters
     ----------
     date : str
-        ISO 8601, such as 2026-11-22, 20261122 or 2026-11-22T14:30, or a number such as running hours.
+        ISO 8601, such as 2026-11-22, 20261122 or 2026-11-22T14:30, a month (2026-11: its first day), or a number such
+        as running hours.
     source : str
         Where it stands, for the error.
 
@@ -57,12 +58,12 @@ def place_of(date: str, source: str) -> float:
 
     Examples
     --------
-    >>> place_of("1970-01-03", "a log"), place_of("812.5", "a log")
-    (2.0, 812.5)
+    >>> place_of("1970-01-03", "a log"), place_of("1970-02", "a log"), place_of("812.5", "a log")
+    (2.0, 31.0, 812.5)
     """
     try:
         if re.fullmatch(r"\d{8}|\d{4}-.*", date):
-            moment = datetime.fromisoformat(date)
+            moment = datetime.fromisoformat(f"{date}-01" if re.fullmatch(r"\d{4}-\d\d", date) else date)
             moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
             return moment.timestamp() / 86400.0
         return float(date)

@@ -8,6 +8,7 @@ import pandas as pd
 
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.rows import STATES, LogRow
+from experiments.page.names_shown import SHOWN
 from experiments.page.numbers import number, shop_unit
 from experiments.page.render import render_page
 from experiments.page.scripting import data_block
@@ -22,25 +23,16 @@ SICK = ("over", "likely")
 
 COLUMNS: Sequence[Mapping[str, Any]] = (
     {"label": "actuator", "kind": "name", "width": 7.7},
-    {"label": "state", "kind": "state", "width": 12.5, "words": STATES},
-    {"label": "found", "kind": "text", "width": 9.8},
+    {"label": "state", "kind": "state", "width": 11.3, "words": STATES},
+    {"label": "found", "kind": "text", "width": 12.5},
     {"label": "worst", "kind": "text", "width": 11.2},
     {"label": "of the limit", "kind": "number", "width": 6.5, "unit": "%"},
-    {"label": "outlook", "kind": "text", "width": 12},
+    {"label": "outlook", "kind": "text", "width": 10.5},
     {"label": "logs left", "kind": "number", "width": 5.5},
     {"label": "last log", "kind": "text", "width": 6.8},
     {"label": "logs", "kind": "number", "width": 4},
 )
 """Columns of the table, their widths in sizes of the page's type [rem]; 76 in all fit a screen of 1280 px."""
-
-SHOWN: Mapping[str, str] = {
-    "leakage_flow": "leakage",
-    "velocity_lost": "velocity lost",
-    "added_friction": "added friction",
-    "pressure_rise": "pressure rise",
-    "bulk_modulus": "bulk modulus",
-}
-"""Severities as a column has room for."""
 
 
 def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: str) -> str:
@@ -79,6 +71,8 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
 
 def _title(counts: Mapping[str, int], total: int) -> str:
     sick = sum(counts[name] for name in SICK)
+    if total == 1:
+        return f"The actuator is past {'a' if sick else 'no'} limit."
     if not sick:
         return f"None of {total} actuators is past a limit."
     return f"{sick} of {total} actuators {'is' if sick == 1 else 'are'} past a limit."
@@ -93,11 +87,22 @@ def row_cells(row: ActuatorRow) -> list[Any]:
         Text, numbers, or None where nothing is known.
     """
     last = row.last
-    share = None if last.worst is None else round(100.0 * last.worst.share, 1)
+    told = last.state != "unknown"  # the amounts of a model that does not fit are none of the actuator's
+    share = round(100.0 * last.worst.share, 1) if last.worst is not None and told else None
     outlook = row.outlook
     left = None if outlook is None or outlook.left is None else round(outlook.left[1], 1)
     words = "" if outlook is None else outlook.words
-    return [row.name, row.state, found_in(last), worst_in(last), share, words, left, last.named.date, len(row.logs)]
+    return [
+        row.name,
+        row.state,
+        found_in(last),
+        worst_in(last) if told else "",
+        share,
+        words,
+        left,
+        last.named.date,
+        len(row.logs),
+    ]
 
 
 def found_in(log: LogRow) -> str:

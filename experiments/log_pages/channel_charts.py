@@ -43,7 +43,8 @@ def _plain(name: str) -> str:
 
     Examples
     --------
-    >>> _plain("differential_pressure_pa"), _plain("velocity_m_s")
-    ('differential pressure', 'velocity')
+    >>> _plain("differential_pressure_pa"), _plain("pressure_a_pa")
+    ('differential pressure', 'pressure A')
     """
-    return name.removesuffix(unit_ending(UNITS[name])).replace("_", " ")
+    *words, last = name.removesuffix(unit_ending(UNITS[name])).split("_")
+    return " ".join([*words, last.upper() if len(last) == 1 else last])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from experiments.log_pages.channel_charts import channel_charts
-from experiments.page.numbers import MISSING, number, percent_text, pretty_unit
+from experiments.page.numbers import MISSING, number, percent_text, pretty_unit, shop_unit
 from experiments.page.render import render_page
 from experiments.page.tables import Column
 from experiments.page.words import left_unread, sentence
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 LEAST_SHARE = 0.001
 """Probability below which a condition is not listed [probability]."""
+
+NO_BREAK = "\N{NO-BREAK SPACE}"
+"""A space at which no line ends."""
 
 COLUMNS = {
     "quantities": (
@@ -78,14 +81,23 @@ def _title(found: "Finding") -> str:
 
 
 def _row(name: str, one: "Quantity") -> dict[str, str]:
+    scale, unit = shop_unit(one.unit)
     return {
         "quantity": name.replace("_", " "),
-        "value": number(one.value),
-        "interval": _ends(one.ci95),
-        "total": _ends(one.ci95_total),
-        "unit": pretty_unit(one.unit),
+        "value": _whole(number(None if one.value is None else scale * one.value)),
+        "interval": _ends(one.ci95, scale),
+        "total": _ends(one.ci95_total, scale),
+        "unit": _whole(pretty_unit(unit)),
     }
 
 
-def _ends(interval: tuple[float, float] | None) -> str:
-    return MISSING if interval is None else f"{number(interval[0])} to {number(interval[1])}"
+def _ends(interval: tuple[float, float] | None, scale: float) -> str:
+    if interval is None:
+        return MISSING
+    low, high = (_whole(number(scale * end)) for end in interval)
+    return f"{low} to {high}"
+
+
+def _whole(shown: str) -> str:
+    """Return a number or a unit that no line breaks."""
+    return shown.replace(" ", NO_BREAK)

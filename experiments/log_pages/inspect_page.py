@@ -66,7 +66,7 @@ def _row(row: Mapping[str, Any]) -> dict[str, str]:
 
 def _draw(columns: "Sequence[ColumnFacts]") -> Figure:
     count = max(1, len(columns))
-    figure, axes = panels("Columns", count, 1, 0.9 + 1.2 * count, Margins(left=0.9, down=0.35))
+    figure, axes = panels("Columns", count, 1, 0.9 + 1.45 * count, Margins(left=0.9, down=0.6))
     for axis, one in zip(axes, columns, strict=False):
         values = one.values if one.values is not None else np.empty(0)
         places = np.linspace(0, len(values) - 1, min(len(values), MOST_POINTS)).astype(int)

@@ -85,6 +85,24 @@ def fixed(value: float | None, decimals: int) -> str:
     return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", MINUS)
 
 
+def decimals_of(low: float, high: float, most: int = 3) -> int:
+    """Return the decimals that leave two digits of an interval's width.
+
+    Parameters
+    ----------
+    low, high : float
+        Its ends [any unit].
+    most : int
+        Decimals, at most [count].
+
+    Examples
+    --------
+    >>> decimals_of(2.05, 2.09), decimals_of(-32.1, 31.2), decimals_of(1.0, 1.0)
+    (3, 0, 2)
+    """
+    return min(max(1 - math.floor(math.log10(high - low)), 0), most) if high > low else 2
+
+
 def exact(value: float) -> str:
     """Write a number as it was given, for parameters and settings.
 

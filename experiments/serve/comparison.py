@@ -4,7 +4,17 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from experiments.page.numbers import MISSING, number, percent_text, pretty_unit, shop_unit
+from experiments.page.names_shown import SHOWN
+from experiments.page.numbers import (
+    MISSING,
+    PLAIN_TO,
+    decimals_of,
+    fixed,
+    number,
+    percent_text,
+    pretty_unit,
+    shop_unit,
+)
 from experiments.page.words import in_words, sentence
 
 if TYPE_CHECKING:
@@ -12,6 +22,12 @@ if TYPE_CHECKING:
 
 LEAST_SHARE = 1e-3
 """Conditions that are less likely in both logs are not shown [probability]."""
+
+LEAST_WIDTH = 5e-3
+"""Width of an interval from which decimals show it, not powers of ten [any unit]."""
+
+MOST_NAMED = 6
+"""Quantities that a title names, at most [count]."""
 
 DEVIATIONS = 1.96
 """Standard deviations from an estimate to the end of its 95 % interval [dimensionless]."""
@@ -57,7 +73,7 @@ def _quantities_shown(rows: Sequence[Mapping[str, Any]]) -> "pd.DataFrame":
 
     shown = [
         {
-            "quantity": row["quantity"].replace("_", " "),
+            "quantity": SHOWN.get(row["quantity"], row["quantity"].replace("_", " ")),
             **_in_a_readers_unit(row),
             "says": "changed" if row["changed"] else "no certain change" if row["interval"] else "not in both logs",
         }
@@ -141,28 +157,53 @@ def std_of(one: Mapping[str, Any]) -> float | None:
 def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:
     scale, unit = shop_unit(row["unit"])
 
-    def ends(interval: Sequence[float]) -> str:
-        return " to ".join(number(scale * end, 3) for end in interval)
-
     def amount(one: Mapping[str, Any] | None) -> str:
         if one is None or one.get("value") is None:
             return MISSING
         known = one.get("ci95")
-        return number(scale * one["value"]) + (f" ({ends(known)})" if known and None not in known else "")
+        told = known and None not in known
+        value, *ends = alike_in_digits(scale * one["value"], [scale * end for end in known] if told else None, unit)
+        return f"{value} ({' to '.join(ends)})" if ends else value
 
-    difference = row["difference"]
+    difference, interval = row["difference"], row["interval"]
+    told = None if interval is None else [scale * end for end in interval]
+    shown, *ends = alike_in_digits(None if difference is None else scale * difference, told, unit)
     return {
         "first": amount(row["first"]),
         "second": amount(row["second"]),
-        "difference": number(None if difference is None else scale * difference),
-        "interval": MISSING if row["interval"] is None else ends(row["interval"]),
+        "difference": shown,
+        "interval": " to ".join(ends) or MISSING,
         "unit": pretty_unit(unit),
     }
+
+
+def alike_in_digits(value: float | None, interval: Sequence[float] | None, unit: str) -> list[str]:
+    """Return a value and the ends of its interval with the decimals that the interval leaves it.
+
+    Parameters
+    ----------
+    value : float or None
+        The value [``unit``].
+    interval : sequence of float or None
+        Its ends [``unit``]; None where there is none.
+
+    Examples
+    --------
+    >>> alike_in_digits(1.1e-13, [-2.01, 1.92], "N"), alike_in_digits(2.5e-11, [2.4e-11, 2.6e-11], "m^3/(s Pa)")
+    (['0.0', '−2.0', '1.9'], ['25.00 × 10⁻¹²', '24.0 × 10⁻¹²', '26.0 × 10⁻¹²'])
+    """
+    if value is None or interval is None:
+        return [number(value)]
+    low, high = interval
+    if unit == "%" or (high - low > LEAST_WIDTH and max(abs(low), abs(high)) < PLAIN_TO):
+        return [fixed(each, decimals_of(low, high)) for each in (value, low, high)]
+    return [number(value), number(low, 3), number(high, 3)]
 
 
 def _title(changed: Sequence[str]) -> str:
     if not changed:
         return "No certain difference between the two logs."
-    named = [one.replace("_", " ") for one in changed[:4]]
+    named = [SHOWN.get(one, one.replace("_", " ")) for one in changed[:MOST_NAMED]]
+    named += ["other quantities"] if len(changed) > MOST_NAMED else []
     said = named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
     return f"{said[:1].upper()}{said[1:]} {'differs' if len(named) == 1 else 'differ'} between the two logs."

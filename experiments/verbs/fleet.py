@@ -63,11 +63,15 @@ def fleet(
     from experiments.fleet.rows import log_rows
 
     limits, repairs = limits_of_options(limit or []), read_maintenance(maintenance)
-    _names((), pattern, names)  # what is wrong with it is said before any log is diagnosed
+    _names((), pattern, names)  # what is wrong there, and in names of files, is said before any log is diagnosed
+    if Path(place).is_file():
+        raise HydrostateError(f"{place}: must be a folder with logs or a store, got a file")
     store = open_store(place)
     from_logs = store.manifest() is None
+    logs = _logs_in(Path(place), out) if from_logs else []
+    _names([str(one) for one in logs], pattern, names)
     if from_logs:
-        store = _diagnosed(Path(place), out, plant, rig, load_columns(columns), workers or os.cpu_count() or 1)
+        store = _diagnosed(Path(place), logs, out, plant, rig, load_columns(columns), workers or os.cpu_count() or 1)
     table = store.rows(["file", "verb", "outcome", "found_condition", "reason", "quantities"]).to_pylist()
     files = [row["file"] for row in table if row["file"]]
     rows = actuator_rows(log_rows(table, _names(files, pattern, names), limits), repairs)
@@ -126,8 +130,24 @@ def _names(files: Sequence[str], pattern: str | None, names: Path | None) -> "Ma
     return {} if names is None else by_table(files, names)
 
 
+def _logs_in(folder: Path, out: Path) -> list[Path]:
+    if not folder.is_dir():
+        raise HydrostateError(f"{folder}: must be a folder with logs or a store, but there is no such folder")
+    known = (*SUFFIXES, *OTHERS)
+    found = sorted(one for one in folder.rglob("*") if one.suffix.lower() in known and out not in one.parents)
+    if not found:
+        raise HydrostateError(f"{folder}: must hold logs, files that end in {', '.join(known)}, but there are none")
+    return found
+
+
 def _diagnosed(
-    folder: Path, out: Path, plant: str | None, rig: Path | None, columns: Mapping[str, str], workers: int
+    folder: Path,
+    logs: Sequence[Path],
+    out: Path,
+    plant: str | None,
+    rig: Path | None,
+    columns: Mapping[str, str],
+    workers: int,
 ) -> "PartStore":
     """Diagnose the logs of a folder into a store beside the page."""
     from experiments.batch.cases import plan_study
@@ -136,21 +156,14 @@ def _diagnosed(
     from experiments.batch.study_file import parse_study
 
     kind, _ = load_actuator(plant, rig)
-    if not folder.is_dir():
-        got = "it is a file" if folder.is_file() else "there is no such folder"
-        raise HydrostateError(f"{folder}: must be a folder with logs or a store, but {got}")
-    known = (*SUFFIXES, *OTHERS)
-    found = sorted(one for one in folder.rglob("*") if one.suffix.lower() in known and out not in one.parents)
-    if not found:
-        raise HydrostateError(f"{folder}: must hold logs, files that end in {', '.join(known)}, but there are none")
-    ends = sorted({one.suffix for one in found})
+    ends = sorted({one.suffix for one in logs})
     methods = [{"verb": "diagnose"}]
-    logs = [{"glob": f"**/*{end}", "columns": dict(columns), "methods": methods} for end in ends]
+    globs = [{"glob": f"**/*{end}", "columns": dict(columns), "methods": methods} for end in ends]
     content: dict[str, Any] = {
         "name": "fleet",
         "plant": kind.name,
         "rig": str(rig.resolve()) if rig else "",
-        "logs": logs,
+        "logs": globs,
     }
     plan = plan_study(parse_study(content, f"{folder}"), folder)
     store = open_store(out / "store")

@@ -55,6 +55,7 @@
       ctx.fillStyle = css("bad");
       ctx.lineWidth = devicePixelRatio;
       ctx.font = `${12 * devicePixelRatio}px system-ui, sans-serif`;
+      ctx.textBaseline = "alphabetic";
       ctx.setLineDash([6 * devicePixelRatio, 4 * devicePixelRatio]);
       for (const mark of panel.marks) {
         const across = mark.axis === "y";
@@ -65,7 +66,10 @@
         ctx.moveTo(across ? bbox.left : at, across ? at : bbox.top);
         ctx.lineTo(across ? bbox.left + bbox.width : at, across ? at : bbox.top + bbox.height);
         ctx.stroke();
-        ctx.fillText(mark.words, across ? bbox.left + 4 : at + 4, across ? at - 4 : bbox.top + 14 * devicePixelRatio);
+        const before = across || at + 4 + ctx.measureText(mark.words).width > last; // no room behind a late mark
+        ctx.textAlign = before ? "right" : "left";
+        const place = across ? bbox.left + bbox.width - 4 : before ? at - 4 : at + 4;
+        ctx.fillText(mark.words, place, across ? at - 4 : bbox.top + 14 * devicePixelRatio);
       }
       ctx.restore();
     };

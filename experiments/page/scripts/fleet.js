@@ -2,7 +2,7 @@
 "use strict";
 
 (() => {
-  const narrow = matchMedia("(max-width: 40rem)"); // there a row is a card of three lines
+  const narrow = matchMedia("(max-width: 62rem)"); // there a row is a card of three lines
   const rowHeight = () => (narrow.matches ? 96 : 36); // [px], as in the style
   const SPARE = 12; // rows above and below those in sight
 

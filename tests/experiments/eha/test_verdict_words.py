@@ -17,6 +17,7 @@ from experiments.eha.verdict_words import (
     since,
     verdict_lines,
 )
+from experiments.page.condition_names import in_words
 from faults.conditions import CONDITIONS
 from faults.diagnosis.diagnose import EhaEvidence
 from faults.diagnosis.rmse import Scores
@@ -70,7 +71,7 @@ def test_a_healthy_actuator_is_healthy_since_no_time_unless_it_was_ill() -> None
 @pytest.mark.parametrize("condition", CONDITIONS)
 def test_a_headline_begins_with_the_condition(condition: str) -> None:
     entries = diagnosis_entries(found_as(condition))
-    assert headline(entries).startswith(condition.replace("_", " "))
+    assert headline(entries).startswith(in_words(condition))
     assert entries["message"] == headline(entries)
 
 

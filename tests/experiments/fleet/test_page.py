@@ -8,7 +8,7 @@ import pytest
 from experiments.fleet.actuators import actuator_rows
 from experiments.fleet.log_pages import file_name, write_pages
 from experiments.fleet.naming import by_pattern
-from experiments.fleet.page import fleet_page
+from experiments.fleet.page import fleet_page, row_cells
 from experiments.fleet.rows import log_rows
 from tests.experiments.fleet.conftest import store_row
 
@@ -42,6 +42,21 @@ def test_why_a_log_was_not_read_is_told_without_its_folder() -> None:
     page = fleet_page(actuator_rows(log_rows([row], {}, {})), {}, "hall")
     assert "no time" in page
     assert "/private" not in page
+
+
+def test_amounts_of_a_model_that_does_not_fit_are_not_shown() -> None:
+    row = store_row(
+        "a.csv", 9.0, outcome="mismatch", found_condition=None, reason="the pump is worn; in none of the nine"
+    )
+    (found,) = actuator_rows(log_rows([row], {}, {}))
+    _, state, said, worst, share, *_ = row_cells(found)
+    assert (state, said, worst, share) == ("unknown", "the pump is worn; in none of the nine", "", None)
+
+
+def test_the_page_explains_each_state_by_the_word_that_it_shows() -> None:
+    page = page_of(2)
+    for words in ("past a limit", "no verdict", "nearing a limit", "not readable"):
+        assert f"&#34;{words.capitalize()}&#34;" in page or f'"{words.capitalize()}"' in page
 
 
 def test_a_name_cannot_end_the_script_that_holds_it() -> None:

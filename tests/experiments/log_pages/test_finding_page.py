@@ -7,7 +7,7 @@ import pytest
 from estimation.finding import Finding, Gate, Outcome, Quantity
 from estimation.notes import EstimateCode
 from experiments.log_pages.entries import message_of
-from experiments.log_pages.finding_page import _title
+from experiments.log_pages.finding_page import _row, _title
 
 PASSED, DOUBTED = Gate(True, ()), Gate(False, (EstimateCode.DIVERGED.note(),))
 
@@ -43,3 +43,11 @@ def test_a_condition_that_the_gate_doubts_is_said_with_the_doubt() -> None:
     said = message_of(found(**named, gate=DOUBTED))
     assert said.startswith("minor_leakage")
     assert f"not to be relied on: {EstimateCode.DIVERGED.note()}" in said
+
+
+def test_bulk_modulus_is_given_in_mpa_and_no_number_breaks_before_its_power_of_ten() -> None:
+    row = _row("bulk_modulus", Quantity.normal(2.07e8, 1e6, "Pa"))
+    assert (row["value"], row["interval"], row["unit"]) == ("207.0", "205.0 to 209.0", "MPa")
+    leak = _row("leakage_coefficient", Quantity.normal(2.5e-11, 1e-13, "m^3/(s Pa)"))
+    assert " " not in leak["value"] + leak["unit"]
+    assert leak["interval"].split(" ")[1] == "to"

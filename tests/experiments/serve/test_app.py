@@ -203,7 +203,7 @@ def test_two_logs_are_compared_and_the_fleet_has_both(served: Served, monkeypatc
     assert (row["difference"], row["changed"]) == (2.0, True)
     assert row["interval"] == pytest.approx([2.0 - 1.96 * 0.1 * 2**0.5, 2.0 + 1.96 * 0.1 * 2**0.5])
     page = client.get("/compare", params={"first": pair[0], "second": pair[1]}).text
-    assert "Leakage flow differs between the two logs." in page
+    assert "Leakage differs between the two logs." in page
     assert "<b>_2" not in page
     fleet = client.get("/fleet")
     assert "1 of 2 actuators is past a limit." in fleet.text

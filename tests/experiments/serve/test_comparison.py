@@ -47,7 +47,7 @@ def test_the_page_of_two_logs_shows_readers_units_and_no_tag_of_a_name() -> None
     first = {"file": "<img src=x>.csv", "message": "one", "bulk_modulus_pa": bulk, "probabilities": {"normal": 0.9}}
     page = compare_view(first, {**first, "file": "b.csv", "bulk_modulus_pa": {**bulk, "value": 1.5e8}})
     assert "Bulk modulus differs between the two logs." in page
-    assert "200.0 (198 to 202)" in page
+    assert "200.0 (198.0 to 202.0)" in page
     assert "MPa" in page
     assert "<img src=x>" not in page
     assert "No certain difference" in compare_view(first, first)
@@ -74,5 +74,5 @@ def test_what_has_no_value_is_shown_as_missing_and_what_is_no_quantity_is_left_o
     (row,) = compared(first, second)
     assert (row["difference"], row["changed"]) == (None, False)
     page = compare_view(first, second)
-    assert "12.00 (11.0 to 13.0)" in page
+    assert "12.0 (11.0 to 13.0)" in page
     assert "None" not in page

@@ -98,10 +98,27 @@ def test_files_are_named_by_a_table_or_by_a_pattern_and_not_by_both(
     table.write_text("file,actuator,date\na.csv,Press 7,2026-01-02\nb.csv,Press 7,2026-01-03\n")
     code, _, _ = invoke("fleet", tmp_path, "--names", table, "--out", tmp_path / "fleet")
     assert code == 0
-    assert "None of 1 actuators is past a limit." in (tmp_path / "fleet" / "index.html").read_text("utf-8")
+    assert "The actuator is past no limit." in (tmp_path / "fleet" / "index.html").read_text("utf-8")
     code, _, said = invoke("fleet", tmp_path, "--names", table, "--pattern", "{actuator}.csv", "--out", tmp_path / "x")
     assert code == 2
     assert "--pattern and --names say the same" in said
+
+
+def test_a_date_that_is_none_is_refused_before_any_log_is_diagnosed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ran = list[Any]()
+    monkeypatch.setattr("experiments.command.batch.run_plan", lambda *asked: ran.append(asked))
+    (tmp_path / "P-1_2026-99.csv").write_text("time_s\n")
+    code, _, said = invoke("fleet", tmp_path, "--pattern", "{actuator}_{date}.csv", "--out", tmp_path / "fleet")
+    assert (code, ran) == (2, [])
+    assert "date must be ISO 8601 such as 2026-11-22, or a number, got '2026-99'" in said
+
+
+def test_a_file_is_no_fleet(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time_s\n")
+    code, _, said = invoke("fleet", tmp_path / "a.csv")
+    assert (code, "must be a folder with logs or a store, got a file" in said) == (2, True)
 
 
 def test_the_logs_of_another_rig_are_diagnosed_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
