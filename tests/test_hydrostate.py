@@ -110,6 +110,12 @@ MISTAKES: dict[str, tuple[Callable[[hs.Log, Path], object], str]] = {
     ),
     "no such rig file": (lambda log, file: hs.read(file, rig="paper"), "hydrostate rig init FILE"),
     "text for a number": (lambda log, file: log.estimate(start_std="1e8"), "start_std must be a number, got '1e8'"),
+    "text for a guess": (lambda log, file: log.estimate(start="5e7"), "start must be a number [Pa], got '5e7'"),
+    "a page under another name": (lambda log, file: log.estimate().report("a.pdf"), "must end in .html, got 'a.pdf'"),
+    "a command stays as it is typed": (
+        lambda log, file: hs.read(file, columns={"position_m": "X"}),
+        "`hydrostate inspect FILE --write rig.toml` guesses which column is which and in what unit, for rig='rig.toml'",
+    ),
     "misspelt option": (lambda log, file: log.estimate(methd="ekf"), "did you mean 'method'"),
     "misspelt condition": (lambda log, file: hs.simulate("minor_leak"), "condition must be one of normal"),
     "misspelt plant": (lambda log, file: hs.simulate(plant="pump"), "plant must be one of eha, reduced, lumped"),

@@ -1,5 +1,8 @@
 """Several logs, one after the other: one that fails is named and the rest are done."""
 
+import contextlib
+import inspect
+import re
 import warnings
 from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
@@ -22,6 +25,12 @@ if TYPE_CHECKING:
     from plant.log.table import Table
 
 T = TypeVar("T")
+
+OURS = re.compile(re.escape(str(Path(__file__).parents[2])) + r"[/\\](plant|experiments|hydrostate\.py)")
+"""Files between a log and who reads it."""
+
+CONTEXTS = contextlib.__file__
+"""What runs a block of a context."""
 
 Work: TypeAlias = Callable[[Path], Result]
 """What a command does with one log."""
@@ -97,7 +106,15 @@ def overheard() -> Generator[list[LogWarning]]:
             yield said
     finally:
         for one in said:
-            warnings.warn(one, stacklevel=3)
+            warnings.warn(one, stacklevel=_level_of_the_reader())
+
+
+def _level_of_the_reader() -> int:
+    """Return how many calls lie between a warning here and the line that asked for the log."""
+    frame, level = inspect.currentframe(), 0
+    while frame is not None and (OURS.match(frame.f_code.co_filename) or frame.f_code.co_filename == CONTEXTS):
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def noted(source: str, read: Callable[[], T]) -> T:

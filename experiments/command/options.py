@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Collection, Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -205,8 +206,10 @@ def require_positive(option: str, value: float | None, unit: str) -> None:
     Raises
     ------
     HydrostateError
-        If it is not positive and finite.
+        If it is no number, or not positive and finite.
     """
+    if not isinstance(value, Real | None) or isinstance(value, bool):
+        raise HydrostateError(f"{option} must be a number [{unit}], got {value!r}")
     if value is not None and not (math.isfinite(value) and value > 0.0):
         raise HydrostateError(f"{option} must be positive and finite, got {value:g} {unit}")
 

@@ -38,6 +38,17 @@ def channel_charts(record: "Record", found: "Finding", stem: str) -> Charts:
     return Charts(record.time, "time [s]", panels, f"{stem}-measured")
 
 
+def label_of(name: str) -> str:
+    """Return what an axis in SI is labelled; a column of any other log keeps its name.
+
+    Examples
+    --------
+    >>> label_of("motor_speed_rad_s"), label_of("Weg [mm]")
+    ('motor speed [rad/s]', 'Weg [mm]')
+    """
+    return f"{_plain(name)} [{UNITS[name]}]" if name in UNITS else name
+
+
 def _plain(name: str) -> str:
     """Return a channel's name without its unit.
 

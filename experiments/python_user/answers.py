@@ -147,7 +147,7 @@ class Answer(Shown):
         Parameters
         ----------
         path : str or Path
-            Where to; its ending becomes ``.html``.
+            Where to; ``.html`` is added to a name without an ending.
         title : str
             What the page calls the log.
 
@@ -159,13 +159,18 @@ class Answer(Shown):
         Raises
         ------
         HydrostateError
-            If the file cannot be written.
+            If the file cannot be written, or its name ends as no page's does.
         """
         from pathlib import Path
 
         from experiments.command.json_output import write_whole
+        from experiments.command.own_paths import PAGES
+        from plant.errors import HydrostateError
 
-        file = Path(path).with_suffix(".html") if Path(path).name else Path(path)
+        file = Path(path)
+        if file.suffix.lower() not in PAGES:
+            raise HydrostateError(f"a page's name must end in .html, got {file.name!r}")
+        file = file.with_suffix(".html") if file.name and not file.suffix else file
         write_whole(file, self._page(title))
         return file
 

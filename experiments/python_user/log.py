@@ -60,13 +60,42 @@ def options_by_name() -> "Generator[None]":
     try:
         yield
     except HydrostateError as error:
-        error.message = _OPTION.sub(lambda found: found[1].replace("-", "_"), error.message)
+        error.message = in_python(error.message)
         error.args = (error.message if error.source is None else f"{error.source}: {error.message}",)
         raise
 
 
 _OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
 """An option as the command spells it."""
+
+_COLUMNS = re.compile(r"--columns '([^']*)'")
+"""Columns as an error offers them for the command line."""
+
+ELSEWHERE = {"--with FILE": "beside=FILE", "--rig rig.toml": "rig='rig.toml'"}
+"""Options that Python calls otherwise, or gives a value in quotes."""
+
+
+def in_python(said: str) -> str:
+    """Return a sentence with its options as Python users know them; a command in backticks stays as it is.
+
+    Examples
+    --------
+    >>> in_python("give --start-std, or `hydrostate rig init --force`; perhaps --columns 'position_m=Weg [mm]:mm'")
+    "give start_std, or `hydrostate rig init --force`; perhaps columns={'position_m': 'Weg [mm]:mm'}"
+    """
+    parts = said.split("`")
+    for place in range(0, len(parts), 2):
+        text = _COLUMNS.sub(lambda found: f"columns={_mapping(found[1])}", parts[place])
+        for option, argument in ELSEWHERE.items():
+            text = text.replace(option, argument)
+        parts[place] = _OPTION.sub(lambda found: found[1].replace("-", "_"), text)
+    return "`".join(parts)
+
+
+def _mapping(option: str) -> dict[str, str]:
+    """Return columns as `read` takes them; a comma within a name begins no channel."""
+    pairs = re.split(r",(?=[a-z0-9_]+=)", option)
+    return {channel: name for channel, _, name in (pair.partition("=") for pair in pairs)}
 
 
 def known_options(options: Mapping[str, Any], known: Mapping[str, Any], verb: str) -> Mapping[str, Any]:
@@ -330,14 +359,16 @@ class Log(Shown):
         return pd.DataFrame(dict(self.record.channels), index=pd.Index(self.record.time, name="time_s"))
 
     def plot(self) -> "list[Axes]":
-        """Draw every channel over time."""
+        """Draw every channel over time, in SI."""
         import matplotlib.pyplot as plt
+
+        from experiments.log_pages.channels import label_of
 
         count = len(self.channels)
         _, axes = plt.subplots(count, 1, sharex=True, squeeze=False, figsize=(8.0, 1.8 * count))
         for axis, name in zip(axes[:, 0], self.channels, strict=True):
             axis.plot(self.record.time, self.record[name], lw=0.8)
-            axis.set_ylabel(name.replace("_", " "), fontsize=8)
+            axis.set_ylabel(label_of(name), fontsize=8)
         axes[0, 0].set_title(str(self))
         axes[-1, 0].set_xlabel("time [s]")
         return list(axes[:, 0])

@@ -57,7 +57,6 @@ def said_by(group: type[TyperGroup], words: Sequence[str]) -> tuple[list[Any], s
         ["a.csv", "b/c.csv", "--name", "flow", "--rig", "r.toml", "--columns", "a=b", "--columns", "c", "--sure"],
         ["a.csv", "--count", "3", "--rate", "2e3", "--whole", "4", "--open"],
         ["a.csv", "--count", "6"],
-        ["a.csv", "--count", "x"],
         ["a.csv", "--rate", "inf", "--shut"],
         ["a.csv", "--there", "FOLDER"],
         ["a.csv", "--there", "FOLDER/none.csv"],
@@ -77,3 +76,14 @@ def test_a_typer_that_works_in_another_way_is_left_alone(monkeypatch: pytest.Mon
     command = typer.main.get_command(taking(TyperGroup))
     take_plainly(command.params)
     assert all(one._runtime_param is None for one in command.params)  # pyright: ignore
+
+
+@pytest.mark.parametrize(
+    ("option", "text", "said"),
+    [
+        ("--count", "x", "a whole number is needed, got 'x'"),
+        ("--rate", "10s", "a number is needed, got '10s'"),
+    ],
+)
+def test_a_text_that_is_no_number_is_repeated(option: str, text: str, said: str) -> None:
+    assert said_by(HydrostateGroup, ["a.csv", option, text]) == ([], said)

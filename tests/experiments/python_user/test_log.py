@@ -11,6 +11,7 @@ import pytest
 
 import hydrostate as hs
 from estimation.eha.result import BulkModulusEstimate
+from plant.errors import LogWarning
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +31,7 @@ def test_a_table_has_a_row_a_sample_by_time_and_a_column_a_channel(log: hs.Log) 
 def test_every_channel_is_drawn_over_one_time_axis(log: hs.Log) -> None:
     axes = log.plot()
     try:
-        assert [axis.get_ylabel() for axis in axes] == [name.replace("_", " ") for name in log.channels]
+        assert [axis.get_ylabel() for axis in axes][:2] == ["motor speed [rad/s]", "position [m]"]
         assert [axis.get_xlabel() for axis in axes] == [""] * (len(axes) - 1) + ["time [s]"]
         for axis, name in zip(axes, log.channels, strict=True):
             np.testing.assert_array_equal(axis.lines[0].get_ydata(), log.record[name])
@@ -141,3 +142,10 @@ def test_an_estimate_is_shared_only_where_channels_rig_and_method_are_the_same(
     both.record = log.between(0.0, 0.4).record
     both.diagnose()
     assert len(fits) == 6
+
+
+def test_a_warning_points_at_the_line_that_read_the_log(log: hs.Log) -> None:
+    table = log.to_frame().assign(position_m=1e3 * log["position_m"])
+    with pytest.warns(LogWarning) as caught:
+        hs.read(table)
+    assert {one.filename for one in caught} == {__file__}
