@@ -89,7 +89,8 @@ def _refuse_shadows() -> None:
 _refuse_shadows()
 
 from experiments.python_user.answers import Answer, Model, no_such  # noqa: E402 - after the check
-from experiments.python_user.log import Log, known_options, options_by_name, refuse  # noqa: E402 - likewise
+from experiments.python_user.log import Log, known_options, refuse  # noqa: E402 - likewise
+from experiments.python_user.python_words import options_by_name  # noqa: E402 - likewise
 from plant.lazy import lazily  # noqa: E402 - likewise
 
 _late = lazily("hydrostate", __file__)
@@ -183,7 +184,7 @@ def read(
     """
     from experiments.actuators import DEFAULT, actuator
     from experiments.command.logs import read_log
-    from experiments.python_user.log import ANY, options_by_name
+    from experiments.python_user.log import ANY
     from experiments.python_user.reading import read_whole_or_sparse
     from plant.errors import NoChannelError
     from plant.log.any_columns import read_any

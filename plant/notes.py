@@ -20,7 +20,7 @@ def in_words(value: float, spec: str) -> str:
     Parameters
     ----------
     value : float
-        The number.
+        The number [any unit].
     spec : str
         How many digits, as `format` has it: ``.2g``.
 
