@@ -53,8 +53,10 @@ class _Taken:
         try:
             return self._checked(about).coerce(value, param=param, ctx=ctx)
         except Exception as error:
-            if isinstance(value, str) and UNPARSED in getattr(error, "message", ""):
-                error.message = f"a {'whole ' if 'integer' in error.message else ''}number is needed, got {value!r}"
+            said = str(getattr(error, "message", ""))
+            if isinstance(value, str) and UNPARSED in said:
+                kind = "whole number" if "integer" in said else "number"
+                vars(error)["message"] = f"a {kind} is needed, got {value!r}"
             raise
 
     def _plain(self, value: Any, annotation: Any, param: Any, ctx: Any) -> Any:

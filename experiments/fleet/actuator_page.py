@@ -79,7 +79,7 @@ def _forecast(one: Outlook) -> dict[str, str]:
     scale, unit = shop_unit(one.unit)
     (level, std), (growth, growth_std) = one.trend.level, one.trend.growth
     ends = [scale * (level + sign * NORMAL_95 * std) for sign in (-1.0, 1.0)]
-    decimals = decimals_of(*ends)
+    decimals = decimals_of(ends[0], ends[1])
     shown, low, high = (fixed(each, decimals) for each in (scale * level, *ends))
     growth = growth if abs(growth) > ROUNDING * growth_std else 0.0
     crossing = one.trend.crossing

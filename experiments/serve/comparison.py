@@ -160,9 +160,9 @@ def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:
     def amount(one: Mapping[str, Any] | None) -> str:
         if one is None or one.get("value") is None:
             return MISSING
-        known = one.get("ci95")
-        told = known and None not in known
-        value, *ends = alike_in_digits(scale * one["value"], [scale * end for end in known] if told else None, unit)
+        known = [scale * end for end in one.get("ci95") or () if end is not None]
+        told = known if len(known) == 2 else None
+        value, *ends = alike_in_digits(scale * one["value"], told, unit)
         return f"{value} ({' to '.join(ends)})" if ends else value
 
     difference, interval = row["difference"], row["interval"]
