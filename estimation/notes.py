@@ -248,10 +248,7 @@ class RigCode(Code):
         "the relief valve opens at {setting_pa:.3g} ± {half_width_pa:.2g} Pa instead of the {rig_pa:.3g} Pa in the "
         "rig file: it is set too low, or leaks"
     )
-    LEAKAGE_GROWS = (
-        "leakage grows by a factor of {factor:.2f} over the log, from {first:.3g} to {last:.3g} m^3/(s Pa): more than "
-        "warming oil explains"
-    )
+    LEAKAGE_GROWS = "leakage grows by a factor of {factor:.3g} over the log: more than warming oil explains"
     LEAKAGE_STEPS = (
         "leakage changes from {first:.3g} to {last:.3g} m^3/(s Pa) after {percent_of_log:.3g} % of the log, within "
         "{within_percent:.2g} % of it"

@@ -5,12 +5,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from estimation.notes import RigCode
-from experiments.page.words import left_unread, sentence
+from experiments.page.words import in_words, left_unread, sentence
 from faults.conditions import CONDITIONS
 from faults.notes import AdviceCode
 
 SURE, LIKELY = 0.99, 0.8
 """Probabilities from which a verdict is called certain, and probable [probability]."""
+
+TOLD = 0.5
+"""Probability of other levels from which one of leakage, or of friction, is not told [probability]."""
 
 LEAKS: Mapping[str, str] = {
     "minor": "leaks inside more than it should (minor leakage)",
@@ -62,17 +65,33 @@ def verdict(result: Mapping[str, Any]) -> str:
     """
     if result["unknown"]:
         return " ".join(_outside(result)) or "No verdict: the log does not fit any known condition of this actuator."
-    condition = CONDITIONS[result["condition"]]
-    faults = [LEAKS.get(condition.leakage), RUBS.get(condition.friction)]
-    wrong = " and ".join(one for one in faults if one)
-    if not wrong and _soft_oil(result):
+    levels = _levels(result)
+    faults = {"leakage": LEAKS.get(levels["leakage"] or ""), "friction": RUBS.get(levels["friction"] or "")}
+    wrong = " and ".join(one for one in faults.values() if one)
+    others = [
+        f"{name} is normal" if levels[name] else f"{name} cannot be told from this log"
+        for name, one in faults.items()
+        if not one
+    ]
+    soft = "; its oil is softer than its limit" if _soft_oil(result) else ""
+    if wrong:
+        return f"The actuator {'; '.join([wrong, *others])}{soft}."
+    if None in levels.values():
+        return sentence("; ".join(others) + soft.replace("its", "the", 1))
+    if soft:
         return "The oil is softer than its limit; leakage and friction are normal."
-    if not wrong:
-        said = "is healthy: leakage and friction are normal"
-    else:
-        absent = [name for name, one in zip(("leakage", "friction"), faults, strict=True) if not one]
-        said = f"{wrong}{''.join(f'; {name} is normal' for name in absent)}"
-    return f"The actuator {said}{'; its oil is softer than its limit' if _soft_oil(result) else ''}."
+    return "The actuator is healthy: leakage and friction are normal."
+
+
+def _levels(result: Mapping[str, Any]) -> dict[str, str | None]:
+    """Return the levels of leakage and of friction, None where others are together likelier than the verdict's."""
+    best, shares = CONDITIONS[result["condition"]], result.get("probabilities", {})
+    found: dict[str, str | None] = {}
+    for name in ("leakage", "friction"):
+        level = getattr(best, name)
+        others = sum(share for one, share in shares.items() if getattr(CONDITIONS[one], name) != level)
+        found[name] = level if others < TOLD else None
+    return found
 
 
 def _soft_oil(result: Mapping[str, Any]) -> bool:
@@ -106,8 +125,15 @@ def sureness(result: Mapping[str, Any]) -> str:
 
 
 def _how_sure(result: Mapping[str, Any]) -> str:
-    share = result["probabilities"][result["condition"]]
-    what = "The verdict on leakage and friction" if _soft_oil(result) else "This"
+    told = {name: level for name, level in _levels(result).items() if level is not None}
+    share = sum(
+        one
+        for name, one in result["probabilities"].items()
+        if all(getattr(CONDITIONS[name], axis) == level for axis, level in told.items())
+    )
+    if not told:
+        return "The log leaves several conditions possible."
+    what = f"The verdict on {' and '.join(told)}" if _soft_oil(result) or len(told) == 1 else "This"
     if share >= SURE:
         return f"{what} is certain (over {100.0 * SURE:.0f} %)."
     word = "probable" if share >= LIKELY else "the most likely of several explanations"
@@ -124,7 +150,7 @@ def _cost(result: Mapping[str, Any]) -> str:
 def _since(result: Mapping[str, Any]) -> str:
     if result["since_s"] is not None:
         low, high = result["since_ci95_s"]
-        before = result["condition_before"].replace("_", " ")
+        before = in_words(result["condition_before"])
         since = f"{result['since_s']:.2f} s into the log ({low:.2f} to {high:.2f} s)"
         return f"The change came {since}; before, it was {before}."
     return "" if result["condition"] == "normal" else "The fault was there before the log began."
@@ -145,7 +171,8 @@ def what_to_do(result: Mapping[str, Any]) -> list[str]:
     """
     found: list[str] = []
     if not result["unknown"]:
-        condition = CONDITIONS[result["condition"]]
-        work = WORK_ON_LEAKAGE.get(condition.leakage), WORK_ON_FRICTION.get(condition.friction)
-        found += [one for one in work if one] or ([] if _soft_oil(result) else ["Nothing needs repair."])
+        levels = _levels(result)
+        work = WORK_ON_LEAKAGE.get(levels["leakage"] or ""), WORK_ON_FRICTION.get(levels["friction"] or "")
+        sound = not _soft_oil(result) and None not in levels.values()
+        found += [one for one in work if one] or (["Nothing needs repair."] if sound else [])
     return [*found, *left_unread(result), *(sentence(one) for one in result["advice"])]

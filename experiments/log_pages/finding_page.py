@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from estimation.notes import ChannelCode
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.page.numbers import MISSING, number, percent_text, pretty_unit, shop_unit
 from experiments.page.render import render_page
@@ -54,7 +55,12 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
         "actuator": found.actuator,
         "message": sentence(result["message"]),
         "to_do": to_do,
-        "doubts": [sentence(one) for one in dict.fromkeys(map(str, (*found.against, *found.gate.reasons)))],
+        "doubts": [
+            sentence(one)
+            for one in dict.fromkeys(map(str, (*found.against, *found.gate.reasons)))
+            if one not in result["message"]  # the page opens with it
+        ],
+        "doubted": bool(found.against or found.gate.reasons),
         "duration": f"{record.duration:g}",
         "channels": ", ".join(found.channels),
         "notes": [one for one in noted if one not in to_do],
@@ -70,6 +76,11 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
 
 def _title(found: "Finding") -> str:
     """Return the verdict in one sentence."""
+    mistaken = [one.code for one in found.against if isinstance(one.code, ChannelCode)]
+    if found.unknown and ChannelCode.NOTHING_CHANGES in mistaken:
+        return "No verdict: no value changes in this log."
+    if found.unknown and mistaken:
+        return "No verdict: columns of the log are not what they are called."
     if found.unknown:
         return "No verdict: the log does not fit any known condition."
     if found.named:

@@ -23,14 +23,15 @@ def in_short(condition: str) -> str:
 
 
 def sentence(said: str) -> str:
-    """Return a clause as a sentence.
+    """Return a clause as a sentence; the name of a channel stays as it is spelt.
 
     Examples
     --------
-    >>> sentence("check the rig file")
-    'Check the rig file.'
+    >>> sentence("check the rig file"), sentence("position_m stays at 0")
+    ('Check the rig file.', 'position_m stays at 0.')
     """
-    return f"{said[:1].upper()}{said[1:].rstrip('.')}."
+    begin = said[:1] if "_" in said.split(" ", 1)[0] else said[:1].upper()
+    return f"{begin}{said[1:].rstrip('.')}."
 
 
 def left_unread(result: Mapping[str, Any]) -> list[str]:

@@ -107,10 +107,10 @@ def advice_for(
         speeds = speeds_held(record)
         found.append((AdviceCode.MORE_SPEEDS if speeds < 2 else AdviceCode.CLOSER_SPEEDS).note(speeds=speeds))
     if probabilities and max(probabilities.values()) < SURE * sum(probabilities.values()):
-        short = record.duration < LONG_ENOUGH
-        found.append(
-            AdviceCode.LOG_LONGER.note(duration_s=record.duration) if short else AdviceCode.CONDITIONS_OPEN.note()
-        )
+        if record.duration < LONG_ENOUGH:
+            found.append(AdviceCode.LOG_LONGER.note(duration_s=record.duration))
+        elif AdviceCode.MOVE_PISTON not in [note.code for note in found]:  # that asks for larger steps already
+            found.append(AdviceCode.CONDITIONS_OPEN.note())
     return tuple(found) or ((AdviceCode.NOTHING.note(),) if probabilities else ())
 
 

@@ -70,3 +70,23 @@ def test_a_fault_that_is_none_of_the_nine_is_the_verdict_and_its_numbers_are_dou
     result = said_of("major_friction", unknown=True, reasons=[note["text"]], notes=[note])
     assert verdict(result) == "A make-up valve is stuck shut."
     assert "do not rely on the numbers below: the make-up valve of chamber B" in sureness(result)
+
+
+def test_friction_that_a_log_does_not_show_is_not_called_normal() -> None:
+    even = dict.fromkeys(("minor_leakage", "minor_leakage_minor_friction", "minor_leakage_major_friction"), 1 / 3)
+    result = said_of("minor_leakage", probabilities=even)
+    told = "The actuator leaks inside more than it should (minor leakage); friction cannot be told from this log."
+    assert verdict(result) == told
+    assert sureness(result).startswith("The verdict on leakage is certain (over 99 %).")
+    assert what_to_do(result)[0].startswith("Plan a check of pump and piston seal.")
+    assert not any("guides" in one for one in what_to_do(result))
+
+
+def test_an_actuator_of_which_nothing_is_told_is_not_called_healthy() -> None:
+    even = dict.fromkeys(("normal", "minor_friction", "major_friction"), 1 / 3)
+    result = said_of("normal", probabilities=even)
+    assert verdict(result) == "Leakage is normal; friction cannot be told from this log."
+    assert "Nothing needs repair." not in what_to_do(result)
+    nothing = said_of("normal", probabilities=dict.fromkeys(CONDITIONS, 1 / 9))
+    assert verdict(nothing) == "Leakage cannot be told from this log; friction cannot be told from this log."
+    assert sureness(nothing).startswith("The log leaves several conditions possible.")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from estimation.finding import Finding, Gate, Outcome, Quantity
-from estimation.notes import EstimateCode
+from estimation.notes import ChannelCode, EstimateCode
 from experiments.log_pages.entries import message_of
 from experiments.log_pages.finding_page import _row, _title
 
@@ -31,6 +31,14 @@ def found(**changes: object) -> Finding:
         ({"quantities": {"bulk_modulus": Quantity(None, "Pa")}}, "No values: the log contains too little"),
         ({"condition": "minor_leakage", "probabilities": {"minor_leakage": 0.9}}, "Found: minor leakage."),
         ({"condition": "minor_leakage", "unknown": True}, "No verdict: the log does not fit any known condition."),
+        (
+            {"unknown": True, "against": (ChannelCode.CHANNELS_SWAPPED.note(),)},
+            "No verdict: columns of the log are not what they are called.",
+        ),
+        (
+            {"unknown": True, "against": (ChannelCode.NOTHING_CHANGES.note(channel="position_m"),)},
+            "No verdict: no value changes in this log.",
+        ),
     ],
 )
 def test_the_title_promises_no_more_than_was_found(changes: dict[str, object], title: str) -> None:

@@ -128,6 +128,11 @@ def test_a_long_log_that_leaves_conditions_open_is_not_asked_to_be_longer() -> N
     assert codes(advice_for(staircase([100.0] * 24), UNSURE, (), (), ALL)) == [AdviceCode.CONDITIONS_OPEN]
 
 
+def test_larger_steps_are_asked_for_once() -> None:
+    unseen = (ClassCode.FRICTION_NOT_VISIBLE.note(),)
+    assert codes(advice_for(staircase([100.0] * 24), UNSURE, (), unseen, ALL)) == [AdviceCode.MOVE_PISTON]
+
+
 def test_where_something_speaks_against_a_log_that_is_mended_first() -> None:
     record = staircase([100.0])
     froze = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.0, begin_s=0.0, length_s=1.0)
