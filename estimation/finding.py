@@ -42,6 +42,12 @@ class Outcome(StrEnum):
     FAILED = "failed"
 
 
+NOT_OBSERVABLE_WITH_PRESSURE = (
+    "With this drive, bulk modulus is not observable although differential pressure was used: the Cramér-Rao bound is "
+    "over 3 %. Drive with larger, slower steps."
+)
+"""What that outcome means of a log with pressure."""
+
 OUTCOMES: Mapping[Outcome, str] = {
     Outcome.OK: "The result is given, with its interval and the verdict of the consistency check.",
     Outcome.NOT_OBSERVABLE: (

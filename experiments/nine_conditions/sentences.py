@@ -50,7 +50,7 @@ def _bulk_modulus_sentence(found: Mapping[Experiment, Recovery], truth: float) -
     )
     return (
         f"With differential pressure logged, effective bulk modulus comes back in {conditions} of {sine.conditions} "
-        f"conditions from every first guess: {mean / 1e8:.3f}e8 Pa on average, the truth being {truth / 1e8:.3f}e8 Pa, "
+        f"conditions from every first guess: {mean / 1e6:.1f} MPa on average, the truth being {truth / 1e6:.1f} MPa, "
         f"and the worst of {sine.estimates + steps.estimates} estimates is {worst:.2g} % off{second}."
     )
 

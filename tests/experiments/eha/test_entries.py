@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation.eha.estimate import estimate_log
-from estimation.finding import Finding
+from estimation.finding import Finding, Outcome, Quantity
 from estimation.notes import EstimateCode, SensorCode
 from experiments.command.json_output import plain
 from experiments.eha.entries import (
@@ -213,3 +213,17 @@ def test_a_log_in_no_class_names_the_frozen_sensor_first() -> None:
     assert entries["condition"] is None
     assert entries["message"] == f"{froze}; {diagnosis_entries(found)['message']}"
     assert "no class: " in diagnosis_entries(found)["message"]
+
+
+@pytest.mark.parametrize("pressure", [True, False])
+def test_pressure_is_asked_for_where_it_was_not_used(pressure: bool) -> None:
+    found = estimate_log(log(), Rig("rig", EhaParameters()))
+    unseen = replace(
+        found,
+        outcome=Outcome.NOT_OBSERVABLE,
+        quantities={**found.quantities, "bulk_modulus": Quantity(None, "Pa")},
+        channels=found.channels if pressure else ("velocity_m_s",),
+    )
+    message = estimate_entries(unseen)["message"]
+    assert ("Log differential pressure" in message) is not pressure
+    assert "larger, slower steps" in message
