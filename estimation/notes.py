@@ -61,8 +61,8 @@ class ChannelCode(Code):
         "column's unit (--columns CHANNEL=NAME:UNIT)"
     )
     NOTHING_CHANGES = (
-        "{channel}: no value changes from the first row to the last, so the log shows nothing; the logger repeats one "
-        "row, or no sensor is connected"
+        "{channel}: no value changes from the first row to the last although the motor turns, so the log shows "
+        "nothing: the logger repeats one row, or no sensor is connected"
     )
 
 

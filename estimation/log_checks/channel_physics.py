@@ -23,7 +23,7 @@ from estimation.log_checks.measurement_noise import position_variance
 from estimation.notes import ChannelCode
 from plant.eha.model import EhaParameters
 from plant.log.columns import TIME
-from plant.log.plausibility import SAMPLE_TIME
+from plant.log.plausibility import LIMITS, SAMPLE_TIME
 from plant.log.record import Record
 from plant.notes import Note
 
@@ -95,7 +95,7 @@ def channel_mistakes(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     tuple of Note
         None for a sound log, however leaky or stuck the actuator.
     """
-    if all(np.nanmax(record[name]) == np.nanmin(record[name]) for name in MEASURED if name in record):
+    if _repeats_one_row(record):
         return (ChannelCode.NOTHING_CHANGES.note(channel=" and ".join(one for one in MEASURED if one in record)),)
     short, middle, long = (channel_blocks(record, p, length) for length in (SHORT, MIDDLE, LONG))
     found = _swapped(short) or _motions_disagree(short, long, p)
@@ -106,6 +106,12 @@ def channel_mistakes(record: Record, p: EhaParameters) -> tuple[Note, ...]:
         balance = None
     units = tuple(_or_of_time(one, record.sample_time) for one in _pump_units(record, long, p, balance))
     return _reversed(record, long, balance) or units or _pressure_units(middle, p, balance)
+
+
+def _repeats_one_row(record: Record) -> bool:
+    """Return whether nothing changes though the motor turns; where it stands, nothing need change."""
+    still = all(np.nanmax(record[name]) == np.nanmin(record[name]) for name in MEASURED if name in record)
+    return still and SPEED in record and bool(np.nanmax(np.abs(record[SPEED])) > LIMITS[SPEED].least)
 
 
 def _or_of_time(note: Note, sample_time: float) -> Note:

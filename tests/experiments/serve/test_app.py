@@ -209,7 +209,7 @@ def test_two_logs_are_compared_and_the_fleet_has_both(served: Served, monkeypatc
     assert "1 of 2 actuators is past a limit." in fleet.text
     assert f"logs/{pair[1]}" in fleet.text
     client.delete(f"/api/logs/{pair[1]}")
-    assert "None of 1 actuators is past a limit." in client.get("/fleet").text
+    assert "The actuator is past no limit." in client.get("/fleet").text
 
 
 def test_logs_are_listed_the_latest_first_and_page_by_page(served: Served) -> None:

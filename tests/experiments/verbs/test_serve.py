@@ -34,6 +34,7 @@ def test_what_cannot_be_served_is_refused_in_a_sentence(tmp_path: Path, options:
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
     assert "the server's folder cannot be made" in refused(tmp_path / "file" / "kept", "--port", "0")
+    assert "file: a folder is needed, got a file" in refused(tmp_path / "file", "--port", "0")
 
 
 def test_a_missing_package_is_named_with_what_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:

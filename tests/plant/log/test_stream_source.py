@@ -148,7 +148,8 @@ def test_rows_of_a_tcp_connection_wait_at_the_sender_until_they_are_read() -> No
 def test_what_is_no_stream_is_refused_in_a_sentence() -> None:
     assert is_stream("tcp://here:1")
     assert not is_stream("bench.csv")
-    for address in ("tcp://here", "tcp://:99", "mqtt://here", "tcp://here:99999999"):
+    assert is_stream("http://here:1/x")  # an address, though none that is read
+    for address in ("http://here:1/x", "tcp://here", "tcp://:99", "mqtt://here", "tcp://here:99999999"):
         with pytest.raises(HydrostateError, match="a stream must be tcp://HOST:PORT, mqtt://"):
             stream_lines(address, Received())
     with pytest.raises(LogError, match="no answer"):
