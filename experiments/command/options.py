@@ -208,7 +208,7 @@ def require_positive(option: str, value: float | None, unit: str) -> None:
     HydrostateError
         If it is no number, or not positive and finite.
     """
-    if not isinstance(value, Real | None) or isinstance(value, bool):
+    if not isinstance(value, Real | None):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         raise HydrostateError(f"{option} must be a number [{unit}], got {value!r}")
     if value is not None and not (math.isfinite(value) and value > 0.0):
         raise HydrostateError(f"{option} must be positive and finite, got {value:g} {unit}")
