@@ -164,7 +164,7 @@ class Answer(Shown):
         from pathlib import Path
 
         from experiments.command.json_output import write_whole
-        from experiments.command.own_paths import PAGES
+        from experiments.command.output_paths import PAGES
         from plant.errors import HydrostateError
 
         file = Path(path)

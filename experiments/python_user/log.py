@@ -309,7 +309,7 @@ class Log(Shown):
         """Draw every channel over time, in SI."""
         import matplotlib.pyplot as plt
 
-        from experiments.log_pages.channels import label_of
+        from experiments.log_pages.channel_charts import label_of
 
         count = len(self.channels)
         _, axes = plt.subplots(count, 1, sharex=True, squeeze=False, figsize=(8.0, 1.8 * count))
