@@ -50,9 +50,9 @@ def actuator_page(row: ActuatorRow, log: str | None) -> str:
     log : str or None
         Path of the page of its last log from this one, where there is one.
     """
-    every = (outlook_of(row.logs, name, row.maintained) for name in SHOWN)
-    outlooks = [one for one in every if one is not None]
     worst = row.outlook
+    every = (worst if worst and worst.name == name else outlook_of(row.logs, name, row.maintained) for name in SHOWN)
+    outlooks = [one for one in every if one is not None]
     last = [*row.logs][-MOST_LOGS:][::-1]
     facts = {
         "name": row.name,

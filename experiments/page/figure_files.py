@@ -4,16 +4,18 @@ from base64 import b64encode
 from collections.abc import Callable, Mapping
 from io import BytesIO
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from markupsafe import Markup
-from matplotlib.figure import Figure
 
 from experiments.page.frames import Tables
 from experiments.page.style import styled
 from plant.atomic import replacing
 
-Drawings: TypeAlias = Mapping[str, Callable[[Tables], Figure]]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Drawings: TypeAlias = "Mapping[str, Callable[[Tables], Figure]]"
 """From a study's tables to its figures, by file name."""
 
 PNG_DOTS_PER_INCH, LOG_DOTS_PER_INCH = 150, 130
@@ -46,7 +48,7 @@ def figure_files(drawings: Drawings, tables: Tables) -> dict[str, bytes]:
     return files
 
 
-def svg_of(figure: Figure) -> bytes:
+def svg_of(figure: "Figure") -> bytes:
     """Return a figure as an SVG file that is the same at every run."""
     buffer = BytesIO()
     with styled():
@@ -54,7 +56,7 @@ def svg_of(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def image_of(figure: Figure | bytes, words: str) -> Markup:
+def image_of(figure: "Figure | bytes", words: str) -> Markup:
     """Return a figure as an image that is inside its page.
 
     Parameters
@@ -69,7 +71,7 @@ def image_of(figure: Figure | bytes, words: str) -> Markup:
     return Markup('<img alt="{}" src="data:image/svg+xml;base64,{}">').format(words, data)
 
 
-def write_png(draw: Callable[[], Figure], path: Path) -> None:
+def write_png(draw: "Callable[[], Figure]", path: Path) -> None:
     """Write the figure of one log as a PNG, whole or not at all."""
     with styled(), replacing(path) as file:
         draw().savefig(file, format="png", dpi=LOG_DOTS_PER_INCH)

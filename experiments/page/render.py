@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -52,6 +53,14 @@ def render_page(
     def chart(name: str, caption: str) -> Markup:
         return facts["charts"][name].html(name, " ".join(caption.split()))
 
+    made = {"table": table, "figure": figure, "chart": chart, "headings_of": _headings_of, "errata_of": linked_errata}
+    page = _templates().get_template(template).render({**facts, **made})
+    return with_scripts(_BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", page))
+
+
+@cache
+def _templates() -> Environment:
+    """Return what reads templates, and compiles each once however many pages it is filled in for."""
     environment = Environment(
         loader=PackageLoader("experiments", ""),
         autoescape=True,
@@ -60,9 +69,7 @@ def render_page(
         lstrip_blocks=True,
     )
     environment.filters |= {"linked": linked, "number": number, "exact": exact}
-    made = {"table": table, "figure": figure, "chart": chart, "headings_of": _headings_of, "errata_of": linked_errata}
-    page = environment.get_template(template).render({**facts, **made})
-    return with_scripts(_BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", page))
+    return environment
 
 
 def _headings_of(body: str) -> Sequence[tuple[str, Markup]]:

@@ -1,11 +1,11 @@
 """The still picture of a chart as SVG, written directly: a plotting library takes 50 ms for one."""
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 from markupsafe import escape
-from matplotlib.ticker import MaxNLocator
 
 from experiments.page.packed import ends_of_stretches
 from experiments.page.panels import COLOURS, Curve, Panel
@@ -35,6 +35,12 @@ LETTER = 4.6
 
 MOST_ACROSS, MOST_UP = 8, 4
 """Steps between ticks at most [count]."""
+
+ROUND = (0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 2.5, 5.0, 10.0, 20.0)
+"""Distances between ticks, times a power of ten [dimensionless]."""
+
+EDGE = 1e-9
+"""A tick this close beyond an end of the axis is on it, as a share of a step [fraction]."""
 
 ROOM = 0.05
 """Room above and below the data, as a share of their range [fraction]."""
@@ -164,10 +170,19 @@ def _range(values: Array, room: float) -> tuple[float, float]:
 
 
 def _ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
-    """Return round places within a range, with their words."""
-    ticks = [float(one) for one in MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)]
-    step = ticks[1] - ticks[0]
-    within = [0.0 if abs(one) < 1e-6 * step else one for one in ticks if low - 1e-9 * step <= one <= high + 1e-9 * step]
+    """Return round places within a range, at least two, with their words.
+
+    Their distance is the least of `ROUND` that makes no more than so many steps, or the next one below.
+    """
+    least = (high - low) / most
+    decade = 10.0 ** math.floor(math.log10(least))
+    distances = [one * decade for one in ROUND]
+    step, first, last = least, 0, 0
+    for step in distances[bisect_left(distances, least) :: -1]:
+        first, last = math.ceil(low / step - EDGE), math.floor(high / step + EDGE)
+        if last > first:
+            break
+    within = [place * step for place in range(first, last + 1)]
     digits = min(max(math.ceil(math.log10(max(map(abs, within), default=1.0) / step + 1e-300)) + 2, 3), 12)
     return [(one, f"{one:.{digits}g}".replace("-", "\N{MINUS SIGN}")) for one in within]
 

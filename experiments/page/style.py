@@ -4,15 +4,16 @@ from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import style
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from experiments.page.words import in_words
+
+if TYPE_CHECKING:  # half a second, which a page without figures does not need
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
@@ -31,6 +32,8 @@ STYLE = Path(__file__).with_name("hydrostate.mplstyle")
 @contextmanager
 def styled() -> Generator[None]:
     """Draw and save figures in the project's look inside this block."""
+    from matplotlib import style
+
     with style.context(STYLE):
         yield
 
@@ -61,7 +64,7 @@ BESIDE_CONDITIONS = Margins(left=2.0, top=0.4)
 
 def panels(
     title: str, rows: int, columns: int, height_inches: float, margins: Margins, **options: Any
-) -> tuple[Figure, list[Axes]]:
+) -> "tuple[Figure, list[Axes]]":
     """Return a titled figure and its axes, row by row.
 
     Parameters
@@ -76,6 +79,8 @@ def panels(
     tuple of Figure and list of Axes
         The figure, and its axes in reading order.
     """
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(WIDTH_INCHES, height_inches))
     figure.suptitle(title, x=0.01, y=1.0 - 0.08 / height_inches, ha="left", va="top")
     width = (WIDTH_INCHES - margins.left - margins.right - (columns - 1) * margins.across) / columns
@@ -92,7 +97,7 @@ def panels(
     return figure, [axis for row in axes for axis in row]
 
 
-def condition_rows(axis: Axes, conditions: Sequence[str]) -> Mapping[str, float]:
+def condition_rows(axis: "Axes", conditions: Sequence[str]) -> Mapping[str, float]:
     """Lay conditions on the vertical axis, the first on top, and return where each stands.
 
     Parameters
@@ -113,7 +118,7 @@ def condition_rows(axis: Axes, conditions: Sequence[str]) -> Mapping[str, float]
     return heights
 
 
-def condition_levels(axis: Axes, conditions: Iterable[str]) -> NDArray[np.float64]:
+def condition_levels(axis: "Axes", conditions: Iterable[str]) -> NDArray[np.float64]:
     """Lay the conditions of a table on the vertical axis, the first on top, and return where each row stands.
 
     Parameters

@@ -107,10 +107,10 @@ def limits_of_options(texts: Sequence[str]) -> dict[str, float]:
     HydrostateError
         If a severity is not known, or a value is no number.
     """
-    from faults.diagnosis.severity import UNITS
-
     found: dict[str, float] = {}
     for text in texts:
+        from faults.diagnosis.severity import UNITS  # which a fleet without such limits need not load
+
         name, _, value = text.partition("=")
         require_known("--limit", name, list(UNITS))
         try:
@@ -175,19 +175,19 @@ def _diagnosed(
 def _page_writer(base: Path, plant: str | None, rig: Path | None, columns: Any) -> Callable[[str, Path], bool]:
     """Return what writes the page of a log, and says whether the log is still there."""
     from experiments.actuators import offered
-    from experiments.command.log_verb import page_of
-    from experiments.command.logs import caught, read_log
 
     kind, bench = load_actuator(plant, rig)
     chosen, mapping = offered(kind, "diagnose"), load_columns(columns)
-    prepared = chosen.prepare(bench, {**chosen.options, "seed": 0})
 
     def write(file: str, path: Path) -> bool:
         if not (base / file).exists():
             return False
+        from experiments.command.log_verb import page_of  # which pages of a store alone need not load
+        from experiments.command.logs import caught, read_log
+
         with caught():
             record = read_log(base / file, bench.columns, mapping, kind.required)
-            found = chosen.run(record, *prepared)
+            found = chosen.run(record, *chosen.prepare(bench, {**chosen.options, "seed": 0}))
         result = {**chosen.blank, "file": file, "rig": bench.name, **chosen.entries(found)}
         write_whole(path, page_of(chosen, result, found, record), "--out", parents=True)
         return True

@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterator
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from faults.trend.kalman import Belief, Settings, beliefs, evidence_of, first_belief, next_belief
+from faults.trend.kalman import Belief, Settings, beliefs, evidence_of
 from plant.arrays import Array
 
 FEWEST, LATEST = 3, 6
@@ -38,22 +38,21 @@ def stretches(
         Place of the stretch's first log, and the belief.
     """
     jumped = {length: jumps(values, stds, length) for length in range(FEWEST, LATEST + 1)}
-    start, run = 0, [first_belief(grid)]
+    start, run = 0, beliefs(times, values, stds, grid)
     for place in range(len(values)):
         if place in known and place > start:
-            start, run = place, [first_belief(grid)]
-        step = float(times[place] - times[place - 1]) if place > start else 0.0
-        run.append(next_belief(run[-1], step, float(values[place]), float(stds[place]), grid))
+            start, run = place, beliefs(times[place:], values[place:], stds[place:], grid)
         for length, large in jumped.items():
             begin = place + 1 - length
             if begin - start < FEWEST or not large[begin]:
                 continue
-            fresh = list(beliefs(times[begin : place + 1], values[begin : place + 1], stds[begin : place + 1], grid))
-            apart = evidence_of(run[begin - start], grid) + evidence_of(fresh[-1], grid) + np.log(RARE)
-            if apart > evidence_of(run[-1], grid):
-                start, run = begin, [first_belief(grid), *fresh]
+            later = slice(begin, place + 1)
+            fresh = beliefs(times[later], values[later], stds[later], grid)[-1]
+            apart = evidence_of(run[begin - start], grid) + evidence_of(fresh, grid) + np.log(RARE)
+            if apart > evidence_of(run[place + 1 - start], grid):
+                start, run = begin, beliefs(times[begin:], values[begin:], stds[begin:], grid)
                 break
-        yield start, run[-1]
+        yield start, run[place + 1 - start]
 
 
 def jumps(values: Array, stds: Array, length: int) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
@@ -75,10 +74,15 @@ def jumps(values: Array, stds: Array, length: int) -> "np.ndarray[tuple[int], np
     found = np.zeros(count, dtype=np.bool_)
     if count < FEWEST + length:
         return found
-    later = np.median(sliding_window_view(values, length), axis=1)[FEWEST:]
-    noise = np.median(sliding_window_view(stds, length), axis=1)[FEWEST:]
-    before = np.median(sliding_window_view(values, FEWEST), axis=1)[: len(later)]
+    later, noise = _medians(values, length)[FEWEST:], _medians(stds, length)[FEWEST:]
+    before = _medians(values, FEWEST)[: len(later)]
     steps = np.concatenate([np.zeros(LATEST - 1), np.abs(np.diff(values))])
-    scatter = 1.4826 / np.sqrt(2.0) * np.median(sliding_window_view(steps, LATEST), axis=1)[FEWEST - 2 :][: len(later)]
+    scatter = 1.4826 / np.sqrt(2.0) * _medians(steps, LATEST)[FEWEST - 2 :][: len(later)]
     found[FEWEST : FEWEST + len(later)] = np.abs(later - before) > JUMP * np.maximum(scatter, noise)
     return found
+
+
+def _medians(values: Array, length: int) -> Array:
+    """Return the median of so many neighbours from each one on; `numpy.median` takes ten times as long over a few."""
+    ranked = np.sort(sliding_window_view(values, length), axis=1)
+    return 0.5 * (ranked[:, (length - 1) // 2] + ranked[:, length // 2])

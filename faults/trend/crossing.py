@@ -1,14 +1,12 @@
 """When a limit is crossed: by Monte Carlo from what is believed now, settings drawn by their weight."""
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
 from faults.trend.kalman import Belief, Settings, exponential_growth
+from faults.trend.kalman_loops import Index
 from plant.arrays import Array
-
-Index: TypeAlias = "np.ndarray[tuple[int], np.dtype[np.int64]]"
 
 DRAWS = 1000
 """Futures that are drawn [count]."""

@@ -9,13 +9,13 @@ variance, to which every setting adds ``scatter**2``. Values are on the scale on
 limit 1; the unit of time is the usual time between two logs, a count of logs.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from itertools import product
 
 import numpy as np
 
+from faults.trend.kalman_loops import Index, fill_predicted, follow, take_in
 from plant.arrays import Array
 
 BENDS = (0.0, 1e-3, 3e-3, 1e-2)
@@ -80,6 +80,16 @@ class Settings:
         return tuple((float(pace), slice(int(a), int(b))) for pace, a, b in zip(paces, first, ends, strict=True))
 
     @cached_property
+    def paces(self) -> tuple[float, ...]:
+        """Its paces, rising [1/log]."""
+        return tuple(pace for pace, _ in self.by_pace)
+
+    @cached_property
+    def paced(self) -> Index:
+        """Which of them each setting has, shape (g,)."""
+        return np.repeat(np.arange(len(self.by_pace)), [own.stop - own.start for _, own in self.by_pace])
+
+    @cached_property
     def log_prior(self) -> Array:
         """Logarithm of each setting's prior weight, half to each hypothesis [dimensionless].
 
@@ -135,8 +145,8 @@ def first_belief(grid: Settings) -> Belief:
     return Belief(np.zeros((count, 3)), covariance, np.zeros(count))
 
 
-def beliefs(times: Array, values: Array, stds: Array, grid: Settings) -> Iterator[Belief]:
-    """Yield what is believed after each log.
+def beliefs(times: Array, values: Array, stds: Array, grid: Settings) -> list[Belief]:
+    """Return what is believed before the first log, and after each.
 
     Parameters
     ----------
@@ -147,15 +157,22 @@ def beliefs(times: Array, values: Array, stds: Array, grid: Settings) -> Iterato
     grid : Settings
         The grid.
 
-    Yields
-    ------
-    Belief
-        One a log.
+    Returns
+    -------
+    list of Belief
+        One more than there are logs.
     """
-    now = first_belief(grid)
-    for time, before, value, std in zip(times, np.concatenate([times[:1], times[:-1]]), values, stds, strict=True):
-        now = next_belief(now, float(time - before), float(value), float(std), grid)
-        yield now
+    first, rows = first_belief(grid), len(times) + 1
+    mean, covariance = np.empty((rows, *first.mean.shape)), np.empty((rows, *first.covariance.shape))
+    evidence = np.empty((rows, *first.evidence.shape))
+    mean[0], covariance[0], evidence[0] = first.mean, first.covariance, first.evidence
+    steps = np.diff(times, prepend=times[:1])
+    made = [_step(step, grid.paces) for step in steps.tolist()]
+    moves, bent, jerked = (np.array(one) for one in zip(*made, strict=True))
+    wandered = steps[:, None] * grid.wander**2
+    of_grid = grid.bend, grid.jerk, wandered, grid.scatter
+    follow(values, stds, GROSS, grid.paced, moves, bent, jerked, *of_grid, mean, covariance, evidence)
+    return [Belief(mean[k], covariance[k], evidence[k]) for k in range(rows)]
 
 
 def next_belief(now: Belief, step: float, value: float, std: float, grid: Settings) -> Belief:
@@ -168,7 +185,10 @@ def next_belief(now: Belief, step: float, value: float, std: float, grid: Settin
     value, std : float
         What the log says, and its own standard deviation [dimensionless].
     """
-    return update(predict(now, step, grid), value, std, grid)
+    found = predict(now, step, grid)
+    evidence = now.evidence.copy()
+    take_in(found.mean, found.covariance, evidence, value, std, GROSS, grid.scatter)
+    return Belief(found.mean, found.covariance, evidence)
 
 
 def predict(now: Belief, step: float, grid: Settings) -> Belief:
@@ -179,24 +199,24 @@ def predict(now: Belief, step: float, grid: Settings) -> Belief:
     step : float
         How much later [count].
     """
+    moves, bent, jerked = _step(step, grid.paces)
     mean, covariance = np.empty_like(now.mean), np.empty_like(now.covariance)
-    for pace, own in grid.by_pace:
-        move, both, bent, jerked = _step(step, pace)
-        gained = grid.bend[own, None] ** 2 * bent + grid.jerk[own, None] ** 2 * jerked
-        gained[:, 0] += grid.wander[own] ** 2 * step
-        mean[own] = now.mean[own] @ move.T
-        covariance[own] = (now.covariance[own].reshape(-1, 9) @ both.T + gained).reshape(-1, 3, 3)
+    wandered = grid.wander**2 * step
+    fill_predicted(
+        now.mean, now.covariance, grid.paced, moves, bent, jerked, grid.bend, grid.jerk, wandered, mean, covariance
+    )
     return Belief(mean, covariance, now.evidence)
 
 
-@lru_cache(maxsize=192)
-def _step(step: float, pace: float) -> tuple[Array, Array, Array, Array]:
-    """Return what moves means and covariances, rows one after the other, and what noise on slope and curvature adds."""
-    move = np.array([[1.0, step, 0.5 * step**2], [0.0, 1.0, step], [0.0, 0.0, 1.0]])
-    bent, jerked = _gained(step, 2), _gained(step, 3)
-    if pace:  # such settings have no curvature
-        move[:2, 1], bent[:2, :2] = exponential_growth(step, pace)
-    return move, np.asarray(np.kron(move, move), dtype=np.float64), bent.ravel(), jerked.ravel()
+@lru_cache(maxsize=64)
+def _step(step: float, paces: tuple[float, ...]) -> tuple[Array, Array, Array]:
+    """Return what moves means, and what noise on slope and curvature adds, the first two of each pace."""
+    moves = np.tile([[1.0, step, 0.5 * step**2], [0.0, 1.0, step], [0.0, 0.0, 1.0]], (len(paces), 1, 1))
+    bent, jerked = np.tile(_gained(step, 2), (len(paces), 1, 1)), _gained(step, 3)
+    for move, turned, pace in zip(moves, bent, paces, strict=True):
+        if pace:  # such settings have no curvature
+            move[:2, 1], turned[:2, :2] = exponential_growth(step, pace)
+    return moves, bent, jerked
 
 
 def exponential_growth(step: float, pace: float) -> tuple[Array, Array]:
@@ -232,22 +252,6 @@ def _gained(step: float, states: int) -> Array:
     gained = np.zeros((3, 3))
     gained[:states, :states] = step**power / (power * factorials[:, None] * factorials)
     return gained
-
-
-def update(now: Belief, value: float, std: float, grid: Settings) -> Belief:
-    """Return what is believed after a log, an innovation beyond `GROSS` being counted as that.
-
-    Parameters
-    ----------
-    value, std : float
-        What the log says, and its own standard deviation [dimensionless].
-    """
-    innovation = value - now.mean[:, 0]
-    expected = np.maximum(now.covariance[:, 0, 0] + std**2 + grid.scatter**2, (innovation / GROSS) ** 2)
-    gain = now.covariance[:, :, 0] / expected[:, None]
-    said = -0.5 * (np.log(2.0 * np.pi * expected) + innovation**2 / expected)
-    covariance = now.covariance - gain[:, :, None] * now.covariance[:, None, 0, :]
-    return Belief(now.mean + gain * innovation[:, None], covariance, now.evidence + said)
 
 
 def evidence_of(belief: Belief, grid: Settings) -> float:

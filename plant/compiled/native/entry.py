@@ -44,7 +44,7 @@ class _Given:
     numbers : list
         Their parts.
     arrays : list of (str, int, int, bool)
-        Arguments, their ends in memory, and whether they are changed.
+        Arguments that are not empty, their ends in memory, and whether they are changed.
     back : list of (ndarray, ndarray)
         Copies whose changes go back to where they were made from.
     copies : list of ndarray
@@ -190,26 +190,22 @@ class Entry:
 
     def _place(self, argument: Argument, array: Any, laid: _Given, *, changed: bool) -> None:
         """Lay out an array that is as it should be, but for its shape."""
-        shape = array.shape
+        shape, name = array.shape, argument.name
         if len(shape) != len(argument.lengths):
-            self._fail(argument.name, f"an {argument.kind.name}", f"{len(shape)}-dimensional")
+            self._fail(name, f"an {argument.kind.name}", f"{len(shape)}-dimensional")
         for axis, wanted in enumerate(argument.lengths):
-            if wanted is not None:
-                self._measure(argument.name, axis, wanted, shape[axis], laid)
+            length = shape[axis]
+            if wanted is None or wanted == length:
+                continue
+            # a name is as long as the first argument that has it
+            known, by = laid.lengths.setdefault(wanted, (length, name)) if isinstance(wanted, str) else (wanted, "")
+            if known != length:
+                of = f"{known} ({wanted}, as of {by})" if by else known
+                raise ValueError(f"{self.__name__}: axis {axis} of {name} must have length {of}, got {length}")
         address = _address(array)
-        laid.numbers.append(address)
-        laid.numbers.extend(shape)
-        laid.arrays.append((argument.name, address, address + array.nbytes, changed))
-
-    def _measure(self, name: str, axis: int, wanted: int | str, length: int, laid: _Given) -> None:
-        if wanted == length:
-            return
-        if isinstance(wanted, str):
-            known, by = laid.lengths.setdefault(wanted, (length, name))
-            if known == length:
-                return
-            wanted = f"{known} ({wanted}, as of {by})"
-        raise ValueError(f"{self.__name__}: axis {axis} of {name} must have length {wanted}, got {length}")
+        laid.numbers += (address, *shape)
+        if size := array.nbytes:
+            laid.arrays.append((name, address, address + size, changed))
 
     def _apart(self, laid: _Given) -> None:
         """Make sure that what is changed is nothing else's memory, for the machine code takes it so."""
@@ -217,7 +213,7 @@ class Entry:
             if not changed:
                 continue
             for other, first, last, _ in laid.arrays:
-                if other != name and begin < last and first < end and begin < end and first < last:
+                if begin < last and first < end and other != name:
                     raise ValueError(f"{self.__name__}: {name} and {other} must not share memory")
 
 

@@ -1,5 +1,7 @@
 """The page of a fleet, and that it works in a browser."""
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +28,15 @@ def test_the_page_says_how_many_are_sick_and_with_which_to_begin() -> None:
     page = page_of(9)
     assert "<h1>2 of 9 actuators are past a limit.</h1>" in page
     assert "Start with P-5, P-1." in page
+
+
+def test_pages_of_a_store_wait_for_no_plotting_library() -> None:
+    code = (
+        "import sys\nimport experiments.fleet.log_pages\nimport experiments.fleet.page\n"
+        "print(sorted({'matplotlib', 'scipy', 'faults.diagnosis'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)  # noqa: S603
+    assert done.stdout.splitlines() == ["[]"]
 
 
 def test_a_page_has_relative_links_and_no_folder() -> None:

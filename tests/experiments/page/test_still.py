@@ -5,9 +5,10 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from matplotlib.ticker import MaxNLocator
 
 from experiments.page.panels import Curve, Mark, Panel
-from experiments.page.still import MOST_STILL, still_picture
+from experiments.page.still import MOST_STILL, _ticks, still_picture  # pyright: ignore[reportPrivateUsage]
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -74,3 +75,13 @@ def test_names_are_escaped_and_a_long_log_keeps_its_peak_with_few_points() -> No
     path = path_of(picture, "line")
     assert len(re.findall("[ML]", path)) <= MOST_STILL
     assert min(float(one) for one in re.findall(r"[ML]\S+ ([\d.]+)", path)) < 10.0
+
+
+def test_ticks_are_where_a_plotting_library_puts_them() -> None:
+    rng = np.random.default_rng(3)
+    for most in (4, 8):
+        for size, where in zip(10.0 ** rng.uniform(-6, 6, 300), rng.uniform(-1.0, 30.0, 300), strict=True):
+            low, high = where * size, (where + 1.0) * size
+            theirs = MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+            ours = [place for place, _ in _ticks(float(low), float(high), most)]
+            assert ours == pytest.approx([one for one in theirs if low <= one <= high], abs=1e-9 * size)

@@ -21,6 +21,7 @@ from faults.trend.kalman import (
 )
 from plant.arrays import Array
 from tests.faults.trend.one_setting import one_setting
+from tests.kernels import loops_in_python
 
 
 def test_without_process_noise_the_filter_is_bayesian_regression_on_a_line() -> None:
@@ -38,6 +39,20 @@ def test_without_process_noise_the_filter_is_bayesian_regression_on_a_line() -> 
     marginal = np.diag(stds**2) + design @ np.diag([LEVEL**2, 0.05**2]) @ design.T
     said = -0.5 * (values @ np.linalg.solve(marginal, values) + np.linalg.slogdet(2.0 * np.pi * marginal)[1])
     assert last.evidence[0] == pytest.approx(said)
+
+
+def test_a_series_is_followed_as_log_by_log() -> None:
+    grid, rng = settings(), np.random.default_rng(5)
+    times, values = np.cumsum(rng.uniform(0.0, 3.0, 6)), np.array([0.0, 0.1, 0.0, 9.0, 0.1, 0.2])
+    now, *rest = beliefs(times, values, np.full(6, 0.05), grid)
+    for step, value, found in zip(np.diff(times, prepend=times[:1]), values, rest, strict=True):
+        now = next_belief(now, float(step), float(value), 0.05, grid)
+        for one, other in zip(vars(now).values(), vars(found).values(), strict=True):
+            assert np.allclose(one, other, rtol=1e-12, atol=0.0)
+    with loops_in_python():
+        plainly = beliefs(times, values, np.full(6, 0.05), grid)
+    assert np.allclose(plainly[-1].covariance, now.covariance, rtol=1e-12, atol=0.0)
+    assert np.allclose(plainly[-1].mean, now.mean, rtol=1e-12, atol=0.0)
 
 
 def test_two_steps_are_one_step_of_twice_the_time() -> None:

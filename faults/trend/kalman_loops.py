@@ -1,0 +1,176 @@
+"""A step and a log of every setting of the grid of `faults.trend.kalman`, as plain loops that are compiled."""
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.arrays import Array
+from plant.compiled.native.loops import natively
+
+Index: TypeAlias = NDArray[np.int64]
+"""Places."""
+
+
+@natively()
+def fill_predicted(
+    mean: Array,
+    covariance: Array,
+    paced: Index,
+    moves: Array,
+    bent: Array,
+    jerked: Array,
+    bend: Array,
+    jerk: Array,
+    wandered: Array,
+    next_mean: Array,
+    next_covariance: Array,
+) -> None:
+    """Fill in what is believed a step later.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (g, 3)
+        Level, slope and curvature [dimensionless, 1/log, 1/log^2].
+    covariance : ndarray, shape (g, 3, 3)
+        Of the three [products of their units].
+    paced : ndarray of int, shape (g,)
+        Which pace a setting has.
+    moves, bent : ndarray, shape (paces, 3, 3)
+        What moves the three of each pace, and what unit white noise on the slope brings.
+    jerked : ndarray, shape (3, 3)
+        What unit white noise on the curvature brings.
+    bend, jerk : ndarray, shape (g,)
+        Size of either noise [1/log, 1/log^2].
+    wandered : ndarray, shape (g,)
+        Variance that the level gains [dimensionless].
+    next_mean : ndarray, shape (g, 3)
+        Room for the means.
+    next_covariance : ndarray, shape (g, 3, 3)
+        Room for the covariances.
+    """
+    for k in range(mean.shape[0]):
+        move, noise = moves[paced[k]], bent[paced[k]]
+        slopes, jolts = bend[k] * bend[k], jerk[k] * jerk[k]
+        rise, bow, growth, turn = move[0, 1], move[0, 2], move[1, 1], move[1, 2]
+        level, slope, curvature = mean[k, 0], mean[k, 1], mean[k, 2]
+        next_mean[k, 0] = level + rise * slope + bow * curvature
+        next_mean[k, 1] = growth * slope + turn * curvature
+        next_mean[k, 2] = curvature
+        # the covariance is symmetric: a name has the two states that it is of
+        slope_slope, slope_bend, bend_bend = covariance[k, 1, 1], covariance[k, 1, 2], covariance[k, 2, 2]
+        level_slope = covariance[k, 0, 1] + rise * slope_slope + bow * slope_bend
+        level_bend = covariance[k, 0, 2] + rise * slope_bend + bow * bend_bend
+        level_level = covariance[k, 0, 0] + rise * covariance[k, 0, 1] + bow * covariance[k, 0, 2]
+        moved_bend = growth * slope_bend + turn * bend_bend
+        next_covariance[k, 0, 0] = level_level + rise * level_slope + bow * level_bend + wandered[k]
+        next_covariance[k, 0, 1] = growth * level_slope + turn * level_bend
+        next_covariance[k, 0, 2] = level_bend
+        next_covariance[k, 1, 1] = growth * (growth * slope_slope + turn * slope_bend) + turn * moved_bend
+        next_covariance[k, 1, 2] = moved_bend
+        next_covariance[k, 2, 2] = bend_bend
+        for i in range(3):
+            for j in range(i, 3):
+                next_covariance[k, i, j] += slopes * noise[i, j] + jolts * jerked[i, j]
+                next_covariance[k, j, i] = next_covariance[k, i, j]
+
+
+@natively()
+def take_in(
+    mean: Array, covariance: Array, evidence: Array, value: float, std: float, gross: float, scatter: Array
+) -> None:
+    """Change what is believed to what is believed after a log.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (g, 3)
+        Level, slope and curvature [dimensionless, 1/log, 1/log^2].
+    covariance : ndarray, shape (g, 3, 3)
+        Of the three [products of their units].
+    evidence : ndarray, shape (g,)
+        Logarithm of the probability of all logs so far [dimensionless].
+    value : float
+        What the log says [dimensionless].
+    std : float
+        Its own standard deviation [dimensionless].
+    gross : float
+        An innovation counts as no more than so many standard deviations [dimensionless].
+    scatter : ndarray, shape (g,)
+        Standard deviation from log to log beyond each log's own [dimensionless].
+    """
+    for k in range(mean.shape[0]):
+        innovation = value - mean[k, 0]
+        level, slope, curvature = covariance[k, 0, 0], covariance[k, 0, 1], covariance[k, 0, 2]
+        usual = level + std * std + scatter[k] * scatter[k]
+        expected = max(usual, (innovation / gross) * (innovation / gross))
+        evidence[k] -= 0.5 * (math.log(2.0 * math.pi * expected) + innovation * innovation / expected)
+        for i in range(3):
+            gain = covariance[k, i, 0] / expected
+            mean[k, i] += gain * innovation
+            covariance[k, i, 0] -= gain * level
+            covariance[k, i, 1] -= gain * slope
+            covariance[k, i, 2] -= gain * curvature
+
+
+@natively()
+def follow(
+    values: Array,
+    stds: Array,
+    gross: float,
+    paced: Index,
+    moves: Array,
+    bent: Array,
+    jerked: Array,
+    bend: Array,
+    jerk: Array,
+    wandered: Array,
+    scatter: Array,
+    mean: Array,
+    covariance: Array,
+    evidence: Array,
+) -> None:
+    """Fill in what is believed after each log, from what is believed before the first, which stands in the first row.
+
+    Parameters
+    ----------
+    values, stds : ndarray, shape (n,)
+        What each log says, and its own standard deviation [dimensionless].
+    gross : float
+        See `take_in` [dimensionless].
+    paced : ndarray of int, shape (g,)
+        See `fill_predicted`, as all that follows.
+    moves, bent : ndarray, shape (n, paces, 3, 3)
+        Of the step before each log.
+    jerked : ndarray, shape (n, 3, 3)
+        The same.
+    bend, jerk : ndarray, shape (g,)
+        Size of either noise [1/log, 1/log^2].
+    wandered : ndarray, shape (n, g)
+        Variance that the level gains in the step before each log [dimensionless].
+    scatter : ndarray, shape (g,)
+        See `take_in` [dimensionless].
+    mean : ndarray, shape (rows, g, 3)
+        A row more than there are logs.
+    covariance : ndarray, shape (rows, g, 3, 3)
+        The same.
+    evidence : ndarray, shape (rows, g)
+        The same.
+    """
+    for k in range(values.shape[0]):
+        fill_predicted(
+            mean[k],
+            covariance[k],
+            paced,
+            moves[k],
+            bent[k],
+            jerked[k],
+            bend,
+            jerk,
+            wandered[k],
+            mean[k + 1],
+            covariance[k + 1],
+        )
+        for i in range(evidence.shape[1]):
+            evidence[k + 1, i] = evidence[k, i]
+        take_in(mean[k + 1], covariance[k + 1], evidence[k + 1], values[k], stds[k], gross, scatter)
