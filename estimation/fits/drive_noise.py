@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem
 from plant.arrays import Array
 
@@ -46,14 +47,20 @@ def drive_variance(
     rough, samples, spread = problem.coarse, len(log.drives), np.array(log.drive_std)
     undisturbed = rough.residuals(theta) if undisturbed is None else undisturbed
     if samples <= SAMPLES_KEPT:
-        drives = spread[:, None] * _kept_draws(*log.drives.shape)
-        drives += log.drives[..., None]
-        moved = rough.disturbed_together(theta, drives) - undisturbed[..., None]
+        moved = rough.disturbed_together(theta, _noisy_drives(log)) - undisturbed[..., None]
         return np.sum((bread @ (slopes.T @ moved.reshape(-1, DRAWS))) ** 2, axis=1) / DRAWS
     rng = np.random.default_rng(0)
     draws = (log.drives + spread * rng.standard_normal(log.drives.shape) for _ in range(DRAWS))
     each = ((errors - undisturbed).ravel() for errors in rough.disturbed(theta, draws))
     return sum((bread @ (slopes.T @ moved)) ** 2 for moved in each) / DRAWS
+
+
+@lru_cache(maxsize=1)
+def _noisy_drives(log: GreyBoxLog) -> Array:
+    """Return a log's driving channels with noise, shape (samples, channels, draws); kept for the other balances."""
+    drives = np.array(log.drive_std)[:, None] * _kept_draws(*log.drives.shape)
+    drives += log.drives[..., None]
+    return drives
 
 
 @lru_cache(maxsize=1)

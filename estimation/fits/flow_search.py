@@ -7,7 +7,7 @@ that explains the log, nothing else is searched; else searches begin at leakages
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from math import ceil
+from math import ceil, prod
 from typing import TypeAlias
 
 import numpy as np
@@ -40,9 +40,13 @@ MAKEUP_TRIED = (1e-9, 1e-13)
 LEAD_START = 1e-5
 """First guess of the motor's lead on the straight line between samples [s]."""
 
-GUESSED = ((1.0, 2.5, 5.0, 8.0, 12.5), (1.0, 3.5, 6.0), (0.7, 1.0, 1.3))
-"""Leakage and flow bias as multiples of the healthy actuator's, and bulk modulus as one of the first guess, in the
-guesses of which the likeliest is followed [dimensionless]: from the healthy actuator to the worst of Table 3."""
+GUESSED: Mapping[str, Sequence[float]] = {
+    "leakage_coefficient": (1.0, 2.5, 5.0, 8.0, 12.5),
+    "flow_bias": (1.0, 3.5, 6.0),
+    "bulk_modulus": (0.7, 1.0, 1.3),
+}
+"""Multiples of the first start's unknowns in the guesses of which the likeliest is followed [dimensionless]: from the
+healthy actuator to the worst of Table 3."""
 
 GUESSED_WITHIN = 0.3
 """First radius of a search from the likeliest guess [dimensionless]: half the distance between guesses of leakage."""
@@ -293,21 +297,23 @@ def _guess(
     search = _search(log)
     problem = FreedProblem.of(form, log.beginning(search.screened).coarsened())
     around = {STIFFNESS: 0.0, **starts[0]}
-    guesses = [
-        problem.model.theta(
-            {
-                **around,
-                "leakage_coefficient": worse * around["leakage_coefficient"],
-                "flow_bias": biased * around["flow_bias"],
-                "bulk_modulus": stiffer * around["bulk_modulus"],
-            }
-        )
-        for worse, biased, stiffer in product(*GUESSED)
-    ]
+    guesses = _guesses_about(around, problem.model)
     likeliest = guesses[int(np.argmin(problem.costs(guesses)))]
     bounds = flow_bounds(form, guesses, log)
     found = descend(problem.at, likeliest, search.evaluations, bounds, search.near_enough, GUESSED_WITHIN)
     return problem.model.values(found.theta), explained(problem, found)
+
+
+def _guesses_about(around: Mapping[str, float], model: GreyBoxModel) -> Array:
+    """Return all guesses about a start, each coordinate of which is made once, shape (guesses, unknowns)."""
+    places = [model.unknowns.index(name) for name in GUESSED]
+    tried = [
+        [model.theta({**around, name: factor * around[name]})[place] for factor in factors]
+        for place, (name, factors) in zip(places, GUESSED.items(), strict=True)
+    ]
+    guesses = np.tile(model.theta(around), (prod(map(len, tried)), 1))
+    guesses[:, places] = list(product(*tried))
+    return guesses
 
 
 def _search(log: GreyBoxLog) -> Search:

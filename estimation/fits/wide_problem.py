@@ -145,13 +145,14 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     latest = 0.0 if log.course is None else -log.sample_time
     limits = {"speed_lead": (latest, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
     limits[START_LEVEL] = (-rig["accumulator_pressure"], _shut_in(log))
-    stiff = max(rig["bulk_modulus"], *(model.values(guess)["bulk_modulus"] for guess in guesses))
+    place = model.unknowns.index("bulk_modulus")  # fitted as a logarithm
+    softest, stiffest_guess = (float(np.exp(end(guess[place] for guess in guesses))) for end in (min, max))
+    stiff = max(rig["bulk_modulus"], stiffest_guess)
     volume = rig["chamber_volume"]
     limits["chamber_volume"] = (volume / MOST_VOLUME, MOST_VOLUME * volume)
     limits["makeup_conductance"] = (0.0, 2.0 * rig["chamber_volume"] / (FASTEST_MAKEUP * stiff))
     if log.passes_on:
-        found = [model.values(guess)["bulk_modulus"] for guess in guesses]
-        limits["bulk_modulus"] = (min(found) / MOST_BIASED, MOST_BIASED * max(found))
+        limits["bulk_modulus"] = (softest / MOST_BIASED, MOST_BIASED * stiffest_guess)
     return search_bounds(model, guesses, {**LIMITS, **limits})
 
 

@@ -1,5 +1,6 @@
 """Gross outliers: samples that no motion explains, taken out before anything is fitted or filtered."""
 
+import math
 from collections.abc import Sequence
 from functools import cache
 
@@ -171,11 +172,12 @@ def _within_range(seen: Array, noise: float) -> Array:
     low, high = float(np.nanmin(inner)), float(np.nanmax(inner))
     reach = high - low + GROSS * noise
     for end in (seen[: ENDS + 2][::-1], seen[-ENDS - 2 :]):
+        values = end.tolist()  # some numbers, which Python compares sooner than NumPy
         for at in range(2, ENDS + 2):
-            before, step = end[at - 1] - end[at - 2], end[at] - end[at - 1]
+            before, step = values[at - 1] - values[at - 2], values[at] - values[at - 1]
             led = before * step > 0.0 and abs(step) <= BENDS * abs(before)
-            if not led and not low - reach <= end[at] <= high + reach:
-                end[at] = np.nan
+            if not led and not low - reach <= values[at] <= high + reach:
+                end[at] = values[at] = math.nan
     return seen
 
 

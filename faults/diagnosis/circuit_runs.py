@@ -226,7 +226,10 @@ def _starts(blocks: Blocks, rows: Array) -> Array:
     p = circuit_values(rows)
     begun = blocks.opening if blocks.begun is None and np.any(p.load_force) else blocks.begun
     states = at_rest(p) if begun is None else under_pressure(*begun, p)
-    return np.stack(np.broadcast_arrays(*states, rows[:, 0])[:-1], axis=-1, dtype=np.float64)
+    found = np.empty((len(rows), len(states)))
+    for place, state in enumerate(states):
+        found[:, place] = state
+    return found
 
 
 def _drift(course: Array, width: int) -> Array:

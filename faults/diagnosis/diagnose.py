@@ -33,7 +33,7 @@ from faults.diagnosis.models_verdict import models_verdict, ranked
 from faults.diagnosis.open_classes import circuits_left_open
 from faults.diagnosis.out_of_model import SOFT, reasons_against, sensors_disagree
 from faults.diagnosis.rmse import Scores, score_mathematical
-from faults.diagnosis.severity import limits_of, severities, severities_at, what_is_not_told, with_bulk_modulus
+from faults.diagnosis.severity import healthy_severities, limits_of, severities, what_is_not_told, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
 from faults.diagnosis.wear import whatever_fault, whatever_the_pump_delivers
 from faults.eha.bank import mathematical_bank
@@ -283,8 +283,8 @@ def diagnose_clean(
         probabilities,
         against,
         severity,
-        severities_at(actuator.conditions[0], actuator),
-        limits_of(actuator),
+        dict(healthy_severities(actuator)),
+        dict(limits_of(actuator)),
         tuple(what_is_not_told(board.fits, severity, pressure=pressure)),
         board,
     )

@@ -3,6 +3,7 @@
 Two banks, as in section 6 of the paper: the identified transfer functions, and the mathematical models.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -194,7 +195,14 @@ def rmse(measured: Array, predicted: Array) -> float:
     """
     if not np.all(np.isfinite(predicted)):
         return float("inf")
-    return float(np.sqrt(np.nanmean((measured - predicted) ** 2)))
+    return _root_mean_square(measured - predicted)
+
+
+def _root_mean_square(values: Array) -> float:
+    """Return the root mean square over what is there; where all is, missing samples are not looked for."""
+    squares = values**2
+    mean = float(np.mean(squares))
+    return math.sqrt(float(np.nanmean(squares)) if math.isnan(mean) else mean)
 
 
 def _scored(rows: Mapping[str, Mapping[str, float]], measured: Mapping[str, Array]) -> Scores:
@@ -207,7 +215,7 @@ def _scored(rows: Mapping[str, Mapping[str, float]], measured: Mapping[str, Arra
 
 
 def _size(values: Array) -> float:
-    size = float(np.sqrt(np.nanmean(values**2)))
+    size = _root_mean_square(values)
     if size == 0.0:
         raise LogError("a channel that is zero throughout cannot be scored: nothing was measured")
     return size

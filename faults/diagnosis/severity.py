@@ -1,6 +1,7 @@
 """How bad is it? A fitted circuit in the units of a shop, each number with a 95 % interval."""
 
 from collections.abc import Mapping, Sequence
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from faults.notes import ClassCode
 from plant.arrays import Array
 from plant.components.friction import quadratic_friction
 from plant.components.oil import ATMOSPHERE
-from plant.eha.circuit_parameters import circuit_values
+from plant.eha.circuit_parameters import CircuitParameters, circuit_values
 from plant.eha.steady_state import steady_state
 from plant.notes import Note
 
@@ -70,7 +71,7 @@ def _of_circuits(points: Array, actuator: Actuator) -> Mapping[str, Array]:
     healthy = actuator.circuit
     p = circuit_values(parameter_rows(points, healthy, actuator.rated))
     velocity, pressure = steady_state(healthy.rated_speed, p)
-    sound_velocity, sound_pressure = steady_state(healthy.rated_speed, healthy)
+    sound_velocity, sound_pressure = _settled(healthy)
     rubbing, sound = (
         quadratic_friction(actuator.rated, 1.0, q.friction_quadratic, q.friction_linear, q.friction_coulomb)
         for q in (p, healthy)
@@ -83,6 +84,12 @@ def _of_circuits(points: Array, actuator: Actuator) -> Mapping[str, Array]:
         "bulk_modulus": p.bulk_modulus,
         "entrained_air": _air(p.bulk_modulus, actuator),
     }
+
+
+@lru_cache(maxsize=16)
+def _settled(circuit: CircuitParameters) -> tuple[float, float]:
+    """Return velocity and pressure of a circuit at rated speed [m/s, Pa], kept for the next log."""
+    return steady_state(circuit.rated_speed, circuit)
 
 
 def severities(
@@ -110,10 +117,9 @@ def severities(
     Mapping[str, Quantity]
         By the names of `UNITS`.
     """
-    rng = np.random.default_rng(0)
     among = circuits or [OpenCircuit(fits.best.coordinates, 1.0)]
     centre = max(among, key=lambda one: one.probability).coordinates
-    drawn = _centres(among) + rng.multivariate_normal(np.zeros(len(centre)), fits.spread, DRAWS, method="cholesky")
+    drawn = _centres(among) + _normal_draws(len(centre)) @ np.linalg.cholesky(fits.spread).T
     with np.errstate(all="ignore"):  # friction that falls faster than leakage holds has no steady state
         table, best = _of_circuits(drawn, actuator), severities_at(centre, actuator)
     found: dict[str, Quantity] = {}
@@ -131,6 +137,12 @@ def severities(
     return found | {"entrained_air": _with_air(found["entrained_air"], found["bulk_modulus"], actuator)}
 
 
+@cache
+def _normal_draws(coordinates: int) -> Array:
+    """Return draws of unit white noise, shape (`DRAWS`, coordinates), the same for every log: a fit can be repeated."""
+    return np.random.default_rng(0).standard_normal((DRAWS, coordinates))
+
+
 def _unresolved(actuator: Actuator) -> Mapping[str, float]:
     """Return what no fit resolves of friction, by severity: no logarithm begins at zero (`LEAST_FORCE`).
 
@@ -140,20 +152,40 @@ def _unresolved(actuator: Actuator) -> Mapping[str, float]:
     parts, least = friction_parts(p, actuator.rated)
     if min(parts) >= least:
         return {}
-    pressure = steady_state(p.rated_speed, p)[1]
+    pressure = _settled(p)[1]
     rise = 100.0 * least / (p.piston_area * pressure) if pressure > 0.0 else 0.0
     return {"added_friction": least, "pressure_rise": rise}
 
 
 def _centres(circuits: Sequence[OpenCircuit]) -> Array:
-    """Return the circuit about which each draw lies, as often as it is likely, shape (`DRAWS`, 7)."""
+    """Return the circuit about which each draw lies, as often as it is likely, shape (`DRAWS` or 1, 7)."""
     shares = np.cumsum([one.probability for one in circuits])
+    if len(circuits) == 1:
+        return circuits[0].coordinates[None]
     of = np.searchsorted(shares / shares[-1], (np.arange(DRAWS) + 0.5) / DRAWS)
     return np.array([one.coordinates for one in circuits])[of]
 
 
+@lru_cache(maxsize=16)
+def healthy_severities(actuator: Actuator) -> Mapping[str, float]:
+    """Return the severities of a healthy actuator, kept for the next log.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        It.
+
+    Returns
+    -------
+    Mapping[str, float]
+        In the units of `UNITS`.
+    """
+    return severities_at(actuator.conditions[0], actuator)
+
+
+@lru_cache(maxsize=16)
 def limits_of(actuator: Actuator) -> Mapping[str, float]:
-    """Return where an actuator stops being sound, until its owner says otherwise.
+    """Return where an actuator stops being sound, until its owner says otherwise; kept for the next log.
 
     Parameters
     ----------
@@ -166,10 +198,9 @@ def limits_of(actuator: Actuator) -> Mapping[str, float]:
         Half-way from healthy to minor leakage or minor friction; the softest oil of a sound actuator of this kind. In
         the units of `UNITS`; air has none, since bulk modulus has one.
     """
-    names = list(CONDITIONS)
-    sound, leaking, rubbing = (
-        severities_at(actuator.conditions[names.index(name)], actuator)
-        for name in ("normal", "minor_leakage", "minor_friction")
+    names, sound = list(CONDITIONS), healthy_severities(actuator)
+    leaking, rubbing = (
+        severities_at(actuator.conditions[names.index(name)], actuator) for name in ("minor_leakage", "minor_friction")
     )
     faulty = {
         **{name: leaking[name] for name in ("leakage_flow", "velocity_lost")},

@@ -213,10 +213,28 @@ def circuit_of(p: EhaParameters) -> CircuitParameters:
     )
 
 
-_NAMES = tuple(field.name for field in fields(CircuitParameters))
+_PLACES = {field.name: place for place, field in enumerate(fields(CircuitParameters))}
 
 
-def circuit_values(rows: Array) -> SimpleNamespace:
+class CircuitRows:
+    """Parameters of circuits by name, looked up in their rows: most who ask read a few of forty.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (..., parameters)
+        Parameters in the order of the fields [SI].
+    """
+
+    def __init__(self, rows: Array) -> None:
+        self._rows = rows
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in _PLACES:
+            raise AttributeError(f"a circuit has no parameter {name!r}")
+        return self._rows[..., _PLACES[name]]
+
+
+def circuit_values(rows: Array) -> Any:
     """Return a circuit's parameters by name, from a row of them, or from rows of many circuits.
 
     Parameters
@@ -224,4 +242,4 @@ def circuit_values(rows: Array) -> SimpleNamespace:
     rows : ndarray, shape (..., parameters)
         Parameters in the order of the fields [SI].
     """
-    return SimpleNamespace(**{name: rows[..., i] for i, name in enumerate(_NAMES)})
+    return CircuitRows(rows)
