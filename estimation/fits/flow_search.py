@@ -304,8 +304,8 @@ def _guess(
     return problem.model.values(found.theta), explained(problem, found)
 
 
-def _guesses_about(around: Mapping[str, float], model: GreyBoxModel) -> Array:
-    """Return all guesses about a start, each coordinate of which is made once, shape (guesses, unknowns)."""
+def _guesses_about(around: Mapping[str, float], model: GreyBoxModel) -> list[Array]:
+    """Return all guesses about a start, each coordinate of which is made once."""
     places = [model.unknowns.index(name) for name in GUESSED]
     tried = [
         [model.theta({**around, name: factor * around[name]})[place] for factor in factors]
@@ -313,7 +313,7 @@ def _guesses_about(around: Mapping[str, float], model: GreyBoxModel) -> Array:
     ]
     guesses = np.tile(model.theta(around), (prod(map(len, tried)), 1))
     guesses[:, places] = list(product(*tried))
-    return guesses
+    return list(guesses)
 
 
 def _search(log: GreyBoxLog) -> Search:

@@ -12,7 +12,7 @@ from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO
 from estimation.fits.promises import promised, promised_each
 from estimation.log_checks.measurement_noise import measurement_variances
-from estimation.models.flow import MASS_FLOW_FORM
+from estimation.models.flow import MASS_FLOW_FORM, STIFFNESS
 from experiments.open_benchmark.logger import PLAIN, Logger
 from experiments.open_benchmark.machine import Machine
 from experiments.open_benchmark.run import TICK, run
@@ -173,3 +173,15 @@ def test_what_the_orifices_of_make_up_valves_leave_is_put_on_no_sensor() -> None
     assert fit.explanation is not None
     assert fit.explanation.names == ("makeup_bends",)
     assert fit.parameters["bulk_modulus"][0] == pytest.approx(Machine().bulk_modulus, rel=0.004)
+
+
+def test_guesses_about_a_start_are_all_multiples_of_it() -> None:
+    start = {"leakage_coefficient": 2e-13, "flow_bias": 3e-6, "bulk_modulus": 1e9, "makeup_conductance": 1e-9}
+    around = {STIFFNESS: 0.0, **flow_starts(EhaParameters(), 1e9)[0], **start}
+    guesses = flow_search._guesses_about(around, MASS_FLOW_FORM)  # pyright: ignore[reportPrivateUsage]
+    found = [MASS_FLOW_FORM.values(guess) for guess in guesses]
+    assert len({tuple(one.values()) for one in found}) == len(found) == 45
+    assert found[0]["bulk_modulus"] == pytest.approx(0.7e9)
+    assert found[-1] == pytest.approx(
+        {**found[0], "leakage_coefficient": 25e-13, "flow_bias": 18e-6, "bulk_modulus": 1.3e9}
+    )

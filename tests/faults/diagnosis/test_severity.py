@@ -14,6 +14,7 @@ from faults.diagnosis.class_regions import ClassFits
 from faults.diagnosis.severity import (
     OF_KIND,
     UNITS,
+    healthy_severities,
     limits_of,
     severities,
     severities_at,
@@ -235,3 +236,12 @@ def test_the_velocity_that_is_lost_is_told_with_its_interval() -> None:
     lost = known["velocity_lost"]
     assert lost.ci95 is not None
     assert (said.data["percent"], said.data["low"], said.data["high"]) == (lost.value, *lost.ci95)
+
+
+def test_what_an_actuator_has_by_itself_is_found_once() -> None:
+    sound = healthy_severities(ACTUATOR)
+    assert sound == severities_at(ACTUATOR.conditions[0], ACTUATOR)
+    assert healthy_severities(ACTUATOR) is sound
+    assert limits_of(ACTUATOR) is limits_of(ACTUATOR)
+    worn = Actuator.of(replace(RIG, leakage_coefficient=9e-12))
+    assert limits_of(worn) != limits_of(ACTUATOR)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
-from plant.eha.circuit_parameters import CircuitParameters, circuit_of, oil_demand
+from plant.eha.circuit_parameters import CircuitParameters, circuit_of, circuit_values, oil_demand
 from plant.eha.model import JUDGED_STROKE, EhaParameters
 from plant.errors import RigError
+from plant.solvers.steps import parameter_row
 from plant.units import notes
 
 PAPER = CircuitParameters()
@@ -87,3 +88,14 @@ def test_what_an_ideal_circuit_lacks_may_be_zero(name: str) -> None:
 def test_air_asks_more_of_the_accumulator() -> None:
     demands = [oil_demand(replace(PAPER, air_fraction=air)) for air in (0.0, 0.05, 0.2)]
     assert np.all(np.diff(demands) > 0.0)
+
+
+def test_rows_of_circuits_have_each_parameter_by_its_name_and_no_other() -> None:
+    circuit = CircuitParameters()
+    rows = np.stack([parameter_row(circuit), parameter_row(replace(circuit, flow_bias=1e-6))])
+    values = circuit_values(rows)
+    for place, field in enumerate(fields(circuit)):
+        assert np.array_equal(getattr(values, field.name), rows[:, place], equal_nan=True)
+    assert values.flow_bias.tolist() == [circuit.flow_bias, 1e-6]
+    with pytest.raises(AttributeError, match="no parameter 'flow_bais'"):
+        _ = values.flow_bais
