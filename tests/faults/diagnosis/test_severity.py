@@ -243,5 +243,5 @@ def test_what_an_actuator_has_by_itself_is_found_once() -> None:
     assert sound == severities_at(ACTUATOR.conditions[0], ACTUATOR)
     assert healthy_severities(ACTUATOR) is sound
     assert limits_of(ACTUATOR) is limits_of(ACTUATOR)
-    worn = Actuator.of(replace(RIG, leakage_coefficient=9e-12))
+    worn = actuator_of(replace(RIG, leakage_coefficient=9e-12))
     assert limits_of(worn) != limits_of(ACTUATOR)
