@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from estimation.fits import asked as asking
-from estimation.fits import flow_fit, motion_fit
+from estimation.fits import flow_fit, motion_fit, plain_flow
 from estimation.fits.descent import Point
-from estimation.fits.flow_fit import _wanted, fit_flow
+from estimation.fits.flow_fit import LogTraits, _wanted, fit_flow
 from estimation.fits.flow_log import homed_at_stop
 from estimation.fits.greybox_fit import GreyBoxFit
 from estimation.fits.hypotheses import BEGUN, HYPOTHESES, MAY_HIDE
@@ -57,15 +57,15 @@ def concluded(
         patch.multiple(
             asking, promised_each=lambda *_, **__: promises, promised=lambda *_, **__: Promise(0.0, 0.0, 0.05)
         ),
+        patch.object(plain_flow, "balanced", lambda *_, **__: fits),
         patch.multiple(
             flow_fit,
-            balanced=lambda *_, **__: fits,
             explain=explained,
             contradicted=lambda *_: (),
             sensed_play=lambda _: sensed or ShownPlay(0.0, 0.0),
         ),
     ):
-        found = fit_flow(log(0.2), PAPER, 2e8, **how)
+        found = fit_flow(log(0.2), PAPER, 2e8, traits=LogTraits(**how))
     return {
         "asked": calls,
         "believed [Pa]": list(found.parameters["bulk_modulus"]),

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from estimation.fits import asked
-from estimation.fits import flow_fit as module
+from estimation.fits import asked, flow_fit, plain_flow
 from estimation.fits.asked import ALWAYS_ASKED
 from estimation.fits.flow_fit import fit_flow
 from estimation.fits.flow_search import balanced, flow_starts
@@ -246,9 +245,9 @@ def concluded(
         assert not paired
         return explanation
 
-    monkeypatch.setattr(module, "balanced", lambda *_, **__: [fit])
+    monkeypatch.setattr(plain_flow, "balanced", lambda *_, **__: [fit])
     monkeypatch.setattr(asked, "promised_each", lambda *_, **__: len(ALWAYS_ASKED) * [Promise(0.0, 0.0, 0.01)])
-    monkeypatch.setattr(module, "explain", explained)
+    monkeypatch.setattr(flow_fit, "explain", explained)
     return fit_flow(record or logged("normal", "prbs", 0.0), PAPER, PAPER.bulk_modulus)
 
 
@@ -284,7 +283,7 @@ def test_a_play_that_a_velocity_sensor_shows_is_asked_for_too(monkeypatch: pytes
 
 def test_a_play_too_small_to_be_one_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = logged("normal", "prbs", 0.0)
-    monkeypatch.setattr(module, "sensed_play", lambda _: ShownPlay(3e-5, PLAY_SHOWN + 0.1))
+    monkeypatch.setattr(flow_fit, "sensed_play", lambda _: ShownPlay(3e-5, PLAY_SHOWN + 0.1))
     fit = fit_flow(sound, PAPER, PAPER.bulk_modulus)
     assert fit.explanation is None
     assert [note.code for note in fit.reasons] == [EstimateCode.PLAY_LEFT]

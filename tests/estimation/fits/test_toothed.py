@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.fits import asked
-from estimation.fits import flow_fit as module
+from estimation.fits import asked, flow_fit, plain_flow
 from estimation.fits.asked import ALWAYS_ASKED
 from estimation.fits.flow_fit import fit_flow
 from estimation.fits.greybox_fit import GreyBoxFit
@@ -190,15 +189,15 @@ def test_teeth_that_are_left_shut_the_gate_where_nothing_else_does(
     monkeypatch: pytest.MonkeyPatch, chi: float, code: EstimateCode
 ) -> None:
     shows = replace(fit(500.0, shown(12, 50.0), shown(13, 40.0)), chi_square=(chi,))
-    monkeypatch.setattr(module, "balanced", lambda *_, **__: [shows])
-    monkeypatch.setattr(module, "asked_of", lambda *_, **__: ((), (RigCode.WEAR_NOT_EXCLUDED.note(percent=3.0),)))
+    monkeypatch.setattr(plain_flow, "balanced", lambda *_, **__: [shows])
+    monkeypatch.setattr(flow_fit, "asked_of", lambda *_, **__: ((), (RigCode.WEAR_NOT_EXCLUDED.note(percent=3.0),)))
     found = fit_flow(log(0.2), PAPER, PAPER.bulk_modulus)
     assert [note.code for note in found.reasons] == [code]
     assert [note.code for note in found.remarks] == [RigCode.WEAR_NOT_EXCLUDED]
 
 
 def test_nothing_is_left_of_a_sound_log(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "balanced", lambda *_, **__: [fit(500.0, shown(12, 3.0))])
+    monkeypatch.setattr(plain_flow, "balanced", lambda *_, **__: [fit(500.0, shown(12, 3.0))])
     monkeypatch.setattr(asked, "promised_each", lambda *_, **__: len(ALWAYS_ASKED) * [Promise(0.0, 0.0, 0.01)])
     found = fit_flow(log(0.2), PAPER, PAPER.bulk_modulus)
     assert not found.reasons

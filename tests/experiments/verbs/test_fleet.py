@@ -108,7 +108,7 @@ def test_a_date_that_is_none_is_refused_before_any_log_is_diagnosed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ran = list[Any]()
-    monkeypatch.setattr("experiments.command.batch.run_plan", lambda *asked: ran.append(asked))
+    monkeypatch.setattr("experiments.batch.run_on_terminal.run_plan", lambda *asked: ran.append(asked))
     (tmp_path / "P-1_2026-99.csv").write_text("time_s\n")
     code, _, said = invoke("fleet", tmp_path, "--pattern", "{actuator}_{date}.csv", "--out", tmp_path / "fleet")
     assert (code, ran) == (2, [])

@@ -131,7 +131,7 @@ def test_what_a_rig_cannot_hold_is_refused_with_file_and_field(tmp_path: Path, t
 def test_a_rig_that_is_not_there_or_no_text_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RigError, match="cannot be read as a rig file: No such file"):
         read_rig(tmp_path / "rig.toml")
-    with pytest.raises(RigError, match="cannot be read: a regular file is needed"):
+    with pytest.raises(RigError, match="cannot be read as a rig file: a regular file is needed"):
         read_rig(tmp_path)
     (tmp_path / "rig.toml").write_bytes(b"\xff\xfe\x00\x01")
     with pytest.raises(RigError, match="TOML"):
