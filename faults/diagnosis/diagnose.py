@@ -101,8 +101,56 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     asked = seen is None and not log.mistakes  # else it is not wanted, or known what is wrong
     plain = _Plain(log, rig.parameters, begun(partial(_of_clean, log, rig.parameters)) if asked else None)
     estimate = estimated(log, rig, EstimateOptions())[1] if seen is None else seen[1]
-    found, strange = finding_of(log, estimate, rig), explained(estimate, rig.parameters)
-    outside = tuple(note for note in strange if note.code in OUTSIDE)
+    found, case = finding_of(log, estimate, rig), _set_right(log, rig, estimate)
+    log, rig = case.log, case.rig
+    scored = log.record.slice(0, round(LONGEST / log.record.sample_time) + 1) if log.mistakes else log.record
+    scores = score_mathematical(scored, mathematical_bank(rig.parameters))
+    verdict = models_verdict(scores, log.record)
+    absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
+    unsure = (*_healthy_of_the_paper(plain.parameters), *estimate.rig_notes)
+    notes = (*log.left_out, *case.strange, *verdict.notes, *absent, *unsure)
+    found = replace(found, outcome=verdict.outcome, notes=notes, channels=scores.channels)
+    if log.mistakes:
+        return replace(_without_class(found, log, scores, log.mistakes), outcome=Outcome.MISMATCH)
+    if verdict.outcome is not Outcome.OK:
+        return replace(found, evidence=EhaEvidence(estimate, scores, None))
+    try:
+        judged = partial(_judged, parameters=rig.parameters, estimate=estimate, plain=plain)
+        diagnosis, around, named = over_drift(judged, log, case.strange)
+    except (RigError, LogError) as error:
+        without = _without_class(found, log, scores, distinct((*case.doubts, *verdict.against)))
+        said = ClassCode.NO_CIRCUIT if isinstance(error, RigError) else ClassCode.NO_PROBABILITIES
+        return replace(without, notes=(*found.notes, said.note(reason=error.message)))
+    found = replace(found, notes=(*found.notes, *named), evidence=EhaEvidence(estimate, scores, diagnosis))
+    left = doubts_after(case.doubts, estimate, log, around, diagnosis.scoreboard)
+    against = distinct((*left, *diagnosis.against))
+    if against:  # nominal models alone are no judges of a circuit with another oil, but they say what is off
+        against = distinct((*against, *verdict.against))
+    return _with_class(found, case, diagnosis, against)
+
+
+class _Case(NamedTuple):
+    """A log and its rig, set right by what explains the log.
+
+    Circuits are fitted around ``rig``, which has the oil that was measured where that is no kin of the file's.
+    Severities count from ``healthy``. What is ``strange`` is noted of rig, oil and logger.
+    """
+
+    log: CleanLog
+    rig: Rig
+    healthy: EhaParameters
+    estimate: BulkModulusEstimate
+    strange: tuple[Note, ...]
+
+    @property
+    def doubts(self) -> tuple[Note, ...]:
+        """What speaks against all nine conditions before a circuit is fitted."""
+        outside = (note for note in self.strange if note.code in OUTSIDE)
+        return (*refused(self.estimate), *outside, *self.log.objections)
+
+
+def _set_right(log: CleanLog, rig: Rig, estimate: BulkModulusEstimate) -> _Case:
+    strange = explained(estimate, rig.parameters)
     log = at_pump_speed(log, estimate.turning)
     if estimate.explanation is not None:
         log = set_right(log, estimate.explanation)
@@ -111,35 +159,21 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     if (other := _another_oil(estimate, healthy)) is not None:
         strange = (*strange, other)
         rig = replace(rig, parameters=replace(healthy, bulk_modulus=estimate.value))
-    scored = log.record.slice(0, round(LONGEST / log.record.sample_time) + 1) if log.mistakes else log.record
-    scores = score_mathematical(scored, mathematical_bank(rig.parameters))
-    verdict = models_verdict(scores, log.record)
-    absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
-    unsure = (*_healthy_of_the_paper(plain.parameters), *estimate.rig_notes)
-    notes = (*log.left_out, *strange, *verdict.notes, *absent, *unsure)
-    found = replace(found, outcome=verdict.outcome, notes=notes, channels=scores.channels)
-    if log.mistakes:
-        return replace(_without_class(found, log, scores, log.mistakes), outcome=Outcome.MISMATCH)
-    if verdict.outcome is not Outcome.OK:
-        return replace(found, evidence=EhaEvidence(estimate, scores, None))
-    doubts = (*refused(estimate), *outside, *log.objections)
-    try:
-        judged = partial(_judged, parameters=rig.parameters, estimate=estimate, plain=plain)
-        diagnosis, around, named = over_drift(judged, log, strange)
-    except (RigError, LogError) as error:
-        without = _without_class(found, log, scores, distinct((*doubts, *verdict.against)))
-        said = ClassCode.NO_CIRCUIT if isinstance(error, RigError) else ClassCode.NO_PROBABILITIES
-        return replace(without, notes=(*found.notes, said.note(reason=error.message)))
-    found = replace(found, notes=(*found.notes, *named))
-    if (stop := diagnosis.scoreboard.blocks.stop) is not None:
-        found = replace(found, notes=(*found.notes, ClassCode.END_STOP.note(reach_mm=1e3 * stop)))
-    against = distinct((*doubts_after(doubts, estimate, log, around, diagnosis.scoreboard), *diagnosis.against))
-    if against:  # nominal models alone are no judges of a circuit with another oil, but they say what is off
-        against = distinct((*against, *verdict.against))
-    severity = _severities(diagnosis, estimate, healthy, rig, pressure=PRESSURE in scores.channels)
-    oil = oil_advice(severity, diagnosis.healthy, diagnosis.limits) if estimate.gate.passed and not against else ()
+    return _Case(log, rig, healthy, estimate, strange)
+
+
+def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tuple[Note, ...]) -> Finding:
+    """Return a finding with its condition, how bad it is, and what to do."""
+    notes, board = found.notes, diagnosis.scoreboard
+    if (stop := board.blocks.stop) is not None:
+        notes = (*notes, ClassCode.END_STOP.note(reach_mm=1e3 * stop))
+    severity = _severities(diagnosis, case.estimate, case.healthy, case.rig, pressure=PRESSURE in found.channels)
+    known = case.estimate.gate.passed and not against
+    oil = oil_advice(severity, diagnosis.healthy, diagnosis.limits) if known else ()
+    further = advice_for(case.log.record, diagnosis.probabilities, against, diagnosis.not_told, found.channels)
     return replace(
         found,
+        notes=notes,
         condition=diagnosis.condition,
         probabilities=diagnosis.probabilities,
         unknown=bool(against),
@@ -147,9 +181,8 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
         severities=severity,
         healthy=diagnosis.healthy,
         not_told=(*diagnosis.not_told, *found.not_told),
-        since=diagnosis.scoreboard.onset,
-        advice=(*oil, *advice_for(log.record, diagnosis.probabilities, against, diagnosis.not_told, scores.channels)),
-        evidence=EhaEvidence(estimate, scores, diagnosis),
+        since=board.onset,
+        advice=(*oil, *further),
     )
 
 
