@@ -118,6 +118,7 @@ def _entries(
     shown: list[dict[str, Any]] = []
     for facts in tables:
         stamps = None if time is None else facts.numbers.get(time.guess.place)
+        clock = None if stamps is None else clock_facts(stamps)
         rows = [
             {"number": number, **_column_entries(one, by_name.get(one.heading.name))}
             for number, one in enumerate(facts.columns, start=1)
@@ -127,7 +128,7 @@ def _entries(
                 "label": facts.table.label,
                 "rows": facts.rows,
                 "step_s": facts.table.step,
-                "clock": None if stamps is None else vars(clock_facts(stamps)),
+                "clock": None if clock is None else vars(clock),
                 "columns": rows,
             }
         )

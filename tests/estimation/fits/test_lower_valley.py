@@ -71,11 +71,12 @@ def test_a_log_with_gaps_is_led_nowhere() -> None:
 
 
 def test_a_search_that_is_told_of_a_lower_valley_ends_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = best()  # before its search is broken: others ask for it too
     monkeypatch.setattr("estimation.fits.flow_search._finished", unmoved)
     lost = balanced(seen(), PAPER, STARTS)
-    led = balanced(seen(), PAPER, STARTS, {**best().values, "bulk_modulus": 1.001 * best().values["bulk_modulus"]})
-    assert min(fit.cost for fit in lost) > best().cost + 1.0
-    assert min(fit.cost for fit in led) == pytest.approx(best().cost, abs=0.5)  # without valves that crack
+    led = balanced(seen(), PAPER, STARTS, {**sound.values, "bulk_modulus": 1.001 * sound.values["bulk_modulus"]})
+    assert min(fit.cost for fit in lost) > sound.cost + 1.0
+    assert min(fit.cost for fit in led) == pytest.approx(sound.cost, abs=0.5)  # without valves that crack
 
 
 def unmoved(one: Any, log: GreyBoxLog, wanted: float = np.inf, *, bent: bool) -> Any:  # noqa: ARG001 -- as it is called

@@ -137,3 +137,12 @@ def test_a_log_without_a_clock_or_a_known_column_is_told_what_to_give(tmp_path: 
     assert "no column holds the time: give the time between rows with --sample-time S" in told
     assert "no column was recognised; name the columns yourself" in told
     assert "or add to one command" not in told
+
+
+def test_a_log_of_one_row_has_no_clock_and_is_shown(tmp_path: Path) -> None:
+    path = tmp_path / "short.csv"
+    path.write_text("time,motor speed,position\ns,rad/s,m\n0.0,1.0,0.5\n")
+    found = invoke(path)
+    assert found.exception is None or isinstance(found.exception, SystemExit)
+    assert "motor speed" in found.stdout
+    assert "clock: " not in found.stdout

@@ -49,7 +49,8 @@ def test_every_log_of_a_seed_gets_its_class_and_none_is_flagged(population: list
     found = [diagnosed(log.record, pressure=pressure) for log in population]
     assert [one.condition for one in found] == [log.condition for log in population]
     assert [one.against for one in found] == [()] * len(found)
-    assert all(sum(one.probabilities.values()) == pytest.approx(1.0) for one in found)
+    sums = [sum(one.probabilities.values()) for one in found]  # without pressure less what a worn pump may have
+    assert all(one == pytest.approx(1.0) if pressure else 0.5 < one < 1.0 + 1e-9 for one in sums)
 
 
 @pytest.mark.parametrize(
