@@ -174,7 +174,7 @@ def test_an_answer_that_comes_late_does_not_undo_a_newer_one(opened: Any, tmp_pa
     (tmp_path / "late answer.csv").write_text("a,b\n1,2\n3,4\n")
     page.set_input_files("#file", str(tmp_path / "late answer.csv"))
     row = page.locator("tr", has_text="late answer.csv")
-    row.locator("td", has_text="failed").wait_for(timeout=30_000)
+    row.locator("td", has_text="failed").wait_for(timeout=120_000)
     (route, old) = held[0]
     with page.expect_response("**/api/logs?most=*"):
         route.fulfill(response=old)
