@@ -28,9 +28,11 @@ def in_words(value: float, spec: str) -> str:
     --------
     >>> in_words(100.0, ".2g"), in_words(123456.0, ".3g"), in_words(1.5e-5, ".3g")
     ('100', '123000', '1.5e-05')
+    >>> in_words(120000.0, "+.2g")
+    '+120000'
     """
-    said = format(value, spec)
-    return f"{float(said):.0f}" if "e+" in said and abs(value) < WRITTEN_OUT else said
+    said, sign = format(value, spec), "+" if spec.startswith("+") else ""
+    return f"{float(said):{sign}.0f}" if "e+" in said and abs(value) < WRITTEN_OUT else said
 
 
 class _Sentence(Formatter):

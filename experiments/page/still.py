@@ -160,11 +160,15 @@ def _every(panel: Panel) -> Array:
     return np.concatenate([np.asarray(lines, dtype=np.float64), *(curve.values for curve in panel.curves)])
 
 
+LEAST = 1e-290
+"""Size below which a channel that does not change is drawn as zero [any unit]."""
+
+
 def _range(values: Array, room: float) -> tuple[float, float]:
     there = values[np.isfinite(values)]
     low, high = (float(there.min()), float(there.max())) if len(there) else (0.0, 1.0)
     if high - low <= 1e-9 * max(abs(low), abs(high), 1e-300):
-        half = 0.05 * abs(low) or 0.5
+        half = 0.05 * abs(low) if abs(low) > LEAST else 0.5
         return low - half, high + half
     return low - room * (high - low), high + room * (high - low)
 

@@ -69,7 +69,7 @@ def fleet(
     store = open_store(place)
     from_logs = store.manifest() is None
     logs = _logs_in(Path(place), out) if from_logs else []
-    _names([str(one) for one in logs], pattern, names)
+    _names([one.relative_to(place).as_posix() for one in logs], pattern, names)
     if from_logs:
         store = _diagnosed(Path(place), logs, out, plant, rig, load_columns(columns), workers or os.cpu_count() or 1)
     table = store.rows(["file", "verb", "outcome", "found_condition", "reason", "quantities"]).to_pylist()

@@ -133,7 +133,11 @@ def _between_samples(record: Record, blocks: Blocks) -> float:
     little of it: by a share of the change that is even between 0 and 1. Changes that are noise count there already.
     """
     rows = round(blocks.block * blocks.sample_time / record.sample_time)
-    changes = float(np.nanmean(np.diff(record["velocity_m_s"]) ** 2)) - 2.0 * rows * float(blocks.noise[0]) ** 2
+    steps = np.diff(record["velocity_m_s"])
+    steps = steps[np.isfinite(steps)]
+    if not len(steps):  # a channel slower than the rows: no two of its samples are neighbours
+        return 0.0
+    changes = float(np.mean(steps**2)) - 2.0 * rows * float(blocks.noise[0]) ** 2
     return (max(changes, 0.0) / (3.0 * rows)) ** 0.5
 
 

@@ -163,6 +163,8 @@ def beliefs(times: Array, values: Array, stds: Array, grid: Settings) -> list[Be
         One more than there are logs.
     """
     first, rows = first_belief(grid), len(times) + 1
+    if not len(times):
+        return [first]
     mean, covariance = np.empty((rows, *first.mean.shape)), np.empty((rows, *first.covariance.shape))
     evidence = np.empty((rows, *first.evidence.shape))
     mean[0], covariance[0], evidence[0] = first.mean, first.covariance, first.evidence

@@ -323,6 +323,12 @@ def test_sensors_that_never_spoke_at_once_do_not_disagree() -> None:
     assert not sensors_disagree(apart, blocks_of(apart))
 
 
+def test_a_velocity_that_is_slower_than_the_rows_is_excused_by_its_noise_too() -> None:
+    record = with_two_sensors(1.0, 0.05)
+    slow = record.replace(velocity_m_s=np.where(np.arange(len(record)) % 2, np.nan, record["velocity_m_s"]))
+    assert not sensors_disagree(slow, blocks_of(slow))
+
+
 @pytest.mark.parametrize("rows", [1, 20])
 def test_a_coarse_log_of_fast_motion_accuses_no_sensor(rows: int) -> None:
     """Velocity that changes between two samples is not seen there, but moves the piston."""

@@ -146,3 +146,8 @@ def test_weights_sum_to_one_and_half_of_the_prior_is_rest() -> None:
     weights = first_belief(grid).weights(grid)
     assert weights.sum() == pytest.approx(1.0)
     assert weights[grid.growing].sum() == pytest.approx(0.5)
+
+
+def test_before_any_log_there_is_one_belief() -> None:
+    none = np.empty(0)
+    assert len(beliefs(none, none, none, settings())) == 1
