@@ -71,5 +71,5 @@ def test_what_a_worn_pump_takes_from_the_nine_is_said(diagnosed: tuple[Finding, 
     told = sum(found.probabilities.values())
     worn = replace(found, probabilities={name: 0.25 / told * share for name, share in found.probabilities.items()})
     page = diagnosis_page({"file": "run.csv", "rig": "paper", **diagnosis_entries(worn)}, worn, log)
-    assert "The remaining 75 % is that of a worn pump, which is none of the nine." in page
+    assert "The remaining 75\N{NO-BREAK SPACE}% is that of a worn pump, which is none of the nine." in page
     assert "if the actuator is in one of the nine" not in page
