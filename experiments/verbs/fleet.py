@@ -68,9 +68,9 @@ def fleet(
         raise HydrostateError(f"{place}: must be a folder with logs or a store, got a file")
     store = open_store(place)
     from_logs = store.manifest() is None
-    logs = _logs_in(Path(place), out) if from_logs else []
-    _names([one.relative_to(place).as_posix() for one in logs], pattern, names)
     if from_logs:
+        logs = _logs_in(Path(place), out)
+        _names([one.relative_to(place).as_posix() for one in logs], pattern, names)
         store = _diagnosed(Path(place), logs, out, plant, rig, load_columns(columns), workers or os.cpu_count() or 1)
     table = store.rows(["file", "verb", "outcome", "found_condition", "reason", "quantities"]).to_pylist()
     files = [row["file"] for row in table if row["file"]]
@@ -107,10 +107,12 @@ def limits_of_options(texts: Sequence[str]) -> dict[str, float]:
     HydrostateError
         If a severity is not known, or a value is no number.
     """
+    if not texts:
+        return {}
+    from faults.diagnosis.severity import UNITS  # which a fleet without such limits need not load
+
     found: dict[str, float] = {}
     for text in texts:
-        from faults.diagnosis.severity import UNITS  # which a fleet without such limits need not load
-
         name, _, value = text.partition("=")
         require_known("--limit", name, list(UNITS))
         try:
