@@ -4,6 +4,7 @@
 (() => {
   const OFTEN = 1000; // time between two looks while something is unfinished [ms]
   const SELDOM = 10000; // the same while nothing is [ms]
+  const PATIENCE = 30000; // time after which a look that has no answer is given up, and the next one follows [ms]
   const MOST = 100; // logs that are asked for at once
   const holder = document.querySelector(".dropped-logs");
   const [input, verb] = [document.getElementById("file"), document.getElementById("verb")];
@@ -94,7 +95,7 @@
     let counts = {};
     while (logs.length < asked) {
       const before = logs.length ? `&before=${logs.at(-1).number}` : "";
-      const answer = await fetch(`api/logs?most=${MOST}${before}`);
+      const answer = await fetch(`api/logs?most=${MOST}${before}`, { signal: AbortSignal.timeout(PATIENCE) });
       if (!answer.ok) throw new Error((await answer.json()).detail);
       const page = await answer.json();
       ({ counts } = page);
