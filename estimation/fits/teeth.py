@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.arrays import Array
+from estimation.fits.gains_beside import gains_beside
 from estimation.fits.greybox_log import GreyBoxLog
 from estimation.fits.greybox_problem import Problem
 from plant.solvers.steps import parameter_names
@@ -107,6 +108,8 @@ class ShownTeeth(NamedTuple):
         Inverse of the covariance of cosine and sine [dimensionless].
     answers : ndarray, shape (unknowns, 2)
         By how much the unknowns fall as cosine and sine grow [dimensionless].
+    beside : float
+        What they gain beside the likeliest count, less that cost [dimensionless].
     """
 
     teeth: Teeth
@@ -117,6 +120,7 @@ class ShownTeeth(NamedTuple):
     offset_std: float = 0.0
     power: Array = np.eye(2)
     answers: Array = np.zeros((1, 2))
+    beside: float = 0.0
 
 
 def with_teeth(log: GreyBoxLog, teeth: Sequence[Teeth], offset: float = 0.0) -> GreyBoxLog:
@@ -229,13 +233,15 @@ def shown_teeth(
     ways = [_ways(log, one) for one in sought]
     level = np.full(len(log.drives), -1.0)
     every = [*(each for several in ways for each in several), (level, NUDGE)]
-    known, *moved = problem.coarse.disturbed(theta, [log.drives, *(_added(log, size * way) for way, size in every)])
+    moved_drives = [np.column_stack([log.drives[:, 0] + size * way, log.drives[:, 1:]]) for way, size in every]
+    known, *moved = problem.coarse.disturbed(theta, [log.drives, *moved_drives])
     sizes = [size for _, size in every]
     columns = (np.stack([one.ravel() for one in moved], axis=-1) - known.reshape(-1, 1)) / sizes
     answers = bread @ (slopes.T @ columns)
     free = columns - slopes @ answers
     along, shown, first = -(errors @ free), dict[int, ShownTeeth](), 0
-    for one, several in zip(sought, ways, strict=True):
+    beside = gains_beside(free, along, [len(several) for several in ways], [one.price for one in sought])
+    for one, several, gained in zip(sought, ways, beside, strict=True):
         its = slice(first, first := first + len(several))
         power = free[:, its].T @ free[:, its]
         scale = np.sqrt(power.diagonal())
@@ -253,6 +259,7 @@ def shown_teeth(
             float(spread[2, 2]) ** 0.5 if offset else 0.0,
             np.asarray(np.linalg.inv(spread[:2, :2]), dtype=float),
             answers[:, its][:, :2],
+            gained,
         )
     power, pulled = float(free[:, -1] @ free[:, -1]), float(along[-1])
     if power == 0.0:
@@ -341,9 +348,3 @@ def _likeliest(problem: Problem, theta: Array, errors: Array, counts: Sequence[i
         else:
             found.append((float(near[0]), _Sought(count)))
     return [one for _, one in sorted(found, key=lambda pair: -pair[0])[:LIKELIEST]]
-
-
-def _added(log: GreyBoxLog, speed: Array) -> Array:
-    drives = log.drives.copy()
-    drives[:, 0] += speed
-    return drives

@@ -19,9 +19,11 @@ from estimation.fits.toothed import (
     KEPT,
     LEAST_OFFSET,
     LEAST_TEETH,
+    MOST_LINEAR,
     MOST_TEETH,
     OFFSET_SETTLED,
     OFFSET_WORTH,
+    ONE_SIDED_95,
     OVERTONE_WORTH,
     ROUNDS,
     SETTLED,
@@ -37,8 +39,11 @@ from plant.notes import Note
 from tests.estimation.fits.short_logs import PAPER, log, made_fit, noted, seen
 
 
-def shown(count: int, gain: float, size: float = 0.1, offset: float = 0.0) -> ShownTeeth:
-    return ShownTeeth(Teeth(count, size, 0.0), gain, 0.01, np.zeros(2), offset, 1e-3)
+def shown(
+    count: int, gain: float, size: float = 0.1, offset: float = 0.0, *, beside: float | None = None
+) -> ShownTeeth:
+    one = ShownTeeth(Teeth(count, size, 0.0), gain, 0.01, np.zeros(2), offset, 1e-3)
+    return one._replace(beside=gain if beside is None else beside)
 
 
 def fit(cost: float, *teeth: ShownTeeth, off: tuple[float, float] = (0.0, 0.0)) -> GreyBoxFit:
@@ -123,6 +128,7 @@ def test_corrections_end() -> None:
         ([shown(12, 50.0, LEAST_TEETH + 0.001)], True),
         ([shown(12, 50.0, LEAST_TEETH - 0.001)], False),
         ([shown(12, 50.0), shown(13, BY_CHANCE + 39.9 / STANDS_OUT)], True),
+        ([shown(12, 50.0), shown(13, 40.0, beside=BY_CHANCE + 39.9 / STANDS_OUT)], True),
         ([shown(12, 50.0), shown(13, BY_CHANCE + 40.1 / STANDS_OUT)], False),
         ([shown(13, 1.0), shown(12, 50.0), shown(6, 49.0)], True),  # each an overtone of the other
         ([shown(6, 50.0), shown(12, 49.0)], True),
@@ -163,6 +169,21 @@ def test_teeth_that_do_not_explain_the_log_or_do_not_stand_out_are_left() -> Non
         assert found.log is PLAIN
     assert not toothed(PLAIN, useful, well).left
     assert not toothed(PLAIN, told(fit(500.0, shown(12, 9.0), shown(13, 8.0)))[0], well).left
+
+
+def test_teeth_that_may_be_as_small_as_any_pumps_are_left_only_where_they_move_bulk_modulus() -> None:
+    def doubted(size: float, moved: float, offset: float = 0.0) -> bool:
+        rivals = fit(500.0, shown(12, 50.0, size, offset), shown(13, 40.0))
+        felt = rivals.std["bulk_modulus"] / rivals.values["bulk_modulus"] * moved
+        fitted, _ = told(replace(rivals, small_teeth=({"bulk_modulus": felt}, {"bulk_modulus": 0.0})))
+        return bool(toothed(PLAIN, fitted, well).left)
+
+    most = LEAST_TEETH + 0.01 * ONE_SIDED_95  # their deviation is 0.01
+    assert not doubted(most - 1e-4, MOST_LINEAR - 0.01)
+    assert doubted(most - 1e-4, MOST_LINEAR + 0.01)
+    assert doubted(most + 1e-4, MOST_LINEAR - 0.01)
+    assert doubted(most - 1e-4, 0.0, offset=0.1)
+    assert not doubted(LEAST_TEETH - 1e-4, MOST_LINEAR + 0.01)
 
 
 def test_teeth_larger_than_any_are_not_believed_but_left() -> None:

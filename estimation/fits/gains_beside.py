@@ -1,0 +1,49 @@
+"""What each of several explanations gains beside the likeliest of them, to first order."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from estimation.arrays import Array
+
+
+def gains_beside(free: Array, along: Array, widths: Sequence[int], prices: Sequence[float]) -> list[float]:
+    """Return what explanations gain in log-likelihood once the likeliest is taken up (Rao's score statistic over two).
+
+    Parameters
+    ----------
+    free : ndarray, shape (blocks, columns)
+        Changes of the normalised residuals by each column, less what the unknowns take up of them [dimensionless].
+    along : ndarray, shape (columns,)
+        What the residuals ask for of each: minus their scalar product with it [dimensionless].
+    widths : sequence of int
+        Columns of each explanation, in turn [count]; more are passed over.
+    prices : sequence of float
+        What it costs to have searched for each, in log-likelihood [dimensionless].
+
+    Returns
+    -------
+    list of float
+        Of each, less its price [dimensionless]: an image of the likeliest gains nothing, and neither does that itself.
+
+    Examples
+    --------
+    >>> image = np.array([[1.0, 1.0, 0.0], [0.0, 0.1, 1.0]])
+    >>> gains_beside(image, np.array([4.0, 4.0, 2.0]), [1, 1, 1], [0.0, 0.0, 1.0])
+    [0.0, 0.0, 1.0]
+    """
+    ends = np.cumsum([0, *widths]).tolist()
+    places = [slice(begin, end) for begin, end in zip(ends[:-1], ends[1:], strict=True)]
+    power = free.T @ free
+    gains = [_gain(power[its, its], along[its]) - price for its, price in zip(places, prices, strict=True)]
+    if not gains:
+        return []
+    top = places[int(np.argmax(gains))]
+    taken = np.linalg.pinv(power[top, top])
+    left, asked = power - power[:, top] @ taken @ power[top], along - power[:, top] @ taken @ along[top]
+    found = [_gain(left[its, its], asked[its]) - price for its, price in zip(places, prices, strict=True)]
+    return [0.0 if its == top else gain for its, gain in zip(places, found, strict=True)]
+
+
+def _gain(power: Array, asked: Array) -> float:
+    return 0.5 * float(asked @ np.linalg.pinv(power) @ asked)
