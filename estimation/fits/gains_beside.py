@@ -1,6 +1,7 @@
 """What each of several explanations gains beside the likeliest of them, to first order."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -33,7 +34,7 @@ def gains_beside(free: Array, along: Array, widths: Sequence[int], prices: Seque
     [0.0, 0.0, 1.0]
     """
     ends = np.cumsum([0, *widths]).tolist()
-    places = [slice(begin, end) for begin, end in zip(ends[:-1], ends[1:], strict=True)]
+    places = [slice(begin, end) for begin, end in pairwise(ends)]
     power = free.T @ free
     gains = [_gain(power[its, its], along[its]) - price for its, price in zip(places, prices, strict=True)]
     if not gains:
