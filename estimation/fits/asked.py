@@ -25,7 +25,7 @@ from estimation.fits.hypotheses import (
 from estimation.fits.lateness import most_late
 from estimation.fits.left_open import wear_open
 from estimation.fits.objections import doubted, fit_explains
-from estimation.fits.play import NO_PLAY, PLAY_SENSED, ShownPlay, play_left
+from estimation.fits.play import NO_PLAY, ShownPlay, play_shows
 from estimation.fits.promises import Promise, promised, promised_each, slopes_of
 from estimation.models.completed_flow import CRACKS, balances_mass
 from estimation.models.flow import STIFFNESS
@@ -104,7 +104,7 @@ def asked_of(
         zero = max(zero, promised(log, parameters, best.values, ENCODER_ZERO))
     worn = delivery.gain > WORTH and delivery.size > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and zero.size > LEAST_ZERO
-    plays = bool(play_left(swinging.play, sensed)) or sensed.gain > PLAY_SENSED
+    plays = play_shows(swinging.play, sensed)
     behind = swinging.values.get("speed_lead", 0.0) > FARTHEST_LEAD * log.sample_time
     tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays), (SPEED_LATE, behind)
     asked = tuple(one for one, worthwhile in tried if worthwhile)

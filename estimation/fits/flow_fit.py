@@ -223,7 +223,7 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
         left, open_play = play_structure(moved, plain.yields(sensed, modulus)), ()
         shown = play_left(one.play, NO_PLAY)
     else:
-        untaken, open_play = plain.play_untaken(sensed)
+        untaken, open_play = plain.play_untaken(one.play, sensed)
         left, shown = float(np.hypot(FILTERED if traits.filtered else STRUCTURE, untaken)), play_left(one.play, sensed)
     return FormFit(
         parameters=with_structure(with_small_teeth(strange.values, one.small_teeth), left),
@@ -243,7 +243,7 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in plain.fits]
     found = with_small_teeth(weighed(plain.fits, SURER, beforehand), best.small_teeth)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
-    untaken, open_play = plain.play_untaken(sensed)
+    untaken, open_play = plain.play_untaken(plain.swinging.play, sensed)
     reasons = (*objections(best, plain.log.passes_on), *play_left(plain.swinging.play, sensed)) or plain.teeth_left
     if begun and not reasons and not _told_by(plain, begun=begun)(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)

@@ -278,7 +278,7 @@ def concluded(
     felt = np.flatnonzero(effects > np.where(problem.prior > 0.0, 0.0, LEAST_EFFECT**2))
     noise, rig, late = np.full(len(theta), np.inf), dict[str, Array](), dict[str, tuple[float, float]]()
     play, teeth, offset = NO_PLAY, dict[int, ShownTeeth](), NO_OFFSET
-    used = int(np.count_nonzero(errors))
+    used, names = int(np.count_nonzero(errors)), [model.unknowns[place] for place in felt]
     if len(felt) and used > len(theta):
         slopes = all_slopes if len(felt) == len(theta) else all_slopes[:, felt]
         left_over, prior, lags = errors.ravel(), problem.prior[felt], automatic_lags(errors.ravel())
@@ -315,7 +315,7 @@ def concluded(
             rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in rig_slopes(problem, theta, response)}
             timed, left = problem.log.timed, left_by(fitted_slopes, fitted_bread, effects[felt] > LEAST_EFFECT**2)
             late = dict(lateness(timed, moved, left_over, left))
-            play = shown_play(moved[len(timed) :], left_over, left)
+            play = shown_play(moved[len(timed) :], left_over, left, lambda one: zip(names, response(one), strict=False))
     # teeth that are taken up are not small, and the course of a slow log's motor looks like some
     asked_of_teeth = {} if problem.log.teeth or problem.log.course is not None else teeth
     sizes, values = dict(model.linear), model.values(theta)
@@ -335,7 +335,7 @@ def concluded(
         slopes=all_slopes,
         teeth=teeth,
         speed_offset=offset,
-        small_teeth=small_teeth(asked_of_teeth, [model.unknowns[place] for place in felt]),
+        small_teeth=small_teeth(asked_of_teeth, names),
         cost=point.cost,
         chi_square=tuple(map(float, squares / seen)),
         autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),

@@ -142,11 +142,13 @@ class PlainFits:
         softness = self.start.parameters.piston_area * sensed.yields / self.start.parameters.chamber_volume
         return softness * bulk_modulus
 
-    def play_untaken(self, sensed: ShownPlay) -> tuple[float, tuple[Note, ...]]:
+    def play_untaken(self, shown: ShownPlay, sensed: ShownPlay) -> tuple[float, tuple[Note, ...]]:
         """Return what a play leaves open that no fit took up; see `estimation.fits.play.play_untaken`.
 
         Parameters
         ----------
+        shown : ShownPlay
+            The play that the residuals show of the fit that is told.
         sensed : ShownPlay
             The play that a velocity sensor shows.
 
@@ -155,7 +157,7 @@ class PlainFits:
         tuple of (float, tuple of Note)
             Relative deviation of bulk modulus [fraction], and a remark where the gate is not shut for it.
         """
-        return play_untaken(sensed, self.yields(sensed, self.swinging.values["bulk_modulus"]))
+        return play_untaken(shown, sensed, self.yields(sensed, self.swinging.values["bulk_modulus"]))
 
 
 def plain_fits(logged: Logged, start: FitStart) -> PlainFits:

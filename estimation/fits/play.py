@@ -1,6 +1,7 @@
 """Play between the piston and its encoder: whether a fit's residuals, or a velocity sensor, show one."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -37,11 +38,14 @@ class ShownPlay(NamedTuple):
         In log-likelihood, Rao's score statistic over two; 0 where all courses ask for less than none [dimensionless].
     yields : float
         How far the piston moves unseen, where that was sensed [m/Pa].
+    moved : Mapping[str, float]
+        By how much each unknown's coordinate moves if it is taken up, to first order [dimensionless].
     """
 
     size: float
     gain: float
     yields: float = 0.0
+    moved: Mapping[str, float] = MappingProxyType({})
 
 
 NO_PLAY = ShownPlay(0.0, 0.0)
@@ -58,7 +62,13 @@ differs from that without, or by what the piston yields unseen beside what the o
 
 PLAY_SHOWN = 4.0
 """Gain in log-likelihood from which residuals show a play of the encoder [dimensionless]: by chance each of three
-courses gains it in one log of 430, so one log in 140 at most is asked in vain."""
+courses gains it in one log of 430, so one log in 140 at most is asked in vain. Up to `PLAY_BELIEVED` the interval holds
+what that play would do, if no fit took it up."""
+
+PLAY_BELIEVED = 7.0
+"""Gain from which a play that residuals show, and no fit took up, shuts the check [dimensionless]: by chance one log in
+3600 at most gains it. It is what one in twenty encoders with a play of up to 100 um, known to some 2 um by such a log,
+makes as likely as none: 3.0 for the one in twenty, 3.0 for the sizes, and 0.7 for courses that are much alike."""
 
 
 PLAY_SENSED = 2.7
@@ -88,7 +98,12 @@ def crossed_drives(problem: Problem) -> list[Array]:
     return [log.drives + 0.5 * NUDGE * np.where(beside, side[:, None], 0.0) for side in sides]
 
 
-def shown_play(changes: Iterable[Array], errors: Array, left: Callable[[Array], Array]) -> ShownPlay:
+def shown_play(
+    changes: Iterable[Array],
+    errors: Array,
+    left: Callable[[Array], Array],
+    taken: Callable[[Array], Iterable[tuple[str, float]]] = lambda _: (),
+) -> ShownPlay:
     """Return the play that a fit's residuals show.
 
     A play is positive, so a course counts that asks for one. On a log without, a gain over 4.5 comes by chance in one
@@ -102,30 +117,51 @@ def shown_play(changes: Iterable[Array], errors: Array, left: Callable[[Array], 
         The normalised residuals there [dimensionless].
     left : callable
         What the unknowns do not take up of a change of the residuals.
+    taken : callable
+        Each unknown by name, and by how much its coordinate rises to take up a change.
 
     Returns
     -------
     ShownPlay
         The likeliest course.
     """
-    found = NO_PLAY
+    found, course = NO_PLAY, None
     for change in changes:
         free = left(change.ravel() / NUDGE)
         power, along = float(free @ free), -float(free @ errors)
         if power > 0.0 and along > 0.0 and (gain := 0.5 * along**2 / power) > found.gain:
-            found = ShownPlay(along / power, gain)
-    return found
+            found, course = ShownPlay(along / power, gain), change
+    if course is None or found.gain <= PLAY_SHOWN:
+        return found
+    size = found.size / NUDGE
+    return found._replace(moved={name: -size * float(one) for name, one in taken(course.ravel())})
 
 
-def play_left(*shown: ShownPlay) -> tuple[Note, ...]:
+def play_shows(shown: ShownPlay, sensed: ShownPlay) -> bool:
+    """Return whether residuals or a velocity sensor show a play for which a log is asked.
+
+    Parameters
+    ----------
+    shown : ShownPlay
+        What the residuals show.
+    sensed : ShownPlay
+        What the sensor shows.
+    """
+    return sensed.gain > PLAY_SENSED or (shown.gain > PLAY_SHOWN and shown.size > LEAST_PLAY)
+
+
+def play_left(shown: ShownPlay, sensed: ShownPlay = NO_PLAY) -> tuple[Note, ...]:
     """Return the objection to a fit that leaves a play which its residuals or a velocity sensor show.
 
     Parameters
     ----------
-    *shown : ShownPlay
-        What each of them shows.
+    shown : ShownPlay
+        What the residuals show.
+    sensed : ShownPlay
+        What the sensor shows.
     """
-    large = [one.size for one in shown if one.gain > PLAY_SHOWN and one.size > LEAST_PLAY]
+    limits = (shown, PLAY_BELIEVED), (sensed, PLAY_SHOWN)
+    large = [one.size for one, limit in limits if one.gain > limit and one.size > LEAST_PLAY]
     return (EstimateCode.PLAY_LEFT.note(play_um=1e6 * max(large)),) if large else ()
 
 
@@ -147,11 +183,13 @@ def play_structure(moved: float, yields: float) -> float:
     return float(np.hypot(PLAY_STRUCTURE, PLAY_OPEN * max(moved, yields)))
 
 
-def play_untaken(sensed: ShownPlay, yields: float) -> tuple[float, tuple[Note, ...]]:
-    """Return what a play leaves open that a velocity sensor may show and no fit took up: all that the piston yields.
+def play_untaken(shown: ShownPlay, sensed: ShownPlay, yields: float) -> tuple[float, tuple[Note, ...]]:
+    """Return what a play leaves open that residuals or a velocity sensor may show and no fit took up: all that it does.
 
     Parameters
     ----------
+    shown : ShownPlay
+        What the residuals show.
     sensed : ShownPlay
         What the sensor shows.
     yields : float
@@ -163,10 +201,12 @@ def play_untaken(sensed: ShownPlay, yields: float) -> tuple[float, tuple[Note, .
         Relative deviation of bulk modulus, zero for what is as seldom by chance as in one log of 100 [fraction]; and a
         remark, if the gate is not shut for it.
     """
-    if sensed.gain <= PLAY_SENSED:
+    if not play_shows(shown, sensed):
         return 0.0, ()
-    said = () if play_left(sensed) else (RigCode.PLAY_NOT_EXCLUDED.note(play_um=1e6 * sensed.size),)
-    return float(np.hypot(PLAY_STRUCTURE, yields)), said
+    moved = shown.moved.get("bulk_modulus", 0.0) if shown.gain > PLAY_SHOWN else 0.0
+    size = max(one.size for one, least in ((shown, PLAY_SHOWN), (sensed, PLAY_SENSED)) if one.gain > least)
+    said = () if play_left(shown, sensed) else (RigCode.PLAY_NOT_EXCLUDED.note(play_um=1e6 * size),)
+    return float(np.hypot(PLAY_STRUCTURE, max(yields, abs(moved)))), said
 
 
 def sensed_play(record: Record) -> ShownPlay:

@@ -15,12 +15,12 @@ from estimation.finding import Change
 from faults.conditions import CONDITIONS
 from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import LONGEST, Blocks, blocks_of
+from faults.diagnosis.change_odds import believed, gain_of
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.class_fit import LASTING, WEAK, PointFit, least_scales, nominal_runs
 from faults.diagnosis.class_regions import ClassFits, fit_classes, lasting_misfit
 from faults.diagnosis.end_stop import stopped
 from faults.diagnosis.out_of_model import unexplained
-from faults.diagnosis.rivals import behind
 from faults.diagnosis.warming import Drift, drift_of
 from faults.notes import AgainstCode
 from faults.watch.events import SLOW, Alarm
@@ -34,7 +34,7 @@ EDGE = 1.0
 """What a log must hold before a change and after it [s]."""
 
 GAIN = 10.0
-"""Log-likelihood that two circuits must gain on one [dimensionless]."""
+"""Log-likelihood that two circuits must gain on one to be looked into [dimensionless]."""
 
 SOFTENED = 30.0
 """The same where both are in one condition, from which the oil is asked whether it softened [dimensionless]: steady
@@ -97,12 +97,15 @@ class Parted(NamedTuple):
         Circuits fitted to each.
     gain : float
         Log-likelihood that they gain on one circuit for all [dimensionless].
+    whole : ClassFits
+        Circuits fitted to all.
     """
 
     place: int
     parts: list[Blocks]
     fits: list[ClassFits]
     gain: float
+    whole: ClassFits
 
     @property
     def conditions(self) -> tuple[int, int]:
@@ -189,9 +192,7 @@ def parted(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Parted | None
     parts = [part_of(blocks, 0, place), part_of(blocks, place, len(blocks.velocity))]
     runs, start = nominal_runs(blocks, actuator), fits.best.coordinates
     found = [fit_classes(part, actuator, runs=runs, start=start) for part in parts]
-    # each part is compared by itself: noise or a model's error that changes with the motion is no other condition
-    gain = sum(float(behind([fits.best], one.best, part)[0]) for part, one in zip(parts, found, strict=True))
-    return Parted(place, parts, found, gain)
+    return Parted(place, parts, found, gain_of(fits, parts, found), fits)
 
 
 def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change, Blocks, ClassFits] | None:
@@ -217,6 +218,8 @@ def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change,
     if two.gain < GAIN or first == last:
         return None
     if unexplained(two.parts[0], before, actuator):  # what comes and goes has no last condition, but a quiet stretch
+        return None
+    if not believed(blocks, two.parts, two.fits, two.whole, actuator):
         return None
     row = parameter_rows(before.best.coordinates[None], actuator.circuit, actuator.rated)[0]
     low, best, high = _when(blocks, row, after.best.coordinates, two.place, actuator)

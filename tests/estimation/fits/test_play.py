@@ -19,6 +19,7 @@ from estimation.fits.hypotheses import PLAY, Hypothesis
 from estimation.fits.objections import DOUBTED
 from estimation.fits.play import (
     NO_PLAY,
+    PLAY_BELIEVED,
     PLAY_OPEN,
     PLAY_SENSED,
     PLAY_SHOWN,
@@ -29,7 +30,7 @@ from estimation.fits.play import (
     sensed_play,
 )
 from estimation.fits.promises import Promise
-from estimation.notes import EstimateCode
+from estimation.notes import EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.arrays import Array
 from plant.eha.circuit_parameters import circuit_of
@@ -235,7 +236,7 @@ def concluded(
     monkeypatch: pytest.MonkeyPatch, plain: float, strange: float, chi: float = 1.0, record: Record | None = None
 ) -> FormFit:
     """Return what is told of a log whose plain fit shows a play by one gain, and that with a play by another."""
-    fit = replace(made_fit(500.0, 2e8, 1e5), play=ShownPlay(3e-5, plain))
+    fit = replace(made_fit(500.0, 2e8, 1e5), play=ShownPlay(3e-5, plain, moved={"bulk_modulus": -0.02}))
     played = replace(made_fit(100.0, 2.1e8, 1e5, chi=chi), play=ShownPlay(1e-5, strange))
     values = {name: (value, played.std[name]) for name, value in played.values.items()}
     explanation = SimpleNamespace(names=("position_play",), values=values, fit=played, delivery_open=0.0)
@@ -266,11 +267,24 @@ def test_a_play_that_is_shown_is_asked_for_and_believed_where_no_more_than_noise
 
 
 def test_a_play_that_is_shown_and_not_found_shuts_the_gate(monkeypatch: pytest.MonkeyPatch) -> None:
-    unexplained = concluded(monkeypatch, PLAY_SHOWN + 0.1, 0.0, chi=DOUBTED + 0.01)
+    unexplained = concluded(monkeypatch, PLAY_BELIEVED + 0.1, 0.0, chi=DOUBTED + 0.01)
     assert unexplained.explanation is None
     assert [(note.code, note.data["play_um"]) for note in unexplained.reasons] == [(EstimateCode.PLAY_LEFT, 30.0)]
-    another = concluded(monkeypatch, PLAY_SHOWN + 0.1, PLAY_SHOWN + 0.1)
+    another = concluded(monkeypatch, PLAY_SHOWN + 0.1, PLAY_BELIEVED + 0.1)
     assert [(note.code, note.data["play_um"]) for note in another.reasons] == [(EstimateCode.PLAY_LEFT, 10.0)]
+
+
+def test_a_play_that_residuals_may_show_by_chance_is_in_the_interval(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = concluded(monkeypatch, PLAY_SHOWN - 0.1, 0.0, chi=DOUBTED + 0.01)
+    doubtful = concluded(monkeypatch, PLAY_BELIEVED - 0.1, 0.0, chi=DOUBTED + 0.01)
+    assert not doubtful.reasons
+    assert doubtful.explanation is None
+    assert doubtful.parameters["bulk_modulus"][0] == sound.parameters["bulk_modulus"][0]
+    moved = 0.02  # as `concluded` has it
+    assert doubtful.parameters["bulk_modulus"][1] == pytest.approx(np.hypot(PLAY_STRUCTURE, moved) * 2e8, rel=0.01)
+    assert sound.parameters["bulk_modulus"][1] < 0.2 * doubtful.parameters["bulk_modulus"][1]
+    assert RigCode.PLAY_NOT_EXCLUDED in [note.code for note in doubtful.remarks]
+    assert RigCode.PLAY_NOT_EXCLUDED not in [note.code for note in sound.remarks]
 
 
 def test_a_play_that_a_velocity_sensor_shows_is_asked_for_too(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -292,9 +306,9 @@ def test_a_play_too_small_to_be_one_is_not_believed(monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize(
     ("shown", "sensed", "shut"),
     [
-        (ShownPlay(6e-6, PLAY_SHOWN + 0.1), NO_PLAY, True),
-        (ShownPlay(6e-6, PLAY_SHOWN - 0.1), NO_PLAY, False),
-        (ShownPlay(4e-6, PLAY_SHOWN + 0.1), NO_PLAY, False),
+        (ShownPlay(6e-6, PLAY_BELIEVED + 0.1), NO_PLAY, True),
+        (ShownPlay(6e-6, PLAY_BELIEVED - 0.1), NO_PLAY, False),
+        (ShownPlay(4e-6, PLAY_BELIEVED + 0.1), NO_PLAY, False),
         (NO_PLAY, ShownPlay(6e-6, PLAY_SHOWN + 0.1), True),
         (NO_PLAY, ShownPlay(6e-6, PLAY_SENSED + 0.1), False),
     ],
@@ -313,6 +327,7 @@ def test_a_piston_that_begins_to_move_within_what_a_sound_encoder_resolves_shows
 
 def test_a_play_is_shown_by_chance_as_seldom_as_its_limit_says() -> None:
     """The score statistic of a course that asks for more is the square of a normal deviate above zero."""
+    assert 1.0 / (3.0 * float(ndtr(-((2.0 * PLAY_BELIEVED) ** 0.5)))) == pytest.approx(3600.0, rel=0.02)
     by_chance = float(ndtr(-((2.0 * PLAY_SHOWN) ** 0.5)))
     assert 1.0 / by_chance == pytest.approx(430.0, rel=0.02)
     assert 1.0 / (3.0 * by_chance) == pytest.approx(140.0, rel=0.03)
