@@ -197,8 +197,8 @@ class RigCode(Code):
         "position_m follows the piston with about {play_um:.1g} um of play (backlash); the play was corrected"
     )
     PLAY_NOT_EXCLUDED = (
-        "velocity_m_s follows pressure while position_m stands still, by chance or because of about {play_um:.1g} um "
-        "of play (backlash): the interval of bulk modulus includes its effect"
+        "the piston moves a little while position_m stands still, by chance or because of about {play_um:.1g} um of "
+        "play (backlash): the interval of bulk modulus includes its effect"
     )
     AREA_TO_DISPLACEMENT = (
         "the ratio of pump displacement to piston area is {percent:.2f} ± {half_width:.2f} % of that in the rig file: "
