@@ -123,6 +123,15 @@ def test_of_many_counts_the_model_is_asked_of_a_few_and_of_none_where_a_fit_is_n
     assert not fits_of(seen(logged(0.0)))[0].teeth
 
 
+def test_what_a_count_gains_beside_the_likeliest_is_what_it_gains_once_that_is_taken_up() -> None:
+    fit = likeliest(0.1)
+    held = with_teeth(replace(seen(logged(0.1)), counts=(11, 19)), [most(fit).teeth])
+    after = min(fits_of(held), key=lambda one: one.cost)
+    assert fit.teeth[11].beside == 0.0
+    assert fit.teeth[19].beside == pytest.approx(after.teeth[19].gain, rel=0.1)
+    assert fit.teeth[19].beside < 0.95 * fit.teeth[19].gain
+
+
 def test_teeth_that_a_log_holds_leave_more_open() -> None:
     held = with_teeth(replace(seen(logged(0.1)), counts=(11,)), [Teeth(11, 0.1, 0.0)])
     free, known = (min(fits_of(log), key=lambda fit: fit.cost) for log in (held, replace(held, counts=(), teeth=())))
