@@ -88,7 +88,8 @@ def odds_of_change(
 
     Without one, one circuit is there from end to end, or it goes elsewhere within its condition: after a change the
     circuit is in any of the nine conditions alike. Likelihoods count in `LASTING` blocks, as the gain does, and there
-    are as many times at which a log may change; which condition a circuit is in is told as a class is.
+    are as many times at which a log may change. Velocity and pressure are tied by the flow, so that a wrong model errs
+    in both at once: they count as one look. Which condition a circuit is in is told as a class is.
 
     Parameters
     ----------
@@ -109,15 +110,16 @@ def odds_of_change(
         Logarithm of the ratio of posterior probabilities [dimensionless].
     """
     times = max(len(blocks.velocity) / LASTING, 1.0)
-    shares = sum(_share(one, actuator) for one in parts) - _share(whole, actuator)
-    to_one = gain + shares - math.log(len(CONDITIONS) * times) + math.log(CHANGES / (1.0 - CHANGES))
+    outputs = len(whole.best.scales)
+    shares = sum(_share(one, outputs, actuator) for one in parts) - _share(whole, outputs, actuator)
+    to_one = gain / outputs + shares - math.log(len(CONDITIONS) * times) + math.log(CHANGES / (1.0 - CHANGES))
     before, after = (one.scores for one in parts)
     to_drift = float(np.max(before) + np.max(after) - np.max(before + after))
     return -float(np.logaddexp(-to_one, -to_drift))
 
 
-def _share(fits: ClassFits, actuator: Actuator) -> float:
+def _share(fits: ClassFits, outputs: int, actuator: Actuator) -> float:
     """Return the logarithm of the share of its condition's region that a log leaves to a circuit, by its density."""
-    told = fits.information / LASTING
+    told = fits.information / (LASTING * outputs)
     volume = 0.5 * float(np.linalg.slogdet(np.eye(len(WITHIN)) + WITHIN @ told)[1])
     return float(np.max(region_scores(fits.best, told, actuator))) - volume

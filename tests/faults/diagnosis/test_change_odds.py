@@ -30,7 +30,7 @@ def fits(*scores: tuple[int, float], deviation: float = 0.02) -> list[ClassFits]
         one = np.full(9, -lead)
         one[place] = 0.0
         best = replace(whole().best, coordinates=ACTUATOR.conditions[place])
-        found.append(replace(whole(), best=best, scores=one, information=np.eye(7) * LASTING / deviation**2))
+        found.append(replace(whole(), best=best, scores=one, information=np.eye(7) * 2 * LASTING / deviation**2))
     return found
 
 
@@ -44,9 +44,9 @@ def test_all_that_was_chosen_is_priced() -> None:
     volume = 0.5 * float(np.linalg.slogdet(np.eye(7) + WITHIN / 0.02**2)[1])
     times = len(log.velocity) / LASTING
     beforehand = math.log(CHANGES / (1.0 - CHANGES))
-    assert odds(30.0, parts) == pytest.approx(30.0 - volume - math.log(9 * times) + beforehand)
+    assert odds(60.0, parts) == pytest.approx(30.0 - volume - math.log(9 * times) + beforehand)
     longer = replace(log, velocity=np.tile(log.velocity, 10))
-    assert odds(30.0, parts, longer) == pytest.approx(odds(30.0, parts) - math.log(10.0))
+    assert odds(60.0, parts, longer) == pytest.approx(odds(60.0, parts) - math.log(10.0))
 
 
 def test_what_a_part_tells_of_a_circuit_counts_as_its_integral_over_the_region() -> None:
@@ -54,7 +54,7 @@ def test_what_a_part_tells_of_a_circuit_counts_as_its_integral_over_the_region()
     parts = fits((0, 300.0), (3, 300.0))
     width, told, off = float(WITHIN[0, 0]), 400.0, 0.2
     first = np.zeros((7, 7))
-    first[0, 0] = LASTING * told
+    first[0, 0] = 2 * LASTING * told  # of two outputs that count as one
     at = parts[0].best.coordinates + np.array([off, *np.zeros(6)])
     parts[0] = replace(parts[0], information=first, best=replace(parts[0].best, coordinates=at))
     normal = math.sqrt(2.0 * math.pi * width)
