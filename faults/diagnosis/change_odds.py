@@ -23,8 +23,8 @@ CHANGES = 0.05
 
 LIKELIER = 10.0
 """How many times likelier than none a change must be to be believed [dimensionless]: evidence is called strong from
-there on (Jeffreys, Theory of Probability, 1961, appendix B). Beside one circuit throughout, 501 logs without a change
-come to a thirtieth at most, and 70 with one to 4000 at least."""
+there on (Jeffreys, Theory of Probability, 1961, appendix B). Beside one circuit throughout, plain logs without a change
+come to a thirtieth at most, and those with one to 36 at least."""
 
 
 def believed(
