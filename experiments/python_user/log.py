@@ -83,6 +83,13 @@ class Log(Shown):
         sparse: "Record | None" = None,
         refusal: str = "",
     ) -> None:
+        from plant.eha.rig import Rig
+        from plant.log.record import Record
+
+        if not isinstance(record, Record):
+            refuse(f"a Log is made of a Record, got {type(record).__name__}; hydrostate.read opens files and tables")
+        if not isinstance(rig, Rig):
+            refuse(f"the rig of a Log must be a Rig, got {type(rig).__name__}; hydrostate.read_rig reads one")
         self.record, self.rig, self.plant, self._said = record, rig, plant, tuple(said)
         self._sparse, self._refusal = sparse, refusal
         self._kept: tuple[Record, dict[Any, Any]] = record, {}

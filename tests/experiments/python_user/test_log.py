@@ -149,3 +149,10 @@ def test_a_warning_points_at_the_line_that_read_the_log(log: hs.Log) -> None:
     with pytest.warns(LogWarning) as caught:
         hs.read(table)
     assert {one.filename for one in caught} == {__file__}
+
+
+def test_a_log_made_of_what_is_no_record_says_what_opens_it(log: hs.Log) -> None:
+    with pytest.raises(hs.HydrostateError, match="made of a Record, got str; hydrostate"):
+        hs.Log("run.csv", hs.Rig())  # type: ignore[arg-type]
+    with pytest.raises(hs.HydrostateError, match="must be a Rig, got str; hydrostate"):
+        hs.Log(log.record, "rig.toml")  # type: ignore[arg-type]
