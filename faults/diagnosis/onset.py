@@ -17,10 +17,11 @@ from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import LONGEST, Blocks, blocks_of
 from faults.diagnosis.change_odds import believed, gain_of
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
-from faults.diagnosis.class_fit import LASTING, WEAK, PointFit, least_scales, nominal_runs
+from faults.diagnosis.class_fit import least_scales, nominal_runs
 from faults.diagnosis.class_regions import ClassFits, fit_classes, lasting_misfit
 from faults.diagnosis.end_stop import stopped
 from faults.diagnosis.out_of_model import unexplained
+from faults.diagnosis.split import GAIN, in_one_condition, likeliest_split
 from faults.diagnosis.warming import Drift, drift_of
 from faults.notes import AgainstCode
 from faults.watch.events import SLOW, Alarm
@@ -29,12 +30,6 @@ from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
 from plant.solvers.adaptive import LANES
-
-EDGE = 1.0
-"""What a log must hold before a change and after it [s]."""
-
-GAIN = 10.0
-"""Log-likelihood that two circuits must gain on one to be looked into [dimensionless]."""
 
 SOFTENED = 30.0
 """The same where both are in one condition, from which the oil is asked whether it softened [dimensionless]: steady
@@ -184,11 +179,14 @@ def parted(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Parted | None
     Returns
     -------
     Parted or None
-        Both parts; None where one circuit will do.
+        Both parts; None where one circuit will do, or where both would be in one condition.
     """
-    place = likeliest_split(blocks, fits.best)
-    if place is None:
+    split = likeliest_split(blocks, fits.best)
+    if split is None:
         return None
+    if blocks.pressure is not None and in_one_condition(split, blocks, actuator):  # without, the oil may have softened
+        return None
+    place = split.place
     parts = [part_of(blocks, 0, place), part_of(blocks, place, len(blocks.velocity))]
     runs, start = nominal_runs(blocks, actuator), fits.best.coordinates
     found = [fit_classes(part, actuator, runs=runs, start=start) for part in parts]
@@ -272,49 +270,6 @@ def part_of(blocks: Blocks, begin: int, end: int) -> Blocks:
     away = (there < begin) | (there >= end)
     pressure = None if blocks.pressure is None else np.where(away, np.nan, blocks.pressure)
     return replace(blocks, velocity=np.where(away, np.nan, blocks.velocity), pressure=pressure)
-
-
-def likeliest_split(blocks: Blocks, fit: PointFit) -> int | None:
-    """Return the block at which one circuit most likely gave way to another, if that explains much more.
-
-    Parameters
-    ----------
-    blocks : Blocks
-        The log.
-    fit : PointFit
-        The circuit fitted to all of it.
-
-    Returns
-    -------
-    int or None
-        The first block of the second circuit; None if one circuit will do.
-    """
-    first, edge = blocks.first, round(EDGE / (blocks.block * blocks.sample_time))
-    left = (blocks.outputs - fit.fitted)[first:] / fit.scales
-    seen = np.isfinite(left)
-    left = np.where(seen, left, 0.0)
-    slopes = np.where(seen, fit.slopes[:, first:] / fit.scales, 0.0)
-    places = np.arange(edge, len(left) - edge)
-    if len(places) == 0:
-        return None
-    scores = np.cumsum(np.einsum("ink,nk->ni", slopes, left), axis=0)
-    known = np.cumsum(np.einsum("ink,jnk->nij", slopes, slopes), axis=0)
-    weak = np.linalg.inv(WEAK)
-    moved = np.linalg.solve(known[places] + weak, scores[places, :, None])[..., 0]
-    moved_on = np.linalg.solve(known[-1] - known[places] + weak, (scores[-1] - scores[places])[..., None])[..., 0]
-    gains = np.einsum("ti,ti->t", scores[places], moved) + np.einsum("ti,ti->t", scores[-1] - scores[places], moved_on)
-    best = int(np.argmax(gains))
-    split = int(places[best])
-    explained = np.concatenate(
-        [
-            np.einsum("ink,i->nk", slopes[:, :split], moved[best]),
-            np.einsum("ink,i->nk", slopes[:, split:], moved_on[best]),
-        ]
-    )
-    before, after = (np.sum(one**2, axis=0) for one in (left, left - explained))
-    tiny = np.finfo(float).tiny
-    gain = 0.5 * float(np.sum(seen, axis=0) @ np.log(np.maximum(before, tiny) / np.maximum(after, tiny)))
-    return first + split if gain >= GAIN * LASTING else None
 
 
 def _when(blocks: Blocks, before: Array, after: Array, place: int, actuator: Actuator) -> tuple[int, int, int]:

@@ -10,8 +10,9 @@ import pytest
 from faults.diagnosis import class_fit, onset, out_of_model
 from faults.diagnosis.class_fit import _at, _step, fit_freely
 from faults.diagnosis.class_regions import fit_classes
-from faults.diagnosis.onset import _when, likeliest_split, part_of
+from faults.diagnosis.onset import _when, part_of
 from faults.diagnosis.out_of_model import _bias, _biases, _larger_pump, _least, _nearest_severity, _one_step
+from faults.diagnosis.split import likeliest_split
 from plant.arrays import Array
 from plant.log.record import Record
 from tests.faults.diagnosis.short_logs import ACTUATOR, OFF, blocks, classes, log, made_classes, noted
@@ -127,7 +128,8 @@ def splits_near_the_ends_of_a_log() -> dict[str, Any]:
     for share in (0.12, 0.3, 0.66, 0.88):
         one = blocks("normal", "major_leakage", seconds=4.0, share=share)
         fits = fit_classes(one, ACTUATOR)
-        place = likeliest_split(one, fits.best)
+        split = likeliest_split(one, fits.best)
+        place = None if split is None else split.place
         told[f"at {4.0 * share:g} s of 4"] = {"block": place}
         if place is not None:
             row = class_fit.parameter_rows(ACTUATOR.conditions[:1], ACTUATOR.circuit, ACTUATOR.rated)[0]
@@ -138,7 +140,8 @@ def splits_near_the_ends_of_a_log() -> dict[str, Any]:
                 "where it is early": list(_when(one, row, ACTUATOR.conditions[2], place - 8, ACTUATOR)),
             }
     weak = blocks("normal", "minor_leakage", seconds=4.0, drive="sine")
-    told["of little"] = likeliest_split(weak, fit_classes(weak, ACTUATOR).best)
+    split = likeliest_split(weak, fit_classes(weak, ACTUATOR).best)
+    told["of little"] = None if split is None else split.place
     return told
 
 

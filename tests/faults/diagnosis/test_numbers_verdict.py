@@ -20,9 +20,10 @@ from faults.diagnosis.force_balance import force_balance
 from faults.diagnosis.innovation_bank import innovation_scores
 from faults.diagnosis.load import first_guesses, under_load
 from faults.diagnosis.models_verdict import margin, models_verdict
-from faults.diagnosis.onset import find_onset, likeliest_split, part_of, parted
+from faults.diagnosis.onset import find_onset, part_of, parted
 from faults.diagnosis.out_of_model import reasons_against, sensors_disagree
 from faults.diagnosis.rmse import Scores, measured_velocity, score_mathematical
+from faults.diagnosis.split import likeliest_split
 from faults.eha.bank import mathematical_bank
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import circuit_of
@@ -133,7 +134,8 @@ def onsets_within_a_log() -> dict[str, Any]:
         one = blocks(condition, after, pressure=pressure, seconds=4.0)
         fits = fit_classes(one, ACTUATOR)
         found = None if (two := parted(one, fits, ACTUATOR)) is None else find_onset(one, two, ACTUATOR)
-        told[name] = {"likeliest split, block": likeliest_split(one, fits.best)}
+        split = likeliest_split(one, fits.best)
+        told[name] = {"likeliest split, block": None if split is None else split.place}
         if found is not None:
             change, rest, later = found
             told[name] |= {

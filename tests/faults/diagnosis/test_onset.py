@@ -16,7 +16,6 @@ from faults.diagnosis import onset
 from faults.diagnosis.actuator import Actuator, actuator_of
 from faults.diagnosis.blocks import Blocks, blocks_of
 from faults.diagnosis.circuit_verdict import Diagnosis
-from faults.diagnosis.class_fit import PointFit
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.diagnose import diagnose_clean
 from faults.diagnosis.onset import (
@@ -25,7 +24,6 @@ from faults.diagnosis.onset import (
     LastPart,
     find_onset,
     last_part,
-    likeliest_split,
     part_of,
     parted,
     softened,
@@ -226,31 +224,8 @@ def test_a_fault_late_in_a_long_log_is_found_by_the_watch_and_told() -> None:
     assert found.scoreboard.onset.since == pytest.approx(90.0, abs=0.3)
 
 
-def flat(velocity: np.ndarray) -> tuple[Blocks, PointFit]:
-    """A log of one output, and a model of it that can only shift it."""
-    blocks = Blocks(np.zeros(10 * len(velocity) + 1), 1e-3, 10, velocity, None, np.array([1.0]))
-    slopes = np.zeros((7, len(velocity), 1))
-    slopes[0] = 1.0
-    fitted = np.full((len(velocity), 1), float(np.mean(velocity)))
-    scale = np.array([float(np.std(velocity))])
-    return blocks, PointFit(ACTUATOR.conditions[0], 0.0, np.eye(7), scale, fitted, slopes)
-
-
-def test_a_jump_splits_a_log_where_it_is_and_noise_does_not() -> None:
-    noise = np.random.default_rng(0).normal(size=800)
-    assert likeliest_split(*flat(noise)) is None
-    jump = np.where(np.arange(800) < 300, 0.0, 5.0)
-    place = likeliest_split(*flat(noise + jump))
-    assert place is not None
-    assert abs(place - 300) <= 1
-
-
-def test_a_log_too_short_to_hold_a_change_is_not_split() -> None:
-    assert likeliest_split(*flat(np.where(np.arange(150) < 75, 0.0, 9.0))) is None
-
-
 def test_a_part_keeps_the_drive_and_misses_the_rest() -> None:
-    blocks, _ = flat(np.arange(20.0))
+    blocks = Blocks(np.zeros(201), 1e-3, 10, np.arange(20.0), None, np.array([1.0]))
     part = part_of(blocks, 5, 12)
     assert np.flatnonzero(np.isfinite(part.velocity)).tolist() == list(range(5, 12))
     assert part.speed is blocks.speed
