@@ -25,9 +25,13 @@ LOWEST = 40.0
 HIGHEST = 0.4
 """Frequency times sample time over which none is looked for [dimensionless]: corners of a drive alternate there."""
 
-STANDS_OUT, SHARED = 1e3, 0.1
+STANDS_OUT, SHARED = 200.0, 0.1
 """Power of a hum's line over the usual one near it, and the share of that ratio which a line of motion at the same
-frequency may have [dimensionless]. Noise alone reaches 20, a piston's motion 200, a hum of 0.1 bar 5,000."""
+frequency may have [dimensionless]. Noise reaches 27 on 204 logs of all kinds, a hum of 0.1 bar 5,000; one of 600 that
+stays makes the balance's residuals 1.3 times the noise."""
+
+REPEATS = 1e3
+"""The same of the line of a drive that repeats itself [dimensionless]."""
 
 ALONE, AROUND, WIDTH = 0.05, 30.0, 1.0
 """Share of a hum's line that others may have [dimensionless], within this distance of it and beyond its own width
@@ -95,12 +99,16 @@ def _window(length: int) -> Array:
 
 
 def _alone(frequencies: Array, lines: Array, place: int) -> bool:
-    """Return whether a line has no others near it, and is no harmonic of what the drive repeats."""
+    """Return whether a line has no others near it, and is no harmonic of what the drive repeats.
+
+    Harmonics come in rows, every one or every other: a line of a slow drive has others of its row near it. Only those
+    of a fast one stand as far apart as tones of the mains.
+    """
     apart = np.abs(frequencies - frequencies[place])
     others = lines[(apart > WIDTH) & (apart < AROUND)]
     slow = np.where((frequencies > 0.0) & (frequencies < LOWEST), lines, 0.0)
     driven = int(np.argmax(slow))
-    if slow[driven] > STANDS_OUT:
+    if slow[driven] > REPEATS and 2.0 * frequencies[driven] > AROUND - WIDTH:
         off = frequencies[place] % frequencies[driven]
         if min(off, frequencies[driven] - off) < WIDTH:
             return False

@@ -59,10 +59,27 @@ def test_a_tone_that_position_has_as_well_is_motion_and_stays() -> None:
     assert without_hum(shaken)[1] == ()
 
 
-def test_a_harmonic_of_a_drive_that_repeats_itself_is_no_hum() -> None:
+@pytest.mark.parametrize("repeats", [4.9, 10.0, 20.0])
+def test_harmonics_of_a_drive_that_repeats_itself_are_no_hum(repeats: float) -> None:
     record = log("steps")
-    driven = humming(humming(record, 1e6, 10.0), 2.5e4, 50.0)
+    time = record.sample_time * np.arange(len(record))
+    square = 1e5 * np.sign(np.sin(2.0 * np.pi * repeats * time + 0.3))
+    assert without_hum(record.replace(**{PRESSURE: record[PRESSURE] + square}))[1] == ()
+
+
+def test_a_line_at_a_harmonic_of_a_fast_drive_may_be_the_drive() -> None:
+    driven = humming(humming(log("steps"), 1e6, 20.0), 2.5e4, 60.0)
     assert without_hum(driven)[1] == ()
+
+
+@pytest.mark.parametrize("repeats", [2.5, 3.4, 6.2])
+def test_the_mains_are_no_harmonic_of_a_slow_drive_that_has_no_others_near_them(repeats: float) -> None:
+    """Every frequency lies within 1 Hz of a multiple of one below 2 Hz, and most do of one of 3 Hz."""
+    speed = 60.0 * np.sin(2.0 * np.pi * repeats * 1e-3 * np.arange(6000))
+    record = simulate(CIRCUIT, speed, 1e-3, EhaParameters(), sensors=BENCH, rng=np.random.default_rng(4))
+    assert without_hum(record)[1] == ()
+    (note,) = without_hum(humming(record, 2.5e4, 50.0))[1]
+    assert note.data["frequency_hz"] == pytest.approx(50.0, abs=0.1)
 
 
 def test_a_line_of_every_other_sample_is_no_hum() -> None:
