@@ -39,6 +39,10 @@ NEAR = 1.15
 LEAST, MOST, LOST = 0.6, 1.3, 0.5
 """What a balance may make of a slip's factor, and what a piston that loses flow leaves of it [fraction]."""
 
+APART = 5.0
+"""Times that two sensors of one motion differ from which one is in a unit that nobody thought of; judged: gains are off
+by less [dimensionless]."""
+
 TINY = 1e-3
 """Factor of a length from which a piston seems to stand, which without pressure no leakage is taken for."""
 
@@ -64,6 +68,9 @@ LENGTHS: Mapping[float, str] = {
     1e-6: "m read as um",
 }
 """Slips of a length's unit, by the factor that they make."""
+
+UNKNOWN_UNIT, UNKNOWN_RIG = "another unit", "another unit, or a rig file of another actuator"
+"""What is said of a factor that no known slip makes."""
 
 EXPLAINED, KNOWN, TOLD = 0.9, 0.1, 4.0
 """Share of the flow that a balance must explain, relative deviation at which its factor counts, and deviations from
@@ -164,6 +171,11 @@ def _motions_disagree(short: ChannelBlocks, long: ChannelBlocks, p: EhaParameter
         guilty, other = (large, small) if too_far else (small, large)
         times = abs(ratio) if guilty == POSITION else 1.0 / abs(ratio)
         found.append(_unit(guilty, other, times, LENGTHS[factor if guilty == POSITION else _inverse(factor)]))
+    elif not 1.0 / APART <= abs(ratio) <= APART:  # a furlong read as a metre: which is wrong only a pump can tell
+        large, small = (POSITION, VELOCITY) if abs(ratio) > 1.0 else (VELOCITY, POSITION)
+        too_far = p.piston_area * abs(with_pump[large][1]) > FARTHEST
+        guilty = large if too_far else f"{large} or {small}"
+        found.append(_unit(guilty, small, max(abs(ratio), 1.0 / abs(ratio)), UNKNOWN_UNIT))
     return tuple(found)
 
 
@@ -234,6 +246,10 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
         length is not None and believed[1] and gone < NEAR * length and not (slips and " and " in moved)
     ):  # two that agree are right
         slips.append((moved, LENGTHS[length], length))
+    if not slips and far and together > FOLLOWS and (balance is None or balance.swept * FARTHEST < 1.0):
+        channel = SPEED if " and " in moved else f"{moved} or {SPEED}"
+        times = 1.0 / gone if channel == SPEED else gone
+        return (_unit(channel, moved if channel == SPEED else SPEED, times, UNKNOWN_RIG),)
     if not slips:
         return ()
     channel, slip = " or ".join(one[0] for one in slips), " or ".join(one[1] for one in slips)

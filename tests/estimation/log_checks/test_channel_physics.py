@@ -113,6 +113,28 @@ def test_a_mistake_is_named(
         assert (said.code, said.data["channel"]) == (code, channel)
 
 
+@pytest.mark.parametrize("condition", ["normal", "minor_leakage", "minor_friction"])
+@pytest.mark.parametrize(
+    ("channel", "factor", "lacking", "accused"),
+    [
+        (POSITION, 201.0, (), POSITION),
+        (VELOCITY, 30.0, (), VELOCITY),
+        (VELOCITY, 1.0 / 30.0, (), f"{POSITION} or {VELOCITY}"),
+        (POSITION, 201.0, (VELOCITY,), f"{POSITION} or {SPEED}"),
+        (SPEED, 1.0 / 25.0, (), SPEED),
+    ],
+)
+def test_a_factor_that_no_known_slip_makes_is_another_unit(
+    channel: str, factor: float, lacking: tuple[str, ...], accused: str, condition: str
+) -> None:
+    """A furlong read as a metre took 17 s to be refused, and only a reader's warning named the channel."""
+    for drive in ("steps", "prbs"):
+        log = scaled(channel, factor)(run(condition, drive)).replace(**dict.fromkeys(lacking))
+        (said,) = channel_mistakes(log, HEALTHY)
+        assert (said.code, said.data["channel"]) == (ChannelCode.CHANNEL_UNIT, accused)
+        assert said.data["slip"].startswith("another unit")
+
+
 def test_a_piston_too_far_for_its_pump_tells_the_unit_where_the_balance_takes_motion_for_leakage(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
