@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from experiments.open_benchmark.added_kinds import ADDED
 from experiments.open_benchmark.draws import course_of, draw_plain
 from experiments.open_benchmark.fault_kinds import FAULTY
 from experiments.open_benchmark.kind import Kind
@@ -28,7 +29,7 @@ VERSION = "1.0"
 SPLITS = ("training", "validation", "test")
 """What may be looked at, what choices may be made on, and what is scored."""
 
-KINDS: Mapping[str, Kind] = {kind.name: kind for kind in (*LOGGERS, *RIGS, *FAULTY)}
+KINDS: Mapping[str, Kind] = {kind.name: kind for kind in (*LOGGERS, *RIGS, *FAULTY, *ADDED)}
 """Every kind by name."""
 
 STRIDE = 4
@@ -85,6 +86,8 @@ def kind_of(name: str) -> Kind:
 def drawn_pairs(split: str, count: int) -> list[str]:
     """Return names of pairs of kinds that do not collide, drawn at random without return; the same for the same split.
 
+    Those with a kind that was added later come last, so that the first ones stay what they were.
+
     Parameters
     ----------
     split : str
@@ -93,9 +96,13 @@ def drawn_pairs(split: str, count: int) -> list[str]:
         How many, at most all that there are; of more, the first are the same.
     """
     require_known("split", split, SPLITS)
-    names = [f"{a.name}{BOTH}{b.name}" for a, b in combinations(KINDS.values(), 2) if not collide(a, b)]
-    order = np.random.default_rng([zlib.crc32(BOTH.encode()), SPLITS.index(split)]).permutation(len(names))
-    return [names[place] for place in order[:count]]
+    pairs = [(a, b) for a, b in combinations(KINDS.values(), 2) if not collide(a, b)]
+    rng = np.random.default_rng([zlib.crc32(BOTH.encode()), SPLITS.index(split)])
+    drawn: list[str] = []
+    for later in (False, True):
+        names = [f"{a.name}{BOTH}{b.name}" for a, b in pairs if (a in ADDED or b in ADDED) is later]
+        drawn += [names[place] for place in rng.permutation(len(names))]
+    return drawn[:count]
 
 
 def seed_of(kind: str, split: str, index: int) -> list[int]:

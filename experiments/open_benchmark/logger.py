@@ -42,6 +42,11 @@ class Sensor:
         What the offset gains from the first row to the last, evenly [unit of the channel].
     play : float
         How far the quantity moves after it turns round before the sensor follows [unit of the channel].
+    hum : float
+        Amplitude of what a cable picks up of the mains; a fifth of it comes at three times their frequency [unit of the
+        channel].
+    hum_frequency : float
+        Of the mains [Hz].
     """
 
     noise: float = 0.0
@@ -55,6 +60,8 @@ class Sensor:
     average: int = 1
     drift: float = 0.0
     play: float = 0.0
+    hum: float = 0.0
+    hum_frequency: float = 50.0
 
     def read(self, time: Array, fine: Array, values: Array, rng: np.random.Generator) -> Array:
         """Return what is logged.
@@ -79,10 +86,16 @@ class Sensor:
         sampled = np.interp(time - self.delay, fine, sensed)
         offset = self.offset + self.drift * np.linspace(0.0, 1.0, len(time))
         logged = self.gain * sampled + offset + self.noise * rng.standard_normal(len(time))
+        logged = logged + self._hum(time) if self.hum > 0.0 else logged
         logged = _averaged(logged, self.average) if self.average > 1 else logged
         logged = self.quantum * np.round(logged / self.quantum) if self.quantum > 0.0 else logged
         rows = np.arange(len(time))
         return logged[rows - rows % self.hold]
+
+    def _hum(self, time: Array) -> Array:
+        """Return what the mains add to a channel."""
+        phase = 2.0 * np.pi * self.hum_frequency * time
+        return self.hum * (np.sin(phase + 1.0) + 0.2 * np.sin(3.0 * phase))
 
 
 def _lagged(values: Array, records: float) -> Array:

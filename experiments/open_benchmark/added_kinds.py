@@ -1,0 +1,51 @@
+"""Kinds of sensors and loggers that were added after the first 51; pairs of those are drawn as before."""
+
+import numpy as np
+
+from experiments.open_benchmark.kind import MAYBE, Kind
+from experiments.open_benchmark.logger import POSITION, PRESSURES, SPEED, VELOCITY
+from experiments.open_benchmark.setup import Setup
+
+
+def _hums(setup: Setup, rng: np.random.Generator) -> Setup:
+    frequency = float(rng.choice((50.0, 60.0)) * (1.0 + rng.uniform(-1e-3, 1e-3)))
+    return setup.with_sensor(PRESSURES, hum=rng.uniform(1e4, 5e4), hum_frequency=frequency)
+
+
+def _held_apart(setup: Setup, _: np.random.Generator) -> Setup:
+    held = setup.with_sensor((SPEED,), hold=4).with_sensor((POSITION, VELOCITY), hold=2)
+    return held.with_sensor(PRESSURES, hold=5)
+
+
+ADDED = (
+    Kind(
+        "pressure_hums",
+        "0.1 to 0.5 bar of mains hum in pressure, and a fifth of it at three times the frequency",
+        _hums,
+        named=r"\bhum\b|\bmains\b",
+    ),
+    Kind(
+        "speed_held",
+        "motor speed comes every 5 to 10 ms and is repeated in between",
+        lambda setup, rng: setup.with_sensor((SPEED,), hold=int(rng.integers(5, 11))),
+        MAYBE,
+        named=r"\brepeat|\bheld\b|\bslow",
+    ),
+    Kind(
+        "held_apart",
+        "motor speed comes every 4 ms, position every 2, pressure every 5, each repeated in between",
+        _held_apart,
+        MAYBE,
+        named=r"\brepeat|\bheld\b|\bslow",
+    ),
+    Kind(
+        "speed_offset",
+        "motor speed reads 0.1 to 3 rad/s too much or too little",
+        lambda setup, rng: setup.with_sensor(
+            (SPEED,), offset=float(rng.choice((-1.0, 1.0)) * np.exp(rng.uniform(np.log(0.1), np.log(3.0))))
+        ),
+        MAYBE,
+        named=r"\boffset|zero point|\breads?\b",
+    ),
+)
+"""Kinds by sensor and logger; the rig file describes their actuator."""
