@@ -70,4 +70,8 @@ class IdentificationCode(Code):
         "neither dead zone nor saturation nor backlash at the input predicts {output!r} better on held-back data: the "
         "linear model was chosen"
     )
+    UNRELATED = (
+        "the inputs explain {output!r} no better than the same inputs in other orders would: it follows a course of "
+        "its own, such as drift, which a slow model imitates; do not rely on the model"
+    )
     NO_FIT = "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): do not rely on it"

@@ -153,11 +153,7 @@ def _response(data: "Channels", log: str, path: Path) -> dict[str, Any]:
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     shown = table("output", "structure", "values [-]", "fit [%]", "held back [%]", "test [%]", "rms error", "gain")
     for result in results:
-        test, gain = result["test"], result["dc_gain"]
-        value = None if gain is None else gain["value"]
-        said = (
-            "-" if value is None else " ".join(f"{one:.4g}" for one in ([value] if isinstance(value, float) else value))
-        )
+        test = result["test"]
         shown.add_row(
             str(result["output"]),
             result["structure"] if result["order"] is None else f"{result['structure']}, order {result['order']}",
@@ -166,7 +162,7 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
             f"{result['held_back_percent']:.2f}",
             "-" if test is None else f"{test['fit_percent']:.2f}",
             f"{result['rmse']:.4g}",
-            said,
+            _gains(result["dc_gain"]),
         )
     yield shown
     for result in results:
@@ -181,6 +177,17 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
         f"From {', '.join(results[0]['inputs'])}. Fits are of free runs: on the fitted logs, on blocks held back from "
         f"the fit, and on --validate. One-step fits, models and candidates are in --json and --out."
     )
+
+
+def _gains(gain: Mapping[str, Any] | None) -> str:
+    """Return the steady gain from each input; one that is less than its standard deviation is not determined."""
+    if gain is None:
+        return "-"
+    values, spreads = gain["value"], gain.get("std")
+    if isinstance(values, float):
+        values, spreads = [values], [spreads]
+    each = zip(values, spreads or [0.0] * len(values), strict=True)
+    return " ".join("undetermined" if spread > abs(one) else f"{one:.4g}" for one, spread in each)
 
 
 def _with_interval(one: Mapping[str, Any]) -> str:

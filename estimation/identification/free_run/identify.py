@@ -33,6 +33,7 @@ from estimation.identification.free_run.model import FreeRunModel, FreeRunQualit
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.transfer_function import linear_model
+from estimation.identification.free_run.unrelated import bend_explains, linear_explains, polynomial_explains
 from estimation.identification.notes import IdentificationCode
 from plant.errors import HydrostateError, LogWarning, require_known
 from plant.notes import Note
@@ -43,6 +44,7 @@ FREE_STRUCTURES = ("output-error", "narx", "hammerstein", "auto", *ADOPTED)
 WARNED = (
     IdentificationCode.TIME_CONSTANT_BEYOND_RECORD,
     IdentificationCode.NO_FIT,
+    IdentificationCode.UNRELATED,
     IdentificationCode.INTEGRATES,
     IdentificationCode.FEEDBACK,
 )
@@ -150,12 +152,16 @@ def _identified(
     linear = linear_candidates(part, list(orders), delays, n_numerator)
     best, notes = _believable(linear, part, by)
     rows = [linear_row(one) for one in linear]
-    sound = not best.doubt
+    related = not best.outlasts_block(part) or linear_explains(best.fit, part)
+    notes = notes if related else [IdentificationCode.UNRELATED.note(output=data.output)]
+    sound = related and not best.doubt
     if structure in ADOPTED:
-        return _adopted(structure, best, data, by, rows)
+        return _adopted(structure, best, data, by, rows, [] if related else notes)
     nonlinear = None
     if structure == "hammerstein" or (structure == "auto" and len(data.inputs) == 1):
         nonlinear = _worthwhile_nonlinearity(linear, best, whole, rows, surely=structure == "auto")
+        if nonlinear is not None and not related and not bend_explains(nonlinear.fit, part):
+            nonlinear = None
     if structure == "hammerstein":
         if nonlinear is not None:
             return _nonlinear(nonlinear, data, whole, rows)
@@ -163,7 +169,7 @@ def _identified(
         structure = "output-error"
     dynamics, held_back, named = LinearDynamics.of(best.fit), best.held_back, "output-error"
     if structure != "output-error":
-        polynomial = polynomial_candidates(linear if sound else [best], part, Asked(order, delay, n_numerator))
+        polynomial = polynomial_candidates([best] if best.doubt else linear, part, Asked(order, delay, n_numerator))
         rows += [polynomial_row(one) for one in polynomial]
         better = min(polynomial, key=lambda one: (one.price, one.held_back), default=None)
         if better is None and structure == "narx":
@@ -174,7 +180,9 @@ def _identified(
             return _nonlinear(nonlinear, data, whole, rows)
         if taken and better is not None:
             dynamics, held_back, named = _refitted(better, whole), better.held_back, "narx"
-            sound, notes = np.isfinite(held_back) and held_back < 1.0, []
+            related = related or polynomial_explains(better, part)
+            notes = [] if related else [IdentificationCode.UNRELATED.note(output=data.output)]
+            sound = related and np.isfinite(held_back) and held_back < 1.0
     transfer = None
     if isinstance(dynamics, LinearDynamics):
         fit = fit_linear(best.form, whole, [best.fit.f], bounded=best.fit.bounded)
@@ -224,14 +232,16 @@ def _nonlinear(taken: HammersteinCandidate, data: Channels, whole: Channels, row
     return Identified(model, quality, 100.0 * (1.0 - taken.held_back), tuple(rows), notes, sound)
 
 
-def _adopted(structure: str, best: Candidate, data: Channels, by: Scaling, rows: list[dict[str, Any]]) -> Identified:
+def _adopted(
+    structure: str, best: Candidate, data: Channels, by: Scaling, rows: list[dict[str, Any]], said: Sequence[Note]
+) -> Identified:
     """Return a structure that is not fitted by its free run, at the order of the best output-error model."""
     dynamics, linear, held_back = adopt(structure, best.form, data, by)
     model = FreeRunModel(data.inputs, data.output, data.sample_time, structure, by, dynamics, linear)
     quality = model.quality(data.u, data.y)
     sound = quality.fit_percent > 0.0 and held_back < 1.0
-    notes = () if sound else (IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent),)
-    return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(rows), notes, sound)
+    notes = said if sound else [*said, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
+    return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(rows), tuple(notes), sound and not said)
 
 
 def _believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> tuple[Candidate, list[Note]]:

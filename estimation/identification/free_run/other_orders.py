@@ -16,13 +16,15 @@ REORDERED, PIECES = 10, (8, 25)
 """Other orders of the inputs that a model is tried on, and pieces that they are cut into, by turns."""
 
 
-def reordered(data: Channels) -> Iterator[Channels]:
+def reordered(data: Channels, count: int = REORDERED) -> Iterator[Channels]:
     """Yield the same channels with pieces of the inputs in other orders, some of them backwards.
 
     Parameters
     ----------
     data : Channels
         Scaled.
+    count : int
+        Other orders.
 
     Yields
     ------
@@ -30,11 +32,11 @@ def reordered(data: Channels) -> Iterator[Channels]:
         Outputs are those of the order that was measured.
     """
     rng = np.random.default_rng(0)
-    for k in range(REORDERED):
-        inputs, count = list[Array](), PIECES[k % len(PIECES)]
+    for k in range(count):
+        inputs, cuts = list[Array](), PIECES[k % len(PIECES)]
         for u in data.u:
-            pieces = np.array_split(u, count)
-            turned = [pieces[p][::-1] if rng.random() < 0.5 else pieces[p] for p in rng.permutation(count)]
+            pieces = np.array_split(u, cuts)
+            turned = [pieces[p][::-1] if rng.random() < 0.5 else pieces[p] for p in rng.permutation(cuts)]
             inputs.append(np.ascontiguousarray(np.concatenate(turned)))
         yield replace(data, u=tuple(inputs))
 

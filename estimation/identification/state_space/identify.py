@@ -87,7 +87,8 @@ def identify_outputs(
     rows = [(*one.candidates, *other.candidates) for one, other in zip(single, together, strict=True)]
     fewer = together[0].model.n_values < sum(one.model.n_values for one in single)
     bar = _left(single) * (1.0 if fewer else 1.0 - CLEARLY)
-    better = all(one.sound for one in together) and _left(together) < bar
+    related = not any(note.code == IdentificationCode.UNRELATED for one in single for note in one.notes)
+    better = related and all(one.sound for one in together) and _left(together) < bar
     return [replace(one, candidates=row) for one, row in zip(together if better else single, rows, strict=True)]
 
 

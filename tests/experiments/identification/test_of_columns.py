@@ -13,6 +13,7 @@ from benchmarks.bent_inputs import PLANTED, logged
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
 from experiments.cli import app
+from experiments.identification.of_columns import _gains
 
 
 @pytest.fixture(scope="module")
@@ -260,3 +261,17 @@ def test_a_test_log_whose_input_leaves_the_fitted_range_is_named(tmp_path: Path)
         if named:
             (note,) = [note for note in one["notes"] if note["code"] == "input_beyond_range"]
             assert note["data"]["greatest"] == pytest.approx(3.0 * note["data"]["high"], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("gain", "shown"),
+    [
+        (None, "-"),
+        ({"value": 2.5, "std": 0.1}, "2.5"),
+        ({"value": 7e10, "std": 3e22}, "undetermined"),
+        ({"value": [1.0, 2.0]}, "1 2"),
+        ({"value": [1.0, 2.0], "std": [0.1, 3.0]}, "1 undetermined"),
+    ],
+)
+def test_a_gain_less_than_its_deviation_is_not_shown_as_a_number(gain: dict[str, object] | None, shown: str) -> None:
+    assert _gains(gain) == shown

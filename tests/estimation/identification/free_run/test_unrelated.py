@@ -1,0 +1,75 @@
+"""An output that its input has no part in is said to be that, however well a slow model follows it."""
+
+import numpy as np
+import pytest
+
+from estimation.arrays import Array
+from estimation.identification.free_run.data import Channels, channels_from
+from estimation.identification.free_run.identify import Identified, identify_channels
+from estimation.identification.free_run.unrelated import explains
+from estimation.identification.notes import IdentificationCode
+from plant.errors import LogWarning
+
+N = 400
+
+
+def _data(y: Array) -> Channels:
+    return channels_from([_input()[:, None]], [y], 0.01, ["u"], "y")
+
+
+def _input() -> Array:
+    return np.repeat(np.random.default_rng(1).choice([-1.0, 1.0], N // 8), 8)
+
+
+def _noise(seed: int) -> Array:
+    return np.random.default_rng(seed).normal(size=N)
+
+
+def _said(found: Identified) -> bool:
+    return any(note.code == IdentificationCode.UNRELATED for note in found.notes)
+
+
+COURSES = {
+    "walk": np.cumsum(_noise(2)),
+    "ramp": np.arange(N) / 100.0 + 0.3 * _noise(3),
+    "sine": np.sin(2.0 * np.pi * np.arange(N) / 220.0) + 0.2 * _noise(4),
+}
+"""Outputs of their own, which slow models follow."""
+
+
+@pytest.mark.parametrize("course", COURSES)
+def test_a_course_of_its_own_is_no_answer_to_an_input(course: str) -> None:
+    with pytest.warns(LogWarning, match="course of its own"):
+        found = identify_channels(_data(COURSES[course]), order=2, delay=1)
+    assert found.quality.fit_percent > 40.0
+    assert _said(found)
+    assert not found.sound
+
+
+def test_structures_that_begin_at_such_a_model_say_so_too() -> None:
+    with pytest.warns(LogWarning):
+        found = identify_channels(_data(COURSES["ramp"]), structure="arx", order=2, delay=1)
+    assert _said(found)
+    assert not found.sound
+
+
+def test_no_nonlinear_model_makes_a_course_of_its_own_an_answer() -> None:
+    with pytest.warns(LogWarning):
+        found = identify_channels(_data(COURSES["ramp"]), structure="auto", order=1, delay=1)
+    assert not found.sound
+
+
+@pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
+def test_what_sums_its_input_or_drifts_beside_its_answer_is_related() -> None:
+    summed = 0.02 * np.cumsum(_input()) + 0.05 * _noise(5)
+    beside = np.convolve(_input(), 0.2 * 0.8 ** np.arange(N))[:N] + 0.03 * np.cumsum(_noise(6))
+    for y in (summed, beside):
+        found = identify_channels(_data(y), order=2, delay=1)
+        assert found.sound
+        assert not _said(found)
+
+
+def test_the_measured_order_has_to_be_better_than_every_other() -> None:
+    for own, wanted in ((4.0, True), (9.0, False)):
+        costs = iter([float("inf"), *[10.0] * 9, 8.0, *[12.0] * 9])
+        assert explains(own, lambda _, costs=costs: next(costs), _data(_noise(7))) is wanted  # type: ignore[misc]
