@@ -183,10 +183,9 @@ def _gains(gain: Mapping[str, Any] | None) -> str:
     """Return the steady gain from each input; one that is less than its standard deviation is not determined."""
     if gain is None:
         return "-"
-    values, spreads = gain["value"], gain.get("std")
-    if isinstance(values, float):
-        values, spreads = [values], [spreads]
-    each = zip(values, spreads or [0.0] * len(values), strict=True)
+    values, spreads = gain["value"], gain.get("std") or 0.0
+    values = [values] if isinstance(values, float) else values
+    each = zip(values, spreads if isinstance(spreads, list) else [spreads] * len(values), strict=True)
     return " ".join("undetermined" if spread > abs(one) else f"{one:.4g}" for one, spread in each)
 
 
