@@ -179,7 +179,12 @@ def misfit(blocks: Blocks, fitted: Array) -> float:
 
 
 def fit_freely(
-    blocks: Blocks, actuator: Actuator, condition: str, start: Array | PointFit | None = None, gained: float = GAINED
+    blocks: Blocks,
+    actuator: Actuator,
+    condition: str,
+    start: Array | PointFit | None = None,
+    gained: float = GAINED,
+    wanted: float = float("inf"),
 ) -> PointFit:
     """Fit the circuit to a log with next to no prior.
 
@@ -196,6 +201,9 @@ def fit_freely(
         those of the condition if not given.
     gained : float
         Gain in log-likelihood below which the search ends [dimensionless].
+    wanted : float
+        Cost above which the circuit is of no use [dimensionless]: the search ends where all steps that are left would
+        not bring it down to that, gaining each what the last one did or the next one promises.
 
     Returns
     -------
@@ -208,9 +216,9 @@ def fit_freely(
         best = about(blocks, actuator, condition, start)
     else:
         best = _at(blocks, actuator, centre, centre if start is None else start, pull)
-    step, promised, reach = centre, 0.0, 0.0
+    step, promised, reach, last = centre, 0.0, 0.0, float("inf")
     least = least_misfit(blocks)
-    for _ in range(ROUNDS):  # a step that gains nothing is taken a third as long
+    for left in range(ROUNDS, 0, -1):  # a step that gains nothing is taken a third as long
         if best.cost - least < PROMISING:  # the sensors' noise is all that is left
             break
         if reach == 0.0:
@@ -219,10 +227,12 @@ def fit_freely(
             # a circuit of no numbers is run for ever
             if promised < PROMISING or not np.all(np.isfinite(step)):
                 break
+            if best.cost - left * max(promised, last) > wanted:
+                break
         there = _at(blocks, actuator, centre, best.coordinates + reach * step, pull)
         gain = best.cost - there.cost
         if gain > 0.0:
-            best, reach = there, 0.0
+            best, reach, last = there, 0.0, gain
             if gain < gained:
                 break
         elif reach < SHORTEST or _most_gained(promised, reach, gain) < PROMISING:

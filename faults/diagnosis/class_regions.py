@@ -101,7 +101,12 @@ class ClassFits:
 
 
 def fit_classes(
-    blocks: Blocks, actuator: Actuator, *, runs: Array | None = None, start: Array | None = None
+    blocks: Blocks,
+    actuator: Actuator,
+    *,
+    runs: Array | None = None,
+    start: Array | None = None,
+    wanted: float = np.inf,
 ) -> ClassFits:
     """Fit circuits to a log from the nearest conditions and weigh all nine.
 
@@ -116,6 +121,8 @@ def fit_classes(
     start : ndarray, shape (7,), optional
         Coordinates of a circuit near by [dimensionless]: one search begins there, in place of one from each condition
         that is near, and ends where it gains little.
+    wanted : float
+        Cost above which a circuit is of no use, see `fit_freely` [dimensionless].
 
     Returns
     -------
@@ -130,7 +137,7 @@ def fit_classes(
     fits: list[PointFit] = []
     for name in [list(CONDITIONS)[place] for place in near or [int(order[0])]]:
         if not fits or not explains(blocks, fits[-1]):
-            fits.append(fit_freely(blocks, actuator, name, start, gained))
+            fits.append(fit_freely(blocks, actuator, name, start, gained, wanted))
         elif about(blocks, actuator, name, fits[-1]).cost < fits[-1].cost:  # the same circuit is nearer to this one
             fits.append(fit_freely(blocks, actuator, name, fits[-1], gained))
     stuck, first = is_stuck(blocks, actuator), min(fits, key=lambda fit: fit.cost)

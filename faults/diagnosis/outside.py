@@ -7,7 +7,7 @@ sound circuit may explain more than a fault does, so the sound circuit is first 
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ from faults.conditions import CONDITIONS
 from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
-from faults.diagnosis.class_fit import PointFit, misfit, nominal_runs
+from faults.diagnosis.class_fit import LASTING, PointFit, misfit, nominal_runs
 from faults.diagnosis.class_regions import ClassFits, fit_classes, is_stuck
 from faults.notes import AgainstCode, ClassCode
 from plant.arrays import Array
@@ -29,14 +29,14 @@ from plant.notes import Note
 
 GAIN = 4.0
 """Log-likelihood over all regions that a fault must gain to be believed, in `LASTING` blocks that count as one
-[dimensionless]: a Bayes factor of 55."""
+[dimensionless]: a Bayes factor of 55. It is as likely as not then, which is what is presumed of such a fault."""
 
 NOT_EXCLUDED = -3.0
 """The same, from which a fault is not excluded [dimensionless]: a Bayes factor of a twentieth."""
 
 HOPELESS = 20.0
 """Log-likelihood below the sound circuit at which a rough search leaves a fault [dimensionless]: a thorough one gained
-up to 26 on it, but few."""
+up to 26 on it, but few. A search that would not come to it in the steps that are left ends there too."""
 
 WORN = "a worn pump"
 """What that fault is called."""
@@ -53,7 +53,7 @@ strong from there on (Jeffreys, Theory of Probability, 1961, appendix B). Of 16 
 and friction none comes to more than 1.4."""
 
 WORTH_SAYING = 0.01
-"""Probability of a worn pump from which it is said beside the fault's name [probability]."""
+"""Probability of a fault from which it is said beside its name [probability]."""
 
 WELL_WORN = 0.8
 """Share up to which a pump is a worn one whatever the rig file's displacement is worth [dimensionless]: an entry may be
@@ -64,6 +64,10 @@ SEATS = (0.4, 1.0)
 
 SETTINGS = (0.75, 0.9)
 """Settings of a relief valve, over the largest pressure that the sound circuit comes to in the log [dimensionless]."""
+
+SO_SET = math.log(math.log(SETTINGS[1] / SETTINGS[0]) / math.log(10.0))
+"""Log-likelihood that a low relief valve is set so, before a log is seen [dimensionless]: it may be set to a tenth of
+what it should be, below which no piston slides, and each of `SETTINGS` stands for those about it."""
 
 WIDER = 5.0
 """By how much wider make-up valves are tried [dimensionless]: no rig file knows them."""
@@ -81,14 +85,14 @@ class Outside(NamedTuple):
     worn : ndarray, shape (1 + pumps, 9), optional
         How well each condition holds it with a sound pump, then with one that delivers each of `DELIVERIES`:
         log-likelihoods [dimensionless]; None where a worn pump is excluded.
-    wear : float
-        How much likelier a well worn pump is than a sound one, by `odds_of_wear` [dimensionless].
+    faulty : float
+        Probability that one of the faults that the log does not tell is there [probability].
     """
 
     against: tuple[Note, ...] = ()
     open: tuple[Note, ...] = ()
     worn: Array | None = None
-    wear: float = -math.inf
+    faulty: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,12 +112,14 @@ class _Fault:
     """A fault: what is said where it is there, what it is called where it is not excluded, and a circuit with it.
 
     The search for one that moves the log into another condition begins in that, any other at the sound circuit.
+    What is presumed is the log-likelihood of its size before a log is seen [dimensionless].
     """
 
     note: Note
     name: str
     circuit: CircuitParameters
-    elsewhere: bool
+    elsewhere: bool = False
+    presumed: float = 0.0
 
 
 def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outside:
@@ -141,7 +147,7 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     found: tuple[float, _Fault, _Tried] | None = None
     for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best, sound.actuator)):
         tried = _with(fault, blocks, sound, runs)
-        gain = tried.score - sound.score
+        gain = tried.score - sound.score + fault.presumed
         gains[fault.name] = max(gain, gains.get(fault.name, gain))
         worn += [tried] if fault.name == WORN else []
         if found is None or gain > found[0]:
@@ -154,45 +160,50 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
         starts = (tried.fits.best.coordinates, None)
         again = [fit_classes(blocks, sound.actuator, runs=runs, start=start).scores for start in starts]
         best = max([best, *again], key=lambda scores: float(np.max(scores)))
-        gains[fault.name] = tried.score - float(np.max(best))
+        gains[fault.name] = tried.score - float(np.max(best)) + fault.presumed
         if gains[fault.name] > GAIN:
             return Outside((fault.note,))
         wear = odds_of_wear(delivered, float(np.max(best)))
         if wear > math.log(LIKELIER):
             return Outside((_delivering(DELIVERIES[int(np.argmax(delivered))]),))
+    odds = {name: gain - GAIN for name, gain in gains.items() if gain > NOT_EXCLUDED}
+    if WORN in odds:
+        odds[WORN] = wear
+    chances = probabilities_of(odds)
     # a setting just under the largest pressure leaves no trace: no log excludes it, and saying so tells nothing
-    open_ = [name for name, gain in gains.items() if gain > NOT_EXCLUDED and name != EARLY]
-    if WORN not in open_:
-        return Outside((), _not_excluded(open_))
-    scores = np.array([best, *(one.fits.scores for one in worn)])
-    return Outside((), _not_excluded(open_, probability_of(wear)), scores, wear)
+    open_ = {name: chance for name, chance in chances.items() if name != EARLY or chance > WORTH_SAYING}
+    scores = np.array([best, *(one.fits.scores for one in worn)]) if WORN in odds else None
+    return Outside((), _not_excluded(open_), scores, sum(chances.values()))
 
 
-def _not_excluded(faults: Sequence[str], worn: float = 0.0) -> tuple[Note, ...]:
-    """Return a note that names the faults that a log does not exclude, a worn pump with its probability."""
-    named = [f"{one} ({100.0 * worn:.0f} %)" if one == WORN and worn > WORTH_SAYING else one for one in faults]
+def _not_excluded(faults: Mapping[str, float]) -> tuple[Note, ...]:
+    """Return a note that names the faults that a log does not exclude, each with its probability."""
+    named = [f"{one} ({100.0 * chance:.0f} %)" if chance > WORTH_SAYING else one for one, chance in faults.items()]
     return (ClassCode.NOT_EXCLUDED.note(faults=", ".join(named)),) if named else ()
 
 
-def probability_of(odds: float) -> float:
-    """Return the probability of what is so much likelier than its opposite.
+def probabilities_of(odds: Mapping[str, float]) -> dict[str, float]:
+    """Return the probability of each of several faults, of which at most one is there.
 
     Parameters
     ----------
-    odds : float
-        Logarithm of their ratio [dimensionless].
+    odds : Mapping[str, float]
+        How much likelier each is than none: logarithms of ratios, by name [dimensionless].
 
     Returns
     -------
-    float
-        Between 0 and 1 [probability].
+    dict[str, float]
+        Probability by name [probability]; what is left is that of none.
 
     Examples
     --------
-    >>> probability_of(0.0), probability_of(-math.inf)
-    (0.5, 0.0)
+    >>> {name: round(chance, 2) for name, chance in probabilities_of({"one": 0.0, "other": 0.0}).items()}
+    {'one': 0.33, 'other': 0.33}
+    >>> probabilities_of({"one": -math.inf})
+    {'one': 0.0}
     """
-    return 0.5 * (1.0 + math.tanh(0.5 * odds))
+    together = np.logaddexp.reduce([0.0, *odds.values()])
+    return {name: math.exp(one - together) for name, one in odds.items()}
 
 
 def odds_of_wear(scores: Sequence[float], sound: float) -> float:
@@ -262,14 +273,17 @@ def largest_pressure(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float
 def _with(fault: _Fault, blocks: Blocks, sound: _Tried, runs: Array) -> _Tried:
     """Return the circuit with a fault that explains a log best."""
     faulty = replace(sound.actuator, circuit=fault.circuit)
+    wanted = LASTING * (HOPELESS - sound.score)  # no region holds a circuit better than its misfit says
     if not fault.elsewhere:
-        return _Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=sound.fits.best.coordinates))
+        start = sound.fits.best.coordinates
+        return _Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
     runs = nominal_runs(blocks, faulty)
     start = faulty.conditions[int(np.argmin([misfit(blocks, run) for run in runs]))]
-    roughly = _Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start))
+    roughly = _Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
     if roughly.score < sound.score - HOPELESS:
         return roughly
-    return max(roughly, _Tried(faulty, fit_classes(blocks, faulty, runs=runs)), key=lambda one: one.score)
+    anew = _Tried(faulty, fit_classes(blocks, faulty, runs=runs, wanted=wanted))
+    return max(roughly, anew, key=lambda one: one.score)
 
 
 def _sound(blocks: Blocks, fits: ClassFits, actuator: Actuator, runs: Array) -> _Tried:
@@ -295,12 +309,12 @@ def _faults(actuator: Actuator, pressure: float) -> Iterator[_Fault]:
         yield _Fault(_delivering(share), WORN, worn, elsewhere=True)
     for share in SETTINGS if 0.0 < pressure < math.inf else ():
         early = replace(sound, relief_pressure=share * pressure)
-        yield _Fault(AgainstCode.RELIEF_EARLY.note(), EARLY, early, elsewhere=False)
+        yield _Fault(AgainstCode.RELIEF_EARLY.note(), EARLY, early, presumed=SO_SET)
     major = actuator.conditions[list(CONDITIONS).index("major_leakage"), COORDINATES.index("leakage")]
     for side in "ab":
         stuck = one_sided(sound, **{f"makeup_shut_{side}": 1.0})
         note = AgainstCode.MAKEUP_STUCK.note(side=side.upper())
-        yield _Fault(note, "a make-up valve that is stuck shut", stuck, elsewhere=False)
+        yield _Fault(note, "a make-up valve that is stuck shut", stuck)
         for size in SEATS:
             leaking = one_sided(sound, **{f"seat_leakage_{side}": size * float(np.exp(major))})
-            yield _Fault(AgainstCode.MAKEUP_LEAKS.note(), "a make-up valve that leaks", leaking, elsewhere=False)
+            yield _Fault(AgainstCode.MAKEUP_LEAKS.note(), "a make-up valve that leaks", leaking)

@@ -70,9 +70,9 @@ def creeps(blocks: Blocks, fit: PointFit) -> bool:
 
 
 def doubts_left(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[Note, ...]:
-    """Return what speaks against a log: no fit of motion where the log does not begin at rest, or its leakage drifts.
+    """Return what speaks against a log: no fit of motion where it begins in motion, leakage drifts, or a stop shows.
 
-    The motion form knows neither. A circuit, whose beginning does not count, says how the piston moves.
+    The motion form knows none of these. A circuit, whose beginning does not count, says how the piston moves.
 
     Parameters
     ----------
@@ -86,9 +86,10 @@ def doubts_left(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[
     Returns
     -------
     tuple of Note
-        All of them where leakage stays and the log begins at rest, or the circuit does not follow the piston.
+        All of them where leakage stays and the log begins at rest and shows no stop, or no circuit follows the piston.
     """
-    if blocks.course is None and (blocks.settling == SETTLING or creeps(blocks, fit)):
+    unknown_to_motion = blocks.settling != SETTLING or blocks.stop is not None
+    if blocks.course is None and (creeps(blocks, fit) or not unknown_to_motion):
         return tuple(doubts)
     return tuple(note for note in doubts if note.code != EstimateCode.POSITION_RESIDUALS_LARGE)
 

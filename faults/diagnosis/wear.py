@@ -18,9 +18,10 @@ from estimation.fits.hypotheses import OFFSET
 from faults.diagnosis.actuator import Actuator
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
-from faults.diagnosis.class_regions import fit_classes
+from faults.diagnosis.class_regions import fit_classes, is_stuck
 from faults.diagnosis.evidence import Scoreboard, bounded
-from faults.diagnosis.outside import DELIVERIES, faults_outside, presumed_of_wear, probability_of
+from faults.diagnosis.near_enough import lies_beside, only_beside
+from faults.diagnosis.outside import DELIVERIES, faults_outside, presumed_of_wear
 from faults.notes import AgainstCode
 from plant.arrays import Array
 from plant.notes import Note
@@ -71,21 +72,25 @@ def whatever_fault(diagnosis: Diagnosis, actuator: Actuator, calibration: Calibr
     -------
     Diagnosis
         With the fault that the log shows, those that it does not tell, and classes weighed over a worn pump where that
-        is one of these: they sum to the probability that the pump is not well worn, which is none of the nine. The same
-        with pressure, and where something speaks against all nine already.
+        is one of these: they sum to the probability that none of these faults is there, which are none of the nine. The
+        same with pressure, of a piston that sticks, and where more than a place beside the nine (`near_enough`) speaks
+        against them already.
     """
-    if diagnosis.against:
-        return diagnosis
     board = diagnosis.scoreboard
+    asked = board.blocks.pressure is None and not is_stuck(board.blocks, actuator)
+    if not asked or not only_beside(diagnosis.against):
+        return diagnosis
     others = faults_outside(board.blocks, board.fits, actuator)
-    worn, probabilities = others.worn, diagnosis.probabilities
-    if worn is not None:
-        summed, sound = summed_over_wear(board, worn, calibration), probability_of(-others.wear)
-        probabilities = {name: sound * share for name, share in summed.items()}
+    beside = diagnosis.against if diagnosis.against and lies_beside(board.blocks, board.fits, actuator) else ()
+    if others.against or beside:
+        return replace(diagnosis, against=(*others.against, *beside))
+    probabilities = diagnosis.probabilities
+    if others.worn is not None:
+        probabilities = summed_over_wear(board, others.worn, calibration)
     return replace(
         diagnosis,
-        probabilities=probabilities,
-        against=others.against,
+        probabilities={name: (1.0 - others.faulty) * share for name, share in probabilities.items()},
+        against=(),
         not_told=(*diagnosis.not_told, *others.open),
     )
 

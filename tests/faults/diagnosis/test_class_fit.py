@@ -102,3 +102,17 @@ def test_a_log_that_gives_no_slope_ends_the_search_where_it_began() -> None:
     with warnings.catch_warnings(action="ignore", category=RuntimeWarning):
         found = fit_freely(nothing, ACTUATOR, next(iter(CONDITIONS)))
     np.testing.assert_array_equal(found.coordinates, CENTRE)
+
+
+@pytest.mark.parametrize(("below", "ends"), [(1e6, True), (0.0, False)])
+def test_a_search_that_cannot_come_to_what_is_wanted_ends_after_a_step_or_two(below: float, ends: bool) -> None:
+    at = list(CONDITIONS).index("minor_leakage")
+    start = ACTUATOR.conditions[at] + 0.2
+    whole = fit_freely(log(), ACTUATOR, "minor_leakage", start)
+    runs: list[int] = []
+    with pytest.MonkeyPatch.context() as patch:
+        real = class_fit.predicted
+        patch.setattr(class_fit, "predicted", lambda *args: runs.append(1) or real(*args))  # pyright: ignore
+        there = fit_freely(log(), ACTUATOR, "minor_leakage", start, wanted=whole.cost - below)
+    assert (len(runs) <= 2) == ends
+    assert (there.cost == whole.cost) == (not ends)

@@ -40,7 +40,7 @@ def looked(
 ) -> tuple[Outside, list[tuple[Any, bool]]]:
     asked: list[tuple[Any, bool]] = []
 
-    def fitted(_: Any, actuator: Any, *, runs: Any, start: Any = None) -> Any:  # noqa: ARG001  as it is called
+    def fitted(_: Any, actuator: Any, *, runs: Any, start: Any = None, **_limits: float) -> Any:  # noqa: ARG001
         asked.append((actuator.circuit, start is not None))
         return fits(score(actuator.circuit))
 
@@ -108,10 +108,10 @@ def test_a_well_worn_pump_that_is_not_excluded_takes_its_probability_from_the_co
     gain: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scores = {1.0: 0.0, 0.7: -9.0, 0.8: gain, 0.9: -9.0}
-    found, _ = looked(monkeypatch, lambda one: scores[worn(one)] if type(one) is type(SOUND) else -9.0)
+    found, _ = looked(monkeypatch, lambda one: scores[worn(one)] if type(one) is type(SOUND) else -9.0, np.nan)
     odds = np.exp(gain - 0.5 * (np.log(0.8) / 0.15) ** 2) + np.exp(-9.0 - 0.5 * (np.log(0.7) / 0.15) ** 2)
-    assert found.wear == pytest.approx(np.log(odds))
     share = odds / (1.0 + odds)
+    assert found.faulty == pytest.approx(share)
     assert found.open[0].data["faults"] == f"a worn pump ({100.0 * share:.0f} %)"
     monkeypatch.setattr(wear, "faults_outside", lambda *_: found)
     nothing = {name: np.zeros(9) for name in ("models", "innovations", "parameters")}
@@ -120,6 +120,49 @@ def test_a_well_worn_pump_that_is_not_excluded_takes_its_probability_from_the_co
     monkeypatch.setattr(wear, "summed_over_wear", lambda *_: {"normal": 0.75, "minor_leakage": 0.25})
     probabilities = wear.whatever_fault(told, ACTUATOR, shipped_calibration()).probabilities
     assert probabilities == pytest.approx({"normal": 0.75 * (1.0 - share), "minor_leakage": 0.25 * (1.0 - share)})
+
+
+@pytest.mark.parametrize("gain", [-2.9, 0.0, 3.9])
+def test_a_valve_that_is_not_excluded_is_as_likely_as_not_where_it_would_be_believed(
+    gain: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def score(one: CircuitParameters) -> float:
+        stuck = getattr(one, "makeup_shut_b", 0.0) == 1.0
+        return gain if stuck else 0.0 if type(one) is type(SOUND) and worn(one) == 1.0 else -9.0
+
+    found, _ = looked(monkeypatch, score, np.nan)
+    odds = np.exp(gain - 4.0)
+    assert found.faulty == pytest.approx(odds / (1.0 + odds))
+    said = f" ({100.0 * found.faulty:.0f} %)" if gain >= 0.0 else ""
+    assert found.open[0].data["faults"] == f"a make-up valve that is stuck shut{said}"
+
+
+@pytest.mark.parametrize(("gain", "named", "said"), [(6.6, True, False), (6.4, False, True), (0.0, False, False)])
+def test_a_low_relief_valve_gains_over_all_settings_that_it_may_have(
+    gain: float, named: bool, said: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def score(one: CircuitParameters) -> float:
+        return gain if one.relief_pressure == 9e5 else 0.0 if one == SOUND else -9.0
+
+    against, open_, _ = decided(monkeypatch, score)
+    assert [note.code for note in against] == ([AgainstCode.RELIEF_EARLY] if named else [])
+    assert bool(open_ and outside.EARLY in open_[0].data["faults"]) == said
+
+
+def test_a_search_for_a_fault_need_not_come_nearer_than_twenty_to_the_sound_circuit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    wanted: list[float] = []
+
+    def fitted(_: Any, actuator: Any, **how: Any) -> Any:
+        wanted.extend([how["wanted"]] if "wanted" in how else [])
+        return fits(3.0 if actuator.circuit.makeup_conductance != SOUND.makeup_conductance else 0.0)
+
+    looked(monkeypatch, lambda _: 0.0)
+    monkeypatch.setattr(outside, "fit_classes", fitted)
+    faults_outside(LOG, fits(0.0), ACTUATOR)
+    assert len(wanted) == 14  # three pumps twice, two settings, two valves that stick and two seats of each
+    assert set(wanted) == {30.0 * (20.0 - 3.0)}
 
 
 def test_a_worn_pump_is_weighed_against_the_sound_one_as_it_is_found_anew(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -131,10 +174,11 @@ def test_a_worn_pump_is_weighed_against_the_sound_one_as_it_is_found_anew(monkey
         asked.append(worn(one))
         return 3.0 if worn(one) == 1.0 and 0.9 in asked else scores[worn(one)]
 
-    found, _ = looked(monkeypatch, score)
+    found, _ = looked(monkeypatch, score, np.nan)
     assert found.worn is not None
     assert found.worn[:, 1].tolist() == [3.0, -9.0, 5.0, -9.0]
-    assert found.wear == pytest.approx(2.0 - 0.5 * (np.log(0.8) / 0.15) ** 2, abs=1e-3)
+    odds = np.exp(2.0 - 0.5 * (np.log(0.8) / 0.15) ** 2)
+    assert found.faulty == pytest.approx(odds / (1.0 + odds), rel=1e-3)
 
 
 @pytest.mark.parametrize(("rough", "thorough"), [(-19.9, True), (-20.1, False)])
@@ -176,6 +220,37 @@ def test_faults_are_tried_on_the_sound_circuit_that_explains_most(monkeypatch: p
     assert seats == {(side, size) for side in "ab" for size in (0.4, 1.0)}
     shut = {side for one in faulty for side in "ab" if getattr(one, f"makeup_shut_{side}", 0.0) == 1.0}
     assert shut == {"a", "b"}
+
+
+@pytest.mark.parametrize(
+    ("said", "lies", "found", "left"),
+    [
+        (AgainstCode.BETWEEN_CONDITIONS, False, None, []),
+        (AgainstCode.OUTSIDE_CONDITIONS, True, None, [AgainstCode.OUTSIDE_CONDITIONS]),
+        (
+            AgainstCode.OUTSIDE_CONDITIONS,
+            True,
+            AgainstCode.RELIEF_EARLY,
+            [AgainstCode.RELIEF_EARLY, AgainstCode.OUTSIDE_CONDITIONS],
+        ),
+        (AgainstCode.BETWEEN_CONDITIONS, False, AgainstCode.RELIEF_EARLY, [AgainstCode.RELIEF_EARLY]),
+        (AgainstCode.NONE_FITS, False, AgainstCode.RELIEF_EARLY, [AgainstCode.NONE_FITS]),
+    ],
+)
+def test_what_lies_beside_the_nine_is_asked_for_faults_before_what_lasts_of_its_misfit_counts(
+    said: AgainstCode,
+    lies: bool,
+    found: AgainstCode | None,
+    left: list[AgainstCode],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    data = {AgainstCode.BETWEEN_CONDITIONS: {"leakage": 0.5, "friction": 0.0}, AgainstCode.NONE_FITS: {"percent": 90.0}}
+    monkeypatch.setattr(wear, "faults_outside", lambda *_: Outside(() if found is None else (found.note(),)))
+    monkeypatch.setattr(wear, "lies_beside", lambda *_: lies)
+    board = Scoreboard({}, LOG, SimpleNamespace(), None, None)  # type: ignore[arg-type]
+    told = Diagnosis({"normal": 1.0}, (said.note(**data.get(said, {})),), {}, {}, {}, (), board)
+    after = wear.whatever_fault(told, ACTUATOR, shipped_calibration())
+    assert [note.code for note in after.against] == left
 
 
 @pytest.mark.parametrize("near", [-1.0, -1e3])

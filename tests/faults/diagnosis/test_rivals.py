@@ -126,11 +126,13 @@ def test_each_other_level_of_friction_is_tried_at_the_leakage_and_the_force_at_r
         np.testing.assert_array_equal(np.delete(start, sliding), np.delete(best.coordinates, sliding))
 
 
-def test_a_fit_of_motion_is_no_doubt_of_a_followed_log_that_begins_in_motion_or_drifts() -> None:
+def test_a_fit_of_motion_is_no_doubt_of_a_followed_log_that_begins_in_motion_or_drifts_or_shows_a_stop() -> None:
     resting, size = log(pressure=False), SIZES[0] / NOISE[0]
     running, warming = replace(resting, settling=1.0), replace(resting, course=np.ones(len(resting.speed)))
+    stopped = replace(resting, stop=0.1)
     far = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=40.0, motion_percent=20.0)
     froze = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.0, begin_s=0.0, length_s=1.0)
     followed = [(running, 0.9, (froze,)), (warming, 0.9, (froze,)), (resting, 0.9, (far, froze))]
-    for one, share, left in (*followed, (running, 1.1, (far, froze)), (warming, 1.1, (froze,))):
+    missed = [(running, 1.1, (far, froze)), (stopped, 1.1, (far, froze)), (warming, 1.1, (froze,))]
+    for one, share, left in (*followed, (stopped, 0.9, (froze,)), *missed):
         assert doubts_left((far, froze), one, leaving(share * ROUGHLY * size, 1.0, one)) == left
