@@ -104,7 +104,7 @@ def test_a_log_that_gives_no_slope_ends_the_search_where_it_began() -> None:
     np.testing.assert_array_equal(found.coordinates, CENTRE)
 
 
-@pytest.mark.parametrize(("below", "ends"), [(1e6, True), (0.0, False)])
+@pytest.mark.parametrize(("below", "ends"), [(1e6, True), (-20.0 * LASTING, False)])
 def test_a_search_that_cannot_come_to_what_is_wanted_ends_after_a_step_or_two(below: float, ends: bool) -> None:
     at = list(CONDITIONS).index("minor_leakage")
     start = ACTUATOR.conditions[at] + 0.2
