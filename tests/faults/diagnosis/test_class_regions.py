@@ -138,7 +138,7 @@ def test_a_creeping_piston_is_tried_with_each_friction_and_named_by_none(monkeyp
     names, tried = list(CONDITIONS), list[tuple[str, bool]]()
     runs = np.array([log.outputs * (1.0 if place == 0 else 50.0) for place in range(len(names))])
 
-    def fitted_from(_: Blocks, __: Actuator, condition: str, start: object = None, ___: float = 0.0) -> PointFit:
+    def fitted_from(_: Blocks, __: Actuator, condition: str, start: object = None, *___: float) -> PointFit:
         tried.append((condition, start is not None))
         left = np.array([10.0 if condition == "normal" else 9.5, 1.0]) * log.noise
         return replace(fit(names.index(condition), 1e-3), fitted=log.outputs - left, scales=left, cost=float(left[0]))
