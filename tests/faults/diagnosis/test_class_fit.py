@@ -112,7 +112,7 @@ def test_a_search_that_cannot_come_to_what_is_wanted_ends_after_a_step_or_two(be
     runs: list[int] = []
     with pytest.MonkeyPatch.context() as patch:
         real = class_fit.predicted
-        patch.setattr(class_fit, "predicted", lambda *args: runs.append(1) or real(*args))  # pyright: ignore
+        patch.setattr(class_fit, "predicted", lambda *args: runs.append(1) or real(*args))
         there = fit_freely(log(), ACTUATOR, "minor_leakage", start, wanted=whole.cost - below)
     assert (len(runs) <= 2) == ends
     assert (there.cost == whole.cost) == (not ends)
