@@ -232,7 +232,7 @@ def _biases(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
     found = _one_step(blocks, fits.best, trust, actuator, sizes)
     matters = {name: abs(value) > _least(name, error, sizes) for name, (value, error) in found.items()}
     pump = found["pump"][0]
-    if blocks.pressure is None and pump < 0.0:  # a worn pump is looked for by `faults.diagnosis.outside`
+    if blocks.pressure is None and pump < 0.0:  # a worn pump is looked for by `faults.diagnosis.other_faults`
         matters["pump"] = False
     if matters["pump"]:
         healthy = actuator.circuit

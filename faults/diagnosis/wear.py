@@ -3,8 +3,8 @@
 Where pressure is logged, the balance says what the pump delivers, or that the log does not tell
 (`estimation.fits.flow_fit`). It follows the oil to the sensors' noise, and a circuit follows the piston to a few
 percent: what a circuit says of the pump beside a balance that holds is what it leaves of friction. Without pressure,
-circuits with a worn pump are compared (`faults.diagnosis.outside`). If a log does not tell, a pump that delivers less
-leaves less leakage to it, and bulk modulus is larger by as much.
+circuits with a worn pump are compared (`faults.diagnosis.other_faults`). If a log does not tell, a pump that delivers
+less leaves less leakage to it, and bulk modulus is larger by as much.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.class_regions import fit_classes, is_stuck
 from faults.diagnosis.evidence import Scoreboard, bounded
 from faults.diagnosis.near_enough import lies_beside, only_beside
-from faults.diagnosis.outside import DELIVERIES, faults_outside, presumed_of_wear
+from faults.diagnosis.other_faults import DELIVERIES, faults_outside, presumed_of_wear
 from faults.notes import AgainstCode
 from plant.arrays import Array
 from plant.notes import Note

@@ -18,7 +18,7 @@ from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.diagnose import diagnose_clean
 from faults.diagnosis.evidence import EVIDENCES
-from faults.diagnosis.outside import Outside
+from faults.diagnosis.other_faults import Outside
 from faults.diagnosis.severity import severities_at
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.drives import make_drive

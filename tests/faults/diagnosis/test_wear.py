@@ -19,7 +19,7 @@ from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.evidence import Scoreboard, bounded, weigh
-from faults.diagnosis.outside import DELIVERIES
+from faults.diagnosis.other_faults import DELIVERIES
 from faults.diagnosis.wear import probabilities_over_wear, whatever_the_pump_delivers
 from faults.notes import AgainstCode
 from plant.eha.circuit_parameters import circuit_of

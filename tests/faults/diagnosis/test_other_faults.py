@@ -8,13 +8,13 @@ import pytest
 
 from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis import outside
+from faults.diagnosis import other_faults
 from faults.diagnosis.actuator import Actuator, actuator_of
 from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.class_regions import fit_classes
 from faults.diagnosis.diagnose import diagnose_clean
-from faults.diagnosis.outside import DELIVERIES, Outside, faults_outside, largest_pressure, odds_of_wear
+from faults.diagnosis.other_faults import DELIVERIES, Outside, faults_outside, largest_pressure, odds_of_wear
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.model import EhaParameters
@@ -103,7 +103,7 @@ def test_a_pump_that_is_well_worn_need_only_be_likelier_than_a_sound_one(shares:
 def test_what_a_worn_pump_gains_may_be_less_than_what_a_rare_fault_must(monkeypatch: pytest.MonkeyPatch) -> None:
     blocks = log_of(FAULTS["pump"][0])
     fits = fit_classes(blocks, ACTUATOR)
-    monkeypatch.setattr(outside, "GAIN", 1e9)
+    monkeypatch.setattr(other_faults, "GAIN", 1e9)
     (note,) = faults_outside(blocks, fits, ACTUATOR).against
     assert (note.code, note.data["percent"]) == (AgainstCode.PUMP_DELIVERS_LESS, pytest.approx(80.0))
     valve = log_of(FAULTS["valve A"][0])
@@ -122,7 +122,7 @@ def test_a_relief_valve_that_opens_just_before_the_largest_pressure_is_not_said_
 def test_with_pressure_and_where_the_piston_sticks_nothing_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     seen, still = log_of(pressure=True), replace(log_of(), velocity=0.0 * log_of().velocity)
     fits = [fit_classes(blocks, ACTUATOR) for blocks in (seen, still)]
-    monkeypatch.setattr(outside, "fit_classes", lambda *_, **__: pytest.fail("a circuit was fitted"))
+    monkeypatch.setattr(other_faults, "fit_classes", lambda *_, **__: pytest.fail("a circuit was fitted"))
     for blocks, one in zip((seen, still), fits, strict=True):
         assert faults_outside(blocks, one, ACTUATOR) == Outside()
 
@@ -134,7 +134,7 @@ def test_a_gain_that_the_sound_circuit_makes_up_when_asked_again_is_none(
     blocks = log_of(FAULTS["pump"][0])
     fits = fit_classes(blocks, ACTUATOR)
     assert faults_outside(blocks, fits, ACTUATOR).against
-    fit, worn = outside.fit_classes, FAULTS["pump"][0].pump_displacement
+    fit, worn = other_faults.fit_classes, FAULTS["pump"][0].pump_displacement
     ended: list[np.ndarray] = []
 
     def as_good(blocks: Blocks, actuator: Actuator, **how: np.ndarray) -> object:
@@ -147,7 +147,7 @@ def test_a_gain_that_the_sound_circuit_makes_up_when_asked_again_is_none(
         again = begun is None if anew else begun is not None and np.array_equal(begun, ended[-1])
         return replace(found, scores=found.scores + 1e3) if again else found
 
-    monkeypatch.setattr(outside, "fit_classes", as_good)
+    monkeypatch.setattr(other_faults, "fit_classes", as_good)
     assert not faults_outside(blocks, fits, ACTUATOR).against
 
 

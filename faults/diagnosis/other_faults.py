@@ -1,9 +1,10 @@
 """Faults outside the nine conditions, without pressure: does one explain the log better than any of the nine.
 
 Where pressure is logged, the balance of flows looks for a worn pump, for make-up valves that stick or leak and for a
-relief valve that is set low. Without, circuits with each of them are laid beside those without, and each is weighed
-over the regions of all nine conditions (`class_regions`): the logarithm of a Bayes factor. What no rig file knows of a
-sound circuit may explain more than a fault does, so the sound circuit is first chosen among some that differ in that.
+relief valve that is set low. Without pressure, a circuit with each of these faults is compared with a sound one over
+the regions of all nine conditions (`class_regions`): the difference of their scores is the logarithm of a Bayes factor.
+What no rig file knows of a sound circuit (its case drain, its make-up valves) may explain more than a fault does, so
+the best of several sound circuits is taken.
 """
 
 import math

@@ -9,12 +9,12 @@ import pytest
 
 from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS
-from faults.diagnosis import diagnose, outside, wear
+from faults.diagnosis import diagnose, other_faults, wear
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_runs import COORDINATES
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.evidence import Scoreboard
-from faults.diagnosis.outside import Outside, faults_outside
+from faults.diagnosis.other_faults import Outside, faults_outside
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import CircuitParameters
 from tests.faults.diagnosis.short_logs import ACTUATOR, PAPER, PRESSURE, blocks, log
@@ -44,10 +44,10 @@ def looked(
         asked.append((actuator.circuit, start is not None))
         return fits(score(actuator.circuit))
 
-    monkeypatch.setattr(outside, "fit_classes", fitted)
-    monkeypatch.setattr(outside, "nominal_runs", lambda *_: np.zeros((9, 1, 1)))
-    monkeypatch.setattr(outside, "misfit", lambda *_: 0.0)
-    monkeypatch.setattr(outside, "largest_pressure", lambda *_: pressure)
+    monkeypatch.setattr(other_faults, "fit_classes", fitted)
+    monkeypatch.setattr(other_faults, "nominal_runs", lambda *_: np.zeros((9, 1, 1)))
+    monkeypatch.setattr(other_faults, "misfit", lambda *_: 0.0)
+    monkeypatch.setattr(other_faults, "largest_pressure", lambda *_: pressure)
     return faults_outside(LOG, fits(0.0), ACTUATOR), asked
 
 
