@@ -13,6 +13,7 @@ import numpy as np
 
 from benchmarks.targets import misses, say
 from estimation.arrays import Array
+from estimation.finding import NORMAL_95
 from estimation.identification.free_run.data import Channels, channels_from
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.identify import identify_channels
@@ -75,7 +76,7 @@ def main(arguments: list[str] | None = None) -> int:
         hits = {name: np.array([one[name] for one in found if one]) for name in planted.values}
         say(f"{planted.kind}: found [%]", 100.0 * sum(map(bool, found)) / chosen.seeds, 100.0, most=False)
         for name, scores in hits.items():
-            covered = 100.0 * float(np.mean(np.abs(scores) <= 1.96))
+            covered = 100.0 * float(np.mean(np.abs(scores) <= NORMAL_95))
             print(f"{planted.kind}, {name}: error over its deviation {scores.mean():.2f} +- {scores.std():.2f}")
             say(f"{planted.kind}, {name}: intervals that cover [%]", covered, 90.0, most=False)
             say(f"{planted.kind}, {name}: intervals that cover [%]", covered, 98.0)

@@ -21,6 +21,7 @@ import pandas as pd
 
 from benchmarks.targets import Check, keep
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from estimation.finding import NORMAL_95
 from experiments.open_benchmark.kinds import make
 from experiments.open_benchmark.logger import PLAIN
 from experiments.running.executors import side_by_side
@@ -61,9 +62,6 @@ COVERED = (90.0, 98.0)
 
 WIDTH = (0.8, 1.3)
 """Wanted of z on our own plants, by root mean square [dimensionless]."""
-
-HALF = 1.959964
-"""Half width of a 95 % interval in standard deviations [dimensionless]."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +151,7 @@ def _severities(log: Log) -> Iterator[tuple[str, float, str]]:
     for name, one in found.severities.items():
         if name != "entrained_air" and one.value is not None and one.ci95 is not None:
             low, high = one.ci95
-            yield name, HALF * (2.0 * exact[name] - low - high) / (low - high), ""
+            yield name, NORMAL_95 * (2.0 * exact[name] - low - high) / (low - high), ""
 
 
 def summarised(rows: pd.DataFrame) -> pd.DataFrame:
@@ -173,7 +171,7 @@ def summarised(rows: pd.DataFrame) -> pd.DataFrame:
                 "refused": int((part["refused"] != "").sum()),
                 "z": float(np.sqrt(np.mean(np.square(z)))),
                 "mean_z": float(z.mean()),
-                "covered_%": 100.0 * float((z.abs() < HALF).mean()),
+                "covered_%": 100.0 * float((z.abs() < NORMAL_95).mean()),
             }
         )
     return pd.DataFrame(lines)

@@ -31,6 +31,7 @@ from estimation.eha.result import LARGEST_BOUND
 from estimation.filters.ekf import ekf
 from estimation.filters.iterated_smoother import iterated_smoother
 from estimation.filters.run import run_filter
+from estimation.finding import NORMAL_95
 from estimation.log_checks.first_belief import START_STD, first_belief
 from estimation.models.augment import augmented, augmented_prior
 from estimation.models.eha_forms import BULK_MODULUS, PRESSURE_FORM
@@ -156,7 +157,7 @@ def run_case(case: Case) -> dict[str, object]:
         "std_percent": 100.0 * std / p.bulk_modulus,
         "bound_percent": 100.0 * bound if bound < LARGEST_BOUND else float("nan"),
         "z": z,
-        "covered": abs(z) < 1.96,
+        "covered": abs(z) < NORMAL_95,
     }
 
 

@@ -23,6 +23,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from benchmarks.targets import misses, say
+from estimation.finding import NORMAL_95
 from experiments.batch.part_store import open_store
 from experiments.batch.rows import SCHEMA
 from faults.conditions import severity
@@ -86,7 +87,7 @@ def write_store(place: Path, course: Array) -> None:
 
 
 def _amount(value: float, std: float, unit: str, healthy: float, limit: float) -> dict[str, Any]:
-    ends = [value - 1.96 * std, value + 1.96 * std]
+    ends = [value - NORMAL_95 * std, value + NORMAL_95 * std]
     return {"value": value, "unit": unit, "ci95": ends, "healthy": healthy, "limit": limit}
 
 

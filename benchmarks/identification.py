@@ -12,6 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.identification_data import NOISES, TABLE_6, Case, random_system, table6_case
+from estimation.finding import NORMAL_95
 from estimation.identification import LinearModel, fit_output_error
 from estimation.identification.fit.output_error import descend_from
 from estimation.identification.fit.profile_interval import dc_gain_interval
@@ -81,8 +82,8 @@ def one_case(name: str, noise: float, seeds: int) -> dict[str, float]:
         spent.append(time.process_time() - begun)
         error = coefficients(model) - coefficients(case.truth)
         distance.append(float(error @ information(case) @ error) / error.size)
-        covered.append(np.abs(error) <= 1.96 * model.coefficient_std)
-        gains.append(abs(model.dc_gain - case.truth.dc_gain) <= 1.96 * model.dc_gain_std)
+        covered.append(np.abs(error) <= NORMAL_95 * model.coefficient_std)
+        gains.append(abs(model.dc_gain - case.truth.dc_gain) <= NORMAL_95 * model.dc_gain_std)
         missed += cost_of(model, case) > (1.0 + WORSE) * cost_from_truth(case)
         flagged.append(bool(model.cancellations))
         if model.cancellations:

@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.identification import coefficients, report
 from benchmarks.identification_data import TABLE_6, Case, noisy, random_binary, table6_case
+from estimation.finding import NORMAL_95
 from estimation.identification import (
     FrequencyResponse,
     LinearModel,
@@ -159,9 +160,9 @@ def robust_lines(seeds: int) -> list[Line]:
                 form = {"n_numerator": truth.free_numerator.size, "n_denominator": 2, "delay": truth.delay}
                 model = fit_output_error(u, y, 1e-3, **form, covariance="coloured")
                 error = np.abs(coefficients(model) - coefficients(truth))
-                covered.append(error <= 1.96 * model.coefficient_std)
-                white.append(error <= 1.96 * np.sqrt(np.diag(model.covariance_white)))
-                gains.append(abs(model.dc_gain - truth.dc_gain) <= 1.96 * model.dc_gain_std)
+                covered.append(error <= NORMAL_95 * model.coefficient_std)
+                white.append(error <= NORMAL_95 * np.sqrt(np.diag(model.covariance_white)))
+                gains.append(abs(model.dc_gain - truth.dc_gain) <= NORMAL_95 * model.dc_gain_std)
             share, gain = float(np.mean(covered)), float(np.mean(gains))
             text = f"{label}, {name}: robust {share:.3f}, gain {gain:.2f}, nominal {np.mean(white):.3f} (0.87 to 0.99)"
             lines.append((text, 0.87 <= share <= 0.99))

@@ -19,6 +19,7 @@ from benchmarks.population import TEST, draw_logs
 from benchmarks.scores import calibration_error, share_interval
 from benchmarks.targets import Check, printed
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from estimation.finding import NORMAL_95
 from faults.diagnosis.diagnose import diagnose_log
 from plant.eha.model import EhaParameters
 from plant.errors import LogWarning
@@ -82,7 +83,7 @@ def moduli(name: str, sensors: Sensors, seeds: int) -> list[Check]:
         f"off by {100.0 * float(np.median(sizes)):.2f} % median, {100.0 * max(sizes):.2f} % at most; "
         f"{(time.process_time() - began) / logs:.2f} s CPU a log"
     )
-    covered = 100.0 * float(np.mean(np.abs(z) < 1.96))
+    covered = 100.0 * float(np.mean(np.abs(z) < NORMAL_95))
     return printed([Check(f"{name}: 95 % intervals of bulk modulus that cover, %", covered, 90.0, 100.0)])
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from benchmarks.targets import misses, say
 from estimation.arrays import Array
+from estimation.finding import NORMAL_95
 from estimation.identification.free_run.data import Channels, channels_from
 from estimation.identification.state_space.dynamics import StateSpaceDynamics, system_in_units
 from estimation.identification.state_space.identify import identify_state_space
@@ -113,7 +114,7 @@ def main(arguments: list[str] | None = None) -> int:
     own = float(np.sqrt(np.mean((error / deviation) ** 2)))
     say("rms error over the deviation said", own, 0.95, most=False)
     say("rms error over the deviation said", own, 1.05)
-    share = 100.0 * float(np.mean(np.abs(error) <= 1.96 * deviation))
+    share = 100.0 * float(np.mean(np.abs(error) <= NORMAL_95 * deviation))
     say("95 % intervals that cover [%]", share, 93.0, most=False)
     say("95 % intervals that cover [%]", share, 97.0)
     worst = np.sqrt(np.mean((error / limit) ** 2, axis=0))

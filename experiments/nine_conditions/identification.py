@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
+from estimation.finding import NORMAL_95
 from experiments.page.drawing import say
 from experiments.page.style import BESIDE_CONDITIONS, BLUE, GREY, ORANGE, VERMILION, Margins, condition_levels, panels
 
@@ -111,7 +112,7 @@ def draw_gains(models: pd.DataFrame) -> Figure:
     level = condition_levels(axis, models["condition"])
     low, high = (MILLI * models[f"published_dc_gain_{end}"] for end in ("low", "high"))
     axis.hlines(level - 0.16, low, high, color=ORANGE, linewidth=5.0, label="Table 6: what its four digits leave open")
-    gain, reach = MILLI * models["dc_gain"], 1.96 * MILLI * models["dc_gain_std"]
+    gain, reach = MILLI * models["dc_gain"], NORMAL_95 * MILLI * models["dc_gain_std"]
     axis.errorbar(
         gain, level + 0.16, None, reach, "o", markersize=4, capsize=2, color=BLUE, label="ours, with 95 % interval"
     )

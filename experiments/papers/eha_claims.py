@@ -8,6 +8,7 @@ import pandas as pd
 from scipy.constants import psi
 
 from estimation.eha.named import PRINTED_Q, PRINTED_R, PUBLISHED_TIME
+from estimation.finding import NORMAL_95, interval_95
 from estimation.identification.signals.preprocess import zero_phase_filter
 from experiments.circuit.first_tests import WITHIN_DOUBTS
 from experiments.circuit.steady_experiments import FIGURE_9_VOLTS
@@ -132,8 +133,8 @@ def _first_tests(study: Tables, circuit: Tables, library: Tables) -> Mapping[str
 
 def _bandwidth(models: pd.DataFrame) -> Ours:
     table = models.set_index("condition")
-    width, spread = cell(table, "normal", "bandwidth_hz"), 1.96 * cell(table, "normal", "bandwidth_std_hz")
-    return Ours(width, width - spread, width + spread)
+    width = cell(table, "normal", "bandwidth_hz")
+    return Ours(width, *interval_95(width, cell(table, "normal", "bandwidth_std_hz")))
 
 
 def _steady(circuit: Tables) -> Mapping[str, Ours]:
@@ -239,8 +240,8 @@ def _as_printed(rows: pd.DataFrame) -> Ours:
 
 def _settled(rows: pd.DataFrame) -> Ours:
     value = float(rows["filter_settled_at_pa"].mean())
-    spread = 1.96 * float(rows["filter_std_pa"].mean())
-    covered = (rows["filter_settled_at_pa"] - RIG.bulk_modulus).abs() <= 1.96 * rows["filter_std_pa"]
+    spread = NORMAL_95 * float(rows["filter_std_pa"].mean())
+    covered = (rows["filter_settled_at_pa"] - RIG.bulk_modulus).abs() <= NORMAL_95 * rows["filter_std_pa"]
     said = f"{_gate(rows)}; 95 % interval ± {1e-8 * spread:.2g}e8 Pa holds 2.07e8 Pa in {covered.sum()} of {len(rows)}"
     return Ours(value, said=said)
 

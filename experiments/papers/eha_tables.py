@@ -6,6 +6,7 @@ from functools import partial
 
 import pandas as pd
 
+from estimation.finding import interval_95
 from experiments.nine_conditions.transfer_functions import COEFFICIENTS
 from experiments.page.frames import cell
 from experiments.page.words import in_words
@@ -193,7 +194,7 @@ def _coefficients(frame: pd.DataFrame) -> Iterator[Row]:
     for condition in CONDITIONS:
         for name in COEFFICIENTS:
             printed = str(table.loc[condition, name])
-            value, spread = cell(ours, condition, name), 1.96 * cell(ours, condition, f"{name}_std")
+            value = cell(ours, condition, name)
             yield Row(
                 paper=PAPER,
                 where="Table 6",
@@ -203,7 +204,7 @@ def _coefficients(frame: pd.DataFrame) -> Iterator[Row]:
                 unit="",
                 accept="digits",
                 basis="model",
-                ours=Ours(value, value - spread, value + spread),
+                ours=Ours(value, *interval_95(value, cell(ours, condition, f"{name}_std"))),
                 shown_by="hydrostate study",
                 note=CELL_NOTE,
             )
@@ -242,21 +243,21 @@ _library_row = partial(Row, paper=PAPER, where="Table 6", basis="model", shown_b
 
 def _library_gain(ours: pd.DataFrame, condition: str) -> Row:
     low, high = (cell(ours, condition, f"published_gain_{end}") for end in ("low", "high"))
-    gain, spread = cell(ours, condition, "dc_gain"), 1.96 * cell(ours, condition, "dc_gain_std")
+    gain = cell(ours, condition, "dc_gain")
     return _library_row(
         claim=f"gain at z = 1, {in_words(condition)}; the digits leave it open between the two",
         printed=f"{low:.3g} to {high:.3g}",
         value=None,
         unit="m/s per rad/s",
         accept=f"{low!r} to {high!r}",
-        ours=Ours(gain, gain - spread, gain + spread),
+        ours=Ours(gain, *interval_95(gain, cell(ours, condition, "dc_gain_std"))),
         note=FREE_NOTE,
     )
 
 
 def _library_bandwidth(ours: pd.DataFrame, condition: str) -> Row:
     published = cell(ours, condition, "published_bandwidth_hz")
-    width, spread = cell(ours, condition, "bandwidth_hz"), 1.96 * cell(ours, condition, "bandwidth_std_hz")
+    width = cell(ours, condition, "bandwidth_hz")
     there = published == published  # NaN where the printed model never falls 3 dB
     return _library_row(
         claim=f"3 dB down, {in_words(condition)}, of the printed model at the inferred 1 ms",
@@ -264,7 +265,7 @@ def _library_bandwidth(ours: pd.DataFrame, condition: str) -> Row:
         value=published if there else "never falls 3 dB",
         unit="Hz",
         accept="± 10 %" if there else "same",
-        ours=Ours(width, width - spread, width + spread),
+        ours=Ours(width, *interval_95(width, cell(ours, condition, "bandwidth_std_hz"))),
         note=FREE_NOTE,
     )
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from estimation.finding import NORMAL_95
 from experiments.page.names_shown import SHOWN
 from experiments.page.numbers import (
     MISSING,
@@ -28,9 +29,6 @@ LEAST_WIDTH = 5e-3
 
 MOST_NAMED = 6
 """Quantities that a title names, at most [count]."""
-
-DEVIATIONS = 1.96
-"""Standard deviations from an estimate to the end of its 95 % interval [dimensionless]."""
 
 
 def compare_view(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
@@ -120,7 +118,7 @@ def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[s
             row["difference"] = known[1]["value"] - known[0]["value"]
             stds = [std for std in map(std_of, known) if std is not None]
             if len(stds) == 2:
-                half = DEVIATIONS * math.hypot(*stds)
+                half = NORMAL_95 * math.hypot(*stds)
                 row["interval"] = [row["difference"] - half, row["difference"] + half]
                 row["changed"] = abs(row["difference"]) > half
         rows.append(row)
@@ -151,7 +149,7 @@ def std_of(one: Mapping[str, Any]) -> float | None:
     if one.get("std") is not None:
         return float(one["std"])
     ends = one.get("ci95")
-    return None if not ends or None in ends else (float(ends[1]) - float(ends[0])) / (2.0 * DEVIATIONS)
+    return None if not ends or None in ends else (float(ends[1]) - float(ends[0])) / (2.0 * NORMAL_95)
 
 
 def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from estimation.finding import interval_95
 from experiments.serve import app as server
 from experiments.serve.limits import HEADERS
 from experiments.serve.settings import Settings
@@ -201,7 +202,7 @@ def test_two_logs_are_compared_and_the_fleet_has_both(served: Served, monkeypatc
     pair = [dropped(client, name, b"a", "diagnose")["id"] for name in ("A_1.csv", "<b>_2.csv")]
     (row,) = client.get("/api/compare", params={"first": pair[0], "second": pair[1]}).json()["differences"]
     assert (row["difference"], row["changed"]) == (2.0, True)
-    assert row["interval"] == pytest.approx([2.0 - 1.96 * 0.1 * 2**0.5, 2.0 + 1.96 * 0.1 * 2**0.5])
+    assert row["interval"] == pytest.approx(interval_95(2.0, 0.1 * 2**0.5))
     page = client.get("/compare", params={"first": pair[0], "second": pair[1]}).text
     assert "Leakage differs between the two logs." in page
     assert "<b>_2" not in page
