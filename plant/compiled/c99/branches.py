@@ -1,6 +1,7 @@
 """Choices of which one side is much work, as blocks that are gone through only where that side is chosen."""
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from plant.compiled.expression import Expression
@@ -43,14 +44,15 @@ def blocks_of(order: Sequence[Expression], kept: Sequence[Expression]) -> dict[i
     dict[int, Block]
         The block of each choice that belongs to one, by the choice's id.
     """
-    users: dict[int, list[tuple[Expression, int]]] = {id(one): [] for one in order}
-    for item in order:
-        for place, one in enumerate(item.arguments):
-            users[id(one)].append((item, place))
+    places = {id(one): place for place, one in enumerate(order)}
+    uses = Counter(id(one) for item in order for one in item.arguments)
     wanted = {id(one) for one in kept}
     found: dict[int, Block] = {}
     for choices in _apart(order):
-        true, false = (_alone(order, users, wanted, choices, place) for place in (1, 2))
+        true, false = (
+            sorted(_alone(uses, wanted, [one.arguments[side] for one in choices]), key=lambda one: places[id(one)])
+            for side in (1, 2)
+        )
         if max(len(true), len(false)) >= LEAST:
             block = Block(choices[0].arguments[0], choices, (true, false))
             found |= {id(one): block for one in choices}
@@ -71,18 +73,14 @@ def _apart(order: Sequence[Expression]) -> list[list[Expression]]:
     return list(groups.values())
 
 
-def _alone(
-    order: Sequence[Expression],
-    users: dict[int, list[tuple[Expression, int]]],
-    wanted: set[int],
-    choices: Sequence[Expression],
-    place: int,
-) -> list[Expression]:
-    """Return the operations that serve one side of the choices and nothing else."""
-    chosen, alone = {id(one) for one in choices}, set[int]()
-    for item in reversed(order):
-        if item.arguments and id(item) not in wanted:
-            serves = users[id(item)]
-            if all(id(user) in alone or (id(user) in chosen and at == place) for user, at in serves):
-                alone.add(id(item))
-    return [item for item in order if id(item) in alone]
+def _alone(uses: Mapping[int, int], wanted: set[int], sides: Sequence[Expression]) -> list[Expression]:
+    """Return the operations that serve one side of the choices and nothing else: all their uses are found from it."""
+    alone: list[Expression] = []
+    found, waiting = Counter[int](), [*sides]
+    while waiting:
+        item = waiting.pop()
+        found[id(item)] += 1
+        if item.arguments and found[id(item)] == uses[id(item)] and id(item) not in wanted:
+            alone.append(item)
+            waiting += item.arguments
+    return alone
