@@ -1,10 +1,12 @@
 """C compilers of this machine, and what they make of exported files."""
 
+import contextlib
 import hashlib
 import os
 import platform
 import shutil
 import subprocess
+import time
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -14,6 +16,8 @@ import pytest
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
 PROGRAMS = Path(__file__).resolve().parents[1] / ".pytest_cache" / "programs"
 """Beside compiled kernels, which outlive a run too."""
+UNUSED = 30 * 86400
+"""Age at which a program that no test asked for is deleted [s]."""
 SANITIZED = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
@@ -36,6 +40,14 @@ def _kept_as(files: Mapping[str, str], command: Sequence[str]) -> Path:
     return PROGRAMS / hashlib.sha256(made_by.encode()).hexdigest()[:32]
 
 
+def _forget() -> None:
+    """Delete programs that no test has asked for in a month: each change of an exported file leaves one behind."""
+    for one in PROGRAMS.iterdir():
+        with contextlib.suppress(FileNotFoundError):  # another worker may forget it meanwhile
+            if one.stat().st_mtime < time.time() - UNUSED:
+                one.unlink()
+
+
 def compiled(folder: Path, files: Mapping[str, str], *flags: str, using: str = "gcc") -> Path:
     """The program that exported files make, compiled without a warning; once, however often tests ask for it."""
     for file, text in files.items():
@@ -43,10 +55,13 @@ def compiled(folder: Path, files: Mapping[str, str], *flags: str, using: str = "
     sources = [file for file in files if file.endswith(".c")]
     command = [compiler(using), *STRICT, *flags, "-o", "program", *sources, "-lm"]
     kept = _kept_as(files, command)
+    if kept.is_file():
+        kept.touch()
     if not kept.is_file() or "-march=native" in flags:
         done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)  # noqa: S603 - our own files
         assert (done.returncode, done.stderr) == (0, "")
         PROGRAMS.mkdir(parents=True, exist_ok=True)
+        _forget()
         shutil.copy2(folder / "program", beside := kept.with_suffix(f".{os.getpid()}"))
         beside.replace(kept)
     return kept
