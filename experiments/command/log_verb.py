@@ -1,6 +1,7 @@
 """The body of `estimate` and `diagnose`, the same for every kind of actuator."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -42,21 +43,20 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     options = understood(context, asked, kind, verb, COMMON | ({"condition"} if diagnosing else set()))
     require_place("--figure", options.get("figure"), ".png")
     chosen: LogVerb = getattr(kind, verb)
-    logs, mapping = asked["logs"], load_columns(asked["columns"])
+    logs, beside = asked["logs"], asked.get("beside") or ()
+    read = partial(
+        read_log,
+        rig_columns=bench.columns,
+        columns=load_columns(asked["columns"]),
+        required=kind.required,
+        sample_time=asked.get("sample_time"),
+    )
     expected: str | None = asked["condition"] if diagnosing else None
     report = page_place(asked.get("report"))
     if expected is not None:
         require_known("--condition", expected, kind.conditions)
-
-    beside: list[Path] = asked.get("beside") or []
     if beside and len(logs) > 1:
         raise HydrostateError("--with goes with one log, got several")
-
-    def read(path: Path, beside: Sequence[Path] = ()) -> "Record":
-        return read_log(
-            path, bench.columns, mapping, kind.required, sample_time=asked.get("sample_time"), beside=beside
-        )
-
     if options.get("healthy") is not None:
         options["healthy"] = read(options["healthy"])
     rig, prepared = chosen.prepare(bench, {**options, "seed": asked["seed"]})
@@ -67,7 +67,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
 
     def work(log: Path) -> Result:
         with overheard() as said:
-            record = read(log, beside)
+            record = read(log, beside=beside)
         found = chosen.run(record, rig, prepared)
         result: dict[str, Any] = {**chosen.blank, **about, **chosen.entries(found)}
         result["message"] = clauses([result["message"], *_agreement(result, found)])

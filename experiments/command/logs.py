@@ -155,18 +155,20 @@ def with_remarks(result: Result, said: Iterable[LogWarning]) -> dict[str, Any]:
 
 
 def _worked(log: Path, work: Work, blank: Result) -> Result:
+    names_a_file = False
     with caught() as said_of_it:
         try:
             result = dict(work(log))
         except HydrostateError as error:
-            result = _failure(blank, error.message if error.source == str(log) else str(error))
+            names_a_file = error.source not in {None, str(log)}
+            result = _failure(blank, str(error) if names_a_file else error.message)
         except Exception as error:  # whatever a log brings up must not cost the others their results
             result = _failure(blank, unexpected(error))
     result = with_remarks(result, said_of_it)
     for sentence in result["warnings"]:
         note(f"{log}: warning: {sentence}")
     if result["outcome"] in {"failed", "diverged"}:
-        note(f"{log}: {result['message']}")
+        note(result["message"] if names_a_file else f"{log}: {result['message']}")
     return {"file": str(log), **result}
 
 
