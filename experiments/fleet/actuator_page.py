@@ -1,13 +1,11 @@
 """The page of one actuator: how every severity develops over its logs, and when a limit is reached."""
 
-import math
-
 import numpy as np
 import pandas as pd
 
-from estimation.finding import NORMAL_95
+from estimation.finding import interval_95
 from experiments.fleet.actuators import ActuatorRow
-from experiments.fleet.outlook import Outlook, outlook_of
+from experiments.fleet.outlook import Outlook, outlook_of, span_of
 from experiments.fleet.page import found_in
 from experiments.fleet.rows import STATES
 from experiments.page.charts import Charts
@@ -78,8 +76,8 @@ def _changed(one: Outlook) -> str:
 def _forecast(one: Outlook) -> dict[str, str]:
     scale, unit = shop_unit(one.unit)
     (level, std), (growth, growth_std) = one.trend.level, one.trend.growth
-    ends = [scale * (level + sign * NORMAL_95 * std) for sign in (-1.0, 1.0)]
-    decimals = decimals_of(ends[0], ends[1])
+    ends = interval_95(scale * level, scale * std)
+    decimals = decimals_of(*ends)
     shown, low, high = (fixed(each, decimals) for each in (scale * level, *ends))
     growth = growth if abs(growth) > ROUNDING * growth_std else 0.0
     crossing = one.trend.crossing
@@ -88,16 +86,10 @@ def _forecast(one: Outlook) -> dict[str, str]:
         "severity": SHOWN[one.name],
         "level": f"{shown} {unit} ({low} to {high})",
         "growth": f"{number(scale * growth, 2)} ± {number(scale * growth_std, 2)} {unit}",
-        "half": MISSING if reached is None else _to(reached[1], reached[3]),
-        "most": MISSING if reached is None else _to(reached[0], reached[4]),
+        "half": MISSING if reached is None else span_of(reached[1], reached[3]),
+        "most": MISSING if reached is None else span_of(reached[0], reached[4]),
         "outlook": one.words,
     }
-
-
-def _to(low: float, high: float) -> str:
-    if math.isinf(low):
-        return "more than 300"
-    return f"{low:.0f} to {f'{high:.0f}' if math.isfinite(high) else 'more than 300'}"
 
 
 def _chart(one: Outlook, name: str) -> Charts:

@@ -10,6 +10,7 @@ import numpy as np
 
 from experiments.fleet.naming import place_of, table_rows
 from experiments.fleet.rows import LogRow
+from faults.trend.crossing import HORIZON
 from faults.trend.trend import FEWEST, Series, Trend, trends
 
 LEAST_STD = 1e-3
@@ -67,9 +68,25 @@ class Outlook:
         low, middle, high = self.left
         if middle <= 0.0:
             return "past the limit"
-        end = f"{high:.0f}" if math.isfinite(high) else "more than 300"
         logs = "log" if f"{middle:.0f}" == "1" else "logs"
-        return f"limit in {middle:.0f} {logs} ({low:.0f} to {end})"
+        return f"limit in {middle:.0f} {logs} ({span_of(low, high)})"
+
+
+def span_of(low: float, high: float) -> str:
+    """Return the interval of a crossing in words; no future is followed beyond `HORIZON`.
+
+    Parameters
+    ----------
+    low, high : float
+        Its ends, infinite beyond [logs, a count].
+
+    Examples
+    --------
+    >>> span_of(3.4, 12.0), span_of(80.0, math.inf), span_of(math.inf, math.inf)
+    ('3 to 12', '80 to more than 300', 'more than 300')
+    """
+    first, last = (f"{end:.0f}" if math.isfinite(end) else f"more than {HORIZON:.0f}" for end in (low, high))
+    return f"{first} to {last}" if math.isfinite(low) else first
 
 
 def outlook_of(logs: Sequence[LogRow], name: str, maintained: Sequence[float] = ()) -> Outlook | None:
