@@ -58,6 +58,16 @@ def test_every_test_that_a_page_names_is_there() -> None:
     assert not [one for one in paths if not (ROOT / one[1]).exists()]
 
 
+def test_every_python_file_that_a_page_names_is_there() -> None:
+    records = {DOCS / "decisions.md", DOCS / "mutants.md"}  # of their day
+    made = {DOCS / "add-a-plant.md"}  # the reader writes its files
+    folders = ("plant", "estimation", "faults", "experiments", "benchmarks", "tests", "docs")
+    known = ["/hydrostate.py", *(file.as_posix() for folder in folders for file in (ROOT / folder).rglob("*.py"))]
+    for page in (page for page in PAGES if page not in records | made):
+        named = re.findall(r"`([\w/]+\.py)`", page.read_text("utf-8"))
+        assert not [name for name in named if not any(one.endswith(f"/{name}") for one in known)], page.name
+
+
 def test_the_site_holds_every_page_once() -> None:
     text = (DOCS / "index.md").read_text("utf-8")
     held = [

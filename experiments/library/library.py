@@ -22,14 +22,14 @@ from faults.conditions import CONDITIONS
 from faults.eha.bank import LIBRARY_DURATION, identify_bank
 from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters
-from plant.eha.drives import HOLD_TIME as SWITCHING_TIME
+from plant.eha.drives import HOLD_TIME as PRBS_HOLD_TIME
 from plant.eha.simulate import CIRCUIT
 from plant.errors import LogWarning
 
 DURATION = 80.0
 """Length of a test, all passes together [s]."""
 
-HOLD_TIME = 0.05
+PASS_HOLD_TIME = 0.05
 """Time between chances to switch [s]: 10 to 20 ms suit 25 Hz, 200 ms leaves it several times less certain."""
 
 MEAN_V, AMPLITUDE_V = 4.0, 2.0
@@ -64,7 +64,7 @@ def circuit_passes(
     speeds, velocities : list of ndarray
         Motor speed [rad/s] and velocity [m/s] of each pass, as the bench's sensors see them.
     """
-    test = Passes(MEAN_V, AMPLITUDE_V, max(1, round(duration / PASS_TIME)), PASS_TIME, HOLD_TIME, SETTLING)
+    test = Passes(MEAN_V, AMPLITUDE_V, max(1, round(duration / PASS_TIME)), PASS_TIME, PASS_HOLD_TIME, SETTLING)
     speeds, velocities = run_passes(in_condition(rig, condition), test, rng)
     return list(speeds), list(velocities)
 
@@ -98,14 +98,14 @@ def build_library(seed: int) -> dict[str, Any]:
         "drive": {
             "kind": "random binary without a mean, as in section 4",
             "amplitude_v": rig.rated_speed / rig.motor_speed_per_volt,
-            "hold_time_s": SWITCHING_TIME,
+            "hold_time_s": PRBS_HOLD_TIME,
             "duration_s": LIBRARY_DURATION,
         },
         "drive_around_mean": {
             "kind": "random binary around a mean, in passes",
             "mean_v": MEAN_V,
             "amplitude_v": AMPLITUDE_V,
-            "hold_time_s": HOLD_TIME,
+            "hold_time_s": PASS_HOLD_TIME,
             "duration_s": DURATION,
         },
         "conditions": entries,

@@ -12,12 +12,10 @@ from estimation.identification.fit.residual_tests import DEFAULT_LAGS, correlati
 from estimation.identification.fit.validate import Validation
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.signals.automatic_window import automatic_response
+from experiments.log_pages.free_run_figure import SHOWN_SAMPLES
 from experiments.page.figure_files import write_png
 from experiments.page.style import BLUE, GREY, ORANGE, VERMILION, Margins, panels
 from plant.log.record import CHANNELS
-
-SHOWN_SAMPLES = 8000
-"""About so many samples are drawn of each curve."""
 
 LEAST_COHERENCE = 0.1
 """Below, the empirical response says nothing and is left out."""

@@ -7,11 +7,9 @@ import pandas as pd
 from experiments.page.frames import Tables, cell
 from experiments.papers.verdict import Ours
 from experiments.piezo_stack import flow
+from experiments.piezo_stack.left_out import PEAK
 from plant.piezo_stack.run import HIGHEST_VOLTAGE
 from plant.units import LITRE_PER_MINUTE
-
-PEAK = 275.0
-"""The published best frequency [Hz]."""
 
 
 def stack_ours(found: Tables) -> Mapping[str, Ours]:

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from plant.log.record import Record
 
 LEARNING = 120.0
-"""Healthy running before alarms can come, unless told otherwise [s]."""
+"""Healthy running before alarms can come, unless told otherwise [s]: `faults.watch.watch.LEARNING`, which a help text
+need not import."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from itertools import product
 
 import numpy as np
 
-from faults.trend.kalman_loops import Index, fill_predicted, follow, take_in
+from faults.trend.kalman_loops import Index, fill_predicted, follow
 from plant.arrays import Array
 
 BENDS = (0.0, 1e-3, 3e-3, 1e-2)
@@ -175,22 +175,6 @@ def beliefs(times: Array, values: Array, stds: Array, grid: Settings) -> list[Be
     of_grid = grid.bend, grid.jerk, wandered, grid.scatter
     follow(values, stds, GROSS, grid.paced, moves, bent, jerked, *of_grid, mean, covariance, evidence)
     return [Belief(mean[k], covariance[k], evidence[k]) for k in range(rows)]
-
-
-def next_belief(now: Belief, step: float, value: float, std: float, grid: Settings) -> Belief:
-    """Return what is believed after a further log.
-
-    Parameters
-    ----------
-    step : float
-        Time since the last one [count].
-    value, std : float
-        What the log says, and its own standard deviation [dimensionless].
-    """
-    found = predict(now, step, grid)
-    evidence = now.evidence.copy()
-    take_in(found.mean, found.covariance, evidence, value, std, GROSS, grid.scatter)
-    return Belief(found.mean, found.covariance, evidence)
 
 
 def predict(now: Belief, step: float, grid: Settings) -> Belief:

@@ -16,11 +16,11 @@ from scipy.optimize import brentq
 from scipy.special import iv, jv
 
 from plant.arrays import Array
+from plant.components.piezoelectricity import PZT_5H
 from plant.errors import RigError
 from plant.units import require_numbers, si
 
 TABLE_1 = "Table 1"
-PZT_5H = "PZT-5H; Erturk and Inman, Piezoelectric Energy Harvesting (2011), appendix E"
 HANDBOOK = "handbook value, errata M22"
 
 

@@ -15,6 +15,7 @@ from plant.compiled.native.kinds import (
     several,
     structure,
 )
+from plant.compiled.native.lines import names_of
 from plant.compiled.native.operations import GIVEN, Operation, operation_of
 from plant.compiled.native.operators import convert
 from plant.compiled.native.scope import Scope
@@ -150,7 +151,7 @@ class Module:
         if compiled.lends:
             scope.keeps = True
             parts.append(f"ptr {scope.owner}")
-        formal = dict(zip(_parameters(self._functions[name]), given, strict=True))
+        formal = dict(zip(names_of(self._functions[name]), given, strict=True))
         for parameter in compiled.written:
             scope.written |= formal[parameter].origin
         text = f"call {structure(compiled.returns)} @{compiled.symbol}({', '.join(parts)})"
@@ -197,7 +198,7 @@ class Module:
         scope = Scope(self, {}, {}, flags)
         formal: list[str] = []
         given: list[tuple[str, Held]] = []
-        for name, kind in zip(_parameters(node), kinds, strict=True):
+        for name, kind in zip(names_of(node), kinds, strict=True):
             parts = tuple(f"%in.{name}.{k}" for k in range(len(kind.parts)))
             attribute = " noalias" if enters else ""
             formal += [
@@ -280,10 +281,6 @@ def _packed(kind: AnyKind) -> bool:
     if isinstance(kind, Several):
         return all(map(_packed, kind.items))
     return kind.packed if isinstance(kind, ArrayKind) else True
-
-
-def _parameters(node: ast.FunctionDef) -> list[str]:
-    return [argument.arg for argument in node.args.args]
 
 
 def _hints(node: ast.FunctionDef) -> tuple[str, bool]:

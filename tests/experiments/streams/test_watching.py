@@ -12,6 +12,7 @@ from experiments.streams.rows import warn_of_lost
 from experiments.streams.state_file import SAVED_EVERY
 from experiments.streams.watch_events import WatchEvents
 from experiments.streams.watching import WatchSettings, watch_rows
+from faults.watch import watch as engine
 from faults.watch.saved import load_state
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
@@ -23,7 +24,7 @@ SPEED = 50.0
 """Motor speed, forward and back [rad/s]."""
 
 HEADER = "time_s,motor_speed_rad_s,velocity_m_s"
-LEARNT = 60.0
+LEARNT = engine.LEAST_LEARNING
 """Least time that a watch learns [s]."""
 
 
@@ -61,6 +62,10 @@ def position(lines: list[str], offset: float = 0.0, T: float = T) -> list[str]:
     cells = [line.split(",") for line in lines]
     place = offset + np.cumsum([float(velocity) for *_, velocity in cells]) * T
     return [f"{time},{speed},{x:.12f}\n" for (time, speed, _), x in zip(cells, place, strict=True)]
+
+
+def test_the_command_learns_as_long_as_the_engine_unless_told() -> None:
+    assert watching.LEARNING == engine.LEARNING
 
 
 def test_what_changes_during_a_gap_is_no_alarm_for_it_is_learnt_again(capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,12 +15,11 @@ from faults.trend.kalman import (
     first_belief,
     growth_evidence,
     moments,
-    next_belief,
     predict,
     settings,
 )
 from plant.arrays import Array
-from tests.faults.trend.one_setting import one_setting
+from tests.faults.trend.small_beliefs import next_belief, one_setting
 from tests.kernels import loops_in_python
 
 

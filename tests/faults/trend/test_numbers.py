@@ -17,12 +17,11 @@ from faults.trend.kalman import (
     first_belief,
     growth_evidence,
     moments,
-    next_belief,
     settings,
 )
 from faults.trend.trend import Series, Trend, first_logs_after, trends
 from plant.arrays import Array
-from tests.faults.trend.one_setting import one_setting
+from tests.faults.trend.small_beliefs import next_belief, one_setting
 from tests.numbers import Numbers
 
 NUMBERS = Numbers(__file__)

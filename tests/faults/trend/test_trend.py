@@ -9,7 +9,7 @@ from faults.trend.crossing import HORIZON, crossing
 from faults.trend.kalman import exponential_growth, first_belief
 from faults.trend.trend import Series, Trend, trend_of, trends
 from plant.arrays import Array
-from tests.faults.trend.one_setting import one_setting
+from tests.faults.trend.small_beliefs import one_setting
 
 
 def series_of(truth: Array, std: float = 0.04, seed: int = 0) -> Series:
