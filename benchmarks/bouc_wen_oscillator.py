@@ -6,21 +6,19 @@ A mass on a spring, a damper and a Bouc-Wen force (equations 1 and 2).
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from math import isfinite
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.piezo_stack.bouc_wen import HysteresisFit, fitted
 from estimation.tuning.step_sensitivity import sensitivity_step
+from plant.arrays import Array
 from plant.compiled.functions import Scalar
 from plant.components.bouc_wen import bouc_wen_rate
 from plant.errors import RigError
 from plant.solvers.steps import rk4_step
 from plant.solvers.trajectory import compile_trajectory
 from plant.units import si
-
-Array: TypeAlias = NDArray[np.float64]
 
 BENCHMARK = "Noël and Schoukens 2016, Table 1"
 

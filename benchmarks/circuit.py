@@ -14,17 +14,15 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from benchmarks.peers.stiff_solvers import Method, reference_trajectory
 from faults.conditions import CONDITIONS, parameters_for
+from plant.arrays import Array
 from plant.eha.circuit import circuit_derivative, circuit_scales
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.drives import DRIVES, make_drive
 from plant.eha.simulate import CIRCUIT, run_plant
 from plant.solvers.steps import parameter_row
-
-Array = NDArray[np.float64]
 
 SAMPLE_TIME = 1e-4
 LADDER = tuple(base * 10.0**-k for k in range(4, 10) for base in (1.0, 0.5, 0.2))

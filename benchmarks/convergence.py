@@ -12,7 +12,6 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from estimation.filters.run import METHODS, available_channels, run_filter
 from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, START_STD, first_belief
@@ -22,14 +21,13 @@ from estimation.trust.bounds import at_bulk_modulus, bulk_modulus_bound
 from experiments.running.executors import side_by_side
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
+from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import PLANTS, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
-
-Array = NDArray[np.float64]
 
 SAMPLE_TIME = 1e-4
 SECONDS = 10.0

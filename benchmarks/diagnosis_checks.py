@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from benchmarks.population import (
     DRIVES,
@@ -30,6 +29,7 @@ from faults.diagnosis.circuit_runs import coordinates_of, predicted
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.severity import severities_at
 from faults.eha.inject import abrupt
+from plant.arrays import Array
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
@@ -38,8 +38,6 @@ from plant.log.files import read_record
 from plant.log.record import Record
 from plant.sensors.sensors import RIG
 from plant.solvers.steps import parameter_row
-
-Array = NDArray[np.float64]
 
 PRESSURE = "differential_pressure_pa"
 

@@ -17,7 +17,6 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.filter_speed import cost, problems
 from benchmarks.peers.c_filter import FUSING, CFilter, built
@@ -26,12 +25,11 @@ from estimation.engine.contract import FilterProblem
 from estimation.export.task import EXPORTED_FORMS, filter_task
 from estimation.filters.run import METHODS
 from faults.conditions import CONDITIONS, parameters_for
+from plant.arrays import Array
 from plant.eha.drives import sine
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, REDUCED, simulate
 from plant.sensors.sensors import BENCH
-
-Array = NDArray[np.float64]
 
 SAMPLES, SAMPLE_TIME, ROUNDS = 100_000, 1e-4, 9
 WANTED = {"agreement": 1e-12, "acceleration": 25.0, "pressure": 60.0}

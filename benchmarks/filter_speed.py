@@ -23,7 +23,6 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.peers import cpp_lanes, filterpy_user
 from benchmarks.peers.acceleration_form import coefficients
@@ -38,6 +37,7 @@ from estimation.filters.filterpy_bridge import filterpy_ekf
 from estimation.filters.run import filter_problem
 from estimation.log_checks.first_belief import first_belief
 from estimation.models.eha_forms import ACCELERATION_FORM, FORMS
+from plant.arrays import Array
 from plant.compiled.expression import ordered
 from plant.compiled.native import machine
 from plant.compiled.simplify import FUSED
@@ -45,8 +45,6 @@ from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import REDUCED, simulate
 from plant.sensors.sensors import BENCH
-
-Array = NDArray[np.float64]
 
 CHANNELS = ("position_m", "velocity_m_s")
 VARIANCES = {"position_m": 1e-12, "velocity_m_s": 1e-6}

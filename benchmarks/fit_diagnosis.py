@@ -33,10 +33,9 @@ from faults.diagnosis.class_regions import ClassFits
 from faults.diagnosis.evidence import EVIDENCES, weigh
 from faults.diagnosis.onset import last_part
 from faults.diagnosis.severity import UNITS, severities, severities_at
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
-
-Array = NDArray[np.float64]
 
 RIDGE = 1e-3
 """Penalty on squared weights [dimensionless]: where training logs are all right, weights would grow for ever."""

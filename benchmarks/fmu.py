@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.targets import Check, keep
+from plant.arrays import Array
 from plant.eha.drives import sine
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import PLANTS, Plant
@@ -22,8 +22,6 @@ from plant.export.c_plant import substeps_of
 from plant.export.fmu import plant_fmu
 from plant.solvers.steps import parameter_row
 from plant.solvers.trajectory import compile_trajectory
-
-Array = NDArray[np.float64]
 
 STEP, SECONDS, WANTED = 1e-3, 2.0, 1e-6
 TOOLS = {"libcosim": ("2.0",), "ecos": ("2.0", "3.0")}

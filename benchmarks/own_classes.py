@@ -6,15 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 import hydrostate as hs
+from plant.arrays import Array
 from plant.errors import LogError
 
 if TYPE_CHECKING:
     from faults.own_classes.verdicts import Verdicts
 
-Array = NDArray[np.float64]
 
 BLOCKS = 10
 """Contiguous blocks of runs, each judged by what the others teach."""

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from faults.conditions import CONDITIONS, parameters_for
 from faults.eha.inject import spread
 from faults.eha.physical import aerated, drifted_relief
+from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -17,8 +17,6 @@ from plant.eha.simulate import CIRCUIT, simulate, simulate_each
 from plant.log.record import Record
 from plant.sensors.faults import Kind, SensorFault, with_fault
 from plant.sensors.sensors import RIG, Sensors, differentiated
-
-Array = NDArray[np.float64]
 
 DRIVES = ("steps", "prbs")
 """The two drives of the population: the paper's nine steps and its random binary signal."""

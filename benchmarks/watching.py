@@ -4,12 +4,12 @@ from copy import deepcopy
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.running.random_streams import stream
 from faults.conditions import find_condition, parameters_for, severity
 from faults.watch.events import Alarm
 from faults.watch.watch import Watch
+from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.drives import HOLD_TIME, prbs
 from plant.eha.simulate import CIRCUIT
@@ -18,8 +18,6 @@ from plant.log.record import Record
 from plant.sensors.sensors import RIG, measure
 from plant.solvers.adaptive import controlled_run
 from plant.solvers.steps import parameter_row
-
-Array = NDArray[np.float64]
 
 SAMPLE_TIME = 1e-3
 """Time between samples of the log [s]."""

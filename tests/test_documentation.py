@@ -68,7 +68,7 @@ def entries(lines: Sequence[str]) -> dict[str, Entry]:
 
 
 @cache
-def _is_unit(text: str) -> bool:
+def is_unit(text: str) -> bool:
     try:
         unit_registry().parse_units(text)
     except Exception:  # pint raises errors of many kinds, all of which mean no
@@ -79,7 +79,7 @@ def _is_unit(text: str) -> bool:
 def has_unit(text: str) -> bool:
     """Tell whether a description holds ``[a unit]``, or says in words that there is none, or whose it is."""
     brackets = re.findall(r"\[([^\[\]]+)\]", text)
-    return bool(UNIT_WORDS.search(text)) or any(_is_unit(said) or "unit" in said for said in brackets)
+    return bool(UNIT_WORDS.search(text)) or any(is_unit(said) or "unit" in said for said in brackets)
 
 
 def _mentions(annotation: ast.expr | None, names: frozenset[str]) -> bool:

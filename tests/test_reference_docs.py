@@ -14,7 +14,8 @@ import pytest
 
 from plant.eha.model import EhaParameters
 from plant.log.record import CHANNELS
-from plant.units import SI, notes, unit_registry
+from plant.units import SI, notes
+from tests.test_documentation import is_unit
 
 ROOT = Path(__file__).resolve().parents[1]
 LAYERS = ("plant", "estimation", "faults", "experiments")
@@ -111,17 +112,9 @@ def bad_notes(parameter_class: type) -> list[str]:
     unread = [
         f"{where}.{name} has a unit that cannot be read, got {note.unit!r}"
         for name, note in noted.items()
-        if note.unit.strip() and not _is_unit(note.unit)
+        if note.unit.strip() and not is_unit(note.unit)
     ]
     return blank + unread
-
-
-def _is_unit(text: str) -> bool:
-    try:
-        unit_registry().parse_units(text)
-    except Exception:  # pint raises errors of many kinds, all of which mean no
-        return False
-    return True
 
 
 def parameter_table(parameter_class: type) -> str:

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from estimation.engine.contract import FilterProblem
 from estimation.export.c_filter import filter_in_c
-
-Array = NDArray[np.float64]
+from plant.arrays import Array
 
 SOURCE = Path(__file__).with_suffix(".c")
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")

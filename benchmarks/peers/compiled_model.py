@@ -2,19 +2,18 @@
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.compiled.expression import as_expression, jacobian, symbol
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import kernel_text, pasted
 from plant.compiled.source import lines_source
 from plant.solvers.steps import Derivative, Parameters, parameter_names, parameter_symbols
-
-Array: TypeAlias = NDArray[np.float64]
 
 
 class ModelKernel(Protocol):

@@ -2,12 +2,10 @@
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
-from numpy.typing import NDArray
 
 from estimation.models.eha_forms import pressure_step
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
-
-Array = NDArray[np.float64]
 
 
 class AccelerationFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy carries no types

@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.peers.compiled_model import compiled_model
+from plant.arrays import Array
 from plant.compiled.native.load import NativeKernel
 from plant.errors import HydrostateError
 from plant.solvers.steps import Derivative, Parameters, parameter_row
-
-Array: TypeAlias = NDArray[np.float64]
 
 Method: TypeAlias = Literal["LSODA", "Radau", "BDF", "odeint", "CVODE"]
 """Scipy's ``solve_ivp`` by its three stiff methods, its ``odeint`` (LSODA without its overhead), SUNDIALS' CVODE."""

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from estimation.filters.run import METHODS, run_filter
@@ -17,14 +16,13 @@ from estimation.fits.greybox_log import greybox_log
 from estimation.models.gaussian import Gaussian
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.model import ProcessModel, StateVariable
+from plant.arrays import Array
 from plant.compiled.functions import Scalar
 from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.solvers.adaptive import ErrorControl, controlled_run
 from plant.solvers.steps import parameter_names, parameter_row, rk4_step, ros2_step
 from plant.solvers.trajectory import trajectory
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,14 +4,12 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from estimation.models.eha_forms import volume_left_open
 from estimation.models.model import ProcessModel, StateVariable
+from plant.arrays import Array
 from plant.compiled.functions import Scalar
 from plant.eha.model import EhaParameters, EhaValues
-
-Array = NDArray[np.float64]
 
 
 def _step(state: tuple[Scalar, ...], speeds: tuple[Scalar, Scalar], p: EhaValues, h: Scalar) -> tuple[Scalar, ...]:

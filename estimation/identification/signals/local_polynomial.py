@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import fdtri
 
-from estimation.arrays import Array
+from estimation.arrays import Array, ComplexArray
 from plant.errors import HydrostateError
 
 DEGREE = 2
@@ -18,8 +18,6 @@ HALF_WIDTH = 6
 EMPTY = (1e-9, 1e-12)
 """A band without input holds less than these shares of the median line and of the largest; rounding leaves 1e-15 of
 the largest [fraction]."""
-
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,16 +2,15 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from estimation.filters.ekf import ekf
 from estimation.filters.run import Estimate, run_filter
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 
-Array = NDArray[np.float64]
 SAMPLE_TIME, SUBSTEPS = 0.25, 1000
 VARIANCES = {"position_m": 1e-6, "velocity_m_s": 1e-4}
 PRIOR = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1e-4, 1e-2, 1.0]))

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from estimation.engine.contract import Method
@@ -15,11 +14,11 @@ from estimation.filters.run import Estimate, run_filter
 from estimation.models.eha_forms import FORMS
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel, StateVariable
+from plant.arrays import Array
 from plant.compiled.functions import Scalar, sqrt
 from plant.eha.model import EhaParameters, EhaValues
 from plant.log.record import Record
 
-Array = NDArray[np.float64]
 CHANNELS = ("position_m", "velocity_m_s")
 PRIOR = Gaussian(np.array([0.5, 2.0]), np.array([[1.0, 0.3], [0.3, 1.0]]))
 VARIANCES = {"position_m": 1e-2, "velocity_m_s": 4e-2}

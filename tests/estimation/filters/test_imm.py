@@ -4,7 +4,6 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.filters.ckf import CKF
@@ -17,6 +16,7 @@ from estimation.models.eha_forms import FORMS
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
 from faults.conditions import CONDITIONS, parameters_for
+from plant.arrays import Array
 from plant.compiled.functions import Scalar
 from plant.eha.drives import make_drive, sine
 from plant.eha.model import EhaParameters, EhaValues
@@ -27,7 +27,6 @@ from plant.sensors.sensors import BENCH
 from plant.solvers.steps import parameter_row
 from tests.estimation.filters.banks import Mode, run_imm
 
-Array = NDArray[np.float64]
 RIG = EhaParameters()
 STEP, Q, R = 0.01, np.array([1e-8, 1e-4, 1e-2]), np.array([1e-4, 1e-2])
 PRIOR = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1e-4, 1e-2, 1.0]))

@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
-from numpy.typing import NDArray
 
 from estimation.engine.contract import FilterProblem, Trace
 from estimation.engine.linearised import compile_step
@@ -19,6 +18,7 @@ from estimation.models.eha_forms import FORMS
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel, StateVariable
 from faults.conditions import CONDITIONS, Condition, parameters_for
+from plant.arrays import Array
 from plant.compiled.functions import Scalar, sqrt
 from plant.eha.drives import sine
 from plant.eha.model import PARAMETER_NAMES, EhaParameters, EhaValues
@@ -27,7 +27,6 @@ from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
-Array = NDArray[np.float64]
 STEPS = 5_000
 RIG = EhaParameters()
 

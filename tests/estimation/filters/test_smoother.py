@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from estimation.engine.contract import FilterProblem
 from estimation.engine.linearised import compile_step
@@ -16,6 +15,7 @@ from estimation.models.eha_forms import FORMS
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
 from faults.conditions import CONDITIONS, Condition, parameters_for
+from plant.arrays import Array
 from plant.eha.drives import sine
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, REDUCED, simulate
@@ -23,7 +23,6 @@ from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
-Array = NDArray[np.float64]
 RIG = EhaParameters()
 
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from estimation.engine.contract import FilterProblem
 from estimation.filters.ekf import ekf
@@ -12,11 +11,11 @@ from estimation.filters.run import filter_problem
 from estimation.filters.svsf import svsf
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
 from plant.log.record import Record
 
-Array = NDArray[np.float64]
 RIG = EhaParameters()
 PRIOR = Gaussian(np.array([0.0, 0.0, 0.5]), np.array([[4e-4, 1e-4, 0.0], [1e-4, 1e-2, 1e-3], [0.0, 1e-3, 1.0]]))
 VARIANCES = {"position_m": 1e-4, "velocity_m_s": 1e-2}

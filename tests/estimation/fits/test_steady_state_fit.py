@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from estimation.fits.steady_state_fit import SteadyFit, SteadyPoints, fit_friction, fit_leakage, steady_points
 from faults.eha.physical import throttled
+from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
@@ -14,7 +14,6 @@ from plant.errors import LogError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, measure
 
-Array = NDArray[np.float64]
 RIG = EhaParameters()
 CIRCUIT_RIG = CircuitParameters(stroke=1.2)
 

@@ -6,7 +6,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.filters.ekf import ekf
@@ -20,13 +19,13 @@ from estimation.notes import ChannelCode, EstimateCode
 from estimation.trust.consistency import consistency_gate, describes, mean_chi_square_bounds, nees, wander
 from estimation.trust.whiteness import SETTLING
 from faults.conditions import CONDITIONS, Condition, parameters_for
+from plant.arrays import Array
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, LUMPED, REDUCED, Plant, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
-Array = NDArray[np.float64]
 RUNS, SAMPLES, SUBSTEPS = 100, 40, 40
 RIG = EhaParameters()
 VARIANCES = {"position_m": 1e-6, "velocity_m_s": 1e-4}

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from estimation.trust.card import Card, percent, rank_drives, sentences
 from estimation.trust.identifiability import SENSED, identifiability_card
 from faults.conditions import CONDITIONS, Condition, parameters_for
+from plant.arrays import Array
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
@@ -16,7 +16,6 @@ from plant.errors import HydrostateError
 from plant.sensors.sensors import BENCH, PAPER
 from tests.estimation.tuning.likelihood_fit import fit_likelihood
 
-Array = NDArray[np.float64]
 RIG = EhaParameters()
 MOTION = SENSED[:2]
 EVERY_CONDITION = pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.stats import chi2
 from statsmodels.stats.diagnostic import acorr_ljungbox
 
@@ -19,9 +18,9 @@ from estimation.trust.whiteness import (
     quantum,
     whiteness,
 )
+from plant.arrays import Array
 from plant.log.record import Record
 
-Array = NDArray[np.float64]
 SAMPLES, SAMPLE_TIME, FREQUENCY = 10_000, 1e-3, 5.0
 CHANNELS = ("position_m", "velocity_m_s")
 TIME = SAMPLE_TIME * np.arange(SAMPLES)

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from estimation.engine.contract import FilterProblem
 from estimation.engine.kalman import belief_names
@@ -28,7 +27,6 @@ from plant.sensors.sensors import BENCH, drop_samples
 from tests.estimation.tuning.likelihood_fit import LUMPED_FORM
 from tests.kernels import functions_of, text_of
 
-Array = NDArray[np.float64]
 RIG = EhaParameters()
 MOVED = ("bulk_modulus", "leakage_coefficient", "flow_bias", "friction_coulomb", "moving_mass", "q1", "q2", "r0", "r1")
 EVERY_FORM = pytest.mark.parametrize("model", [LUMPED_FORM, PRESSURE_FORM, ACCELERATION_FORM], ids=lambda m: m.name)

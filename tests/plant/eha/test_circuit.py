@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from faults.eha.physical import throttled
+from plant.arrays import Array
 from plant.components.oil import effective_bulk_modulus
 from plant.eha.circuit import (
     CircuitState,
@@ -29,7 +29,6 @@ from plant.log.record import Record
 from plant.solvers.steps import parameter_row
 from plant.solvers.trajectory import compile_trajectory
 
-Array = NDArray[np.float64]
 PAPER = CircuitParameters()
 HARSH = parameters_for(CONDITIONS["major_leakage_minor_friction"], PAPER)
 TRUTHS = ("position_m", "velocity_m_s", "differential_pressure_pa")

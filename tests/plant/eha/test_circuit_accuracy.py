@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from benchmarks.peers.stiff_solvers import Method, reference_trajectory
 from faults.conditions import CONDITIONS, parameters_for
 from faults.eha.physical import throttled
+from plant.arrays import Array
 from plant.eha.circuit import circuit_derivative, circuit_scales
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.drives import DRIVES, make_drive
@@ -17,7 +17,6 @@ from plant.solvers.adaptive import controlled_run
 from plant.solvers.steps import parameter_row
 from plant.solvers.trajectory import compile_trajectory
 
-Array = NDArray[np.float64]
 PAPER = CircuitParameters()
 CHANNELS = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa")
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from faults.eha.physical import throttled
+from plant.arrays import Array
 from plant.components.oil import ATMOSPHERE, NUCLEI, specific_volume
 from plant.eha.circuit import chamber_volumes, circuit_pressures
 from plant.eha.circuit_parameters import CircuitParameters
@@ -14,7 +14,6 @@ from plant.eha.simulate import CIRCUIT
 from plant.solvers.steps import parameter_row
 from plant.solvers.trajectory import compile_trajectory
 
-Array = NDArray[np.float64]
 PAPER = CircuitParameters()
 
 

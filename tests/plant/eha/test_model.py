@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from faults.conditions import CONDITIONS, Condition, parameters_for
+from plant.arrays import Array
 from plant.compiled.elimination import eliminated_jacobian
 from plant.compiled.expression import symbol
 from plant.eha.model import (
@@ -24,7 +24,6 @@ from plant.solvers.steps import parameter_names, parameter_row, parameter_symbol
 from plant.solvers.trajectory import compile_trajectory
 from tests.kernels import computed
 
-Array = NDArray[np.float64]
 RIG = EhaParameters()
 STEP = 1e-4
 EVERY_CONDITION = pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from plant.compiled.functions import Scalar, absolute
 from plant.solvers import adaptive_kernel, fixed_step_kernel, trajectory
@@ -19,8 +18,6 @@ from plant.solvers.fixed_step_loops import run_alone, run_side_by_side
 from plant.solvers.steps import rk4_step
 from plant.solvers.trajectory import compile_trajectory
 from tests.kernels import functions_of, in_python, on_memory, text_of
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,18 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from numpy.typing import NDArray
 
 from benchmarks.peers.compiled_model import compile_model
 from benchmarks.peers.stiff_solvers import reference_trajectory
 from faults.conditions import CONDITIONS, Condition, parameters_for
+from plant.arrays import Array
 from plant.eha.model import PARAMETER_NAMES, EhaParameters, lumped_step, reduced_derivative
 from plant.eha.simulate import LUMPED, REDUCED
 from plant.errors import HydrostateError
 from plant.solvers.steps import parameter_names, parameter_row, parameter_symbols, rk4_step, ros2_step, solve_linear
 from plant.solvers.trajectory import Trajectory, compile_trajectory
 
-Array = NDArray[np.float64]
 MILLISECOND = 1e-3
 EVERY_CONDITION = pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
 

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.compiled.native.kinds import KernelError
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature
 from plant.compiled.paste import pasted
-
-Array = NDArray[np.float64]
 
 
 def compiled(takes: str, *functions: Callable[..., Any]) -> Callable[..., Any]:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from plant.arrays import Array
 from plant.compiled.native.kinds import KernelError
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature
 from plant.compiled.paste import pasted
 
-Array = NDArray[np.float64]
 TAKES = "x : float\nn : int\nflag : bool\nvalues : ndarray, shape (k,)"
 GIVEN = (0.75, 3, True, np.array([0.5, -2.0, 3.0, 8.0]))
 
