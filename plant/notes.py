@@ -14,7 +14,7 @@ WRITTEN_OUT = 1e7
 """Size below which a reader is spared a power of ten."""
 
 
-def in_words(value: float, spec: str) -> str:
+def written_out(value: float, spec: str) -> str:
     """Return a number in significant digits as a reader writes it: 100, not 1e+02.
 
     Parameters
@@ -26,9 +26,9 @@ def in_words(value: float, spec: str) -> str:
 
     Examples
     --------
-    >>> in_words(100.0, ".2g"), in_words(123456.0, ".3g"), in_words(1.5e-5, ".3g")
+    >>> written_out(100.0, ".2g"), written_out(123456.0, ".3g"), written_out(1.5e-5, ".3g")
     ('100', '123000', '1.5e-05')
-    >>> in_words(120000.0, "+.2g")
+    >>> written_out(120000.0, "+.2g")
     '+120000'
     """
     said, sign = format(value, spec), "+" if spec.startswith("+") else ""
@@ -40,7 +40,7 @@ class _Sentence(Formatter):
 
     def format_field(self, value: Any, format_spec: str) -> Any:
         if format_spec.endswith("g") and isinstance(value, int | float):
-            return in_words(value, format_spec)
+            return written_out(value, format_spec)
         return super().format_field(value, format_spec)
 
     def convert_field(self, value: Any, conversion: Any) -> Any:

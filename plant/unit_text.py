@@ -35,7 +35,6 @@ SPELLINGS: Mapping[str, str] = {
     "usec": "us",
     "Volt": "V",
     "Volts": "V",
-    "MPa": "MPa",
     "barg": "bar",
     "bar(g)": "bar",
 }

@@ -8,8 +8,6 @@ from decimal import Decimal
 from estimation.finding import Quantity
 from experiments.page.numbers import shop_unit
 
-"""Shown are MPa, not Pa [MPa/Pa]."""
-
 ROOM = 1.05
 """A bar's scale ends so far beyond the largest number on it [dimensionless]."""
 

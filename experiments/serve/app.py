@@ -27,6 +27,7 @@ from experiments.serve.metrics import PROMETHEUS_TEXT, exposition
 from experiments.serve.pages import home_page, live_page, policy_of, policy_of_file
 from experiments.serve.service import Service
 from experiments.serve.settings import Settings
+from experiments.serve.store import Kept
 from plant.errors import HydrostateError
 
 Identity = Annotated[str, Path(pattern=r"^[0-9a-f]{16}$", description="The id from the list of logs.")]
@@ -170,23 +171,8 @@ def _offer_logs(app: FastAPI, service: Service) -> None:
     @app.post("/api/logs", status_code=202, responses=why(413, 415, 422), openapi_extra=BODY, tags=["logs"])
     async def drop(request: Request, response: Response, name: Name, verb: Verb = "diagnose") -> Log:
         """Take a log and put it into the queue; the body is the file itself."""
-        known = plain_name(name)
-        if request.headers.get("content-type", "").lower().startswith("multipart/"):
-            raise RefusedError(415, "the body must be the file itself, not a form: curl --data-binary @run.csv")
-        service.require_place()
-        if service.room.uploads >= MOST_UPLOADS:
-            raise RefusedError(429, f"{MOST_UPLOADS} logs are coming in, come again")
-        service.room.uploads += 1
-        try:
-            room, length = service.room.left(), request.headers.get("content-length", "")
-            require_size(int(length) if length.isdecimal() else 0, service.settings.largest, room)
-            identity = secrets.token_hex(8)
-            part = service.settings.work / f"{identity}.part"
-            size = await receive_file(request.stream(), part, service.settings.largest, room)
-        finally:
-            service.room.uploads -= 1
-        kept = await asyncio.to_thread(service.take_in, identity, part, known, verb, size)
-        response.headers["Location"] = f"/api/logs/{identity}"
+        kept = await _received(request, service, plain_name(name), verb)
+        response.headers["Location"] = f"/api/logs/{kept.id}"
         return log_of(kept, service.jobs)
 
     @app.get("/api/logs", responses=why(422), tags=["logs"])
@@ -211,6 +197,25 @@ def _offer_logs(app: FastAPI, service: Service) -> None:
     def delete(id: Identity) -> None:  # noqa: A002 - a path's name
         """Delete a log with its page and result; if it is running, it stops at once."""
         service.delete(id)
+
+
+async def _received(request: Request, service: Service, name: str, verb: Verb) -> Kept:
+    """Receive the file that a request carries, and put it into the queue."""
+    if request.headers.get("content-type", "").lower().startswith("multipart/"):
+        raise RefusedError(415, "the body must be the file itself, not a form: curl --data-binary @run.csv")
+    service.require_place()
+    if service.room.uploads >= MOST_UPLOADS:
+        raise RefusedError(429, f"{MOST_UPLOADS} logs are coming in, come again")
+    service.room.uploads += 1
+    try:
+        room, length = service.room.left(), request.headers.get("content-length", "")
+        require_size(int(length) if length.isdecimal() else 0, service.settings.largest, room)
+        identity = secrets.token_hex(8)
+        part = service.settings.work / f"{identity}.part"
+        size = await receive_file(request.stream(), part, service.settings.largest, room)
+    finally:
+        service.room.uploads -= 1
+    return await asyncio.to_thread(service.take_in, identity, part, name, verb, size)
 
 
 def _offer_state(app: FastAPI, service: Service) -> None:

@@ -13,7 +13,7 @@ from plant.log.columns import TIME, TRUTH
 from plant.log.guess import absent
 from plant.log.notes import LogCode
 from plant.log.plausibility import implausible
-from plant.notes import Note, in_words
+from plant.notes import Note, written_out
 
 SHORTEST, LONGEST = 1e-8, 1e4
 """Sample times of logs [s]; nothing is computed of others."""
@@ -127,7 +127,7 @@ def _rows_with_time(columns: Channels, source: str, notes: list[Note]) -> Channe
 
 
 def _share(count: int, total: int) -> str:
-    return f"{count} of {total} samples ({in_words(100.0 * count / total, '.2g')} %)"
+    return f"{count} of {total} samples ({written_out(100.0 * count / total, '.2g')} %)"
 
 
 def _derived(channels: Channels, notes: list[Note]) -> Channels:
