@@ -10,7 +10,6 @@ import pytest
 from tests import numbers
 from tests.numbers import Found, Numbers, Roughly
 
-ROOT = Path(__file__).resolve().parents[1]
 TOLD: Mapping[str, Any] = {
     "pressure [Pa]": 2.0e6,
     "flows [m^3/s]": np.array([1e-5, -2e-5, 0.0]),

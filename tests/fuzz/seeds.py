@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tests.ways import written
-from tests.ways.written import SI
+from tests.log_formats import written
+from tests.log_formats.written import SI
 
 N = 60
 KINDS: Mapping[str, str] = {
@@ -28,7 +28,7 @@ KINDS: Mapping[str, str] = {
     "gzip": "gzipped",
     "zstd": "zstd",
 }
-"""What writes each, of `tests.ways.written`."""
+"""What writes each, of `tests.log_formats.written`."""
 
 
 def seeds(folder: Path) -> dict[str, tuple[str, bytes]]:

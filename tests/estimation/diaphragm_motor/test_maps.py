@@ -15,7 +15,6 @@ from plant.errors import HydrostateError
 
 HEALTHY = DiaphragmMotorParameters()
 PEAK = 480.0
-STEP = 1e-3
 
 
 @pytest.fixture(scope="module")

@@ -15,10 +15,8 @@ from estimation.models.motion import (
     parallel_friction,
 )
 from plant.components.friction import quadratic_friction
-from plant.eha.model import EhaParameters
 from plant.solvers.steps import parameter_row
 
-P = EhaParameters()
 LAWS = ((6.589e4, 2.144e3, 436.0), (1.162e6, -7.44e3, 500.0), (4.462e6, 1.863e4, 551.0))
 
 

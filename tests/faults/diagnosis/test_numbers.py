@@ -22,7 +22,6 @@ from faults.diagnosis.class_fit import (
     scales_of,
 )
 from faults.diagnosis.class_regions import (
-    ClassFits,
     believed_information,
     is_stuck,
     lasting_misfit,
@@ -31,7 +30,6 @@ from faults.diagnosis.class_regions import (
 )
 from faults.diagnosis.severity import limits_of, severities, severities_at, what_is_not_told, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
-from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.doubts import PRESSURE_GAIN, Spread
 from plant.eha.drives import make_drive
@@ -250,11 +248,6 @@ def what_a_log_does_not_tell() -> dict[str, Any]:
         some = {**found, "leakage_flow": Quantity(0.35, "L/min", flow), "velocity_lost": Quantity(12.0, "%", speed)}
         told[name] = noted(what_is_not_told(made_classes(OFF, blocks()), some, pressure=True))
     return told
-
-
-def scaled(off: Array, **other: Any) -> tuple[Blocks, ClassFits]:
-    one = replace(blocks(), **other)
-    return one, made_classes(off, one)
 
 
 @pytest.mark.parametrize("case", NUMBERS.cases)

@@ -22,7 +22,7 @@ import scipy.io
 from experiments.command.logs import read_log
 from plant.errors import LogError, LogWarning
 from plant.log.files import read_record
-from tests.ways.written import SI, mdf4
+from tests.log_formats.written import SI, mdf4
 
 N = 400
 TIME = 1e-3 * np.arange(N)

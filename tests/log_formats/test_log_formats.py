@@ -20,7 +20,7 @@ from plant.errors import LogError, LogWarning
 from plant.log.files import read_record
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
-from tests.ways.written import SI, WAYS, T, Way, rounded, with_a_copied_row
+from tests.log_formats.written import SI, WAYS, T, Way, rounded, with_a_copied_row
 
 READ = {name: way for name, way in WAYS.items() if not way.refused}
 REFUSED = {name: way for name, way in WAYS.items() if way.refused}
