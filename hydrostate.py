@@ -144,9 +144,9 @@ def read(
 ) -> "Log":
     """Read a log, of an actuator or of anything.
 
-    A log without the actuator's channels is read as it stands, every column of numbers under its own name, if neither
-    rig, columns nor kind are given: `Log.identify` relates them. So it does in a log, or a channel, of which up to half
-    of the samples are missing; to estimate, to diagnose and for the rest at most 5 % may be.
+    If no rig, columns or kind is given, a log without the actuator's channels is read as it stands: every column of
+    numbers under its own name, for `Log.identify`. Up to half of the samples may be missing for `Log.identify`; at most
+    5 % for everything else.
 
     Parameters
     ----------

@@ -128,7 +128,7 @@ def uncommitted() -> bool:
 
 
 def environment() -> dict[str, str]:
-    """Return what numbers hang on beside the code: processor and versions."""
+    """Return what numbers depend on beside the code: processor and versions."""
     versions = {name: version(name) for name in ("numpy", "scipy", "llvmlite", "pandas")}
     return {"processor": get_host_cpu_name(), "python": platform.python_version(), **versions}
 
@@ -196,7 +196,7 @@ def _cpu_seconds() -> float:
 
 
 def _digest(call: Call, logs: Path) -> str:
-    """Return a name for all that a call's numbers hang on beside the commit."""
+    """Return a name for all that a call's numbers depend on beside the commit."""
     asked = [call.verb, call.options, call.logs, environment()]
     digest = hashlib.sha256(json.dumps(asked).encode())
     for path in call.files(logs):

@@ -67,8 +67,8 @@ class LogVerb:
     run : callable
         ``run(record, rig, options) -> Finding``, with rig and options as `prepare` returned them.
     run_beside : callable, optional
-        ``run_beside(record, rig, options, kept) -> Finding``, the same for one log of which several verbs are asked:
-        in the dictionary ``kept``, empty at first, a verb leaves what another begins with too.
+        ``run_beside(record, rig, options, kept) -> Finding``, the same for a log that several verbs are asked of: each
+        leaves in the dictionary ``kept``, empty at first, what others can begin from.
     options : Options
         Options that it understands, with what they are where they are not given. ``healthy`` comes as a Record.
     prepare : callable

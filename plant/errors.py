@@ -115,7 +115,7 @@ def require_known(
 
 
 def require_each_known(what: str, names: Sequence[str], known: Sequence[str]) -> None:
-    """Refuse names of which one is not among those known, or comes twice.
+    """Refuse names if one of them is unknown or comes twice.
 
     Raises
     ------

@@ -23,7 +23,7 @@ NOT_THE_LOGS = {
     EstimateCode.FORCES_ON_ANY_SCALE,
     EstimateCode.WEAKLY_HELD,
 }
-"""Reasons of a gate that speak against bulk modulus alone: the log holds too little of it, or it hangs on how the
+"""Reasons of a gate that speak against bulk modulus alone: the log holds too little of it, or it depends on how the
 piston starts and stops, which decides no condition."""
 
 LARGEST_SHARE = 0.06

@@ -9,7 +9,7 @@ everything else takes the laws of dimension below. They are exact in what they s
 - without it mass, friction, pressures and bulk modulus may grow together, and leakage fall: the mass holds the scale.
 
 Leakage is a small difference of two flows: an error of the pump's or the piston's counts by pumped flow over leakage.
-How the ratio of the two flows acts on bulk modulus hangs on the drive; the laws let the displacement carry it.
+How the ratio of the two flows acts on bulk modulus depends on the drive; the laws let the displacement carry it.
 """
 
 import math

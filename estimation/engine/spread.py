@@ -13,7 +13,7 @@ from plant.compiled.hints import is_waypoint
 
 
 def waypoints_of(outputs: Sequence[Expression]) -> list[Expression]:
-    """Return the waypoints of a step, each after those that it hangs on.
+    """Return the waypoints of a step, each after those that it depends on.
 
     Parameters
     ----------

@@ -221,7 +221,7 @@ def _lengthened(problem: Problem, guess: Array) -> Point:
 
 
 def _refined(problem: Problem, point: Point, noise: Array, typical: Array) -> Solution:
-    """Return the fit taken on until noise and unknowns agree, and how far it hangs on the steps' length."""
+    """Return the fit taken on until noise and unknowns agree, and how far it depends on the steps' length."""
     left = 0
     for _ in range(ROUNDS):
         deviations = np.where(np.isnan(noise), _shown(problem, point.theta, typical), noise)

@@ -122,7 +122,7 @@ def is_affine(item: Expression, mean: Sequence[Expression]) -> bool:
     Returns
     -------
     bool
-        Whether it is; a sign or a choice that hangs on a state makes it not so.
+        Whether it is; a sign or a choice that depends on a state makes it not so.
     """
     states = {id(z) for z in mean}
     degree: dict[int, int] = {}

@@ -314,7 +314,7 @@ class HydrostateGroup(TyperGroup):
         return super().parse_args(ctx, args)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return a command by its name, of which the same holds."""
+        """Return a command by its name; no validator is imported for its plain values either."""
         command = super().get_command(ctx, cmd_name)
         if command is not None:
             take_plainly(command.get_params(ctx))

@@ -157,7 +157,7 @@ class Log(Shown):
         return Log(self.record.slice(*span), self.rig, self.plant, self._said, sparse=sparse, refusal=self._refusal)
 
     def whole(self) -> "Record":
-        """Return the record, of which few enough samples are missing to estimate an actuator.
+        """Return the record, if few enough of its samples are missing to estimate an actuator.
 
         Raises
         ------
@@ -172,7 +172,7 @@ class Log(Shown):
 
     @property
     def related(self) -> "Record":
-        """The record whose channels `identify` relates, also those of which up to half is missing."""
+        """The record whose channels `identify` relates; up to half of a channel may be missing."""
         return self.record if self._sparse is None else self._sparse
 
     def estimate(self, **options: Any) -> "Answer":
@@ -214,10 +214,9 @@ class Log(Shown):
             Further experiments, where ``input`` and ``output`` are given.
         **options
             With ``input`` and ``output``, names or lists of them: ``structure`` ("output-error", "narx", "hammerstein",
-            "state-space", "auto"), ``order``, ``delay``, ``n_numerator``, ``sample_time`` [s]; what is not given the
-            data choose. ``reference``: columns that drive a closed loop from outside. Without, or with an option that
-            only it has: as
-            `estimation.identification.from_record.identify_record` takes them, ``n_denominator=3``.
+            "state-space", "auto"), ``order``, ``delay``, ``n_numerator``, ``sample_time`` [s], ``reference`` (columns
+            that drive a closed loop from outside); the data choose what is not given. Without these two, as
+            `estimation.identification.from_record.identify_record` takes them: ``n_denominator=3``.
 
         Returns
         -------
@@ -250,7 +249,7 @@ class Log(Shown):
         return identified([one.related for one in logs], inputs, outputs, options)
 
     def _tell_sparse(self, asked: "Sequence[Any]") -> None:
-        """Warn of channels that were left out of the record, and of which what is there is used now."""
+        """Warn of channels that lack too many samples for the record; the samples that are there are used now."""
         import warnings
 
         import numpy as np

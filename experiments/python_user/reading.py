@@ -25,7 +25,7 @@ class Reading:
     said : sequence of LogWarning
         What reading it brought up.
     sparse : Record or None
-        The log with channels of which up to half is missing; None where `record` lacks none of them.
+        The log with the channels that `record` lacks, up to half of each missing; None if it lacks none.
     refusal : str
         Why nothing is estimated of `record`; empty where few enough samples are missing.
     """

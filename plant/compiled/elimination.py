@@ -1,6 +1,6 @@
 """The Jacobian of a graph by elimination of its inner nodes, cheapest first.
 
-Differentiating forward carries every input through every operation. Where many operations hang on few quantities, as
+Differentiating forward carries every input through every operation. Where many operations depend on few quantities, as
 flows on pressures, it costs less to join the derivatives on both sides of such a quantity once. Each elimination of a
 node joins its uses with its operands; taking the node with the fewest joins next is Markowitz's rule (Griewank and
 Walther 2008, Evaluating Derivatives, section 9).
@@ -12,7 +12,7 @@ from typing import TypeAlias
 from plant.compiled.expression import ONE, ZERO, Expression, ordered, select, slopes_of
 
 Edges: TypeAlias = dict[int, dict[int, Expression]]
-"""``edges[a][b]``: the derivative by which a hangs on b, or on which b hangs."""
+"""``edges[a][b]``: the derivative of a by its operand b; of uses, the derivative of b by its operand a."""
 
 _MINUS = -ONE
 
@@ -42,7 +42,7 @@ def eliminated_jacobian(outputs: Sequence[Expression], inputs: Sequence[Expressi
 
 
 def _local_edges(outputs: Sequence[Expression], inputs: Sequence[Expression]) -> tuple[Edges, Edges]:
-    """Return what hangs on what, for all that hangs on an input; output i is the node -1 - i."""
+    """Return what depends on what, for all that depends on an input; output i is the node -1 - i."""
     operands: Edges = {id(item): {} for item in inputs}
     uses: Edges = {id(item): {} for item in inputs}
     sources = set(operands)

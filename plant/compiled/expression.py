@@ -24,7 +24,7 @@ class Expression:
     value : float or str
         A constant's value [any unit], or a symbol's name.
     slopes : tuple of (Expression, Expression)
-        What it hangs on where derivatives are taken, each with its derivative by that; nothing: its arguments.
+        What it depends on where derivatives are taken, each with its derivative by that; nothing: its arguments.
 
     Raises
     ------

@@ -31,7 +31,7 @@ def following(x: Scalar, *slopes: tuple[Scalar, Scalar]) -> Scalar:
     x : float, ndarray of shape (runs,), or Expression
         Any unit.
     *slopes : tuple of (float or Expression, float or Expression)
-        What it hangs on [any unit], each with its derivative by that [unit of x over that one's]; what it is computed
+        What it depends on [any unit], each with its derivative by that [unit of x over that one's]; what it is computed
         from plays no part.
 
     Returns

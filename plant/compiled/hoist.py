@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping, Sequence, Set
 from plant.compiled.expression import Expression, ordered, symbol
 
 COMPARISONS = ("<", "<=", ">", ">=", "present")
-"""Operations whose result is not a number."""
+"""Operations whose result is a truth, not a number: an ``int`` in C."""
 
 
 def hoisted(

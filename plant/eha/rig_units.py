@@ -51,7 +51,7 @@ Litres are told by it in any size of actuator."""
 
 
 def require_si(p: EhaParameters) -> None:
-    """Refuse an actuator of which an entry is in another unit.
+    """Refuse an actuator if one of its entries is in another unit than SI.
 
     Parameters
     ----------

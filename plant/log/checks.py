@@ -83,7 +83,7 @@ def trusted(
 
 
 def alternatives(wanted: str) -> list[str]:
-    """Return the channels of which one is wanted.
+    """Return the channels, at least one of which is wanted.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Choices of which one side is much work, as blocks that are gone through only where that side is chosen."""
+"""Choices with much work on one side, as blocks: the work is done only where that side is chosen."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ class Block:
     condition : Expression
         What they choose by.
     choices : list of Expression
-        The choices, none of which hangs on another.
+        The choices; none depends on another.
     sides : tuple of list of Expression
         What only one side of them needs, operands before results: where the condition holds, and where not.
     """
@@ -60,7 +60,7 @@ def blocks_of(order: Sequence[Expression], kept: Sequence[Expression]) -> dict[i
 
 
 def _apart(order: Sequence[Expression]) -> list[list[Expression]]:
-    """Return choices by the same condition together, without those that hang on another of them."""
+    """Return choices by the same condition together, without those that depend on another of them."""
     groups: dict[int, list[Expression]] = {}
     below: dict[int, set[int]] = {}
     for item in order:

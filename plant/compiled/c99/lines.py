@@ -10,10 +10,8 @@ from collections.abc import Mapping
 from plant.compiled.c99.branches import Block, blocks_of
 from plant.compiled.c99.precision import Precision
 from plant.compiled.expression import Expression, ordered
+from plant.compiled.hoist import COMPARISONS
 from plant.compiled.source import symbols_in
-
-TRUTHS = ("<", "<=", ">", ">=", "present")
-"""Operations whose result is a truth, an ``int`` in C."""
 
 KINDS: Mapping[str, str] = {
     "+": "additions",
@@ -28,7 +26,7 @@ KINDS: Mapping[str, str] = {
     "abs": "choices and comparisons",
     "sign": "choices and comparisons",
     "where": "choices and comparisons",
-    **dict.fromkeys(TRUTHS, "choices and comparisons"),
+    **dict.fromkeys(COMPARISONS, "choices and comparisons"),
 }
 """What each operation counts as, where operations are counted."""
 
@@ -139,7 +137,7 @@ class _Writer:
             for one in item.arguments:
                 self._write(one, indent)
             operands = [self.names[id(one)] for one in item.arguments]
-            kind = "int" if item.operation in TRUTHS else self._precision.name
+            kind = "int" if item.operation in COMPARISONS else self._precision.name
             spelling = spelt_in_c(item, operands, self._precision)
             self.lines.append(f"{indent}const {kind} {self._named(item)} = {spelling};")
 

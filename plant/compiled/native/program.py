@@ -127,7 +127,7 @@ class Module:
         self._declared[text] = None
 
     def separate(self, name: str, parameters: str, body: Callable[[Scope], None]) -> str:
-        """Write a function of which only the parameters and the instructions are given, and return its name."""
+        """Write a function from its parameters and its instructions, and return its name."""
         symbol = f"{name}.{len(self._texts)}"
         self._texts.append("")
         scope = Scope(self, {}, {})

@@ -24,7 +24,7 @@ class Program(Protocol):
         ...
 
     def separate(self, name: str, parameters: str, body: "Callable[[Scope], None]") -> str:
-        """Write a function of its own, of which only the instructions are given, and return its name."""
+        """Write a function of its own from its instructions, and return its name."""
         ...
 
     def has(self, name: str) -> bool:
