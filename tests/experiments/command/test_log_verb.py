@@ -47,14 +47,6 @@ def test_a_page_says_first_what_reading_the_log_brought_up(verb: str, log: Path,
     assert f"<li>C{said[1:]}." in page
 
 
-def test_a_sentence_about_a_file_has_the_files_name_alone_in_front(log: Path, tmp_path: Path) -> None:
-    absent = tmp_path / "absent.csv"
-    beside = invoke("estimate", log, "--with", absent)
-    assert beside.stderr.splitlines() == [f"{absent}: there is no such file"]
-    related = invoke("identify", log, "--input", "WRONG", "--output", "velocity_m_s")
-    assert related.stderr.startswith(f"{log}: column 'WRONG' is needed")
-
-
 def test_files_of_other_loggers_go_with_one_log(log: Path, tmp_path: Path) -> None:
     lines = [line.replace('"', "").split(",") for line in log.read_text().splitlines()]
     names = lines[0]
@@ -69,3 +61,11 @@ def test_files_of_other_loggers_go_with_one_log(log: Path, tmp_path: Path) -> No
     refused = invoke("estimate", log, tmp_path / "motion.csv", "--with", tmp_path / "pressure.csv")
     assert refused.exit_code == 2
     assert "--with goes with one log, got several" in refused.stderr
+
+
+def test_a_sentence_about_a_file_has_the_files_name_alone_in_front(log: Path, tmp_path: Path) -> None:
+    absent = tmp_path / "absent.csv"
+    beside = invoke("estimate", log, "--with", absent)
+    assert beside.stderr.splitlines() == [f"{absent}: there is no such file"]
+    related = invoke("identify", log, "--input", "WRONG", "--output", "velocity_m_s")
+    assert related.stderr.startswith(f"{log}: column 'WRONG' is needed")
