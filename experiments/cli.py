@@ -118,9 +118,9 @@ def _whole() -> typer.Typer:
     from experiments.verbs import export, rig
 
     made = _of(VERBS)
-    made.add_typer(rig.commands, name="rig")
-    made.add_typer(export.commands, name="export")
-    made.add_typer(open_benchmark.commands, name="benchmark")
+    made.add_typer(rig.commands, name="rig", cls=HydrostateGroup)
+    made.add_typer(export.commands, name="export", cls=HydrostateGroup)
+    made.add_typer(open_benchmark.commands, name="benchmark", cls=HydrostateGroup)
     return made
 
 

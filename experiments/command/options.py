@@ -52,6 +52,9 @@ Out: TypeAlias = Annotated[
         "-o",
     ),
 ]
+Report: TypeAlias = Annotated[
+    Path | None, option("FILE", "Write a page (HTML); several logs get one page each.", "--report", "--html")
+]
 Seed: TypeAlias = Annotated[int, option("INT", "Seed of the random numbers; stored in the results.", min=0)]
 RigFile: TypeAlias = Annotated[
     Path | None,

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 import typer
 from typer.core import TyperGroup
 
+from experiments.command.plain_help import hide_bool, read_plainly
 from experiments.command.plain_values import take_plainly
 from plant.errors import HydrostateError
 
@@ -305,19 +306,26 @@ def _usage_sentence(error: Exception) -> str | None:
     return f"{command}: {said}" if said else ""
 
 
+def _help_last(args: list[str]) -> list[str]:
+    """Return ``help VERB`` as ``VERB --help``."""
+    return [*args[1:], "--help"] if args[:1] == ["help"] else args
+
+
 class HydrostateGroup(TyperGroup):
     """The command line, with its errors as sentences and the exit codes that the help promises."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse what stands before a command; no validator is imported for values that need none."""
         take_plainly(self.get_params(ctx))
-        return super().parse_args(ctx, args)
+        hide_bool(self.get_params(ctx))
+        return super().parse_args(ctx, _help_last(args))
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return a command by its name; no validator is imported for its plain values either."""
         command = super().get_command(ctx, cmd_name)
         if command is not None:
             take_plainly(command.get_params(ctx))
+            read_plainly(command)
         return command
 
     def main(self, *args: Any, **kwargs: Any) -> NoReturn:

@@ -1,6 +1,5 @@
 """`hydrostate diagnose LOG...`: which condition or fault each log shows, and how bad it is."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -17,6 +16,7 @@ from experiments.command.options import (
     Logs,
     Out,
     Plant,
+    Report,
     RigFile,
     SampleTime,
     Seed,
@@ -49,7 +49,7 @@ def diagnose(
     scores: Annotated[
         bool, flag("--scores/--no-scores", "Also print a table with the model error of every condition.")
     ] = False,
-    report: Annotated[Path | None, option("FILE", "Write a page (HTML); several logs get one page each.")] = None,
+    report: Report = None,
     no_pressure: Annotated[bool, flag("--no-pressure", "Ignore differential pressure even if it is logged.")] = False,
     plant: Plant = None,
     bias_pressure: BiasPressure = None,

@@ -18,6 +18,7 @@ from experiments.command.options import (
     Logs,
     Out,
     Plant,
+    Report,
     RigFile,
     SampleTime,
     Seed,
@@ -85,7 +86,7 @@ def estimate(
     figure: Annotated[
         Path | None, option("PNG", "Draw the filtered estimate with its 95 % band, innovations and NIS.")
     ] = None,
-    report: Annotated[Path | None, option("FILE", "Write a page (HTML); several logs get one page each.")] = None,
+    report: Report = None,
     plant: Plant = None,
     bias_pressure: BiasPressure = None,
     load: Load = None,

@@ -30,7 +30,8 @@ def require_regular(path: Path) -> None:
     try:
         mode = path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise LogError("there is no such file", str(path)) from error
+        stream = "; a log is read from a file only, a stream by `hydrostate watch -`" if str(path) == "-" else ""
+        raise LogError(f"there is no such file{stream}", str(path)) from error
     except ValueError as error:  # a zero in the name
         raise LogError("there is no such file", repr(str(path))) from error
     if stat.S_ISDIR(mode):

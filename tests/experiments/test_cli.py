@@ -46,6 +46,32 @@ def test_a_verb_that_is_loaded_alone_reads_as_among_the_others(words: list[str])
     assert (alone.exit_code, alone.output) == (among.exit_code, among.output)
 
 
+def test_help_of_a_verb_leaves_room_for_what_an_option_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    shown = invoke("diagnose", "--help").stdout
+    assert "stack_displacement_m" in shown, "a name is cut"
+    assert "diaphragm-motor: known force against" in shown
+    assert "<" not in shown
+    assert "<" not in invoke("--help").stdout
+
+
+@pytest.mark.parametrize("words", [["diagnose"], ["rig", "init"], ["rig"], []])
+def test_help_may_be_asked_for_by_its_name(words: list[str]) -> None:
+    asked, meant = invoke("help", *words), invoke(*words, "--help")
+    assert (asked.exit_code, asked.output) == (0, meant.output)
+
+
+@pytest.mark.parametrize("verb", ["diagnose", "estimate", "inspect"])
+def test_a_page_is_asked_for_by_either_name(verb: str) -> None:
+    refused = [invoke(verb, "x.csv", name, "page.txt").output for name in ("--report", "--html")]
+    assert refused[0] == refused[1]
+    assert "must end in .html" in refused[0]
+
+
+def test_a_log_on_standard_input_is_told_of_watch() -> None:
+    assert "hydrostate watch -" in invoke("diagnose", "-").output
+
+
 @pytest.mark.parametrize(
     ("command", "units"),
     [
