@@ -37,8 +37,8 @@ class AgainstCode(Code):
     )
     OUTSIDE_CONDITIONS = "the actuator that fits best is in none of the nine conditions, nor between them"
     BETWEEN_CONDITIONS = (
-        "between the nine conditions: leakage {leakage:.2f} and friction {friction:.2f}, where 1 is minor and 2 is "
-        "major; a fault of another size, or a sensor with a wrong gain"
+        "between the nine conditions: to the nearest quarter, leakage {leakage:.3g} and friction {friction:.3g}, "
+        "where 1 is minor and 2 is major; a fault of another size, or a sensor with a wrong gain"
     )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from estimation.notes import RigCode
 from experiments.page.words import in_words, left_unread, sentence
 from faults.conditions import CONDITIONS
-from faults.notes import AdviceCode
+from faults.notes import AdviceCode, AgainstCode
 
 SURE, LIKELY = 0.99, 0.8
 """Probabilities from which a verdict is called certain, and probable [probability]."""
@@ -64,7 +64,7 @@ def verdict(result: Mapping[str, Any]) -> str:
     'The actuator is healthy: leakage and friction are normal.'
     """
     if result["unknown"]:
-        return " ".join(_outside(result)) or "No verdict: the log does not fit any known condition of this actuator."
+        return " ".join(_named(result)) or "No verdict: the log does not fit any known condition of this actuator."
     levels = _levels(result)
     faults = {"leakage": LEAKS.get(levels["leakage"] or ""), "friction": RUBS.get(levels["friction"] or "")}
     wrong = " and ".join(one for one in faults.values() if one)
@@ -103,6 +103,18 @@ def _outside(result: Mapping[str, Any]) -> list[str]:
     return [OUTSIDE[one["code"]] for one in result["notes"] if one["code"] in OUTSIDE]
 
 
+def _named(result: Mapping[str, Any]) -> list[str]:
+    """Return what is wrong though it is none of the nine conditions: faults by name, else a size between theirs."""
+    found = _outside(result)
+    for one in result["notes"] if not found else ():
+        if one["code"] == str(AgainstCode.BETWEEN_CONDITIONS):
+            words = {"leakage": "leaks more inside", "friction": "has more friction"}
+            raised = [said for name, said in words.items() if one["data"][name] > 0.0]
+            if raised:
+                found.append(f"The actuator {' and '.join(raised)} than a healthy one, or a sensor has a wrong gain.")
+    return found
+
+
 def sureness(result: Mapping[str, Any]) -> str:
     """Return how sure the verdict is, what the fault costs, and since when it is there.
 
@@ -118,7 +130,7 @@ def sureness(result: Mapping[str, Any]) -> str:
     """
     if result["unknown"]:
         reasons = "; ".join(result["reasons"])
-        if _outside(result):
+        if _named(result):
             return f"This is none of the nine conditions, so do not rely on the numbers below: {reasons}."
         return f"Do not rely on anything on this page: {reasons}."
     return " ".join(one for one in (_how_sure(result), _cost(result), _since(result)) if one)

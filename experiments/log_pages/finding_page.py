@@ -1,12 +1,13 @@
 """The page on one log, whatever the actuator: verdict, what to do, quantities with intervals, notes, the channels."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from estimation.notes import ChannelCode
+from experiments.command.terminal import clauses
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.page.numbers import MISSING, number, percent_text, pretty_unit, shop_unit
 from experiments.page.render import render_page
@@ -48,22 +49,24 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
     file = Path(result["file"]).name
     to_do = [*left_unread(result), *(sentence(str(note)) for note in found.advice)]
     noted = [sentence(one["text"]) for one in result["notes"]]
+    against = list(dict.fromkeys(map(str, (*found.against, *found.gate.reasons))))
+    message = _shortened(result["message"], against)
     facts = {
         "result": result,
         "file": file,
         "title": _title(found),
         "actuator": found.actuator,
-        "message": sentence(result["message"]),
+        "message": sentence(message),
         "to_do": to_do,
         "doubts": [
             sentence(one)
-            for one in dict.fromkeys(map(str, (*found.against, *found.gate.reasons)))
-            if one not in result["message"]  # the page opens with it
+            for one in against
+            if one not in message  # the page opens with it
         ],
-        "doubted": bool(found.against or found.gate.reasons),
+        "doubted": bool(against),
         "duration": f"{record.duration:g}",
         "channels": ", ".join(found.channels),
-        "notes": [one for one in noted if one not in to_do],
+        "notes": [one for one in noted if one not in (*to_do, *map(sentence, against))],
         "quantities": pd.DataFrame([_row(name, one) for name, one in shown.items()]),
         "probabilities": pd.DataFrame(
             [(name.replace("_", " "), percent_text(share)) for name, share in shares if share >= LEAST_SHARE],
@@ -72,6 +75,15 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
         "charts": {"measured": channel_charts(record, found, Path(file).stem)},
     }
     return render_page("log_pages/finding.html", facts, COLUMNS, {})
+
+
+def _shortened(message: str, against: Sequence[str]) -> str:
+    """Return what a page opens with: of several reasons the first, since all stand below."""
+    more = len(against) - 1
+    if more < 1:
+        return message
+    first = f"{against[0].rstrip('.')}; {more} more {'reason stands' if more == 1 else 'reasons stand'} below"
+    return message.replace(clauses(against), first)
 
 
 def _title(found: "Finding") -> str:

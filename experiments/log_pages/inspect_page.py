@@ -73,6 +73,7 @@ def _draw(columns: "Sequence[ColumnFacts]") -> Figure:
         finite = np.where(np.isfinite(values), np.clip(values, -1e300, 1e300), np.nan)
         axis.plot(places, finite[places], color=BLUE, lw=0.8)
         axis.set_title(one.heading.name[:80].replace("$", r"\$"))
-        axis.set_ylabel(f"[{(one.heading.unit or '').replace('$', '')}]")
+        unit = (one.heading.unit or "").replace("$", "")
+        axis.set_ylabel(f"[{unit}]" if unit else "")
     axes[-1].set_xlabel("row")
     return figure

@@ -48,7 +48,8 @@ def render_page(
     def figure(name: str, caption: str) -> Markup:
         caption = " ".join(caption.split())
         image = image_of(files[f"figures/{name}.svg"], caption)
-        return Markup('<figure id="figure-{}">{}<figcaption>{}</figcaption></figure>').format(name, image, caption)
+        box = Markup('<div class="picture" tabindex="0" role="region" aria-label="{}">{}</div>').format(name, image)
+        return Markup('<figure id="figure-{}">{}<figcaption>{}</figcaption></figure>').format(name, box, caption)
 
     def chart(name: str, caption: str) -> Markup:
         return facts["charts"][name].html(name, " ".join(caption.split()))

@@ -173,7 +173,8 @@ def _named(frame: pd.DataFrame, columns: Columns) -> Iterator[Column]:
 
 
 def _cell(column: Column, row: Row, *, named: bool) -> Markup:
-    head = Markup(' data-head="{}"').format(column.header) if named else ""
+    unit = f" [{column.unit}]" if column.unit else ""
+    head = Markup(' data-head="{}{}"').format(column.header, unit) if named else ""
     value = row[column.source]
     if column.of_row is not None:
         shown = column.of_row(row)

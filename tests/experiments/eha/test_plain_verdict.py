@@ -7,7 +7,7 @@ import pytest
 from estimation.notes import RigCode
 from experiments.eha.plain_verdict import sureness, verdict, what_to_do
 from faults.conditions import CONDITIONS
-from faults.notes import AdviceCode
+from faults.notes import AdviceCode, AgainstCode
 
 AMOUNT = {"velocity_lost": {"value": 28.4, "unit": "%", "ci95": [27.0, 30.0]}}
 
@@ -34,6 +34,29 @@ def test_every_condition_has_a_verdict_and_work_that_name_what_is_wrong(conditio
         assert (f"{level} {fault}" in verdict(result)) == (level != "none")
     assert ("Nothing needs repair." in what_to_do(result)) == (condition == "normal")
     assert what_to_do(result)[-1] == "Log again."
+
+
+@pytest.mark.parametrize(
+    ("leakage", "friction", "said"),
+    [
+        (0.5, 0.0, "The actuator leaks more inside than a healthy one, or"),
+        (0.0, 1.5, "The actuator has more friction than a healthy one, or"),
+        (0.25, 0.5, "The actuator leaks more inside and has more friction than a healthy one, or"),
+        (0.0, 0.0, "No verdict: the log does not fit any known condition of this actuator."),
+    ],
+)
+def test_a_fault_of_another_size_is_in_the_verdict(leakage: float, friction: float, said: str) -> None:
+    note = AgainstCode.BETWEEN_CONDITIONS.note(leakage=leakage, friction=friction)
+    result = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=[str(note)])
+    assert verdict(result).startswith(said)
+    assert "do not rely on the numbers" in sureness(result) or leakage == friction == 0.0
+    assert "to the nearest quarter" in str(note)
+
+
+def test_a_fault_that_has_a_name_comes_before_its_size() -> None:
+    notes = [RigCode.MAKEUP_BLOCKED.note(side="B"), AgainstCode.BETWEEN_CONDITIONS.note(leakage=0.5, friction=0.5)]
+    result = said_of("normal", unknown=True, notes=[one.to_dict() for one in notes])
+    assert verdict(result) == "A make-up valve is stuck shut."
 
 
 def test_soft_oil_is_in_the_verdict_and_leaves_something_to_repair() -> None:

@@ -7,7 +7,7 @@ import pytest
 from estimation.finding import Finding, Gate, Outcome, Quantity
 from estimation.notes import ChannelCode, EstimateCode
 from experiments.log_pages.entries import message_of
-from experiments.log_pages.finding_page import _row, _title
+from experiments.log_pages.finding_page import _row, _shortened, _title
 
 PASSED, DOUBTED = Gate(True, ()), Gate(False, (EstimateCode.DIVERGED.note(),))
 
@@ -43,6 +43,15 @@ def found(**changes: object) -> Finding:
 )
 def test_the_title_promises_no_more_than_was_found(changes: dict[str, object], title: str) -> None:
     assert _title(found(**changes)).startswith(title)
+
+
+def test_a_page_opens_with_the_first_of_several_reasons() -> None:
+    whole = "Bulk modulus 144 MPa; do not rely on it: A is off; B is off; C is off"
+    assert _shortened(whole, ["A is off.", "B is off", "C is off"]).endswith("A is off; 2 more reasons stand below")
+    assert _shortened("do not rely on it: A is off; B is off", ["A is off", "B is off"]).endswith(
+        "1 more reason stands below"
+    )
+    assert _shortened("do not rely on it: A is off", ["A is off"]) == "do not rely on it: A is off"
 
 
 def test_a_condition_that_the_gate_doubts_is_said_with_the_doubt() -> None:

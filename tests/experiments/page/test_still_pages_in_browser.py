@@ -23,6 +23,27 @@ def pages(written: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, 
 
 
 @pytest.mark.parametrize("name", ["inspect", "study"])
+def test_figures_can_be_read_on_a_phone(browser: Any, pages: dict[str, Path], name: str) -> None:
+    page = browser.new_page(viewport={"width": 390, "height": 800})
+    page.goto(pages[name].as_uri())
+    picture = page.locator("figure .picture").first
+    assert picture.locator("img").bounding_box()["width"] >= 700
+    assert picture.evaluate("one => [one.clientWidth <= 390, one.scrollWidth > 600]") == [True, True]
+    page.close()
+
+
+def test_no_column_of_a_log_is_out_of_sight_on_a_phone(browser: Any, pages: dict[str, Path]) -> None:
+    page = browser.new_page(viewport={"width": 390, "height": 800})
+    page.goto(pages["inspect"].as_uri())
+    cells = page.locator("#columns td")
+    boxes = [one.bounding_box() for one in cells.all() if one.is_visible()]
+    assert len(boxes) > 20
+    assert max(box["x"] + box["width"] for box in boxes) <= 390
+    assert page.locator('#columns td[data-head="sure [%]"]').count() > 4
+    page.close()
+
+
+@pytest.mark.parametrize("name", ["inspect", "study"])
 def test_a_still_page_is_quiet_dark_and_as_wide_as_a_phone(browser: Any, pages: dict[str, Path], name: str) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
     page = browser.new_page(viewport={"width": 390, "height": 800}, color_scheme="dark")
