@@ -134,7 +134,7 @@ def actuators() -> Mapping[str, str]:
 
 
 def read(
-    path: "str | Path | pd.DataFrame",
+    path: "str | Path | pd.DataFrame | Mapping[str, Any]",
     *,
     rig: "Rig[Any] | str | Path | None" = None,
     columns: Mapping[str, str] | None = None,
@@ -150,9 +150,10 @@ def read(
 
     Parameters
     ----------
-    path : str, Path or pandas.DataFrame
+    path : str, Path, pandas.DataFrame or Mapping[str, array_like]
         Text, Parquet, Feather or MAT; with the extra ``bench`` also XLSX, TDMS, MDF and HDF5. `hydrostate inspect`
-        shows what a strange one holds. Or a table, with ``time_s`` or its index as time: seconds or dates.
+        shows what a strange one holds. Or a table, also of Polars or Arrow, or arrays by name, with ``time_s`` or its
+        index as time: seconds, durations or dates.
     rig : Rig, str or Path, optional
         The actuator, or its rig file; the paper's if not given.
     columns : Mapping[str, str], optional
@@ -188,20 +189,22 @@ def read(
     from experiments.python_user.reading import read_whole_or_sparse
     from plant.errors import NoChannelError
     from plant.log.any_columns import read_any
-    from plant.log.frames import frame_table, is_frame
+    from plant.log.frames import by_name, frame_table, is_frame
 
     with options_by_name():
         kind = actuator(plant or DEFAULT)
     bench = _rig(rig, kind)
     if not isinstance(sample_time, Real | None):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         refuse(f"sample_time must be a number of seconds, got {sample_time!r}")
-    if not isinstance(path, str | Path) and not is_frame(path):
-        refuse(f"the path of a log or a pandas.DataFrame is needed, got {path!r}"[:200])
+    table = None if isinstance(path, str | Path) else path if is_frame(path) else by_name(path)
+    if not isinstance(path, str | Path) and table is None:
+        got = repr(path) if isinstance(path, Real | bytes | list | tuple | None) else type(path).__name__
+        refuse(f"the path of a log, a pandas.DataFrame or arrays by name are needed, got {got}"[:200])
     if columns is not None and not isinstance(columns, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         refuse(f"columns must be a mapping such as {{'position_m': 'POS_MM:mm'}}, got {columns!r}")
     others = [Path(one) for one in ([beside] if isinstance(beside, str | Path) else beside)]
     more: dict[str, Any] = {"sample_time": sample_time, "beside": others}
-    file = Path(path) if isinstance(path, str | Path) else frame_table(path)
+    file = Path(path) if isinstance(path, str | Path) else frame_table(table)
     try:
         with options_by_name():
             found = read_whole_or_sparse(

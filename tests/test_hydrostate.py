@@ -97,7 +97,10 @@ def test_a_model_turns_into_python_controls(log: hs.Log) -> None:
 
 MISTAKES: dict[str, tuple[Callable[[hs.Log, Path], object], str]] = {
     "no such file": (lambda log, file: hs.read("none.csv"), "none.csv: there is no such file"),
-    "no path": (lambda log, file: hs.read(3), "the path of a log or a pandas.DataFrame is needed, got 3"),  # type: ignore[arg-type]
+    "no path": (
+        lambda log, file: hs.read(3),
+        "the path of a log, a pandas.DataFrame or arrays by name are needed, got 3",
+    ),  # type: ignore[arg-type]
     "no such column": (
         lambda log, file: hs.read(file, columns={"position_m": "X"}),
         "name one of them as position_m=NAME",

@@ -1,11 +1,13 @@
 """A log in the hands of a Python user: its channels, and the verbs that say what it holds."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from experiments.python_user.answers import Answer, Model, Shown, no_such
 from experiments.python_user.python_words import options_by_name
+from experiments.python_user.words_of_answer import Words
 
 if TYPE_CHECKING:
     import numpy as np
@@ -282,14 +284,8 @@ class Log(Shown):
             found = self._found(chosen, record, rig, prepared)
         entries = {**chosen.blank, **chosen.entries(found)}
 
-        def page(title: str) -> str:
-            from experiments.command.log_verb import page_of
-            from experiments.command.logs import with_remarks
-
-            about = {"file": title, "plant": self.plant, "rig": rig.name, "seed": 2024, "expected": None}
-            return page_of(chosen, with_remarks({**about, **entries}, self._said), found, record)
-
-        return Answer(found, entries, lambda rows: chosen.screen(rows, asked), page)
+        words = Words(self.plant, verb, asked, rig.name, record, self._said)
+        return Answer(found, entries, words.screen, partial(words.page, found, entries))
 
     def _found(self, chosen: "LogVerb", record: "Record", rig: "Rig[Any]", prepared: Any) -> "Finding":
         """Return what a verb finds, with what another verb of this log has left for it."""

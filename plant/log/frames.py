@@ -1,4 +1,4 @@
-"""Tables in memory, read as a log: a pandas DataFrame, or columns by name."""
+"""Tables in memory, read as a log: of pandas, Polars or Arrow, or columns by name."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeGuard
@@ -19,14 +19,38 @@ SOURCE = "the table"
 
 def is_frame(given: object) -> "TypeGuard[pd.DataFrame]":
     """Return whether something is a pandas DataFrame, without importing pandas."""
-    return hasattr(given, "columns") and hasattr(given, "iloc") and hasattr(given, "index")
+    return hasattr(given, "iloc") and hasattr(given, "columns") and hasattr(given, "index")
+
+
+def by_name(given: object) -> "Mapping[str, Any] | None":
+    """Return the columns of a table of Polars or Arrow, or of a mapping; None of anything else.
+
+    Parameters
+    ----------
+    given : object
+        What a user has.
+
+    Returns
+    -------
+    Mapping[str, array_like] or None
+        Columns by name; values that are missing are NaN.
+    """
+    if isinstance(given, Mapping):
+        return given  # pyright: ignore[reportUnknownVariableType]  names and values are checked where they are read
+    if hasattr(given, "collect"):  # a query, whose rows are not there yet
+        return None
+    names = getattr(given, "column_names", getattr(given, "columns", None))
+    if not isinstance(names, list) or not hasattr(given, "__getitem__"):
+        return None
+    table: Any = given
+    return {name: table[name].to_numpy() for name in names}  # pyright: ignore[reportUnknownVariableType]
 
 
 def frame_table(given: "pd.DataFrame | Mapping[str, Any]") -> Table:
     """Return a table in memory as an open log.
 
-    The index of a DataFrame is its time if it holds dates or floats, or has a name such as ``time_ms``, unless a column
-    is called time.
+    The index of a DataFrame is its time if it holds dates, durations or floats, or has a name such as ``time_ms``,
+    unless a column is called time.
 
     Parameters
     ----------
@@ -60,7 +84,8 @@ def frame_table(given: "pd.DataFrame | Mapping[str, Any]") -> Table:
     if len(set(lengths.values())) > 1:
         got = ", ".join(f"{name} {length}" for name, length in lengths.items())
         raise LogError(f"columns of one length are needed, got {got} samples", SOURCE)
-    return table_of(SOURCE, values)
+    spans = {name: _seconds(one) for name, one in values.items() if np.asarray(one).dtype.kind == "m"}
+    return table_of(SOURCE, {**values, **spans}, units=dict.fromkeys(spans, "s"))
 
 
 def _is_time(name: str) -> bool:
@@ -72,7 +97,13 @@ def _time(index: "pd.Index[Any]") -> dict[str, Any]:
     name = "" if index.name is None else str(index.name)
     if index.dtype.kind in "iuf" and (_is_time(name) or index.dtype.kind == "f"):
         return {name if _is_time(name) else TIME: _plain(index)}
-    return {TIME: _plain(index)} if index.dtype.kind == "M" else {}
+    return {TIME: _plain(index)} if index.dtype.kind in "mM" else {}
+
+
+def _seconds(spans: Any) -> Any:
+    """Return durations in seconds, NaN where there is none."""
+    exact = np.asarray(spans).astype("timedelta64[ns]")
+    return np.where(np.isnat(exact), np.nan, exact.astype(np.int64) * 1e-9)
 
 
 def _columns(given: Any) -> list[Any]:

@@ -156,3 +156,12 @@ def test_a_log_made_of_what_is_no_record_says_what_opens_it(log: hs.Log) -> None
         hs.Log("run.csv", hs.Rig())  # type: ignore[arg-type]
     with pytest.raises(hs.HydrostateError, match="must be a Rig, got str; hydrostate"):
         hs.Log(log.record, "rig.toml")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("verb", ["estimate", "diagnose"])
+def test_an_answer_comes_back_from_another_process_as_it_was(log: hs.Log, verb: str, tmp_path: Path) -> None:
+    answer = getattr(log, verb)()
+    copied = pickle.loads(pickle.dumps(answer))  # noqa: S301 - our own
+    assert str(copied) == str(answer)
+    pages = [one.report(tmp_path / f"{name}.html").read_text("utf-8") for name, one in (("a", answer), ("b", copied))]
+    assert pages[0] == pages[1]

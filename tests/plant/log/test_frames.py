@@ -1,16 +1,17 @@
 """Tables in memory are read as the same log from a file is."""
 
 import warnings
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pytest
 
 from plant.errors import LogError, LogWarning
 from plant.log.any_columns import read_any
 from plant.log.files import read_record
-from plant.log.frames import frame_table, is_frame
+from plant.log.frames import by_name, frame_table, is_frame
 
 TIME = 0.01 * np.arange(400)
 CHANNELS = {"motor_speed_rad_s": 90.0 + np.sin(TIME), "position_m": 0.01 * np.cos(TIME)}
@@ -28,10 +29,24 @@ def table(index: Any = None) -> pd.DataFrame:
         table(index=TIME),
         table(index=pd.Index(TIME, name="time_s")),
         table(index=pd.Index((1e3 * TIME).round().astype(int), name="time_ms")),
+        pd.DataFrame({"time_s": pd.to_timedelta(TIME, unit="s"), **CHANNELS}),
+        table(index=pd.to_timedelta(TIME, unit="s")),
+        by_name(pa.table({"time_s": TIME, **CHANNELS})),
         pd.DataFrame({"time_s": TIME, **CHANNELS}, index=TIME + 7.0),
         pd.DataFrame({"time_s": TIME, **CHANNELS}, index=[f"row {k}" for k in range(400)]),
     ],
-    ids=["columns", "mapping", "index", "named index", "milliseconds", "column before index", "index of text"],
+    ids=[
+        "columns",
+        "mapping",
+        "index",
+        "named index",
+        "milliseconds",
+        "durations",
+        "index of durations",
+        "Arrow",
+        "column before index",
+        "index of text",
+    ],
 )
 def test_a_table_is_read_as_its_file_would_be(given: pd.DataFrame) -> None:
     record = read_record(frame_table(given))
@@ -89,3 +104,16 @@ def test_text_in_a_column_is_named() -> None:
 def test_only_pandas_has_frames() -> None:
     assert is_frame(table())
     assert not any(is_frame(one) for one in (CHANNELS, np.zeros((3, 2)), "run.csv", None))
+
+
+def test_a_query_that_has_not_run_and_bare_numbers_are_no_tables() -> None:
+    class Query:
+        columns: ClassVar = ["time_s"]
+
+        def collect(self) -> None: ...
+
+        def __getitem__(self, name: str) -> None: ...
+
+    assert by_name(Query()) is None
+    assert by_name(np.zeros((20, 3))) is None
+    assert by_name({"time_s": TIME}) == {"time_s": TIME}

@@ -1,0 +1,52 @@
+"""How an answer is shown, found anew by the names of actuator and verb, so that an answer can be pickled."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from estimation.finding import Finding
+    from experiments.actuator_kind import LogVerb
+    from plant.errors import LogWarning
+    from plant.log.record import Record
+
+
+@dataclass(frozen=True, eq=False)
+class Words:
+    """What the page and the screen of an answer need beside the answer.
+
+    Parameters
+    ----------
+    plant, verb : str
+        Kind of actuator, and what was asked of the log.
+    options : Mapping[str, Any]
+        The verb's options.
+    said : sequence of LogWarning
+        What reading the log brought up.
+    """
+
+    plant: str
+    verb: str
+    options: Mapping[str, Any]
+    rig: str
+    record: "Record"
+    said: "Sequence[LogWarning]"
+
+    def _chosen(self) -> "LogVerb":
+        from experiments.actuators import actuator, offered
+
+        return offered(actuator(self.plant), self.verb)
+
+    def screen(self, rows: Sequence[Mapping[str, Any]]) -> "Iterable[RenderableType]":
+        """Return what a terminal shows of entries."""
+        return self._chosen().screen(rows, self.options)
+
+    def page(self, found: "Finding", entries: Mapping[str, Any], title: str) -> str:
+        """Return the page of the log, as HTML."""
+        from experiments.command.log_verb import page_of
+        from experiments.command.logs import with_remarks
+
+        about = {"file": title, "plant": self.plant, "rig": self.rig, "seed": 2024, "expected": None}
+        return page_of(self._chosen(), with_remarks({**about, **entries}, self.said), found, self.record)
