@@ -61,6 +61,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
         options["healthy"] = read(options["healthy"])
     rig, prepared = chosen.prepare(bench, {**options, "seed": asked["seed"]})
     prepare_output(asked["out"])
+    unwritten: list[str] = []
     figures, pages = own_paths(options.get("figure"), logs), own_paths(report, logs)
     about = {"plant": kind.name, "rig": bench.name, "seed": asked["seed"], "expected": expected}
     about |= {"condition": options["condition"]} if "condition" in options else {}
@@ -75,14 +76,20 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
             chosen.figure(found, log.name, figures[log])
         if log in pages:
             page = page_of(chosen, with_remarks({"file": str(log), **result}, said), found, record)
-            write_whole(pages[log], page, "--report")
+            try:
+                write_whole(pages[log], page, "--report")
+            except HydrostateError as error:  # what was found is shown all the same
+                unwritten.append(str(error))
         return result
 
     batch = run_logs(logs, work, {**chosen.blank, **about}, doing)
     for remark in chosen.remarks(batch.results):
         note(remark)
 
-    finish(batch, lambda results: chosen.screen(results, options), as_json=asked["as_json"], out=asked["out"])
+    for sentence in unwritten:
+        note(sentence)
+    form: dict[str, Any] = {"as_json": asked["as_json"], "out": asked["out"], "lost": bool(unwritten)}
+    finish(batch, lambda results: chosen.screen(results, options), **form)
 
 
 def _agreement(result: Result, found: "Finding") -> list[str]:

@@ -176,13 +176,15 @@ def _failure(blank: Result, message: str) -> dict[str, Any]:
     return {"outcome": "failed", **blank, "message": message}
 
 
-def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None) -> NoReturn:
+def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None, lost: bool = False) -> NoReturn:
     """Print what was found, write it if wanted, and leave with the exit code.
 
     Parameters
     ----------
     out : Path or None
         Where results are written too.
+    lost : bool
+        Whether something else that was asked for could not be written: then not all is done.
 
     Raises
     ------
@@ -193,7 +195,7 @@ def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None) -> 
         emit(json_text(batch.results))
     elif batch.done:
         emit(rendered(*screen(batch.done)))
-    code = batch.exit_code
+    code = batch.exit_code or (SOME_FAILED if lost else 0)
     if out is not None:
         try:
             note(f"written: {', '.join(str(path) for path in write_results(batch.results, out))}")

@@ -9,7 +9,7 @@ import typer
 
 from experiments.command.json_output import write_whole
 from experiments.command.options import Columns, Plant, RigFile, argument, load_actuator, load_columns, option
-from experiments.command.terminal import SOME_FAILED, USAGE, emit, note
+from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, emit, note
 from plant.errors import HydrostateError, require_known
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def _diagnosed(
     columns: Mapping[str, str],
     workers: int,
 ) -> "PartStore":
-    """Diagnose the logs of a folder into a store beside the page."""
+    """Diagnose the logs of a folder into a store; Ctrl-C ends without a page, which would lack actuators."""
     from experiments.batch.cases import plan_study
     from experiments.batch.part_store import open_store
     from experiments.batch.run_on_terminal import RunSettings, run_plan
@@ -170,7 +170,11 @@ def _diagnosed(
     plan = plan_study(parse_study(content, f"{folder}"), folder)
     store = open_store(out / "store")
     with store.writing():
-        run_plan(plan, store, "fleet", RunSettings(workers=workers))
+        tally, before = run_plan(plan, store, "fleet", RunSettings(workers=workers))
+    if tally.stopped:
+        done, total = before + tally.done, len(plan.keys)
+        note(f"{tally.stopped}: {done} of {total} logs are kept in {store.name}; the same command goes on from there")
+        raise typer.Exit(INTERRUPTED)
     return store
 
 

@@ -8,6 +8,8 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from experiments.cli import app
+from experiments.command import log_verb
+from plant.errors import HydrostateError
 
 
 def invoke(*arguments: object) -> Result:
@@ -45,6 +47,19 @@ def test_a_page_says_first_what_reading_the_log_brought_up(verb: str, log: Path,
     assert told["warnings"].count(said) == 1
     page = html.unescape((tmp_path / "page.html").read_text("utf-8"))
     assert f"<li>C{said[1:]}." in page
+
+
+def test_a_page_that_cannot_be_written_costs_no_verdict(
+    log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, *_: object) -> None:
+        raise HydrostateError(f"--report {path}: cannot be written: No space left on device")
+
+    monkeypatch.setattr(log_verb, "write_whole", full)
+    done = invoke("diagnose", log, "--report", tmp_path / "page.html")
+    assert done.exit_code == 1
+    assert "probability" in done.stdout
+    assert "No space left on device" in done.stderr
 
 
 def test_files_of_other_loggers_go_with_one_log(log: Path, tmp_path: Path) -> None:

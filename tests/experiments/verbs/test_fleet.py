@@ -7,6 +7,8 @@ import pyarrow as pa
 import pytest
 from typer.testing import CliRunner
 
+from experiments.batch import run_on_terminal
+from experiments.batch.runner import Tally
 from experiments.cli import app
 
 
@@ -139,3 +141,20 @@ def test_the_logs_of_another_rig_are_diagnosed_with_it(tmp_path: Path, monkeypat
     assert {one.glob for one in plan.study.logs} >= {"**/*.csv", "**/*.CSV"}
     assert all(one.columns == {"position_m": "POS:mm"} for one in plan.study.logs)
     assert not any("md" in one.glob for one in plan.study.logs)
+
+
+def test_an_interrupted_fleet_writes_no_page_and_says_how_to_go_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "logs").mkdir()
+    for name in ("a", "b"):
+        (tmp_path / "logs" / f"{name}.csv").write_text("a,b\n1,2\n")
+
+    def ended(*_: Any) -> tuple[Tally, int]:
+        return Tally(done=1, stopped="interrupted"), 0
+
+    monkeypatch.setattr(run_on_terminal, "run_plan", ended)
+    code, out, said = invoke("fleet", tmp_path / "logs", "--out", tmp_path / "fleet", "--workers", 1)
+    assert (code, out) == (130, "")
+    assert "interrupted: 1 of 2 logs are kept in" in said
+    assert not (tmp_path / "fleet" / "index.html").exists()

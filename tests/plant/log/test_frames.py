@@ -31,7 +31,7 @@ def table(index: Any = None) -> pd.DataFrame:
         table(index=pd.Index((1e3 * TIME).round().astype(int), name="time_ms")),
         pd.DataFrame({"time_s": pd.to_timedelta(TIME, unit="s"), **CHANNELS}),
         table(index=pd.to_timedelta(TIME, unit="s")),
-        by_name(pa.table({"time_s": TIME, **CHANNELS})),
+        by_name(pa.Table.from_pandas(pd.DataFrame({"time_s": TIME, **CHANNELS}))),
         pd.DataFrame({"time_s": TIME, **CHANNELS}, index=TIME + 7.0),
         pd.DataFrame({"time_s": TIME, **CHANNELS}, index=[f"row {k}" for k in range(400)]),
     ],
