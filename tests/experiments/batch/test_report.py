@@ -122,3 +122,5 @@ def test_the_study_of_a_fleet_runs_on_a_small_archive(tmp_path: Path) -> None:
     assert np.allclose(modulus, 2.07e8, rtol=0.03)
     page = Path(write_report(store, store.folder)).read_text(encoding="utf-8")
     assert "broken.csv" in page
+    for section in ("logs", "failures"):  # whose words leave no room on a phone for the rest of a row
+        assert 'class="cards whole"' in page.split(f'<section id="{section}">')[1].split("</section>")[0]
