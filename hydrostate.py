@@ -197,14 +197,14 @@ def read(
     if not isinstance(sample_time, Real | None):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         refuse(f"sample_time must be a number of seconds, got {sample_time!r}")
     table = None if isinstance(path, str | Path) else path if is_frame(path) else by_name(path)
-    if not isinstance(path, str | Path) and table is None:
+    file = Path(path) if isinstance(path, str | Path) else None if table is None else frame_table(table)
+    if file is None:
         got = repr(path) if isinstance(path, Real | bytes | list | tuple | None) else type(path).__name__
         refuse(f"the path of a log, a pandas.DataFrame or arrays by name are needed, got {got}"[:200])
     if columns is not None and not isinstance(columns, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         refuse(f"columns must be a mapping such as {{'position_m': 'POS_MM:mm'}}, got {columns!r}")
     others = [Path(one) for one in ([beside] if isinstance(beside, str | Path) else beside)]
     more: dict[str, Any] = {"sample_time": sample_time, "beside": others}
-    file = Path(path) if isinstance(path, str | Path) else frame_table(table)
     try:
         with options_by_name():
             found = read_whole_or_sparse(

@@ -88,9 +88,9 @@ class Log(Shown):
         from plant.eha.rig import Rig
         from plant.log.record import Record
 
-        if not isinstance(record, Record):
+        if not isinstance(record, Record):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
             refuse(f"a Log is made of a Record, got {type(record).__name__}; hydrostate.read opens files and tables")
-        if not isinstance(rig, Rig):
+        if not isinstance(rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
             refuse(f"the rig of a Log must be a Rig, got {type(rig).__name__}; hydrostate.read_rig reads one")
         self.record, self.rig, self.plant, self._said = record, rig, plant, tuple(said)
         self._sparse, self._refusal = sparse, refusal

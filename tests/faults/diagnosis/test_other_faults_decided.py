@@ -146,7 +146,7 @@ def test_a_low_relief_valve_gains_over_all_settings_that_it_may_have(
 
     against, open_, _ = decided(monkeypatch, score)
     assert [note.code for note in against] == ([AgainstCode.RELIEF_EARLY] if named else [])
-    assert bool(open_ and outside.EARLY in open_[0].data["faults"]) == said
+    assert bool(open_ and other_faults.EARLY in open_[0].data["faults"]) == said
 
 
 def test_a_search_for_a_fault_need_not_come_nearer_than_twenty_to_the_sound_circuit(
@@ -159,7 +159,7 @@ def test_a_search_for_a_fault_need_not_come_nearer_than_twenty_to_the_sound_circ
         return fits(3.0 if actuator.circuit.makeup_conductance != SOUND.makeup_conductance else 0.0)
 
     looked(monkeypatch, lambda _: 0.0)
-    monkeypatch.setattr(outside, "fit_classes", fitted)
+    monkeypatch.setattr(other_faults, "fit_classes", fitted)
     faults_outside(LOG, fits(0.0), ACTUATOR)
     assert len(wanted) == 14  # three pumps twice, two settings, two valves that stick and two seats of each
     assert set(wanted) == {30.0 * (20.0 - 3.0)}
