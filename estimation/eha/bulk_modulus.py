@@ -13,10 +13,10 @@ from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide, 
 from estimation.eha.rig_share import fitted_responses, scaled_responses, with_wear
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
-from estimation.fits.delivery import delivered
-from estimation.fits.flow_fit import FLOW_CHANNELS, REPORTED, LogTraits, fit_flow, require_flow_channels
-from estimation.fits.form_fit import FormFit
-from estimation.fits.motion_fit import MOTION_CHANNELS, fit_motion
+from estimation.fits.explaining.delivery import delivered
+from estimation.fits.explaining.form_fit import FormFit
+from estimation.fits.flow.fit import FLOW_CHANNELS, REPORTED, LogTraits, fit_flow, require_flow_channels
+from estimation.fits.motion.fit import MOTION_CHANNELS, fit_motion
 from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED
 from estimation.log_checks.channel_physics import FARTHEST, RPM, TURNS
 from estimation.log_checks.clean import CleanLog, clean_log

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from estimation.fits.tried import Explanation
+from estimation.fits.explaining.tried import Explanation
 from estimation.models.wide_flow import GROWTH, grown_leakage
 from estimation.notes import RigCode
 from plant.arrays import Array

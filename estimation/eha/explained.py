@@ -8,9 +8,9 @@ import numpy as np
 from estimation.eha.changing_leakage import growth_note, leakage_over, step_note
 from estimation.eha.port_drains import drain_note
 from estimation.finding import NORMAL_95
-from estimation.fits.play_courses import crossings
-from estimation.fits.teeth import EVENLY, Turning, delivering
-from estimation.fits.tried import Explanation
+from estimation.fits.explaining.tried import Explanation
+from estimation.fits.greybox.play_courses import crossings
+from estimation.fits.greybox.teeth import EVENLY, Turning, delivering
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.clean import CleanLog

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from math import exp
 
 from estimation.finding import NORMAL_95
-from estimation.fits.flow_log import DRAIN_START, PRESUMED_STD, usual_leakage
-from estimation.fits.tried import Explanation
+from estimation.fits.explaining.tried import Explanation
+from estimation.fits.flow.log import DRAIN_START, PRESUMED_STD, usual_leakage
 from estimation.notes import RigCode
 from plant.eha.model import EhaParameters
 from plant.notes import Note

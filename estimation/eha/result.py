@@ -7,8 +7,8 @@ from types import MappingProxyType
 from estimation.eha.rig_share import Responses, rig_notes, with_total
 from estimation.filters.run import Estimate
 from estimation.finding import Gate, Outcome, Quantity, interval_95
-from estimation.fits.teeth import EVENLY, Turning
-from estimation.fits.tried import Explanation
+from estimation.fits.explaining.tried import Explanation
+from estimation.fits.greybox.teeth import EVENLY, Turning
 from estimation.notes import EstimateCode
 from estimation.tuning.tuning import Tuning
 from plant.eha.doubts import Spread

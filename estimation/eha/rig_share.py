@@ -18,7 +18,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from estimation.finding import NORMAL_95, Quantity
-from estimation.fits.form_fit import FormFit
+from estimation.fits.explaining.form_fit import FormFit
 from estimation.notes import EstimateCode, RigCode
 from plant.eha.doubts import PRESSURE_GAIN, Spread
 from plant.eha.model import EhaParameters

@@ -13,7 +13,7 @@ from estimation.equations.problem import Problem, spread
 from estimation.equations.search import MOST_STEPS, SETTLED, Solution, noise_of
 from estimation.equations.stops import standing
 from estimation.finding import Finding, Gate, Outcome, Quantity
-from estimation.fits.covariance import automatic_lags, least_squares_covariance
+from estimation.fits.greybox.covariance import automatic_lags, least_squares_covariance
 from estimation.identification.fit.residual_tests import cross_correlation_test
 from plant.errors import HydrostateError
 from plant.notes import Note

@@ -10,7 +10,7 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.equations.definition import Equations, Parameter
 from estimation.equations.kernel import compile_equations
-from estimation.fits.descent import Point
+from estimation.fits.greybox.descent import Point
 from plant.errors import HydrostateError, LogError
 from plant.log.record import Record
 

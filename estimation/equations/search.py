@@ -9,7 +9,7 @@ from estimation.arrays import Array
 from estimation.equations.definition import Equations
 from estimation.equations.kernel import SCHEMES
 from estimation.equations.problem import Part, Problem, spread
-from estimation.fits.descent import Point, descend
+from estimation.fits.greybox.descent import Point, descend
 from estimation.log_checks.measurement_noise import NORMAL_MAD
 from plant.errors import HydrostateError
 

@@ -1,6 +1,7 @@
 """What may be strange about a rig, its oil or its logger, as hypotheses that a log accepts or not.
 
-A log that the plain flow form explains is not asked. `estimation.fits.explain` fits one that it does not under them.
+A log that the plain flow form explains is not asked. One that it does not is fitted under them by
+`estimation.fits.explaining.explain`.
 """
 
 from collections.abc import Mapping

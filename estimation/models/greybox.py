@@ -1,6 +1,6 @@
 """Grey-box models: physics with unknown parameters, to be fitted to a log.
 
-`estimation.fits.greybox_loops` predicts a log with exact sensitivities, `estimation.fits.greybox_fit` finds the
+`estimation.fits.greybox.loops` predicts a log with exact sensitivities, `estimation.fits.greybox.fit` finds the
 unknowns.
 """
 

@@ -40,7 +40,7 @@ SHORTEST_LAG = 1e-6
 
 
 COURSES = ("side_of_play", "play_by_pressure", "play_at_once", "play_sprung")
-"""Courses of the piston in its encoder's play, see `estimation.fits.play.crossings`."""
+"""Courses of the piston in its encoder's play, see `estimation.fits.greybox.play.crossings`."""
 
 CROSSED = COURSES[1:]
 """Parameters that say how far each of the others is followed in place of the first."""

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from estimation.eha.estimate import NOT_THE_LOGS
 from estimation.eha.result import BulkModulusEstimate
-from estimation.fits.motion_values import share_at
+from estimation.fits.motion.values import share_at
 from estimation.log_checks.clean import CleanLog
 from estimation.notes import EstimateCode
 from faults.diagnosis.actuator import Actuator, actuator_of

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.fits.averaged import samples_a_block
+from estimation.fits.greybox.averaged import samples_a_block
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, severity
 from faults.diagnosis.actuator import Actuator

@@ -1,7 +1,7 @@
 """The balance of flows judges the pump, and where a log does not tell what it delivers, that is integrated out.
 
 Where pressure is logged, the balance says what the pump delivers, or that the log does not tell
-(`estimation.fits.flow_fit`). It follows the oil to the sensors' noise, and a circuit follows the piston to a few
+(`estimation.fits.flow.fit`). It follows the oil to the sensors' noise, and a circuit follows the piston to a few
 percent: what a circuit says of the pump beside a balance that holds is what it leaves of friction. Without pressure,
 circuits with a worn pump are compared (`faults.diagnosis.other_faults`). If a log does not tell, a pump that delivers
 less leaves less leakage to it, and bulk modulus is larger by as much.

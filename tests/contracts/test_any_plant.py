@@ -11,8 +11,8 @@ from scipy.linalg import expm
 
 from estimation.filters.run import METHODS, run_filter
 from estimation.finding import NORMAL_95
-from estimation.fits.greybox_fit import fit_greybox
-from estimation.fits.greybox_log import greybox_log
+from estimation.fits.greybox.fit import fit_greybox
+from estimation.fits.greybox.log import greybox_log
 from estimation.models.gaussian import Gaussian
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.model import ProcessModel, StateVariable

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.arrays import Array, BoolArray
-from estimation.fits.covariance import automatic_lags, least_squares_covariance
+from estimation.fits.greybox.covariance import automatic_lags, least_squares_covariance
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem, fit_linear

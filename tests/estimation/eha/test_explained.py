@@ -9,8 +9,8 @@ import pytest
 from estimation.eha.bulk_modulus import _impossible_delivery
 from estimation.eha.changing_leakage import WARMED
 from estimation.eha.explained import LEAKAGE_COURSE, OUTSIDE, at_pump_speed, notes_of, rig_set_right, set_right
-from estimation.fits.teeth import EVENLY, Teeth, Turning, delivering
-from estimation.fits.tried import Explanation
+from estimation.fits.explaining.tried import Explanation
+from estimation.fits.greybox.teeth import EVENLY, Teeth, Turning, delivering
 from estimation.log_checks.clean import CleanLog
 from estimation.notes import RigCode
 from plant.components.oil import ATMOSPHERE, effective_bulk_modulus

@@ -11,7 +11,7 @@ from estimation.eha.changing_leakage import leakage_over
 from estimation.eha.explained import notes_of, rig_set_right, set_right
 from estimation.eha.rig_share import GAIN, rig_notes, scaled_responses, with_total
 from estimation.finding import Quantity
-from estimation.fits.tried import Explanation
+from estimation.fits.explaining.tried import Explanation
 from estimation.log_checks.clean import CleanLog
 from plant.eha.doubts import PRESSURE_GAIN
 from plant.eha.model import EhaParameters

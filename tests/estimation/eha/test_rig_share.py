@@ -11,7 +11,7 @@ from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.eha.estimate import estimate_log
 from estimation.eha.rig_share import fitted_responses, scaled_responses, with_total, with_wear
 from estimation.finding import Quantity
-from estimation.fits.flow_fit import fit_flow
+from estimation.fits.flow.fit import fit_flow
 from estimation.notes import EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.doubts import DOUBTS, PRESSURE_GAIN, Spread

@@ -11,7 +11,7 @@ import pytest
 from estimation.equations import fit, search
 from estimation.equations.definition import Equations, Parameter
 from estimation.equations.problem import Part, Problem
-from estimation.fits.descent import Point
+from estimation.fits.greybox.descent import Point
 from plant.arrays import Array
 from plant.log.record import Record
 from tests.numbers import Numbers, refused

@@ -11,15 +11,15 @@ from scipy.signal import lfilter
 
 from estimation.eha.estimate import estimate_log
 from estimation.eha.explained import notes_of, rig_set_right, set_right
-from estimation.fits import asked
-from estimation.fits import explain as module
-from estimation.fits.asked import near_starts
-from estimation.fits.descent import Point
-from estimation.fits.flow_fit import LogTraits, _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
-from estimation.fits.flow_search import MAKEUP_TRIED, flow_starts
+from estimation.fits.explaining import explain as module
+from estimation.fits.explaining.left_open import OPEN_DELIVERY
+from estimation.fits.explaining.tried import Explanation, Tried
+from estimation.fits.flow import asked
+from estimation.fits.flow.asked import near_starts
+from estimation.fits.flow.fit import LogTraits, _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
+from estimation.fits.flow.search import MAKEUP_TRIED, flow_starts
+from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import HYPOTHESES, LATEST
-from estimation.fits.left_open import OPEN_DELIVERY
-from estimation.fits.tried import Explanation, Tried
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.first_belief import begins_in_motion, first_load
 from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters, grown_leakage
@@ -35,8 +35,8 @@ from tests.estimation.fits.strange_logs import HEALTHY, PRESSURE, explained, log
 from tests.thinned import thinned
 
 if TYPE_CHECKING:
-    from estimation.fits.greybox_fit import GreyBoxFit
-    from estimation.fits.greybox_log import GreyBoxLog
+    from estimation.fits.greybox.fit import GreyBoxFit
+    from estimation.fits.greybox.log import GreyBoxLog
 
 
 def lagging(lag: float) -> Record:

@@ -8,21 +8,23 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from estimation.fits import asked as asking
-from estimation.fits import flow_fit, motion_fit, plain_flow
-from estimation.fits.descent import Point
-from estimation.fits.flow_fit import LogTraits, _wanted, fit_flow
-from estimation.fits.flow_log import homed_at_stop
-from estimation.fits.greybox_fit import GreyBoxFit
+from estimation.fits.explaining.objections import fit_explains_all
+from estimation.fits.explaining.promises import Promise, slopes_of
+from estimation.fits.explaining.tried import Tried
+from estimation.fits.explaining.wide_log import widened
+from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_starts
+from estimation.fits.flow import asked as asking
+from estimation.fits.flow import fit as flow_fit
+from estimation.fits.flow import plain as plain_flow
+from estimation.fits.flow.fit import LogTraits, _wanted, fit_flow
+from estimation.fits.flow.log import homed_at_stop
+from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.play import ShownPlay
 from estimation.fits.hypotheses import BEGUN, HYPOTHESES, MAY_HIDE
-from estimation.fits.motion_fit import _starts, _steps, motion_log, unseen
-from estimation.fits.motion_search import MOST_WORK, Begun, MotionSearch, explained, rough
-from estimation.fits.objections import fit_explains_all
-from estimation.fits.play import ShownPlay
-from estimation.fits.promises import Promise, slopes_of
-from estimation.fits.tried import Tried
-from estimation.fits.wide_log import widened
-from estimation.fits.wide_problem import flow_bounds, freed, own_starts
+from estimation.fits.motion import fit as motion_fit
+from estimation.fits.motion.fit import _starts, _steps, motion_log, unseen
+from estimation.fits.motion.search import MOST_WORK, Begun, MotionSearch, explained, rough
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
 from estimation.models.motion import MOTION_FORMS
 from plant.log.record import Record

@@ -6,17 +6,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.fits.chance import largest_chi_square
-from estimation.fits.descent import Point, descend
-from estimation.fits.flow_fit import fit_flow
-from estimation.fits.flow_log import _swept_share, speed_gaps, usual_leakage, without_strays
-from estimation.fits.flow_search import balanced, flow_starts
-from estimation.fits.form_fit import FormFit
-from estimation.fits.greybox_fit import GreyBoxFit, Search, concluded, explained, fit_greybox
-from estimation.fits.greybox_problem import Problem, search_bounds
-from estimation.fits.greybox_problem import weighed as sums_of
+from estimation.fits.explaining.form_fit import FormFit
+from estimation.fits.explaining.wide_problem import flow_bounds, freed
+from estimation.fits.flow.fit import fit_flow
+from estimation.fits.flow.log import _swept_share, speed_gaps, usual_leakage, without_strays
+from estimation.fits.flow.search import balanced, flow_starts
+from estimation.fits.greybox.chance import largest_chi_square
+from estimation.fits.greybox.descent import Point, descend
+from estimation.fits.greybox.fit import GreyBoxFit, Search, concluded, explained, fit_greybox
+from estimation.fits.greybox.problem import Problem, search_bounds
+from estimation.fits.greybox.problem import weighed as sums_of
 from estimation.fits.hypotheses import HYPOTHESES, LIMITS
-from estimation.fits.wide_problem import flow_bounds, freed
 from estimation.log_checks.bridging import within_gaps
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM
 from tests.estimation.fits.short_logs import (

@@ -13,15 +13,19 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from estimation.fits import explain as explaining
-from estimation.fits import flow_search, force_scale, greybox_fit, motion_fit, motion_search
-from estimation.fits import promises as promising
-from estimation.fits.descent import Point
-from estimation.fits.flow_search import flow_starts
-from estimation.fits.freed_problem import FreedProblem
+from estimation.fits.explaining import explain as explaining
+from estimation.fits.explaining import promises as promising
+from estimation.fits.flow import search as flow_search
+from estimation.fits.flow.search import flow_starts
+from estimation.fits.greybox import fit as greybox_fit
+from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.hypotheses import HYPOTHESES
-from estimation.fits.motion_fit import _fitted, _starts, motion_log
-from estimation.fits.motion_search import MotionSearch, likeliest
+from estimation.fits.motion import fit as motion_fit
+from estimation.fits.motion import force_scale
+from estimation.fits.motion import search as motion_search
+from estimation.fits.motion.fit import _fitted, _starts, motion_log
+from estimation.fits.motion.search import MotionSearch, likeliest
 from estimation.models.motion import MOTION_FORMS
 from plant.arrays import Array
 from plant.log.record import Record

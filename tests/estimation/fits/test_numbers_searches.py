@@ -10,17 +10,17 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from estimation.fits.descent import Point
-from estimation.fits.explain import explain
-from estimation.fits.flow_fit import LogTraits, fit_flow
-from estimation.fits.flow_log import without_strays
-from estimation.fits.flow_search import balanced, flow_starts
-from estimation.fits.freed_problem import FreedProblem
-from estimation.fits.greybox_fit import Search, explained, roughly
-from estimation.fits.greybox_problem import Problem
+from estimation.fits.explaining.explain import explain
+from estimation.fits.explaining.wide_problem import flow_bounds
+from estimation.fits.flow.fit import LogTraits, fit_flow
+from estimation.fits.flow.log import without_strays
+from estimation.fits.flow.search import balanced, flow_starts
+from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.fit import Search, explained, roughly
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.problem import Problem
 from estimation.fits.hypotheses import HYPOTHESES
-from estimation.fits.motion_fit import fit_motion
-from estimation.fits.wide_problem import flow_bounds
+from estimation.fits.motion.fit import fit_motion
 from plant.arrays import Array
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive

@@ -8,10 +8,10 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from estimation.fits import play, play_courses, teeth
+from estimation.fits.greybox import play, play_courses, teeth
+from estimation.fits.greybox.lateness import LATE_NUDGE, changes_beside, lateness
+from estimation.fits.greybox.teeth import COUNTS, Teeth, _delivered, _likeliest, _turned, shown_teeth, with_teeth
 from estimation.fits.hypotheses import LEAST_PLAY
-from estimation.fits.lateness import LATE_NUDGE, changes_beside, lateness
-from estimation.fits.teeth import COUNTS, Teeth, _delivered, _likeliest, _turned, shown_teeth, with_teeth
 from estimation.models.flow import HELD_FLOW_FORM
 from plant.arrays import Array
 from plant.log.record import Record

@@ -9,22 +9,23 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from estimation.fits import asked, motion_fit
-from estimation.fits.asked import asked_of, near_starts
-from estimation.fits.explain import explain
-from estimation.fits.flow_search import _guess, _search, flow_starts
-from estimation.fits.force_scale import disagree
-from estimation.fits.form_fit import weighed, with_structure
-from estimation.fits.freed_problem import FreedProblem
-from estimation.fits.greybox_fit import GreyBoxFit
+from estimation.fits.explaining.explain import explain
+from estimation.fits.explaining.form_fit import weighed, with_structure
+from estimation.fits.explaining.objections import objections
+from estimation.fits.explaining.promises import Promise, promised
+from estimation.fits.explaining.tried import Explanation
+from estimation.fits.explaining.wide_log import delayed, usual_values
+from estimation.fits.explaining.wide_problem import freed, own_starts
+from estimation.fits.flow import asked
+from estimation.fits.flow.asked import asked_of, near_starts
+from estimation.fits.flow.search import _guess, _search, flow_starts
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, PRESUMED
-from estimation.fits.motion_fit import _starts, _steps, motion_log
-from estimation.fits.motion_search import MotionSearch
-from estimation.fits.objections import objections
-from estimation.fits.promises import Promise, promised
-from estimation.fits.tried import Explanation
-from estimation.fits.wide_log import delayed, usual_values
-from estimation.fits.wide_problem import freed, own_starts
+from estimation.fits.motion import fit as motion_fit
+from estimation.fits.motion.fit import _starts, _steps, motion_log
+from estimation.fits.motion.force_scale import disagree
+from estimation.fits.motion.search import MotionSearch
 from estimation.models.flow import FLOW_FORM, STIFFNESS
 from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS
 from plant.log.record import Record

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from estimation.eha.explained import notes_of
-from estimation.fits.flow_fit import fit_flow
-from estimation.fits.flow_log import flow_log, without_strays
+from estimation.fits.explaining.wide_log import widened
+from estimation.fits.explaining.wide_problem import freed
+from estimation.fits.flow.fit import fit_flow
+from estimation.fits.flow.log import flow_log, without_strays
 from estimation.fits.hypotheses import LEAKAGE_RISE, LEAKAGE_TURBULENT
-from estimation.fits.wide_log import widened
-from estimation.fits.wide_problem import freed
 from estimation.log_checks.clean import clean_log
 from estimation.models.wide_flow import (
     LAMINAR_BELOW,

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.fits.flow_log import MOST_LEAD
-from estimation.fits.freed_problem import FreedProblem
-from estimation.fits.greybox_fit import LEAST_EFFECT, GreyBoxFit, concluded
+from estimation.fits.flow.log import MOST_LEAD
+from estimation.fits.greybox.fit import LEAST_EFFECT, GreyBoxFit, concluded
+from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.models.flow import FLOW_FORM
 from tests.estimation.fits.short_logs import PAPER, WORN, log, seen
 

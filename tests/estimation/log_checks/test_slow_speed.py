@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
-from estimation.fits import flow_fit
+from estimation.fits.flow import fit as flow_fit
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.held import without_held
 from estimation.notes import SensorCode

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.fits.greybox_fit import GreyBoxFit, fit_greybox
-from estimation.fits.greybox_log import BLOCK, GreyBoxLog, OutputNoise
-from estimation.fits.greybox_problem import Problem
+from estimation.fits.greybox.fit import GreyBoxFit, fit_greybox
+from estimation.fits.greybox.log import BLOCK, GreyBoxLog, OutputNoise
+from estimation.fits.greybox.problem import Problem
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.functions import Scalar
 from plant.eha.model import EhaParameters

@@ -3,9 +3,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from estimation.fits.freed_problem import FreedProblem
-from estimation.fits.greybox_log import GreyBoxLog, OutputNoise
-from estimation.fits.greybox_problem import Problem
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
+from estimation.fits.greybox.problem import Problem
 from estimation.models.motion import (
     LINEAR,
     MOTION_FORMS,

@@ -134,8 +134,7 @@ def onsets_within_a_log() -> dict[str, Any]:
         one = blocks(condition, after, pressure=pressure, seconds=4.0)
         fits = fit_classes(one, ACTUATOR)
         found = None if (two := parted(one, fits, ACTUATOR)) is None else find_onset(one, two, ACTUATOR)
-        split = likeliest_split(one, fits.best)
-        told[name] = {"likeliest split, block": None if split is None else split.place}
+        told[name] = {"likeliest split, block": getattr(likeliest_split(one, fits.best), "place", None)}
         if found is not None:
             change, rest, later = found
             told[name] |= {

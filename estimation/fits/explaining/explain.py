@@ -1,0 +1,329 @@
+"""`explain(log, parameters, ...) -> Explanation`: the hypotheses under which a log is explained, alone or two together.
+
+A log that the plain flow form does not explain is fitted under the hypotheses that the slopes of that fit promise most
+of, then under the others, then under pairs with the likeliest; what is freed without need only widens the interval.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import TypeAlias
+
+import numpy as np
+
+from estimation.fits.explaining.form_fit import weighed
+from estimation.fits.explaining.promises import promised_beside, promising
+from estimation.fits.explaining.tried import Explanation, Tried
+from estimation.fits.explaining.wide_log import balanced_by, delayed, usual_pressure, usual_values, widened
+from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_starts
+from estimation.fits.greybox.descent import Point, descend
+from estimation.fits.greybox.fit import GreyBoxFit, concluded
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LATEST, Hypothesis
+from estimation.models.flow import STIFFNESS
+from estimation.models.wide_flow import GROWTH, grown_leakage
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+
+SCREENING, SETTLING, FINISHING = 7, 40, 12
+"""Evaluations of the model for a start, for one that is carried on, and for the last, with short model steps."""
+
+ROUNDS = 6
+"""How often the last ones are made at most, while each gains what would tell a hypothesis from another [count]."""
+
+NEAR = 2.0
+"""First radius of a search [dimensionless]: it begins where the plain form ended, or a simpler hypothesis."""
+
+FINALISTS, CARRIED, NEARLY = 3, 2, 3.0
+"""Hypotheses that are carried on, starts of each, and up to which share of the best start's cost the second is."""
+
+FINEST_DELAY = 1e-3
+"""Step in which a delay is sought [s]; what is left of it goes into the lag."""
+
+MAY_VANISH, VANISHED = ("leakage_coefficient", "flow_bias", "makeup_conductance"), 1e-2
+"""What a search may take for nothing by mistake, and the share of the rig's value below which it has."""
+
+NEARLY_AS_GOOD = 1.1
+"""What the cost of a finished set is multiplied by before others are compared with it: their model steps are long, and
+have errors [dimensionless]."""
+
+CLOSE = 60.0
+"""Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""
+
+NEVER = float(np.finfo(np.float64).max)
+"""Cost of a fit that is not what its hypotheses say, so that it is not believed [dimensionless]."""
+
+LITTLE = 1e-3
+"""Share of the cost below which a gain tells nothing of what leaves far more than noise [fraction]; judged."""
+
+WORTH = 10.0
+"""Gain in log-likelihood below which a hypothesis is not accepted [dimensionless]."""
+
+ALIKE = 15.0
+"""Difference of log-likelihood up to which two sets of hypotheses are said to explain a log alike [dimensionless]."""
+
+
+Accepted: TypeAlias = Callable[[GreyBoxFit], bool]
+
+
+def explain(
+    log: GreyBoxLog,
+    parameters: EhaParameters,
+    starts: Sequence[Mapping[str, float]],
+    accepted: Accepted,
+    *,
+    asked: Sequence[Hypothesis] = HYPOTHESES,
+    paired: bool = True,
+    hopeless: float = np.inf,
+    by_mass: bool = False,
+) -> Explanation:
+    """Return the hypotheses that explain a log best, alone or two together.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    starts : sequence of Mapping[str, float]
+        First guesses of the plain form's unknowns [SI].
+    accepted : callable
+        ``accepted(fit)``: whether a fit explains the log.
+    asked : sequence of Hypothesis
+        What is tried alone; pairs are with any other.
+    paired : bool
+        Whether pairs are tried where nothing explains the log alone.
+    hopeless : float
+        Cost from which the best alone counts for so little that no pair is tried [dimensionless].
+    by_mass : bool
+        Whether mass is balanced while hypotheses are compared, as where the likelier plain fit does; else volume. At
+        high pressure the two differ by more than what is strange.
+
+    Returns
+    -------
+    Explanation
+        The likeliest; whether it explains the log is for the gate to say.
+    """
+    wide = balanced_by(widened(log, parameters, starts[0]), 1.0 if by_mass else 0.0)
+    likely, others = promising(wide, (), starts[0], asked)
+    screened = [[*_screened(wide, (one,), starts)] for one in likely]
+    finished = _likeliest(wide, screened)
+    if others and not _explained(finished[0], accepted):
+        known = finished[0].cost
+        more = _likeliest(wide, _nearing(wide, others, starts, _hopeful(starts, screened), known), known)
+        finished = _ranked([*finished, *more])
+    if paired and finished[0].cost < hopeless and not _explained(finished[0], accepted):
+        first, second = finished[0], finished[1] if len(finished) > 1 else None
+        pairs = _paired(wide, first, starts[0], accepted)
+        near = first.fit.chi_square[0] < NEARLY or (pairs and _explained(pairs[0], accepted))
+        if second and near and second.cost <= NEARLY_AS_GOOD * first.cost:
+            pairs += _paired(wide, second, starts[0], accepted)
+        finished = _distinct([first, *pairs])
+    best = finished[0]
+    rivals = [one for one in finished[1:] if one.cost < best.cost + ALIKE]
+    found = weighed([fit for one in (best, *rivals) for fit in one.fits])
+    values = {name: (value, best.fit.std[name]) for name, value in best.fit.values.items()} | dict(found)
+    if any(name in values for name in GROWTH):  # what is told of a leakage is what it is at the end
+        ended = float(grown_leakage(1.0, *(values.get(name, (0.0, 0.0))[0] for name in GROWTH)))
+        value, std = values["leakage_coefficient"]
+        values["leakage_coefficient"] = ended * value, ended * std
+    names = tuple(one.name for one in best.together)
+    open_by = _delivery_open(wide, best)
+    return Explanation(names, values, best.delays, best.fit, len(rivals), usual_pressure(log, parameters), open_by)
+
+
+def _paired(log: GreyBoxLog, first: Tried, plain: Mapping[str, float], accepted: Accepted) -> list[Tried]:
+    """Return what explains a log together with a hypothesis that does not alone, and better; the best first.
+
+    What slopes promise most is tried first, and all else where that does not explain the log: slopes are taken where
+    the first hypothesis has gone to take up what the second one does. The best of it is fitted to the end in any case.
+    """
+    late = delayed(log, first.delays)
+    taken = {one.name for one in first.together}
+    likely, others = promising(late, first.together, first.values, [one for one in HYPOTHESES if one.name not in taken])
+    begun = [_begun_again(log, first), {**plain, **own_starts(log, first.together[-1])[0]}]
+    tried = [*likely, *(one for one in others if one.far)]
+    pairs = _likeliest(late, [_screened(late, (*first.together, one), begun) for one in tried], first.cost)
+    if not pairs or not _explained(pairs[0], accepted):
+        known = NEARLY_AS_GOOD * min(one.cost for one in (first, *pairs[:1]))
+        rest = [_screened(late, (*first.together, one), begun, known) for one in others if not one.far]
+        pairs = _ranked([*pairs, *_likeliest(late, rest)])
+    better = (one for one in pairs if one.cost < first.cost - WORTH)
+    return [replace(one, delays={**first.delays, **one.delays}) for one in better]
+
+
+def _explained(tried: Tried, accepted: Accepted) -> bool:
+    return not tried.void and accepted(tried.fit)
+
+
+def _begun_again(log: GreyBoxLog, first: Tried) -> Mapping[str, float]:
+    """Return where a hypothesis ended with long model steps, as the next search takes; nothing of it has vanished."""
+    return {**first.coarse, **_gone(log, first.coarse)}
+
+
+def _delivery_open(log: GreyBoxLog, best: Tried) -> float:
+    """Return how well a log tells what the pump delivers beside what explains it; see `Explanation`."""
+    if DELIVERY.free[0] in best.values:
+        return 0.0
+    return promised_beside(delayed(log, best.delays), best.together, best.values, DELIVERY).deviation
+
+
+def _ranked(tried: Iterable[Tried]) -> list[Tried]:
+    return sorted(tried, key=lambda one: one.cost)
+
+
+def _distinct(tried: Iterable[Tried]) -> list[Tried]:
+    """Return the best of each set of hypotheses, in whatever order these came; the best first."""
+    best: dict[frozenset[str], Tried] = {}
+    for one in _ranked(tried):
+        best.setdefault(frozenset(each.name for each in one.together), one)
+    return [*best.values()]
+
+
+def _screened(
+    log: GreyBoxLog,
+    together: tuple[Hypothesis, ...],
+    starts: Sequence[Mapping[str, float]],
+    wanted: float = np.inf,
+) -> Iterator[Tried]:
+    """Yield the best from each start after a few steps, with one model step a sample; fewer if it cannot be wanted."""
+    absent = usual_values(log)
+    asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
+    problems = [(delays, freed(delayed(log, delays).coarsened(), together)) for delays in asked]
+    begun = list(product(problems, own_starts(log, together[-1])))
+    for start in starts:
+        tried: list[Tried] = []
+        for (delays, problem), own in begun:
+            guess = problem.model.theta({**absent, **start, **own})
+            bounds = flow_bounds(problem.model, [guess], log)
+            point = descend(problem.at, guess, SCREENING, bounds, radius=NEAR, wanted=wanted)
+            tried.append(Tried(together, point, problem.model.values(point.theta), delays, absent))
+            wanted = min(wanted, NEARLY * tried[-1].cost)
+        yield min(tried, key=lambda one: one.cost)
+
+
+def _hopeful(starts: Sequence[Mapping[str, float]], screened: Sequence[Sequence[Tried]]) -> list[Mapping[str, float]]:
+    """Return the starts from which some of the hypotheses that came near ended near the best of their own."""
+    bests = [min(one.cost for one in each) for each in screened]
+    near = [each for each, best in zip(screened, bests, strict=True) if best <= NEARLY * min(bests)]
+    kept = [any(each[i].cost <= NEARLY * min(one.cost for one in each) for each in near) for i in range(len(starts))]
+    return [start for start, keep in zip(starts, kept, strict=True) if keep]
+
+
+def _nearing(
+    log: GreyBoxLog,
+    asked: Iterable[Hypothesis],
+    starts: Sequence[Mapping[str, float]],
+    hopeful: Sequence[Mapping[str, float]],
+    known: float,
+) -> Iterator[Sequence[Tried]]:
+    """Yield hypotheses from their starts, those first of which slopes say nothing; none is followed far from the best.
+
+    Those begin from every start, the others from the ``hopeful`` ones.
+    """
+    for one in sorted(asked, key=lambda each: not each.far):
+        found = [*_screened(log, (one,), starts if one.far else hopeful, NEARLY * known)]
+        known = min(known, *(each.cost for each in found))
+        yield found
+
+
+def _settled(log: GreyBoxLog, tried: Tried, wanted: float = np.inf) -> Tried:
+    """Return a set of hypotheses brought to its optimum, with one model step a sample, if its cost may be as wanted."""
+    early = delayed(log, tried.delays).coarsened()
+    best = _descended(early, tried, tried.point.theta, SETTLING, wanted=wanted)
+    if (revived := _revived(log, best)) is not None:
+        best = min(best, _descended(early, best, revived, SETTLING, wanted=wanted), key=lambda one: one.cost)
+    if len(tried.together[-1].delays) == 1:
+        return best
+    channel, early = tried.together[-1].late, min(tried.together[-1].delays) < 0.0
+    least, most = (-LATEST, 0.0) if early else (0.0, LATEST)
+    for step in (FINEST_DELAY, -FINEST_DELAY):
+        while least <= (delay := best.delays.get(channel, 0.0) + step) <= most:
+            moved = replace(best, delays={channel: delay})
+            later = delayed(log, moved.delays).coarsened()
+            moved = _descended(later, moved, best.point.theta, SETTLING, wanted=best.cost)
+            if moved.cost >= best.cost:
+                break
+            best = moved
+    return best
+
+
+def _revived(log: GreyBoxLog, tried: Tried) -> Array | None:
+    """Return a start with the rig's value of what has all but vanished, from where a logarithm finds no way back."""
+    gone = _gone(log, tried.values)
+    return freed(log, tried.together).model.theta({**tried.values, **gone}) if gone else None
+
+
+def _gone(log: GreyBoxLog, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the rig's values of what has all but vanished."""
+    usual = usual_values(log)
+    return {name: usual[name] for name in MAY_VANISH if values[name] < VANISHED * usual[name]}
+
+
+def _descended(
+    log: GreyBoxLog, tried: Tried, start: Array, evaluations: int, *more: str, wanted: float = np.inf
+) -> Tried:
+    problem = freed(log, tried.together, *more)
+    bounds = flow_bounds(problem.model, [start], log)
+    point = descend(problem.at, start, evaluations, bounds, radius=NEAR, wanted=wanted)
+    return replace(tried, point=point, values=problem.model.values(point.theta))
+
+
+def _finished(log: GreyBoxLog, tried: Tried) -> Tried:
+    """Return a set of hypotheses fitted to the end, balanced by volume and by mass.
+
+    Balanced by mass, the inner circuit yields as it does in the plain form. A log that does not tell the two apart is
+    believed neither alone: they may differ by three deviations.
+    """
+    row = delayed(log, tried.delays)
+    done: list[tuple[Tried, FreedProblem]] = []
+    for share, more in ((0.0, ()), (1.0, (STIFFNESS,))):
+        own = balanced_by(row, share)
+        problem, begun = freed(own, tried.together, *more), done[-1][0] if done else tried
+        start = problem.model.theta({**usual_values(own), **begun.values})
+        done.append((_to_its_end(own, begun, start, *more), problem))
+    done.sort(key=lambda one: one[0].cost)
+    best = replace(done[0][0], coarse=tried.values)
+    count = [one for one in done if one[0].cost <= best.cost + ALIKE]
+    first, *rivals = (_concluded(problem, one.point, log) for one, problem in count)
+    found = ((one, one.free[0]) for one in best.together)
+    if best.meant and all(one.told(best.values[name], first.std.get(name, 0.0)) for one, name in found):
+        return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
+    return replace(best, void=True, fits=(replace(first, cost=NEVER),))
+
+
+def _concluded(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxFit:
+    least, _ = flow_bounds(problem.model, [point.theta], log)
+    return concluded(problem, point, least=least, warned=False)
+
+
+def _to_its_end(log: GreyBoxLog, tried: Tried, start: Array, *more: str) -> Tried:
+    """Return the end of a search with short model steps: where long ones end may be far from it."""
+    best = _descended(log, tried, start, FINISHING, *more)
+    for _ in range(ROUNDS - 1):
+        further = _descended(log, best, best.point.theta, FINISHING, *more)
+        gained = best.cost - further.cost
+        if gained > 0.0:
+            best = further
+        if gained < max(CLOSE, LITTLE * best.cost):
+            break
+    return best
+
+
+def _likeliest(log: GreyBoxLog, tried: Iterable[Iterable[Tried]], known: float = np.inf) -> list[Tried]:
+    """Return the likeliest of several sets of hypotheses, each tried from some starts, the best first.
+
+    The first set is carried on in any case: a few steps from a start are no measure of what promises most. What cannot
+    come close to the best, or to what is known, is not followed to its optimum.
+    """
+    known *= NEARLY_AS_GOOD
+    first, *others = [_ranked(one) for one in tried]
+    sets = [first, *sorted(others, key=lambda one: one[0].cost)[: FINALISTS - 1]]
+    carried = [[one[0], *(start for start in one[1:CARRIED] if start.cost < NEARLY * one[0].cost)] for one in sets]
+    settled: list[Tried] = []
+    for one in carried:
+        wanted = min((known, *(other.cost for other in settled))) + CLOSE
+        settled.append(_ranked(_settled(log, start, wanted) for start in one)[0])
+    best = min((known, *(one.cost for one in settled)))
+    return _ranked(_finished(log, one) for one in _ranked(settled) if one.cost <= best + CLOSE)

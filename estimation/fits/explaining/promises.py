@@ -1,0 +1,211 @@
+"""What each hypothesis promises beside a fit, by the slopes there: to first order, from one evaluation."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.fits.explaining.leakage_step import likeliest_step
+from estimation.fits.explaining.wide_log import balanced_by, usual_values, widened
+from estimation.fits.explaining.wide_problem import freed
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypotheses import Hypothesis
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+
+LIKELIEST = 4
+"""Hypotheses that are tried first, of which the slopes of the fit so far promise most."""
+
+STEPPED = 0.25
+"""Share that a step must explain of what one leakage leaves of the lost flow, to be tried first [fraction]; judged. A
+step that multiplies leakage is too large for slopes to promise it."""
+
+
+class Promise(NamedTuple):
+    """What a hypothesis promises beside a fit, to first order.
+
+    Parameters
+    ----------
+    gain : float
+        In log-likelihood, Rao's score statistic over two [dimensionless].
+    size : float
+        How far what is freed first would move in its fitted coordinate: for a logarithm a relative change
+        [dimensionless].
+    deviation : float
+        How well that coordinate would then be known, what is presumed of it included [dimensionless].
+    """
+
+    gain: float
+    size: float
+    deviation: float
+
+
+def promised(
+    log: GreyBoxLog, parameters: EhaParameters, plain: Mapping[str, float], one: Hypothesis, *, by_mass: bool = False
+) -> Promise:
+    """Return what a hypothesis promises beside the plain fit, to first order.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    plain : Mapping[str, float]
+        What the plain form found [SI].
+    one : Hypothesis
+        What is asked.
+    by_mass : bool
+        Whether the plain fit balances mass: promises are of where it stands.
+
+    Returns
+    -------
+    Promise
+        Its promise.
+    """
+    return promised_each(log, parameters, plain, (one,), by_mass=by_mass)[0]
+
+
+def promised_each(
+    log: GreyBoxLog,
+    parameters: EhaParameters,
+    plain: Mapping[str, float],
+    asked: Sequence[Hypothesis],
+    *,
+    by_mass: bool = False,
+    slopes: Mapping[str, Array] = MappingProxyType({}),
+) -> list[Promise]:
+    """Return what each of several hypotheses promises by itself, from one evaluation; see `promised`.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    plain : Mapping[str, float]
+        What the plain form found [SI].
+    asked : sequence of Hypothesis
+        What is asked; none holds an unknown of the plain form.
+    by_mass : bool
+        Whether the plain fit balances mass.
+    slopes : Mapping[str, ndarray of shape (blocks,)], optional
+        Derivatives of the plain fit's normalised residuals, by unknown; they need not be taken again [dimensionless].
+
+    Returns
+    -------
+    list of Promise
+        Their promises.
+    """
+    wide = widened(log, parameters, plain)
+    return _promises(balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, asked, slopes)
+
+
+def promised_beside(
+    log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], one: Hypothesis
+) -> Promise:
+    """Return what one more hypothesis promises beside those that are taken.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    together : tuple of Hypothesis
+        What is taken already.
+    found : Mapping[str, float]
+        What the fit under them found [SI].
+    one : Hypothesis
+        What is asked.
+
+    Returns
+    -------
+    Promise
+        Its promise.
+    """
+    return _promises(log, together, found, (one,))[0]
+
+
+def promising(
+    log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], asked: Sequence[Hypothesis]
+) -> tuple[list[Hypothesis], list[Hypothesis]]:
+    """Return the hypotheses that promise most beside those that are taken, best first; and the others.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    together : tuple of Hypothesis
+        What is taken already.
+    found : Mapping[str, float]
+        What the fit so far found [SI].
+    asked : sequence of Hypothesis
+        What else is asked.
+
+    Returns
+    -------
+    tuple of list of Hypothesis
+        The `LIKELIEST`, and the others.
+    """
+    promises = _promises(log.coarsened(), together, found, asked)
+    stepped = any(one.from_change for one in asked) and likeliest_step(log).share > STEPPED
+    gains = [np.inf if stepped and one.from_change else promises[i].gain for i, one in enumerate(asked)]
+    order = sorted(range(len(asked)), key=lambda i: -gains[i])
+    likely = [asked[i] for i in order if not asked[i].far][:LIKELIEST]
+    return likely, [one for one in asked if one not in likely]
+
+
+def _promises(
+    log: GreyBoxLog,
+    together: tuple[Hypothesis, ...],
+    found: Mapping[str, float],
+    asked: Sequence[Hypothesis],
+    slopes: Mapping[str, Array] = MappingProxyType({}),
+) -> list[Promise]:
+    """Return what each hypothesis promises beside those that are taken, as `promised` does, from one evaluation."""
+    problem = freed(log, (*together, *(replace(one, instead=()) for one in asked)))
+    theta = problem.model.theta({**usual_values(log), **found})
+    point = problem.at_beside(theta, slopes) if slopes else problem.at(theta)
+    # an unknown at its bound promises what only the hypothesis in its place can keep
+    held = {name for one in asked for name in one.instead}
+    own = [name for name in freed(log, together).model.unknowns if name not in held]
+
+    def step(names: Sequence[str]) -> tuple[float, Array, Array]:
+        places = [problem.model.unknowns.index(name) for name in names]
+        gradient = point.gradient[places]
+        gram = point.gram[np.ix_(places, places)]
+        known = np.asarray(np.linalg.pinv(gram, rcond=len(places) * np.finfo(float).eps), dtype=np.float64)
+        moved: Array = known @ gradient
+        return 0.5 * float(gradient @ moved), moved, np.diag(known)
+
+    before = step(own)[0]
+    promises: list[Promise] = []
+    for one in asked:
+        names = list(dict.fromkeys((*own, *one.free)))
+        gain, moved, variances = step(names)
+        place = names.index(one.free[0])
+        promises.append(Promise(gain - before, float(abs(moved[place])), float(variances[place]) ** 0.5))
+    return promises
+
+
+def slopes_of(fit: GreyBoxFit, log: GreyBoxLog) -> Mapping[str, Array]:
+    """Return the slopes of a plain fit's residuals, where the wide form has the same.
+
+    Parameters
+    ----------
+    fit : GreyBoxFit
+        The fit.
+    log : GreyBoxLog
+        Its log.
+
+    Returns
+    -------
+    Mapping[str, ndarray]
+        By unknown, shape (samples,) [dimensionless]; none where noise counts with them, or speed has gaps: they are the
+        fit's own then.
+    """
+    if log.passes_on or log.gaps.size:
+        return {}
+    return dict(zip(fit.model.unknowns, fit.slopes.T, strict=False))

@@ -1,0 +1,161 @@
+"""The least-squares problem of a log under hypotheses, where its searches begin, and how far they may go."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.fits.explaining.form_fit import LONGEST_STEP
+from estimation.fits.explaining.leakage_step import likeliest_step
+from estimation.fits.explaining.wide_log import usual_values
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.problem import search_bounds
+from estimation.fits.hypotheses import LEAKAGE_TURBULENT, LIMITS, Hypothesis
+from estimation.log_checks.channel_names import POSITION
+from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
+from estimation.models.greybox import GreyBoxModel
+from estimation.models.wide_flow import (
+    LINEAR,
+    TURBULENT_FLOW_FORM,
+    WIDE_FLOW_FORM,
+)
+from plant.arrays import Array
+from plant.solvers.steps import parameter_names
+
+RELIEF_START = 1e-10
+"""Slope of a relief valve that opens early, first guess [m^3/(s Pa)]."""
+
+SHARPEST_RELIEF = 3e-3
+"""Least rise of pressure over its setting within which a relief valve passes the largest flow of the log [fraction].
+Valves need 0.05 to 0.2. At a sharper corner, which no sensor resolves, the model chatters from open to closed: slopes
+are then so steep that the deviation of bulk modulus comes out twenty times too small."""
+
+FASTEST_MAKEUP = 0.5 * LONGEST_STEP
+"""Least time in which a wide open make-up valve fills a chamber [s]. At a fifth of a model step the model may chatter,
+as at a sharp relief valve: the deviation of bulk modulus came out nine times too small."""
+
+MOST_VOLUME = 2.0
+"""Factor by which a chamber's volume is sought above or below the rig file's [dimensionless]: 4.6 deviations of what is
+presumed. Volumes 4 and 80 times as large took the place of an encoder's zero."""
+
+ADIABATIC = 1.4
+"""Exponent of nitrogen that is compressed quickly [dimensionless]."""
+
+LEAST_GAS = 1.0
+"""Least gas of the inner circuit's accumulator, in chamber volumes; judged. With less its pressure would follow every
+stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
+
+POSITION_ZERO = "position_zero"
+
+START_PRESSURE, START_LEVEL = "start_pressure", "start_level"
+
+LEAST_PEAK = 1.0
+"""Highest differential pressure taken of a log whose sensor is dead: the logarithm of none is no start [Pa]."""
+
+LEVELS_TRIED = (0.0, 0.3)
+"""Levels over the accumulator's pressure with which both sides may begin, as shares of the most [fraction]."""
+
+MOST_BIASED = 2.0
+"""Factor by which position's noise may have put the first bulk modulus off [dimensionless]. Far above it there is a
+second valley, where all that the log shows is noise that the oil's stiffness makes large."""
+
+
+def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedProblem:
+    """Return the least-squares problem of a log under hypotheses.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    together : sequence of Hypothesis
+        What is freed beside the plain form's unknowns.
+    *more : str
+        Parameters that are freed in any case.
+
+    Returns
+    -------
+    FreedProblem
+        The problem; relief is free where the log reaches its setting. A channel whose lag is free is not asked about.
+    """
+    extra = [*(name for one in together for name in (*one.free, *one.beside)), *more]
+    relieved = reaches_relief(log.measured, usual_values(log)["relief_pressure"])
+    plain = relieving(FLOW_FORM) if relieved else FLOW_FORM
+    held = {name for one in together for name in one.instead}
+    known = [name for name in plain.unknowns if name not in held]
+    late = {one.late for one in together}
+    log = replace(log, timed=tuple(channel for channel in log.timed if channel not in late))
+    form = TURBULENT_FLOW_FORM if set(LEAKAGE_TURBULENT.free) <= set(extra) else WIDE_FLOW_FORM
+    return FreedProblem(form, log, tuple(dict.fromkeys((*known, *extra))), LINEAR)
+
+
+def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]]:
+    """Return where the search under a hypothesis begins.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log.
+    one : Hypothesis
+        The hypothesis.
+
+    Returns
+    -------
+    sequence of Mapping[str, float]
+        First guesses [SI].
+    """
+    if one.from_first_sample:
+        seen = log.measured[np.isfinite(log.measured[:, 0]), 0]
+        begun = float(seen[0]) if len(seen) else 0.0
+        if START_PRESSURE not in one.free:
+            return [{one.free[0]: begun}]
+        return [{START_PRESSURE: begun, START_LEVEL: share * _shut_in(log)} for share in LEVELS_TRIED]
+    if one.from_change:
+        return [likeliest_step(log).first or one.starts[0]]
+    if one.from_mid_travel:
+        read = log.drives[:, WIDE_FLOW_FORM.drives.index(POSITION)]
+        return [*one.starts, {POSITION_ZERO: 0.5 * float(np.min(read) + np.max(read))}]
+    if not one.shares_of_peak:
+        return one.starts
+    peak = max(float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)
+    return [{"relief_pressure": share * peak, "relief_conductance": RELIEF_START} for share in one.shares_of_peak]
+
+
+def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) -> tuple[Array, Array]:
+    """Return how far a search for the flow form's unknowns may go, plain or wide.
+
+    Parameters
+    ----------
+    model : GreyBoxModel
+        The flow form with its unknowns.
+    guesses : sequence of ndarray, shape (unknowns,)
+        Where it begins [dimensionless].
+    log : GreyBoxLog
+        The log, as the model sees it.
+
+    Returns
+    -------
+    tuple of ndarray, shape (unknowns,)
+        Lower and upper bounds [dimensionless].
+    """
+    rig = dict(zip(parameter_names(model.parameters), map(float, log.parameters), strict=True))
+    most = rig["pump_displacement"] * float(np.max(np.abs(log.drives[:, 0])))
+    relief = (0.0, max(most / (SHARPEST_RELIEF * rig["relief_pressure"]), rig["relief_conductance"]))
+    stiffest = ADIABATIC * rig["accumulator_pressure"] / (LEAST_GAS * rig["chamber_volume"])
+    latest = 0.0 if log.course is None else -log.sample_time
+    limits = {"speed_lead": (latest, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
+    limits[START_LEVEL] = (-rig["accumulator_pressure"], _shut_in(log))
+    place = model.unknowns.index("bulk_modulus")  # fitted as a logarithm
+    softest, stiffest_guess = (float(np.exp(end(guess[place] for guess in guesses))) for end in (min, max))
+    stiff = max(rig["bulk_modulus"], stiffest_guess)
+    volume = rig["chamber_volume"]
+    limits["chamber_volume"] = (volume / MOST_VOLUME, MOST_VOLUME * volume)
+    limits["makeup_conductance"] = (0.0, 2.0 * rig["chamber_volume"] / (FASTEST_MAKEUP * stiff))
+    if log.passes_on:
+        limits["bulk_modulus"] = (softest / MOST_BIASED, MOST_BIASED * stiffest_guess)
+    return search_bounds(model, guesses, {**LIMITS, **limits})
+
+
+def _shut_in(log: GreyBoxLog) -> float:
+    """Return the most that a loaded chamber passes to the other one while no make-up flows: half of what loaded it."""
+    return max(0.5 * float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)

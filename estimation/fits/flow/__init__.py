@@ -1,0 +1,1 @@
+"""The flow form, fitted to logs with differential pressure."""

@@ -1,0 +1,293 @@
+"""`flow_log(record, parameters, ...)`: a log as the flow form sees it, with what its sensors' noise does to the fit."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.fits.explaining.form_fit import LONGEST_STEP
+from estimation.fits.greybox.averaged import averaged
+from estimation.fits.greybox.course import SLOW
+from estimation.fits.greybox.log import GreyBoxLog, greybox_log
+from estimation.fits.greybox.speed_course import straightened
+from estimation.log_checks.bridging import bridged, within_gaps
+from estimation.log_checks.dropout import LONG_GAP, without_pauses
+from estimation.log_checks.measurement_noise import measurement_variances, position_variance, struck_variance
+from estimation.log_checks.outliers import without_outliers
+from estimation.models.completed_flow import CRACKS
+from estimation.models.flow import FLOW_FORM
+from estimation.models.flow_parameters import flow_parameters
+from estimation.models.inner_circuit import BEND
+from estimation.stretches import stretches
+from plant.eha.model import EhaParameters, piston_areas
+from plant.log.record import Record
+
+OPENING_START = 1e3
+"""First guess of the drop at which a make-up check valve is half open [Pa]."""
+
+DRAIN_START = 0.05
+"""First guess of the pump's case drain, as a share of the healthy leakage [fraction]."""
+
+PRESUMED_STD = 1.0
+"""Standard deviation of the logarithms of the last two about their first guesses, before the log is seen: where the
+make-up valves never open, no log tells a drain from leakage, and any drain would do [dimensionless]."""
+
+LEAST_LEAKAGE = 1e-3
+"""Least first guess of a leakage, as a share of the rated pump flow [fraction]; a logarithm cannot start at zero."""
+
+MOST_LEAD = 0.25
+"""Standard deviation of the motor's lead before a log is seen, over the sample time [dimensionless]: it is a twelfth of
+the sample time over the motor's lag, so that only a motor that settles within a sample leads by more."""
+
+FULLEST = 0.7
+"""Share of a chamber that the piston is believed to sweep at most: an encoder's zero may be anywhere [fraction]."""
+
+FELT_GAP = 0.1
+"""A gap in speed matters where what it leaves open moves pressure by this share of its noise or more [fraction]."""
+
+FELT_NOISE = 0.1
+"""Noise of position matters to the slopes where it moves pressure by this share of the sensor's own [fraction]."""
+
+BESIDE_STOP = 0.02
+"""Share of its travel that an encoder homed at an end stop may read beyond the stop, which is soft; and what a log that
+begins in mid-stroke, at a reading of none, may read at first [fraction]."""
+
+OUTRUNS, OUTRUN_SPAN = 1.2, 5e-3
+"""How many times as fast as the pump's whole flow would move it a piston is that outruns it [dimensionless], and over
+which time [s]. Of 100 training logs without a constant load none is 0.95, of 20 with one seven are 1.8."""
+
+NOISY_BLOCK = 5e-3
+"""Length over which residuals are averaged then [s]: what they say of bulk modulus is slower, the noise is not. With 1
+ms, 50 um of noise put bulk modulus of leaky actuators up to 4 % low, with 5 ms 2.5 %."""
+
+
+def without_strays(record: Record) -> tuple[Record, Mapping[str, float]]:
+    """Return the channels of the flow form without gross outliers, and their variances.
+
+    Parameters
+    ----------
+    record : Record
+        A log that has them.
+
+    Returns
+    -------
+    tuple of (Record, Mapping[str, float])
+        The channels, and the variance of each [SI squared].
+    """
+    channels = (*FLOW_FORM.drives, *FLOW_FORM.outputs)
+    noise = measurement_variances(record, channels)
+    sound = {name: without_outliers(record[name], noise[name] ** 0.5) for name in channels}
+    record = Record(record.sample_time, sound, start_time=record.start_time)
+    return record, measurement_variances(record, channels)
+
+
+def speed_gaps(record: Record, parameters: EhaParameters, noise: float) -> Array:
+    """Return where missing motor speeds leave the pumped volume open by more than the pressure can overlook.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    parameters : EhaParameters
+        The actuator.
+    noise : float
+        Standard deviation of the differential pressure's noise [Pa].
+
+    Returns
+    -------
+    ndarray, shape (gaps, 3)
+        As `GreyBoxLog.gaps`, in pressure [Pa squared].
+    """
+    missing = np.isnan(record["motor_speed_rad_s"])
+    first, after = stretches(missing)
+    speed, last, length = bridged(record["motor_speed_rad_s"]), len(missing) - 1, after - first
+    before, further, behind = np.maximum(first - 1, 0), np.maximum(first - 2, 0), np.minimum(after, last)
+    # a straight line is right where the speed goes on as it did before the gap and does after it
+    slopes = 0.5 * (speed[before] - speed[further] + speed[np.minimum(after + 1, last)] - speed[behind])
+    sudden = np.abs(speed[behind] - speed[before] - slopes * (length + 1))
+    sudden = np.where(length < LONG_GAP, sudden, np.maximum(sudden, np.std(speed)))
+    stiffness = parameters.bulk_modulus / parameters.chamber_volume * parameters.pump_displacement
+    open_by = 0.5 * stiffness * sudden * length * record.sample_time
+    open_gaps = np.array([first, behind, open_by**2 / (length + 1)], dtype=np.float64)
+    return np.ascontiguousarray(open_gaps[:, open_by > FELT_GAP * noise].T)
+
+
+def flow_log(
+    record: Record, parameters: EhaParameters, uncertainties: Mapping[str, float], variances: Mapping[str, float]
+) -> GreyBoxLog:
+    """Return a log as the flow form sees it.
+
+    Position is both an input and noisy: what it is off by compresses the oil in the model alone. Where that is felt
+    beside the pressure sensor's own noise, the output's noise has a part that is proportional to bulk modulus, and the
+    fit takes no error of the encoder for soft oil.
+
+    Parameters
+    ----------
+    record : Record
+        The log, without gross outliers.
+    parameters : EhaParameters
+        The actuator.
+    uncertainties : Mapping[str, float]
+        Relative standard deviation of its parameters [fraction].
+    variances : Mapping[str, float]
+        Of the noise of the channels [SI squared].
+
+    Returns
+    -------
+    GreyBoxLog
+        Averaged where it is faster than the form has use for.
+    """
+    sensed, record = record, without_pauses(record)
+    pressure = "differential_pressure_pa"  # a motor's blows stay in its noise: so intervals hold its course
+    quiet = {pressure: min(variances[pressure], struck_variance(sensed[pressure]))}
+    log = greybox_log(
+        FLOW_FORM,
+        record,
+        flow_parameters(parameters),
+        longest_step=LONGEST_STEP,
+        variances={**variances, **quiet},
+        uncertainties=uncertainties,
+    )
+    speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
+    swept = _swept_share(log.drives[:, position], parameters)
+    drives = log.drives.copy()
+    drives[:, speed] = straightened(log.drives[:, speed], slow=record.sample_time >= SLOW)
+    passed_on = swept * position_variance(sensed["position_m"]) ** 0.5
+    open_gaps = speed_gaps(record, parameters, variances["differential_pressure_pa"] ** 0.5)
+    log = replace(
+        log,
+        noise=(replace(log.noise[0], passed_on=passed_on, passed_by="bulk_modulus"),),
+        timed=FLOW_FORM.drives,
+        drive_std=(log.drive_std[0], 0.0),  # the residuals hold position's
+        # where the piston is within a gap of its position is not known, where it is after it is
+        drives=_balanced_across(open_gaps, record, drives, parameters),
+        measured=np.where(within_gaps(record["position_m"])[:, None], np.nan, log.measured),
+        gaps=open_gaps,
+        presumed={
+            "case_leakage": (DRAIN_START * usual_leakage(parameters), PRESUMED_STD),
+            "makeup_opening": (OPENING_START, PRESUMED_STD),
+            "speed_lead": (0.0, MOST_LEAD * record.sample_time / dict(FLOW_FORM.linear)["speed_lead"]),
+            **dict.fromkeys((*CRACKS, BEND), (0.0, 1.0)),
+        },
+    )
+    log = averaged(log, LONGEST_STEP)
+    felt = log.noise[0].passed_on * parameters.bulk_modulus > FELT_NOISE * log.noise[0].variance ** 0.5
+    return replace(log, block=NOISY_BLOCK) if felt else log.taken_at(parameters.bulk_modulus)
+
+
+def carried(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float]) -> GreyBoxLog:
+    """Return a log with what noise of motor speed leaves in the chambers, as a random walk of pressure.
+
+    What a noisy speed is off by is oil that the model pumps, and it stays until it has leaked off. To squares of the
+    residuals a softer oil and a larger leakage then look better than the true ones, for they keep less of it.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    values : Mapping[str, float]
+        Bulk modulus and leakage coefficient, as a first fit has found them [SI].
+
+    Returns
+    -------
+    GreyBoxLog
+        The same log where the walk is not felt beside the pressure sensor's noise before the oil has leaked off.
+    """
+    (noise,), stiffness = log.noise, values["bulk_modulus"] / parameters.chamber_volume
+    speed = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
+    variance = min(log.drive_std[0] ** 2, struck_variance(speed))
+    walk = (stiffness * parameters.pump_displacement) ** 2 * variance * log.sample_time
+    remembered = 0.5 / max(stiffness * values["leakage_coefficient"], 1.0 / (len(log.drives) * log.sample_time))
+    felt = walk * remembered > FELT_NOISE**2 * noise.variance
+    return replace(log, noise=(replace(noise, walk=walk),)) if felt else log
+
+
+def homed_at_stop(log: GreyBoxLog) -> bool:
+    """Return whether an encoder may have been homed at an end stop: it reads one sign only, and not zero at first.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the flow form sees it.
+
+    Returns
+    -------
+    bool
+        Whether it may.
+    """
+    read = log.drives[:, FLOW_FORM.drives.index("position_m")]
+    low, high = float(np.min(read)), float(np.max(read))
+    beside = BESIDE_STOP * (high - low)
+    return min(max(-low, 0.0), max(high, 0.0)) <= beside < abs(float(read[0]))
+
+
+def outruns_pump(log: GreyBoxLog, p: EhaParameters) -> bool:
+    """Return whether the piston moves faster than all that the pump delivers would move it, as one that a load pulls.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the flow form sees it.
+    p : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    bool
+        Whether it does.
+    """
+    speed, position = (log.drives[:, FLOW_FORM.drives.index(name)] for name in FLOW_FORM.drives)
+    samples = min(max(1, round(OUTRUN_SPAN / log.sample_time)), len(position) - 1)
+    fastest = float(np.max(np.abs(position[samples:] - position[:-samples]))) / (samples * log.sample_time)
+    return p.piston_area * fastest > OUTRUNS * p.pump_displacement * float(np.max(np.abs(speed)))
+
+
+def _swept_share(position: Array, p: EhaParameters) -> float:
+    """Return the relative change of volume per piston travel, added over both chambers, by root mean square [1/m]."""
+    area_1, area_2 = piston_areas(p)
+    volume = 2.0 * p.chamber_volume
+    swept = [np.clip(area * side * position / volume, -FULLEST, FULLEST) for area, side in ((area_1, 1), (area_2, -1))]
+    shares = area_1 / (1.0 + swept[0]) + area_2 / (1.0 + swept[1])
+    return float(np.sqrt(np.mean(shares**2))) / volume
+
+
+def _balanced_across(open_gaps: Array, record: Record, drives: Array, p: EhaParameters) -> Array:
+    """Return the drives with speeds in gaps that deliver what the piston sweeps, and what the oil yields and leaks.
+
+    That is known from the ends of a gap, at the rig's values well enough. Speeds on a straight line from end to end may
+    deliver so much less that a chamber of the model draws oil. No other valve lets it out again, so it would stay.
+    """
+    speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
+    out, pressure = drives.copy(), bridged(record["differential_pressure_pa"])
+    missing = np.isnan(record["motor_speed_rad_s"])
+    for first, behind, _ in open_gaps:
+        before, after = int(first) - 1, int(behind)
+        if before < 0 or missing[after]:
+            continue  # at an end of the log nothing is known of the other end of a gap
+        length = (after - before) * record.sample_time
+        swept = p.piston_area * (drives[after, position] - drives[before, position])
+        yielded = p.chamber_volume / p.bulk_modulus * (pressure[after] - pressure[before])
+        leaked = p.leakage_coefficient * 0.5 * (pressure[after] + pressure[before]) * length
+        wanted = (swept + yielded + leaked) / p.pump_displacement
+        line = float(np.trapezoid(drives[before : after + 1, speed], dx=record.sample_time))
+        out[before + 1 : after, speed] += (wanted - line) / ((after - before - 1) * record.sample_time)
+    return out
+
+
+def usual_leakage(p: EhaParameters) -> float:
+    """Return the first guess of a leakage [m^3/(s Pa)].
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    float
+        The healthy actuator's, or a little where it has none.
+    """
+    return max(p.leakage_coefficient, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed / p.relief_pressure)

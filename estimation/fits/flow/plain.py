@@ -1,0 +1,217 @@
+"""`plain_fits(logged, start) -> PlainFits`: the plain flow form's fits of a log, before it is asked what is strange."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from operator import attrgetter
+
+import numpy as np
+
+from estimation.fits.explaining.between_samples import with_course
+from estimation.fits.explaining.objections import fit_explains, limits
+from estimation.fits.explaining.toothed import toothed
+from estimation.fits.flow.log import carried, flow_log
+from estimation.fits.flow.search import balanced, flow_starts
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.play import ShownPlay, play_untaken
+from estimation.fits.greybox.teeth import Turning
+from estimation.models.flow import HELD_FLOW_FORM
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from plant.notes import Note
+
+LEAST_GUESS = 1e-2
+"""Share of the rig file's bulk modulus that a first guess is at least [fraction]."""
+
+_cost = attrgetter("cost")
+
+
+@dataclass(frozen=True, eq=False)
+class Logged:
+    """A log without gross outliers, and what is known of it.
+
+    Parameters
+    ----------
+    record : Record
+        Its channels.
+    variances : Mapping[str, float]
+        Measurement variance of each [SI squared].
+    uncertainties : Mapping[str, float]
+        Relative standard deviation of the actuator's parameters [fraction].
+    """
+
+    record: Record
+    variances: Mapping[str, float]
+    uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    def seen_at(self, parameters: EhaParameters) -> GreyBoxLog:
+        """Return the log as the flow form sees it in an actuator.
+
+        Parameters
+        ----------
+        parameters : EhaParameters
+            The actuator.
+        """
+        return flow_log(self.record, parameters, self.uncertainties, self.variances)
+
+
+@dataclass(frozen=True, eq=False)
+class FitStart:
+    """Where the searches of a fit begin.
+
+    Parameters
+    ----------
+    parameters : EhaParameters
+        The actuator.
+    bulk_modulus : float
+        First guess of effective bulk modulus [Pa].
+    speed_offset : float
+        First guess of how much the logged speed exceeds the shaft's [rad/s].
+    valley : Mapping[str, float], optional
+        Values of the plain form's unknowns from which searches begin as well, see `lower_valley` [SI].
+    """
+
+    parameters: EhaParameters
+    bulk_modulus: float
+    speed_offset: float = 0.0
+    valley: Mapping[str, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class PlainFits:
+    """The plain form's fits of a log.
+
+    Parameters
+    ----------
+    start : FitStart
+        Where they began.
+    starts : sequence of Mapping[str, float]
+        All places from which searches began [SI].
+    fitted : callable
+        ``fitted(log)``: the fits of a log by every form that counts.
+    unturned, log : GreyBoxLog
+        The log before teeth and an offset of speed were taken up, and with them, noise of position as at the found bulk
+        modulus.
+    fits : sequence of GreyBoxFit
+        By every form that counts.
+    explains : callable
+        ``explains(fit)``: whether a fit explains the log.
+    teeth, teeth_left : tuple of Note
+        What was taken up of the pump's teeth and the speed's offset, and what residuals show of them beside.
+    turning : Turning
+        Teeth and offset of speed that were taken up.
+    """
+
+    start: FitStart
+    starts: Sequence[Mapping[str, float]]
+    fitted: Callable[[GreyBoxLog], Sequence[GreyBoxFit]]
+    unturned: GreyBoxLog
+    log: GreyBoxLog
+    fits: Sequence[GreyBoxFit]
+    explains: Callable[[GreyBoxFit], bool]
+    teeth: tuple[Note, ...]
+    teeth_left: tuple[Note, ...]
+    turning: Turning
+
+    @property
+    def best(self) -> GreyBoxFit:
+        """The likeliest."""
+        return min(self.fits, key=_cost)
+
+    @property
+    def swinging(self) -> GreyBoxFit:
+        """The likeliest with volumes that swing."""
+        return _swinging(self.fits)
+
+    def yields(self, sensed: ShownPlay, bulk_modulus: float) -> float:
+        """Return what the piston yields unseen, over what the oil does.
+
+        Parameters
+        ----------
+        sensed : ShownPlay
+            The play that a velocity sensor shows.
+        bulk_modulus : float
+            Of the oil [Pa].
+
+        Returns
+        -------
+        float
+            The ratio [fraction].
+        """
+        softness = self.start.parameters.piston_area * sensed.yields / self.start.parameters.chamber_volume
+        return softness * bulk_modulus
+
+    def play_untaken(self, shown: ShownPlay, sensed: ShownPlay) -> tuple[float, tuple[Note, ...]]:
+        """Return what a play leaves open that no fit took up; see `estimation.fits.greybox.play.play_untaken`.
+
+        Parameters
+        ----------
+        shown : ShownPlay
+            The play that the residuals show of the fit that is told.
+        sensed : ShownPlay
+            The play that a velocity sensor shows.
+
+        Returns
+        -------
+        tuple of (float, tuple of Note)
+            Relative deviation of bulk modulus [fraction], and a remark where the gate is not shut for it.
+        """
+        return play_untaken(shown, sensed, self.yields(sensed, self.swinging.values["bulk_modulus"]))
+
+
+def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
+    """Fit the plain flow form to a log by every balance that counts.
+
+    What the motor's course between samples leaves open, a pump's teeth, and an offset of speed are taken up on the way.
+
+    Parameters
+    ----------
+    logged : Logged
+        The log.
+    start : FitStart
+        Where searches begin.
+
+    Returns
+    -------
+    PlainFits
+        The fits, and the log as they see it.
+    """
+    parameters = start.parameters
+    log = logged.seen_at(parameters)
+    starts = flow_starts(parameters, max(start.bulk_modulus, LEAST_GUESS * parameters.bulk_modulus))
+    explains = partial(fit_explains, noisy=log.passes_on)
+    largest, _ = limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))
+    fitted = partial(balanced, parameters=parameters, starts=starts, valley=start.valley)
+    unturned = with_course(log, fitted, parameters)
+    log, fits, teeth, left = toothed(unturned, fitted, explains, largest, start.speed_offset)
+    turning = Turning(log.teeth, log.speed_offset)
+    log = carried(log, parameters, _swinging(fits).values)
+    return PlainFits(start, starts, fitted, unturned, log, fits, explains, teeth, left, turning)
+
+
+def stiffer(logged: Logged, plain: PlainFits) -> EhaParameters | None:
+    """Return the actuator with the stiff oil that was found, where noise of position counts there but did not yet.
+
+    Parameters
+    ----------
+    logged : Logged
+        The log.
+    plain : PlainFits
+        Its fits.
+
+    Returns
+    -------
+    EhaParameters or None
+        The actuator to fit the log anew at; None where noise of position counts already, or nowhere.
+    """
+    parameters, swinging = plain.start.parameters, plain.swinging
+    found = swinging.values["bulk_modulus"]
+    if plain.log.passes_on or found <= parameters.bulk_modulus or not plain.explains(swinging):
+        return None
+    stiff = replace(parameters, bulk_modulus=found)
+    return stiff if logged.seen_at(stiff).passes_on else None
+
+
+def _swinging(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:
+    return min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)

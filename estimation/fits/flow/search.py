@@ -1,0 +1,350 @@
+"""`balanced(log, ...)`: fits of the flow form, balanced by volume, by mass, and by volume in held chambers.
+
+The likeliest of many coarse guesses is followed first, for a run without slopes is cheap. Where it leads to a point
+that explains the log, nothing else is searched; else searches begin at leakages and flow biases of all conditions.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from math import ceil, prod
+from typing import TypeAlias
+
+import numpy as np
+
+from estimation.fits.explaining.form_fit import FAULTS_TRIED
+from estimation.fits.explaining.wide_problem import flow_bounds
+from estimation.fits.flow.log import DRAIN_START, LEAST_LEAKAGE, OPENING_START, carried, outruns_pump, usual_leakage
+from estimation.fits.greybox.descent import Point, descend
+from estimation.fits.greybox.fit import NEAR_ENOUGH, GreyBoxFit, Search, concluded, explained, roughly
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.problem import Problem
+from estimation.models.completed_flow import CRACKS, completed
+from estimation.models.flow import (
+    FLOW_FORM,
+    HELD_FLOW_FORM,
+    MASS_FLOW_FORM,
+    STIFFNESS,
+    reaches_relief,
+    relieving,
+)
+from estimation.models.greybox import GreyBoxModel
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+from plant.spare_processors import each
+
+MAKEUP_TRIED = (1e-9, 1e-13)
+"""Make-up conductances of the starts [m^3/(s Pa)]: a circuit with make-up valves, and one without."""
+
+LEAD_START = 1e-5
+"""First guess of the motor's lead on the straight line between samples [s]."""
+
+GUESSED: Mapping[str, Sequence[float]] = {
+    "leakage_coefficient": (1.0, 2.5, 5.0, 8.0, 12.5),
+    "flow_bias": (1.0, 3.5, 6.0),
+    "bulk_modulus": (0.7, 1.0, 1.3),
+}
+"""Multiples of the first start's unknowns in the guesses of which the likeliest is followed [dimensionless]: from the
+healthy actuator to the worst of Table 3."""
+
+GUESSED_WITHIN = 0.3
+"""First radius of a search from the likeliest guess [dimensionless]: half the distance between guesses of leakage."""
+
+SCREENED_SECONDS = 4.0
+"""Starts are compared on the beginning of the log: it tells a wrong valley from a right one [s]."""
+
+ROUGH_ENOUGH = 0.05
+"""Half the sum of squares that a further step must promise while model steps are long [dimensionless]: their errors put
+the optimum off by more. With 0.3 logs of a sine, whose valleys are flat, took twice as many short steps after."""
+
+FINISHING = 60
+"""Evaluations with short model steps. Most searches end by themselves by the tenth. Where oil is stiff and a pump is
+large, long model steps lead so far astray that 15 left 74 of log-likelihood, and bulk modulus 1.3 % off [count]."""
+
+SETTLING = 15
+"""The same of a form that no more than long steps explain: it is then asked what is strange [count]."""
+
+UNLIKELY = 36.0
+"""Difference of log-likelihood from which a form of the balance counts for nothing beside the other [dimensionless]."""
+
+RIVAL = 2.0 * UNLIKELY
+"""The same between searches with long model steps, which have errors [dimensionless]."""
+
+
+_Found: TypeAlias = tuple[Problem, Point, tuple[Array, Array]]
+"""A problem, its solution, and the bounds of its search."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Rough:
+    """Where one balance fits best with long model steps, and the bounds of its search."""
+
+    problem: Problem
+    point: Point
+    bounds: tuple[Array, Array]
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        return {STIFFNESS: 0.0, **self.problem.model.values(self.point.theta)}
+
+
+def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
+    """Return where searches for the flow form's unknowns begin.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+    bulk_modulus : float
+        First guess of effective bulk modulus [Pa].
+
+    Returns
+    -------
+    list of dict
+        Values of the unknowns [SI]; those of the healthy actuator at the first guess come first.
+    """
+    leakage = usual_leakage(p)
+    bias = max(p.flow_bias, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed)
+    moduli = sorted({bulk_modulus, p.bulk_modulus})
+    return [
+        {
+            "bulk_modulus": modulus,
+            "leakage_coefficient": worse * leakage,
+            "flow_bias": biased * bias,
+            "makeup_conductance": makeup,
+            "makeup_opening": OPENING_START,
+            "case_leakage": DRAIN_START * leakage,
+            "speed_lead": LEAD_START,
+            "relief_pressure": p.relief_pressure,
+            "relief_conductance": p.relief_conductance,
+        }
+        for worse, biased in FAULTS_TRIED
+        for makeup in MAKEUP_TRIED
+        for modulus in moduli
+    ]
+
+
+def balanced(
+    log: GreyBoxLog,
+    parameters: EhaParameters,
+    starts: Sequence[Mapping[str, float]],
+    valley: Mapping[str, float] | None = None,
+) -> Sequence[GreyBoxFit]:
+    """Return the fits of the balances that count.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    starts : sequence of Mapping[str, float]
+        Where searches begin, see `flow_starts` [SI].
+    valley : Mapping[str, float], optional
+        A place in a lower valley, see `lower_valley`, where searches with short model steps begin as well [SI].
+
+    Returns
+    -------
+    sequence of GreyBoxFit
+        One with volumes that swing at least. Rig slopes and lateness are told of the likeliest, and of the likeliest
+        with volumes that swing.
+    """
+    rough = _rough(log, parameters, starts)
+    least = min(one.point.cost for one in rough)
+    near = min((one for one in rough if not _held(one.problem)), key=lambda one: one.point.cost)
+    likely = [one for one in rough if one is near or one.point.cost < least + RIVAL]
+    behind = [one for one in rough if not (_held(one.problem) or one in likely)]
+    log, bent = carried(log, parameters, near.values), outruns_pump(log, parameters)
+    done = each(lambda one: _finished(one, log, bent=bent), likely)
+    wanted = min(done, key=_cost)[1].cost
+    done += each(lambda one: _finished(one, log, wanted, bent=bent), behind)
+    if valley is not None:
+        done = each(lambda one: min(one, _from_valley(one[0].model, log, valley), key=_cost), done)
+    best = min(done, key=_cost)
+    swinging = min((one for one in done if not _held(one[0])), key=_cost)
+    least = best[1].cost
+
+    def told(one: _Found) -> GreyBoxFit:
+        problem, point, bounds = one
+        counts, asked = point.cost < least + UNLIKELY, one is best or one is swinging
+        return concluded(problem, point, least=bounds[0], disturbed=counts, asked=asked)
+
+    return each(told, done)
+
+
+def lower_valley(
+    log: GreyBoxLog, fit: GreyBoxFit, found: Mapping[str, tuple[float, float]], wanted: float
+) -> Mapping[str, float] | None:
+    """Return a place from which the plain form leads lower than a cost, given what explains a log better than its fit.
+
+    A form has several valleys where make-up valves open and shut. The way out of one may lead through a hypothesis of
+    which nothing is left at the end: a drain of one port that ends as the other one's.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the flow form sees it.
+    fit : GreyBoxFit
+        The plain form's.
+    found : Mapping[str, tuple of float]
+        Value and deviation of what explains the log, by parameter [SI].
+    wanted : float
+        The cost [dimensionless].
+
+    Returns
+    -------
+    Mapping[str, float] or None
+        Values of the unknowns of the plain form [SI]; None where it leads nowhere so low, where it was not completed
+        because it comes nowhere near the log, or the log has gaps.
+    """
+    if log.gaps.size or CRACKS[0] not in fit.values:
+        return None
+    values = {**fit.values, **dict.fromkeys(CRACKS, 0.0), **{name: value for name, (value, _) in found.items()}}
+    _, point, _ = _from_valley(fit.model, log, values, wanted)
+    return values if point.cost < wanted else None
+
+
+def _from_valley(form: GreyBoxModel, log: GreyBoxLog, valley: Mapping[str, float], wanted: float = np.inf) -> _Found:
+    """Return where a form leads from values of its unknowns."""
+    problem = FreedProblem.of(form, log)
+    theta = form.theta({STIFFNESS: 0.0, **valley})
+    bounds = flow_bounds(form, [theta], log)
+    return problem, descend(problem.at, theta, FINISHING, bounds, radius=GUESSED_WITHIN, wanted=wanted), bounds
+
+
+def _finished(one: _Rough, log: GreyBoxLog, wanted: float = np.inf, *, bent: bool) -> _Found:
+    """Return where short model steps lead; what they alone explain is completed as well, for long ones have errors.
+
+    A search that will not come down to the cost ``wanted`` ends early. Make-up valves that must let in more than the
+    pump delivers are orifices (``bent``).
+    """
+    one = replace(one, problem=one.problem.on(log))
+    if not _plain(one):
+        one = replace(one, point=descend(one.problem.at, one.point.theta, SETTLING, one.bounds, wanted=wanted))
+        if not _plain(one):
+            return one.problem, one.point, one.bounds
+    problem, theta, bounds = _completed(one, log, bent=bent)
+    return problem, descend(problem.at, theta, FINISHING, bounds, wanted=wanted), bounds
+
+
+def _cost(one: _Found) -> float:
+    return one[1].cost
+
+
+def _held(problem: Problem) -> bool:
+    return problem.model.rates is HELD_FLOW_FORM.rates
+
+
+def _plain(one: _Rough) -> bool:
+    """Return whether a form explains a log so far that the last digits matter.
+
+    Elsewhere valves that crack would take up what is strange and hide it: an encoder that was homed at the end stop,
+    or a worn pump. Held chambers are the lumped plant's, which has no such valves.
+    """
+    return not _held(one.problem) and not one.problem.log.gaps.size and explained(one.problem, one.point)
+
+
+def _completed(one: _Rough, log: GreyBoxLog, *, bent: bool) -> tuple[Problem, Array, tuple[Array, Array]]:
+    """Return the problem with what matters to the last digits alone, where its search begins, and its bounds."""
+    problem = FreedProblem.of(completed(one.problem.model, bent=bent), one.problem.log)
+    theta = np.append(one.point.theta, np.zeros(len(problem.model.unknowns) - len(one.point.theta)))
+    lowest, highest = flow_bounds(problem.model, [theta], log)
+    known = len(one.point.theta)
+    lowest[:known], highest[:known] = one.bounds
+    return problem, theta, (lowest, highest)
+
+
+def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]) -> list[_Rough]:
+    """Return where the balances fit best with long model steps, each searched from where the first one ended."""
+    relieved = reaches_relief(log.measured, parameters.relief_pressure)
+    forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
+    afar = log.taken_at(parameters.bulk_modulus)
+    if not log.gaps.size:
+        guess, near = _guess(forms[0], afar, starts)
+        if not near:  # in a wrong valley the whole log takes all steps that there are
+            first = _searched(forms[0], log, afar, starts, hopeful=True)
+            if _explains(first):
+                return [first, *_others(forms[1:], log, afar, first)]
+        first = _searched(forms[0], log, afar, [guess], alone=True)
+        others = _others(forms[1:], log, afar, first, alone=True)
+        if _explains(first) or _explains(others[0]):
+            return [first, *others]
+        starts = [*starts, first.values]
+    first = _searched(forms[0], log, afar, starts)
+    return [first, *_others(forms[1:], log, afar, first)]
+
+
+def _others(
+    forms: Sequence[GreyBoxModel], log: GreyBoxLog, afar: GreyBoxLog, first: _Rough, *, alone: bool = False
+) -> list[_Rough]:
+    """Return where other forms lead from where the first one ended, as far as they may count beside it."""
+    wanted = first.point.cost + RIVAL
+    return each(lambda form: _searched(form, log, afar, [first.values], alone=alone, wanted=wanted), forms)
+
+
+def _explains(one: _Rough) -> bool:
+    return explained(one.problem, one.point)
+
+
+def _guess(
+    form: GreyBoxModel, log: GreyBoxLog, starts: Sequence[Mapping[str, float]]
+) -> tuple[Mapping[str, float], bool]:
+    """Return where the likeliest of many guesses about the first start leads, and whether that explains the log.
+
+    Of the log its beginning is looked at.
+    """
+    search = _search(log)
+    problem = FreedProblem.of(form, log.beginning(search.screened).coarsened())
+    around = {STIFFNESS: 0.0, **starts[0]}
+    guesses = _guesses_about(around, problem.model)
+    likeliest = guesses[int(np.argmin(problem.costs(guesses)))]
+    bounds = flow_bounds(form, guesses, log)
+    found = descend(problem.at, likeliest, search.evaluations, bounds, search.near_enough, GUESSED_WITHIN)
+    return problem.model.values(found.theta), explained(problem, found)
+
+
+def _guesses_about(around: Mapping[str, float], model: GreyBoxModel) -> list[Array]:
+    """Return all guesses about a start, each coordinate of which is made once."""
+    places = [model.unknowns.index(name) for name in GUESSED]
+    tried = [
+        [model.theta({**around, name: factor * around[name]})[place] for factor in factors]
+        for place, (name, factors) in zip(places, GUESSED.items(), strict=True)
+    ]
+    guesses = np.tile(model.theta(around), (prod(map(len, tried)), 1))
+    guesses[:, places] = list(product(*tried))
+    return list(guesses)
+
+
+def _search(log: GreyBoxLog) -> Search:
+    # where the noise moves with bulk modulus, steps promise less than they give
+    near_enough = NEAR_ENOUGH if log.passes_on else ROUGH_ENOUGH
+    return Search(screened=ceil(SCREENED_SECONDS / log.sample_time), near_enough=near_enough)
+
+
+def _searched(
+    form: GreyBoxModel,
+    log: GreyBoxLog,
+    afar: GreyBoxLog,
+    starts: Sequence[Mapping[str, float]],
+    *,
+    alone: bool = False,
+    wanted: float = np.inf,
+    hopeful: bool = False,
+) -> _Rough:
+    """Return the best that is found from starts, at first with noise of position as it is at the rig's bulk modulus."""
+    search = _search(log)
+    problem = Problem(form, afar) if log.gaps.size else FreedProblem.of(form, afar)  # what gaps leave open, once
+    guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in starts]
+    bounds = flow_bounds(form, guesses, afar)
+    if not log.passes_on:
+        point = roughly(problem, guesses, search, bounds, wanted, hopeful=hopeful)
+        return _Rough(problem, point, bounds)
+    point = roughly(problem, guesses, search, bounds, hopeful=hopeful)
+    if np.isinf(point.cost):
+        return _Rough(problem, point, bounds)
+    problem, modulus = problem.on(log), form.values(point.theta)["bulk_modulus"]
+    guesses = [form.theta({STIFFNESS: 0.0, **start, "bulk_modulus": modulus}) for start in starts]
+    bounds = flow_bounds(form, guesses, log)
+    again = [point.theta] if alone else [*guesses, point.theta]
+    return _Rough(problem, roughly(problem, again, search, bounds, wanted), bounds)

@@ -1,0 +1,251 @@
+"""Gauss-Newton steps within a trust region and bounds, for least squares."""
+
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.fits.greybox.root import root_between
+
+Array = NDArray[np.float64]
+
+FIRST_RADIUS = 30.0
+"""Length of the longest first step, in fitted coordinates: logarithms, or typical sizes [dimensionless]."""
+
+REACH = 30.0
+"""A coordinate by itself steps no farther [dimensionless]: its slope over this is added to its curvature."""
+
+RIDGE = 1e-6
+"""Added to the curvature: an unknown that is not felt stays where it is [dimensionless]."""
+
+LEAST_GAIN = 1e-3
+"""Half the sum of squares that a further step must promise: less moves no unknown by a twentieth of its deviation."""
+
+SHORTEST = 1e-5
+"""A step shorter than this that fails is the last [dimensionless]: the misfit is rougher than its slopes say."""
+
+SHORTENED = 12
+"""How often at most a step is shortened that promises a loss."""
+
+POOR, GOOD = 0.25, 0.75
+"""Shares of a step's promise below which the radius shrinks to that part of it, and above which it grows."""
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """The misfit at one point of the search.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (unknowns,)
+        Fitted coordinates [dimensionless].
+    cost : float
+        Half the sum of squared normalised residuals, outliers counted linearly, and the prior's part [dimensionless].
+    gradient : ndarray, shape (unknowns,)
+        Of the cost.
+    gram : ndarray, shape (unknowns, unknowns)
+        ``J'J``, each block counted by its weight, and what is known beforehand.
+    """
+
+    theta: Array
+    cost: float
+    gradient: Array
+    gram: Array
+
+
+def descend(
+    at: Callable[[Array], Point],
+    start: Array,
+    evaluations: int,
+    bounds: tuple[Array, Array],
+    least_gain: float = LEAST_GAIN,
+    radius: float = FIRST_RADIUS,
+    wanted: float = np.inf,
+    least_share: float = 0.0,
+) -> Point:
+    """Return the least cost downhill from a start: Gauss-Newton steps within a trust region and bounds.
+
+    The radius is of the coordinates themselves, mostly logarithms, not of their effects: several unknowns may then move
+    far together where together they change little (Conn, Gould and Toint 2000, Trust-Region Methods, algorithm 6.1.1).
+
+    Parameters
+    ----------
+    at : callable
+        The cost at given coordinates.
+    start : ndarray, shape (unknowns,)
+        Where to begin [dimensionless].
+    evaluations : int
+        How often the cost may be evaluated [evaluations].
+    bounds : tuple of ndarray, shape (unknowns,)
+        Lowest and highest coordinates [dimensionless].
+    least_gain : float
+        Cost that a further step must promise [dimensionless].
+    radius : float
+        Length of the longest first step [dimensionless].
+    wanted : float
+        Cost above which the result is of no use [dimensionless]: a search ends where all steps that are left would not
+        bring it down to that, gaining each what the last one did or the next one promises.
+    least_share : float
+        Share of the cost that is left which a further step must promise [fraction].
+
+    Returns
+    -------
+    Point
+        The best point; further steps promise less than the least gain, unless the evaluations were used up.
+
+    Examples
+    --------
+    >>> def valley(x: Array) -> Point:
+    ...     slopes = np.array([[1.0, 0.0], [-20.0 * x[0], 10.0]])
+    ...     errors = np.array([x[0] - 1.0, 10.0 * (x[1] - x[0] ** 2)])
+    ...     return Point(x, 0.5 * errors @ errors, slopes.T @ errors, slopes.T @ slopes)
+    >>> far = np.full(2, 10.0)
+    >>> descend(valley, np.array([-1.2, 1.0]), 40, (-far, far)).theta.round(1).tolist()
+    [1.0, 1.0]
+    """
+    return descend_together(
+        lambda thetas: [at(one) for one in thetas],
+        [start],
+        evaluations,
+        bounds,
+        least_gain,
+        radius,
+        wanted,
+        least_share,
+    )[0]
+
+
+def descend_together(
+    at_each: Callable[[Sequence[Array]], Sequence[Point]],
+    starts: Sequence[Array],
+    evaluations: int,
+    bounds: tuple[Array, Array],
+    least_gain: float = LEAST_GAIN,
+    radius: float = FIRST_RADIUS,
+    wanted: float = np.inf,
+    least_share: float = 0.0,
+) -> list[Point]:
+    """Return the least cost downhill from each of several starts, all a step at a time; see `descend`.
+
+    Parameters
+    ----------
+    at_each : callable
+        The cost at each of several coordinates.
+    starts : sequence of ndarray, shape (unknowns,)
+        Where to begin [dimensionless].
+    evaluations : int
+        How often the cost may be evaluated on the way down from each start [evaluations].
+    bounds : tuple of ndarray, shape (unknowns,)
+        Lowest and highest coordinates [dimensionless].
+    least_gain : float
+        Cost that a further step must promise [dimensionless].
+    radius : float
+        Length of the longest first step [dimensionless].
+    wanted : float
+        See `descend` [dimensionless].
+    least_share : float
+        See `descend` [fraction].
+
+    Returns
+    -------
+    list of Point
+        The best point from each start.
+    """
+    searches = [_search(start, evaluations, bounds, least_gain, radius, wanted, least_share) for start in starts]
+    asked = {i: next(search) for i, search in enumerate(searches)}
+    ended: dict[int, Point] = {}
+    while asked:
+        found = at_each(list(asked.values()))
+        for i, point in zip(tuple(asked), found, strict=True):
+            try:
+                asked[i] = searches[i].send(point)
+            except StopIteration as stop:
+                ended[i] = stop.value
+                del asked[i]
+    return [ended[i] for i in range(len(searches))]
+
+
+def _search(
+    start: Array,
+    evaluations: int,
+    bounds: tuple[Array, Array],
+    least_gain: float,
+    radius: float,
+    wanted: float,
+    least_share: float,
+) -> Generator[Array, Point, Point]:
+    """Yield where the cost is to be evaluated, and return the best point."""
+    best = yield np.clip(start, *bounds)
+    gained = np.inf  # by the last step; unknown before the first, and after one that broke its promise
+    for left in range(evaluations - 1, 0, -1):
+        curvature = best.gram + np.diag(np.abs(best.gradient) / REACH)
+        step, promised, radius = _downhill(best, curvature, radius, bounds)
+        if promised < max(least_gain, least_share * best.cost) or best.cost - left * max(promised, gained) > wanted:
+            break
+        tried = yield best.theta + step
+        gain, length = (best.cost - tried.cost) / promised, _length(step)
+        if gain <= 0.0 and length < SHORTEST:
+            break
+        if gain < POOR:
+            radius = POOR * length
+        elif gain > GOOD:
+            radius = max(radius, 2.0 * length)
+        gained = best.cost - tried.cost if gain > POOR else np.inf
+        if gain > 0.0:
+            best = tried
+    return best
+
+
+def _downhill(point: Point, curvature: Array, radius: float, bounds: tuple[Array, Array]) -> tuple[Array, float, float]:
+    """Return the best step, by how much it lowers the quadratic model, and the radius that it took.
+
+    A bound may bend a long step uphill; a shorter one then goes down.
+    """
+    for _ in range(SHORTENED):
+        step = _step(point, curvature, radius, bounds)
+        promised = float(-point.gradient @ step - 0.5 * step @ curvature @ step)
+        if promised >= 0.0:
+            return step, promised, radius
+        radius = POOR * _length(step)
+    return np.zeros_like(point.theta), 0.0, radius
+
+
+def _step(point: Point, curvature: Array, radius: float, bounds: tuple[Array, Array]) -> Array:
+    """Return the best step by the quadratic model that ends within the radius and within bounds."""
+    lower, upper = (bound - point.theta for bound in bounds)
+    step = _shortened(curvature, point.gradient, radius)
+    outside = (step < lower) | (step > upper)
+    if not outside.any():
+        return step
+    step, free = np.clip(step, lower, upper), ~outside
+    while free.any():
+        gradient = point.gradient[free] + curvature[np.ix_(free, ~free)] @ step[~free]
+        step[free] = _shortened(curvature[np.ix_(free, free)], gradient, radius)
+        outside = (step < lower) | (step > upper)
+        if not outside.any():
+            break
+        step = np.clip(step, lower, upper)
+        free &= ~outside
+    return step
+
+
+def _shortened(curvature: Array, gradient: Array, radius: float) -> Array:
+    """Return ``-(C + shift)^-1 g``, with the least shift that makes it no longer than the radius."""
+    values, vectors = np.linalg.eigh(curvature)
+    values, along = np.maximum(values, 0.0) + RIDGE, vectors.T @ gradient
+
+    def excess(logarithm: float) -> float:
+        return _length(along / (values + np.exp(logarithm))) - radius
+
+    shift = 0.0
+    if _length(along / values) > radius:
+        longest = float(np.log(_length(along) / radius))
+        shift = float(np.exp(root_between(excess, float(np.log(RIDGE)) - 40.0, longest, 0.01)))
+    return -vectors @ (along / (values + shift))
+
+
+def _length(vector: Array) -> float:
+    """Return a vector's length, to the bit that of `numpy.linalg.norm`, which takes several times as long."""
+    return sqrt(vector.dot(vector))

@@ -1,0 +1,350 @@
+"""Output-error fit of a grey-box model: several starts, exact sensitivities, and how far to believe what comes out.
+
+The variance of an estimate has three parts, told apart: noise of the outputs, noise of the driving channels, and how
+well the rig's own parameters are known. The last two are read off the fit's linear response to them.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.fits.greybox.chance import largest_chi_square
+from estimation.fits.greybox.course import opened, vanished
+from estimation.fits.greybox.covariance import automatic_lags, least_squares_covariance
+from estimation.fits.greybox.descent import Point, descend
+from estimation.fits.greybox.drive_noise import drive_variance
+from estimation.fits.greybox.lateness import changes_beside, lateness, left_by
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.play import NO_PLAY, ShownPlay, shown_play
+from estimation.fits.greybox.problem import Problem, search_bounds
+from estimation.fits.greybox.rig_response import rig_slopes
+from estimation.fits.greybox.small_teeth import NOT_MOVED, small_teeth
+from estimation.fits.greybox.teeth import NO_OFFSET, ShownOffset, ShownTeeth, shown_teeth
+from estimation.fits.greybox.within_bounds import bounded
+from estimation.models.greybox import GreyBoxModel
+from plant.arrays import Array
+from plant.spare_processors import each
+
+LEAST_EFFECT = 1.0
+"""An unknown whose unit change moves the prediction by less, in standard deviations of one sample, is not felt."""
+
+SCREENED_SAMPLES = 200_000
+"""A longer log is screened on its beginning."""
+
+LENGTHENED = 8
+"""Factor between the beginnings of a long log on which a fit is brought near."""
+
+NEAR_ENOUGH = 0.01
+"""Half the sum of squares that a further step must promise while model steps are long [dimensionless]."""
+
+NOISE_DOUBT = 0.2
+"""Standard deviation of the share of a driving channel's noise that is counted with the slopes: its size is known to
+some percent, and it is white in theory alone [fraction]."""
+
+
+@dataclass(frozen=True, eq=False)
+class GreyBoxFit:
+    """What a fit found.
+
+    Parameters
+    ----------
+    model : GreyBoxModel
+        The model.
+    theta : ndarray, shape (unknowns,)
+        The fitted coordinates.
+    values : Mapping[str, float]
+        The unknowns in SI.
+    std : Mapping[str, float]
+        Standard deviation of each from noise alone, in SI; infinite where the log does not determine it.
+    cost : float
+        Half the sum of squared normalised residuals, outliers counted linearly [dimensionless].
+    chi_square : tuple of float
+        Mean squared normalised residual of each output; 1 where the model explains the log [dimensionless].
+    autocorrelation : tuple of float
+        Of neighbouring normalised residuals; 0 where the model explains the log [dimensionless].
+    rig_slopes : Mapping[str, Mapping[str, float]]
+        By uncertain entry of the rig: by how much each unknown would differ, in SI, per relative change of the entry.
+    late : Mapping[str, tuple of float]
+        By driving channel whose timing is asked: the time by which it seems to come late [s], and what bringing it
+        forward would gain in log-likelihood, to first order [dimensionless].
+    play : ShownPlay
+        What the residuals say of a play of the encoder, where a fit was asked.
+    slopes : ndarray, shape (outputs * blocks, unknowns)
+        Derivatives of the normalised residuals there [dimensionless].
+    teeth : Mapping[int, ShownTeeth]
+        What they say of the pump's teeth, by their count in a turn, where a fit was asked.
+    speed_offset : ShownOffset
+        What they say of an offset of the logged speed, the same.
+    small_teeth : tuple of Mapping[str, float]
+        By how much teeth that are not taken up move each coordinate, and add to its variance [dimensionless].
+    seen : float
+        Residuals of the first output that count; without end where they are not counted [count].
+    """
+
+    model: GreyBoxModel
+    theta: Array
+    values: Mapping[str, float]
+    std: Mapping[str, float]
+    cost: float
+    chi_square: tuple[float, ...]
+    autocorrelation: tuple[float, ...]
+    rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
+    late: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
+    play: ShownPlay = NO_PLAY
+    slopes: Array = field(default_factory=lambda: np.empty((0, 0)))
+    teeth: Mapping[int, ShownTeeth] = field(default_factory=dict[int, ShownTeeth])
+    speed_offset: ShownOffset = NO_OFFSET
+    small_teeth: tuple[Mapping[str, float], Mapping[str, float]] = NOT_MOVED
+    seen: float = np.inf
+
+
+@dataclass(frozen=True)
+class Search:
+    """How the best of several starts is found.
+
+    Parameters
+    ----------
+    screened : int
+        A longer log is screened on its beginning [samples].
+    screening : int
+        Evaluations of the model that every start is given.
+    finalists : int
+        Starts that are carried on.
+    evaluations : int
+        Evaluations of the model that a finalist may take.
+    near_enough : float
+        Half the sum of squares that a further step must promise [dimensionless].
+    """
+
+    screened: int = SCREENED_SAMPLES
+    screening: int = 12
+    finalists: int = 2
+    evaluations: int = 40
+    near_enough: float = NEAR_ENOUGH
+
+
+DEFAULT_SEARCH = Search()
+"""Enough where few unknowns act alone."""
+
+
+def fit_greybox(
+    model: GreyBoxModel,
+    log: GreyBoxLog,
+    *,
+    starts: Sequence[Mapping[str, float]],
+    search: Search = DEFAULT_SEARCH,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+) -> GreyBoxFit:
+    """Fit the unknowns of any model to a log, from several starts, and return the best.
+
+    Parameters
+    ----------
+    model : GreyBoxModel
+        The model.
+    log : GreyBoxLog
+        The log, see `estimation.fits.greybox.log.greybox_log`.
+    starts : sequence of Mapping[str, float]
+        First guesses of the unknowns in SI.
+    search : Search
+        How they are brought to the optimum.
+    limits : Mapping[str, tuple of float], optional
+        Least and largest value of an unknown, where physics gives them [SI].
+
+    Returns
+    -------
+    GreyBoxFit
+        The best fit.
+    """
+    problem, guesses = Problem(model, log), [model.theta(start) for start in starts]
+    bounds = search_bounds(model, guesses, limits or {})
+    near = roughly(problem, guesses, search, bounds)
+    return concluded(problem, descend(problem.at, near.theta, search.evaluations, bounds))
+
+
+def roughly(
+    problem: Problem,
+    guesses: Sequence[Array],
+    search: Search,
+    bounds: tuple[Array, Array],
+    wanted: float = np.inf,
+    *,
+    hopeful: bool = False,
+) -> Point:
+    """Return the least cost that is found from several starts, with one model step a sample.
+
+    Parameters
+    ----------
+    problem : Problem
+        Model and log.
+    guesses : sequence of ndarray, shape (unknowns,)
+        The starts [dimensionless].
+    search : Search
+        How they are brought to the optimum.
+    bounds : tuple of ndarray, shape (unknowns,)
+        Lowest and highest coordinates [dimensionless].
+    wanted : float
+        Cost above which the result is of no use [dimensionless], see `estimation.fits.greybox.descent.descend`.
+    hopeful : bool
+        Whether several starts are followed only if one explains the beginning; else the cost is infinite.
+
+    Returns
+    -------
+    Point
+        The best point, with its cost at those model steps.
+    """
+    log = problem.log.coarsened()
+    whole = problem.on(log)
+
+    def descended(guess: Array, samples: int, evaluations: int) -> Point:
+        if samples < len(log.measured):
+            return descend(problem.on(log.beginning(samples)).at, guess, evaluations, bounds, search.near_enough)
+        return descend(whole.at, guess, evaluations, bounds, search.near_enough, wanted=wanted)
+
+    if len(guesses) > 1:
+        screened = each(lambda guess: descended(guess, search.screened, search.screening), guesses)
+        likely = sorted(screened, key=_cost)[: search.finalists]
+        if hopeful and not explained(problem.on(log.beginning(search.screened)), likely[0]):
+            return replace(likely[0], cost=np.inf)
+        guesses = [point.theta for point in likely]
+    points: list[Point] = []
+    for guess in guesses:
+        length = LENGTHENED * search.screened
+        while length < len(log.measured):  # on ever longer beginnings, so that the whole takes few steps
+            guess, length = descended(guess, length, search.evaluations).theta, LENGTHENED * length
+        points.append(descended(guess, len(log.measured), search.evaluations))
+        if explained(whole, points[-1]):
+            break
+    return min(points, key=_cost)
+
+
+def explained(problem: Problem, point: Point) -> bool:
+    """Return whether a point of the search leaves so little of a log that no better one is looked for.
+
+    Parameters
+    ----------
+    problem : Problem
+        Model and log.
+    point : Point
+        A point of its search.
+
+    Returns
+    -------
+    bool
+        Whether no other finalist need be tried.
+    """
+    return 2.0 * point.cost < largest_chi_square(problem.blocks) * problem.blocks
+
+
+def _cost(point: Point) -> float:
+    return point.cost
+
+
+def concluded(
+    problem: Problem,
+    point: Point,
+    *,
+    least: Array | None = None,
+    disturbed: bool = True,
+    asked: bool = True,
+    warned: bool = True,
+) -> GreyBoxFit:
+    """Return what a solution says, with its deviations.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    point : Point
+        Its solution.
+    least : ndarray, shape (unknowns,), optional
+        Lowest coordinates of its search, see `estimation.fits.greybox.within_bounds` [dimensionless].
+    disturbed : bool
+        Whether the deviations hold the drives' noise too.
+    asked : bool
+        Whether it is told, of a fit so disturbed, what the rig's doubts would change and which drives come late.
+    warned : bool
+        Whether the caller is warned where unknowns are not separately determined; else their deviations are infinite.
+
+    Returns
+    -------
+    GreyBoxFit
+        The fit.
+    """
+    model, theta = problem.model, point.theta
+    errors, all_slopes = problem.linearised(theta)
+    effects = np.einsum("ij,ij->j", all_slopes, all_slopes)
+    felt = np.flatnonzero(effects > np.where(problem.prior > 0.0, 0.0, LEAST_EFFECT**2))
+    noise, rig, late = np.full(len(theta), np.inf), dict[str, Array](), dict[str, tuple[float, float]]()
+    play, teeth, offset = NO_PLAY, dict[int, ShownTeeth](), NO_OFFSET
+    used, names = int(np.count_nonzero(errors)), [model.unknowns[place] for place in felt]
+    if len(felt) and used > len(theta):
+        slopes = all_slopes if len(felt) == len(theta) else all_slopes[:, felt]
+        left_over, prior, lags = errors.ravel(), problem.prior[felt], automatic_lags(errors.ravel())
+        bread, spread = least_squares_covariance(slopes, left_over, used, lags, prior, warned=warned)
+        # doubts are asked beside what was fitted; deviations also hold what the fit has put to nothing
+        fitted_slopes, fitted_bread = slopes, bread
+        if problem.log.course is not None and (gone := vanished(problem, theta, errors, felt)):
+            slopes, prior = np.column_stack([slopes, *gone]), np.append(prior, np.zeros(len(gone)))
+            bread, spread = least_squares_covariance(slopes, left_over, used, lags, prior, warned=warned)
+
+        def response(shift: Array) -> Array:
+            return bread @ (slopes.T @ shift.ravel())
+
+        told = disturbed and asked
+        known, moved = changes_beside(problem, theta) if told else (None, [])
+        tilt = bread[:, : len(felt)] @ problem.untilted(theta, errors)[felt]
+        kept = spread if least is None else bounded(problem, point, least, felt, fitted_bread, spread)
+        variance = np.diag(kept) + (NOISE_DOUBT * tilt) ** 2
+        variance = variance + (drive_variance(problem, theta, bread, slopes, known) if disturbed else 0.0)
+        if problem.log.course is not None and disturbed:  # a window's estimate of few turns is poor
+            variance = variance + np.maximum(np.diag(bread - spread), 0.0)
+            variance = variance + opened(problem, theta, errors, bread, slopes)
+        # the window's estimate need not be positive: then nothing is known
+        variance = np.where(np.diag(spread) > 0.0, variance, np.inf)[: len(felt)]
+        held, shifted = [one.count for one in problem.log.teeth], problem.log.speed_offset != 0.0
+        counts = problem.log.counts if asked else held
+        if (disturbed and counts) or shifted:
+            teeth, offset = shown_teeth(problem, theta, left_over, fitted_bread, fitted_slopes, counts)
+            variance = variance + sum(teeth[count].opened for count in held if count in teeth)
+            variance = variance + (offset.opened if shifted and not held else 0.0)
+        noise[felt] = np.sqrt(variance)
+        noise[effects <= LEAST_EFFECT**2] = np.inf  # what is known of it is not from this log
+        if told:
+            rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in rig_slopes(problem, theta, response)}
+            timed, left = problem.log.timed, left_by(fitted_slopes, fitted_bread, effects[felt] > LEAST_EFFECT**2)
+            late = dict(lateness(timed, moved, left_over, left))
+            play = shown_play(moved[len(timed) :], left_over, left, lambda one: zip(names, response(one), strict=False))
+    # teeth that are taken up are not small, and the course of a slow log's motor looks like some
+    asked_of_teeth = {} if problem.log.teeth or problem.log.course is not None else teeth
+    sizes, values = dict(model.linear), model.values(theta)
+    unit = np.array([sizes.get(name, values[name]) for name in model.unknowns])
+    squares = np.einsum("ij,ij->i", errors, errors)
+    slopes_si = {name: dict(zip(model.unknowns, map(float, unit * one), strict=True)) for name, one in rig.items()}
+    neighbours = np.einsum("ij,ij->i", errors[:, 1:], errors[:, :-1])
+    seen = np.maximum(np.count_nonzero(errors, axis=1), 1)
+    return GreyBoxFit(
+        model=model,
+        theta=theta,
+        values=values,
+        std=dict(zip(model.unknowns, map(float, unit * noise), strict=True)),
+        rig_slopes=slopes_si,
+        late=late,
+        play=play,
+        slopes=all_slopes,
+        teeth=teeth,
+        speed_offset=offset,
+        small_teeth=small_teeth(asked_of_teeth, names),
+        cost=point.cost,
+        chi_square=tuple(map(float, squares / seen)),
+        autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),
+        seen=float(seen[0]),
+    )
+
+
+def _spread_out(values: Array, places: NDArray[np.intp], length: int) -> Array:
+    """Return values at their places, zero elsewhere."""
+    whole = np.zeros(length)
+    whole[places] = values[: len(places)]
+    return whole

@@ -1,0 +1,310 @@
+"""The least-squares problem of a model in which any of the parameters may be free: derivatives by finite differences.
+
+`Problem` has exact sensitivities written into its kernel, which takes a kernel for each set of unknowns. Here one
+kernel without unknowns serves every hypothesis.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cache, partial
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.kernel import compile_kernel
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.normal_loops import fill_differences
+from estimation.fits.greybox.problem import OUTLIER, Problem, weighed
+from estimation.fits.greybox.side_by_side import LANES, MANY, ResidualsRun, compile_side_by_side
+from estimation.models.greybox import GreyBoxModel
+from plant.arrays import Array
+from plant.solvers.steps import parameter_names
+from plant.spare_processors import each
+
+NUDGE = 1e-4
+"""Step of the finite differences in the fitted coordinates [dimensionless]. Residuals of a piston that sticks and slips
+have many small corners: a step of 1e-7 sees the slope between two of them, and searches stop far from the optimum."""
+
+MOST_SIDE_BY_SIDE = 200_000
+"""Longest log whose drives are copied once for each run side by side [samples]: some 30 MB."""
+
+MOST_REMEMBERED = 100_000
+"""Blocks of the longest log whose last slopes are kept [count]: some 15 MB."""
+
+
+class FreedProblem(Problem):
+    """The least-squares problem of one log with some parameters of a model free.
+
+    Parameters
+    ----------
+    model : GreyBoxModel
+        A model without unknowns.
+    log : GreyBoxLog
+        The log; its parameters hold the values of what is not free.
+    free : sequence of str
+        Parameters that are fitted.
+    linear : Mapping[str, float]
+        Typical sizes of parameters that are not fitted as logarithms [SI].
+    """
+
+    def __init__(self, model: GreyBoxModel, log: GreyBoxLog, free: Sequence[str], linear: Mapping[str, float]) -> None:
+        sizes = tuple((name, linear[name]) for name in free if name in linear)
+        if not log.gaps.size:  # what a gap leaves open costs as much again to follow
+            model = replace(model, jump=())
+        super().__init__(replace(model, unknowns=tuple(free), linear=sizes), log, partial(_by_itself, model))
+        self._bare, self._sizes = model, linear
+        self._last: list[tuple[Array, Array, Array, Array]] = []
+        self._columns = [parameter_names(model.parameters).index(name) for name in free]
+        self._kernels: dict[int, ResidualsRun] = {}
+        self._units = np.array([linear.get(name, np.nan) for name in free])
+        self._logarithmic = np.isnan(self._units)
+
+    @classmethod
+    def of(cls, model: GreyBoxModel, log: GreyBoxLog) -> "FreedProblem":
+        """Return the problem of a model's own unknowns, its derivatives by finite differences.
+
+        Eight predictions side by side cost less than one with exact derivatives by seven unknowns.
+
+        Parameters
+        ----------
+        model : GreyBoxModel
+            The model, its unknowns fields of its parameters.
+        log : GreyBoxLog
+            The log.
+
+        Returns
+        -------
+        FreedProblem
+            The problem.
+        """
+        return cls(replace(model, unknowns=(), linear=()), log, model.unknowns, dict(model.linear))
+
+    def on(self, log: GreyBoxLog) -> "FreedProblem":
+        """Return the same problem of another log; see `Problem.on`."""
+        return FreedProblem(self._bare, log, self.model.unknowns, self._sizes)
+
+    def at_each(self, thetas: Sequence[Array]) -> list[Point]:
+        """Return the misfit at several points, which is quicker than one after another.
+
+        Parameters
+        ----------
+        thetas : sequence of ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+
+        Returns
+        -------
+        list of Point
+            As of `Problem.at`.
+        """
+        if self.log.passes_on:  # each has a variance of its own
+            return [self.at(theta) for theta in thetas]
+        rows = np.vstack([self._rows(_nudged(theta), self.log.parameters) for theta in thetas])
+        found = self._residuals(rows, None, self._variances(thetas[0]))[..., : len(rows)]
+        parts = np.split(found, len(thetas), axis=-1)
+        return [self._point(at, *weighed(*_differences(part, len(at)))) for at, part in zip(thetas, parts, strict=True)]
+
+    def at_beside(self, theta: Array, known: Mapping[str, Array]) -> Point:
+        """Return the misfit at a point at which the slopes of some unknowns are known, for a fit has found them.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        known : Mapping[str, ndarray of shape (outputs * blocks,)]
+            Derivatives of the normalised residuals, by unknown [dimensionless].
+
+        Returns
+        -------
+        Point
+            As of `Problem.at`.
+        """
+        names = self.model.unknowns
+        asked = [place for place, name in enumerate(names) if name not in known]
+        rows = self._rows(_nudged(theta)[[0, *(1 + place for place in asked)]], self.log.parameters)
+        here, columns = _differences(self._residuals(rows, None, self._variances(theta)), len(asked))
+        slopes = np.empty((*here.shape, len(names)))
+        slopes[..., asked] = columns
+        for place, name in enumerate(names):
+            if name in known:
+                slopes[..., place] = known[name].reshape(here.shape)
+        return self._point(theta, *weighed(here, slopes))
+
+    def costs(self, thetas: Sequence[Array]) -> Array:
+        """Return the cost at several points, without slopes: eight points take as long as one with its slopes.
+
+        Parameters
+        ----------
+        thetas : sequence of ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+
+        Returns
+        -------
+        ndarray, shape (points,)
+            As of `Problem.at` [dimensionless]; noise of driving channels counts as at the first point.
+        """
+        points = np.array(thetas)
+        errors = self._residuals(self._rows(points, self.log.parameters), None, self._variances(points[0]))
+        errors = errors[..., : len(points)]
+        weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)
+        misfit = np.einsum("ijk,ijk->k", (1.0 - 0.5 * weight) * weight * errors, errors)
+        return misfit + 0.5 * (points - self.presumed) ** 2 @ self.prior
+
+    def residuals_of(self, theta: Array, parameters: Sequence[Array]) -> list[Array]:
+        """Return the normalised residuals under several parameters of the rig, side by side.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        parameters : sequence of ndarray, shape (parameters,)
+            Parameters of the rig [SI].
+
+        Returns
+        -------
+        list of ndarray, shape (outputs, blocks)
+            As of `residuals`.
+        """
+        rows = np.vstack([self._rows(theta[None], row) for row in parameters])
+        found = self._residuals(rows, None, self._variances(theta))
+        return [found[..., i] for i in range(len(parameters))]
+
+    def disturbed(self, theta: Array, drives: Iterable[Array]) -> Iterator[Array]:
+        """Yield the normalised residuals under other driving channels than the log's, several side by side.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        drives : iterable of ndarray, shape (n, channels)
+            The channels [SI].
+
+        Yields
+        ------
+        ndarray, shape (outputs, blocks)
+            As of `residuals`.
+        """
+        if self.log.gaps.size or len(self.log.drives) > MOST_SIDE_BY_SIDE:
+            yield from super().disturbed(theta, drives)
+            return
+        waiting = iter(drives)
+        while some := list(islice(waiting, MANY)):
+            lanes = LANES if len(some) <= LANES else MANY
+            found = self.disturbed_together(theta, np.stack([*some, *some[-1:] * (lanes - len(some))], axis=-1))
+            yield from (found[..., i] for i in range(len(some)))
+
+    def disturbed_together(self, theta: Array, drives: Array) -> Array:
+        """Return the normalised residuals under several other driving channels than the log's, in one run.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        drives : ndarray, shape (n, channels, `LANES` or `MANY`)
+            The channels [SI].
+
+        Returns
+        -------
+        ndarray, shape (outputs, blocks, `LANES` or `MANY`)
+            As of `residuals`.
+        """
+        if self.log.gaps.size:  # what a gap leaves open only the other kernel follows
+            return super().disturbed_together(theta, drives)
+        rows = np.repeat(self._rows(theta[None], self.log.parameters), drives.shape[-1], axis=0)
+        return self._side_by_side(rows, drives, self._variances(theta))[..., : len(rows)]
+
+    def _run(
+        self,
+        theta: Array,
+        errors: Array,
+        slopes: Array,
+        drives: Array | None = None,
+        parameters: Array | None = None,
+        variance: Array | None = None,
+    ) -> tuple[float, Array, Array]:
+        parameters = self.log.parameters if parameters is None else parameters
+        variance = self._variances(theta) if variance is None else variance
+        if not slopes.size and errors.size:
+            errors[...] = self._residuals(self._rows(theta[None], parameters), drives, variance)[..., 0]
+            return 0.0, np.zeros(0), np.zeros((0, 0))
+        own = drives is None and parameters is self.log.parameters
+        here, columns = self._remembered(theta, variance) if own else (None, None)
+        if here is None or columns is None:
+            found = self._residuals(self._rows(_nudged(theta), parameters), drives, variance)
+            here, columns = _differences(found, len(theta))
+            if own and len(here[0]) <= MOST_REMEMBERED:
+                self._last = [*self._last[-1:], (theta.copy(), variance, here, columns)]
+        if errors.size:
+            errors[...] = here
+        if slopes.size:
+            slopes[...] = columns
+            return 0.0, np.zeros(0), np.zeros((0, 0))
+        return weighed(here, columns)
+
+    def _remembered(self, theta: Array, variance: Array) -> tuple[Array, Array] | tuple[None, None]:
+        """Return the residuals and slopes at one of the last two points, where a search ends."""
+        for point, known, here, columns in self._last:
+            if np.array_equal(point, theta) and np.array_equal(known, variance):
+                return here, columns
+        return None, None
+
+    def _rows(self, thetas: Array, parameters: Array) -> Array:
+        """Return the parameters at some points, shape (points, parameters)."""
+        rows = np.repeat(parameters[None], len(thetas), axis=0)
+        values = thetas * self._units
+        np.exp(thetas, out=values, where=self._logarithmic)
+        rows[:, self._columns] = values
+        return rows
+
+    def _residuals(self, rows: Array, drives: Array | None, variance: Array) -> Array:
+        """Return the normalised residuals under some parameters, shape (outputs, blocks, rows or more)."""
+        # one run is cheaper alone, and what a gap leaves open only its kernel follows
+        if len(rows) == 1 or self.log.gaps.size:
+            return np.stack([self._alone(row, drives, variance) for row in rows], axis=-1)
+        shared = (self.log.drives if drives is None else drives)[..., None]
+        groups = [rows[first : first + MANY] for first in range(0, len(rows), MANY)]
+        found = each(lambda some: self._side_by_side(some, shared, variance), groups)
+        return found[0] if len(found) == 1 else np.concatenate(found, axis=-1)
+
+    def _side_by_side(self, rows: Array, drives: Array, variance: Array) -> Array:
+        """Return the normalised residuals of up to `MANY` runs, shape (outputs, blocks, lanes)."""
+        lanes = LANES if len(rows) <= LANES else MANY
+        found = self._room(lanes)
+        filled = rows if len(rows) == lanes else np.concatenate([rows, np.repeat(rows[-1:], lanes - len(rows), axis=0)])
+        with np.errstate(all="ignore"):  # a try that runs away is stepped back from
+            self._kernel_of(lanes)(filled, drives, self.log.measured, *self._course(variance), found)
+        return found
+
+    def _kernel_of(self, lanes: int) -> ResidualsRun:
+        if lanes not in self._kernels:
+            self._kernels[lanes] = compile_side_by_side(self._bare, lanes)
+        return self._kernels[lanes]
+
+    def _alone(self, row: Array, drives: Array | None, variance: Array) -> Array:
+        errors = self._room()
+        super()._run(np.empty(0), errors, np.empty((0, 0, 0)), drives, row, variance)
+        return errors
+
+
+def _by_itself(model: GreyBoxModel, *given: Any) -> tuple[float, Array, Array]:
+    """Run a model by itself: most problems run it side by side alone, and need not load this kernel."""
+    return compile_kernel(model)(*given)
+
+
+def _nudged(theta: Array) -> Array:
+    """Return a point and its neighbours, a row each."""
+    return theta + NUDGE * _neighbours(len(theta))
+
+
+@cache
+def _neighbours(unknowns: int) -> Array:
+    """Return the directions from a point to itself and to its neighbours, a row each."""
+    return np.eye(unknowns + 1, unknowns, -1)
+
+
+def _differences(found: Array, unknowns: int) -> tuple[Array, Array]:
+    """Return the residuals at a point and their slopes, of the residuals there and at its neighbours."""
+    here, slopes = np.empty(found.shape[:2]), np.empty((*found.shape[:2], unknowns))
+    fill_differences(found, NUDGE, here, slopes)
+    return here, slopes

@@ -1,0 +1,254 @@
+"""A log as a fit of a grey-box model sees it, with its noise."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from estimation.arrays import Array, IntArray
+from estimation.log_checks.bridging import bridged
+from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.models.greybox import GreyBoxModel
+from plant.log.record import Record
+from plant.runs import steps_a_sample
+from plant.solvers.steps import Parameters, parameter_row
+
+if TYPE_CHECKING:
+    from estimation.fits.greybox.course import Course
+    from estimation.fits.greybox.teeth import Teeth
+
+BLOCK = 1e-3
+"""Usual length over which residuals are averaged before they are squared [s]."""
+
+
+@dataclass(frozen=True)
+class OutputNoise:
+    """Noise of an output.
+
+    Parameters
+    ----------
+    variance : float
+        Of its white noise, a sample [SI squared].
+    walk : float
+        Variance that its random walk gathers [SI squared a second]; white noise of a rate, such as measured speed,
+        that the model integrates.
+    passed_on : float
+        Standard deviation of what a driving channel's noise adds at once, over `passed_by` [SI].
+    passed_by : str
+        The unknown that the driving channel's noise is multiplied by, one that is fitted as a logarithm.
+    """
+
+    variance: float
+    walk: float = 0.0
+    passed_on: float = 0.0
+    passed_by: str = ""
+
+    def scaled(self, variance: float, walk: float = 1.0) -> "OutputNoise":
+        """Return the noise times a factor.
+
+        Parameters
+        ----------
+        variance, walk : float
+            Factors on the white noise's variance and on the random walk's [dimensionless].
+
+        Returns
+        -------
+        OutputNoise
+            The other noise.
+        """
+        return replace(
+            self,
+            variance=variance * self.variance,
+            walk=walk * self.walk,
+            passed_on=variance**0.5 * self.passed_on,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class GreyBoxLog:
+    """A log, as a fit sees it.
+
+    Parameters
+    ----------
+    drives : ndarray, shape (n, channels)
+        Driving channels in SI, no sample missing.
+    measured : ndarray, shape (n, outputs)
+        Outputs in SI; NaN is missing.
+    parameters : ndarray, shape (parameters,)
+        Row of the actuator's parameters; the unknowns' entries are not used.
+    sample_time : float
+        Seconds between samples [s].
+    steps : ndarray of int, shape (n,)
+        Model steps up to each sample.
+    noise : tuple of OutputNoise
+        Of each output.
+    drive_std : tuple of float
+        Standard deviation of each driving channel's noise, where the outputs' noise does not hold it already [SI].
+    uncertainties : Mapping[str, float]
+        Relative standard deviation of the actuator's parameters [fraction]; those of unknowns are not used.
+    gaps : ndarray, shape (gaps, 3)
+        First and last sample on which a gap in the drives acts, and the variance that it adds to the state from one
+        sample to the next, in units of `GreyBoxModel.jump`; in order of time, none overlapping.
+    presumed : Mapping[str, tuple of float]
+        What is known of unknowns before the log is seen: value [SI] and standard deviation of its coordinate.
+    block : float
+        Length over which residuals are averaged before they are squared [s].
+    timed : tuple of str
+        Driving channels of which a fit asks whether they come late.
+    counts : tuple of int
+        Counts of a pump's teeth that a fit asks for, see `estimation.fits.greybox.teeth`.
+    teeth : tuple of Teeth
+        Those whose delivery the drives hold; how large it is stays open.
+    speed_offset : float
+        What was subtracted from motor speed [rad/s]; where it is not 0, it stays open too.
+    course : Course, optional
+        What is open of the motor's course between the samples of a slow log, see `estimation.fits.greybox.course` [Pa].
+    """
+
+    drives: Array
+    measured: Array
+    parameters: Array
+    sample_time: float
+    steps: IntArray
+    noise: tuple[OutputNoise, ...]
+    drive_std: tuple[float, ...] = ()
+    uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
+    gaps: Array = field(default_factory=lambda: np.empty((0, 3)))
+    presumed: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
+    block: float = BLOCK
+    timed: tuple[str, ...] = ()
+    counts: tuple[int, ...] = ()
+    teeth: tuple["Teeth", ...] = ()
+    speed_offset: float = 0.0
+    course: "Course | None" = None
+
+    def beginning(self, samples: int) -> "GreyBoxLog":
+        """Return the log's first part.
+
+        Parameters
+        ----------
+        samples : int
+            How many samples are kept [samples].
+
+        Returns
+        -------
+        GreyBoxLog
+            The shorter log.
+        """
+        return replace(self, drives=self.drives[:samples], measured=self.measured[:samples], steps=self.steps[:samples])
+
+    def coarsened(self) -> "GreyBoxLog":
+        """Return the log with one model step a sample: predicted faster and less exactly.
+
+        Returns
+        -------
+        GreyBoxLog
+            The same log.
+        """
+        return replace(self, steps=np.ones_like(self.steps))
+
+    @property
+    def passes_on(self) -> bool:
+        """Whether noise of a driving channel counts with an unknown."""
+        return any(noise.passed_on > 0.0 for noise in self.noise)
+
+    def walks(self, block: int) -> tuple[Array, Array]:
+        """Return what the random walk of each output gains after each block, and what else is open of its mean.
+
+        Parameters
+        ----------
+        block : int
+            Samples a block [count].
+
+        Returns
+        -------
+        tuple of ndarray, shapes (outputs, walks) and (outputs, places)
+            The last number counts for all blocks that follow [SI squared].
+        """
+        walk = np.array([[noise.walk * block * self.sample_time] for noise in self.noise])
+        beside = np.zeros_like(walk)
+        if self.course is None:
+            return walk, beside
+        samples = len(self.measured)
+        return walk + self.course.walk(samples, block), beside + self.course.beside(samples, block)
+
+    def taken_at(self, value: float) -> "GreyBoxLog":
+        """Return the log with the noise that driving channels pass on as it is where the unknown has a value.
+
+        The variance then depends on nothing that is fitted, and a search from afar finds no valley in which it grows
+        without end.
+
+        Parameters
+        ----------
+        value : float
+            Value of what the driving channels' noise is multiplied by [SI].
+
+        Returns
+        -------
+        GreyBoxLog
+            The same log under noise of its outputs alone.
+        """
+        noise = tuple(OutputNoise(one.variance + (value * one.passed_on) ** 2, one.walk) for one in self.noise)
+        return replace(self, noise=noise)
+
+    def softened(self, variance: float, walk: float) -> "GreyBoxLog":
+        """Return the log as if its noise were larger, which makes the way to the optimum smoother.
+
+        Parameters
+        ----------
+        variance, walk : float
+            Factors on the white noise's variance and on the random walk's [dimensionless].
+
+        Returns
+        -------
+        GreyBoxLog
+            The same log under that noise.
+        """
+        return replace(self, noise=tuple(noise.scaled(variance, walk) for noise in self.noise))
+
+
+def greybox_log(
+    model: GreyBoxModel,
+    record: Record,
+    parameters: Parameters,
+    *,
+    longest_step: float,
+    variances: Mapping[str, float] | None = None,
+    uncertainties: Mapping[str, float] | None = None,
+) -> GreyBoxLog:
+    """Return a record as a fit of a model sees it.
+
+    Parameters
+    ----------
+    model : GreyBoxModel
+        The model.
+    record : Record
+        The log, with the model's drives and outputs.
+    parameters : dataclass
+        What is known of the plant, with the fields of the model's parameters.
+    longest_step : float
+        Longest step of the model [s].
+    variances : Mapping[str, float], optional
+        Of the noise of channels [SI squared]; of outputs read off the log by default, of drives none.
+    uncertainties : Mapping[str, float], optional
+        Relative standard deviation of the plant's parameters [fraction]; none by default.
+
+    Returns
+    -------
+    GreyBoxLog
+        The log, its drives without gaps.
+    """
+    noise = dict(variances or {})
+    if unknown := [channel for channel in model.outputs if channel not in noise]:
+        noise |= measurement_variances(record, unknown)
+    return GreyBoxLog(
+        drives=np.column_stack([bridged(record[channel]) for channel in model.drives]),
+        measured=np.column_stack([record[channel] for channel in model.outputs]),
+        parameters=parameter_row(parameters, model.parameters),
+        sample_time=record.sample_time,
+        steps=np.full(len(record), steps_a_sample(record.sample_time, longest_step)),
+        noise=tuple(OutputNoise(noise[channel]) for channel in model.outputs),
+        drive_std=tuple(noise.get(channel, 0.0) ** 0.5 for channel in model.drives),
+        uncertainties=uncertainties or {},
+    )

@@ -1,0 +1,43 @@
+"""By how much what was fitted would differ if the rig's own parameters were others."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from estimation.fits.greybox.problem import Problem
+from plant.arrays import Array
+from plant.solvers.steps import parameter_names
+
+RIG_NUDGE = 1e-3
+"""Relative change of a rig parameter by which the fit's response to it is read off [fraction]."""
+
+
+def rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Array]) -> Iterator[tuple[str, Array]]:
+    """Yield by how much the unknowns would differ per relative change of each uncertain parameter of the rig.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    theta : ndarray, shape (unknowns,)
+        Its solution [dimensionless].
+    response : callable
+        From a change of the normalised residuals, shape (outputs, blocks), to how far the felt unknowns go.
+
+    Yields
+    ------
+    name : str
+        The parameter.
+    slopes : ndarray, shape (felt,)
+        Of the felt unknowns, in the fitted coordinates [dimensionless].
+    """
+    names, row = parameter_names(problem.model.parameters), problem.log.parameters
+    asked = [
+        name
+        for name, relative in problem.log.uncertainties.items()
+        if relative > 0.0 and name in names and name not in problem.model.unknowns
+    ]
+    nudged = [np.where(np.arange(len(row)) == names.index(name), row * (1.0 + RIG_NUDGE), row) for name in asked]
+    known, *shifted = problem.residuals_of(theta, [row, *nudged])
+    for name, errors in zip(asked, shifted, strict=True):
+        yield name, -response(errors - known) / RIG_NUDGE

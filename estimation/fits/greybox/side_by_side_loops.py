@@ -1,0 +1,157 @@
+"""The loop that runs a grey-box model along a log under several parameter sets side by side, as a plain function.
+
+`estimation.fits.greybox.side_by_side` pastes it into a kernel file. What it finds in such a file is its parameter
+``kernel``.
+"""
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from estimation.arrays import Array, IntArray
+from plant.solvers.fixed_step_loops import Operation, SideBySide, lay, share
+
+
+class SideBySideKernel(SideBySide, Protocol):
+    """What the kernel of a model has.
+
+    In memory stand, `LANES` numbers each, states, drives at the last sample, their rises in a step, outputs,
+    the step's length, parameters, and what `settle_at` makes of them.
+
+    Attributes
+    ----------
+    DRIVES, OUTPUTS : int
+        Counts of drives and of outputs.
+    RUNAWAY : float
+        Largest normalised residual [dimensionless].
+    begin_at, step_at, show_at : callable
+        The states before the first sample, the step with the number ``j`` after the last sample, and the outputs.
+    """
+
+    DRIVES: int
+    OUTPUTS: int
+    RUNAWAY: float
+    begin_at: Operation
+    step_at: Operation
+    show_at: Operation
+
+
+def residuals_side_by_side(
+    kernel: SideBySideKernel,
+    parameters: Array,
+    drives: Array,
+    measured: Array,
+    sample_time: float,
+    substeps: IntArray,
+    block: int,
+    variance: Array,
+    walk: Array,
+    open_at: Array,
+    errors: Array,
+) -> None:
+    """Fill in the normalised residuals of a model under several parameter sets.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (lanes, parameters)
+        Parameter rows.
+    drives : ndarray, shape (n, drives, one or lanes)
+        Drives at the samples [their SI units], linear between; of all sets alike, or of each.
+    measured : ndarray, shape (n, outputs)
+        Outputs; NaN is missing.
+    sample_time : float
+        Seconds between samples [s].
+    substeps : ndarray of int, shape (n,)
+        Steps up to each sample.
+    block : int
+        Samples a block.
+    variance, walk, open_at : ndarray, shapes (outputs,), (outputs, walks), (outputs, places)
+        White noise of each output, what its random walk gains after each block, and what else is open of each block's
+        mean; the last number counts for all blocks that follow [SI squared].
+    errors : ndarray, shape (outputs, blocks, lanes)
+        Room for the residuals; those of missing blocks are left as they are.
+    """
+    room = np.zeros(kernel.NUMBERS + 8)  # what is at no time set, the share of a step at its start, is zero
+    work = room[-room.ctypes.data % 64 // 8 :]  # a vector across two cache lines takes twice as long
+    slots, lanes = work.ctypes.data, kernel.LANES
+    bases = kernel.WIDTH * lanes
+    rises = bases + kernel.DRIVES * lanes
+    shown = rises + kernel.DRIVES * lanes
+    pace = shown + kernel.OUTPUTS * lanes
+    lay(kernel, work, pace + lanes, parameters.T, kernel.COLUMNS)
+    excess, level = np.zeros((kernel.OUTPUTS, lanes)), np.zeros((kernel.OUTPUTS, lanes))
+    present, spread = np.zeros(kernel.OUTPUTS), np.zeros(kernel.OUTPUTS)
+    n, steps, own = drives.shape[0], 0, drives.shape[2] > 1
+    for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
+        kernel.begin_at(slots + first, 0.0)
+    for k in range(n):
+        if k > 0:
+            if substeps[k] != steps:
+                steps = substeps[k]
+                share(kernel, work, pace, (sample_time / steps,))
+                for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
+                    kernel.settle_at(slots + first, 0.0)
+            for i in range(kernel.DRIVES):
+                if own:
+                    for lane in range(lanes):
+                        work[bases + i * lanes + lane] = drives[k - 1, i, lane]
+                        work[rises + i * lanes + lane] = (drives[k, i, lane] - drives[k - 1, i, lane]) / steps
+                else:
+                    rise = (drives[k, i, 0] - drives[k - 1, i, 0]) / steps
+                    for lane in range(lanes):
+                        work[bases + i * lanes + lane] = drives[k - 1, i, 0]
+                        work[rises + i * lanes + lane] = rise
+            for j in range(steps):
+                for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
+                    kernel.step_at(slots + first, float(j))
+        for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
+            kernel.show_at(slots + first, 0.0)
+        for i in range(kernel.OUTPUTS):
+            if measured[k, i] == measured[k, i]:
+                present[i] += 1.0
+                for lane in range(lanes):
+                    excess[i, lane] += work[shown + i * lanes + lane] - measured[k, i]
+        if (k + 1) % block == 0 or k == n - 1:
+            for i in range(kernel.OUTPUTS):
+                if present[i] > 0.0:
+                    total = spread[i] + variance[i] / present[i] + open_at[i, min(k // block, open_at.shape[1] - 1)]
+                    gain = spread[i] / total
+                    absorb(kernel, excess[i], level[i], present[i], gain, math.sqrt(total), errors[i, k // block])
+                    spread[i] -= gain * spread[i]
+                    present[i] = 0.0
+                spread[i] += walk[i, min(k // block, walk.shape[1] - 1)]
+
+
+def absorb(
+    kernel: SideBySideKernel,
+    excess: Array,
+    level: Array,
+    samples: float,
+    gain: float,
+    deviation: float,
+    errors: Array,
+) -> None:
+    """Fill in the residuals of a block, less the random walk's level so far, and begin the next block.
+
+    Parameters
+    ----------
+    excess : ndarray, shape (lanes,)
+        Sums over the block, predicted less measured [SI].
+    level : ndarray, shape (lanes,)
+        The random walk's level [SI].
+    samples : float
+        How many samples the block has.
+    gain : float
+        Share of an innovation that goes into the level [fraction].
+    deviation : float
+        Standard deviation of an innovation [SI].
+    errors : ndarray, shape (lanes,)
+        Room for the normalised residuals.
+    """
+    for lane in range(kernel.LANES):
+        innovation = excess[lane] / samples - level[lane]
+        level[lane] += gain * innovation
+        value = innovation / deviation
+        errors[lane] = min(max(value, -kernel.RUNAWAY), kernel.RUNAWAY) if value == value else kernel.RUNAWAY
+        excess[lane] = 0.0

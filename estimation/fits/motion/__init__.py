@@ -1,0 +1,1 @@
+"""The motion form, fitted to logs without pressure."""

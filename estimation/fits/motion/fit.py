@@ -1,0 +1,350 @@
+"""`fit_motion(record, parameters, ...) -> FormFit`: bulk modulus, leakage and friction of a log without pressure."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.fits.explaining.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
+from estimation.fits.flow.log import DRAIN_START, LEAST_LEAKAGE
+from estimation.fits.flow.search import LEAD_START
+from estimation.fits.greybox.averaged import block_means, samples_a_block
+from estimation.fits.greybox.descent import Point, descend
+from estimation.fits.greybox.fit import GreyBoxFit, concluded
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
+from estimation.fits.motion.force_scale import Way, bulk_modulus, disagree, rescaled
+from estimation.fits.motion.search import (
+    ENOUGH,
+    EXPLAINED,
+    FINISHING,
+    HOPELESS,
+    NEAR_ENOUGH,
+    NEARING,
+    SCREENED,
+    SLIGHT_SHARE,
+    WAYS,
+    Ended,
+    MotionSearch,
+    explained,
+    likeliest,
+    rough,
+)
+from estimation.log_checks.bridging import bridged
+from estimation.log_checks.measurement_noise import measurement_variances, position_variance
+from estimation.models.motion import MOTION_FORMS, MotionParameters
+from estimation.notes import EstimateCode
+from estimation.trust.consistency import MISMATCH_NIS
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+from plant.errors import LogError
+from plant.log.record import Record
+from plant.notes import Note
+from plant.runs import steps_a_sample
+from plant.solvers.steps import parameter_row
+
+MOTION_CHANNELS = ("position_m",)
+"""Channels that the motion form needs beside motor speed."""
+
+FRICTION_TRIED = ((1.0, 1.0, 1.0), (18.0, -3.5, 1.15), (68.0, 8.7, 1.25))
+"""Friction coefficients a_1, a_2, a_3 of the starts, as multiples of the healthy actuator's: the spread of Table 4."""
+
+YIELDED = 2e-5
+"""First guess of the deflection at which seals slide [m]; tens of micrometres in the literature on presliding."""
+
+DAMPING_START = 100.0
+"""First guess of the bristle's damping [N s/m]; small beside the oil's."""
+
+FINEST_STEP = 6.25e-5
+"""Longest step while the piston turns, yields or is set off [s]: the bristle's state passes through zero there."""
+
+TURNING = 0.3
+"""Speed under which it counts as turning, over the log's root mean square [fraction]."""
+
+SET_OFF = 1.0
+"""Change of motor speed between samples from which the pump counts as setting the piston off [rad/s]."""
+
+SHORTEST_SAMPLE = 1e-3
+"""Faster logs are averaged to about this sample time [s]: nothing that the model describes is quicker to see."""
+
+MOST_SAMPLES = 30_000
+"""A longer log is fitted on its beginning: the fit's interval is under a percent long before."""
+
+STRUCTURE = 0.005
+"""Relative standard deviation of bulk modulus from friction being of no known law: on the foreign bench, whose
+presliding is of another make, noise alone explains a tenth to a half of the errors. Judged from that one bench
+[fraction]."""
+
+MOST_MOVED = 0.03
+"""Share of bulk modulus by which a misfit that does not show may move it, above which it is not believed [fraction]: as
+much as noise may (`estimation.eha.result.LARGEST_BOUND`)."""
+
+UNLIKELY = 72.0
+"""Difference of log-likelihood from which a structure counts for nothing beside the other [dimensionless]."""
+
+SPARED_NIS, SPARED_SHARE = 0.5 * MISMATCH_NIS, 0.03
+"""Mean squared normalised residual, and share of the motion, up to which what is left of a log refuses no class
+[dimensionless, fraction]: half of what does."""
+
+BEGINNING = 0.2
+"""Share of these that counts on a beginning of the log [fraction]: the rest may be followed less well."""
+
+ALIKE = 5.0
+"""Difference of log-likelihood up to which two structures are said to explain a log alike [dimensionless]."""
+
+
+def fit_motion(
+    record: Record,
+    parameters: EhaParameters,
+    bulk_modulus: float,
+    uncertainties: Mapping[str, float] | None = None,
+    variances: Mapping[str, float] | None = None,
+) -> FormFit:
+    """Fit the motion form to a log with either structure of friction, and weigh the two.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with position; it begins at rest.
+    parameters : EhaParameters
+        Geometry, pump and mass are taken from it; leakage, flow bias and friction are first guesses.
+    bulk_modulus : float
+        First guess of effective bulk modulus [Pa].
+    uncertainties : Mapping[str, float], optional
+        Relative standard deviation of the actuator's parameters [fraction]; none by default.
+    variances : Mapping[str, float], optional
+        Measurement variance of motor speed [rad^2/s^2] by its name; read off the log if not given.
+
+    Returns
+    -------
+    FormFit
+        Value, deviations, and what speaks against them.
+
+    Raises
+    ------
+    LogError
+        If position is missing.
+    """
+    if "position_m" not in record:
+        raise LogError("the motion form needs position_m, the record lacks it")
+    noise = (variances or measurement_variances(record, ("motor_speed_rad_s",)))["motor_speed_rad_s"]
+    log = motion_log(record, parameters, uncertainties or {}, noise)
+    starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
+    ended = likeliest([MotionSearch.of(form, log, starts) for form in MOTION_FORMS])
+    fits, others = _fitted(ended)
+    best = min(fits, key=lambda fit: fit.cost)
+    found = weighed(fits)
+    value, std = found["bulk_modulus"]
+    apart = max((abs(float(np.log(other / value))) for other in others), default=0.0)
+    bound, moved = float(np.hypot(std / value, apart)), unseen(best, len(log.measured)) * std / value
+    believed = with_structure(found, float(np.linalg.norm([STRUCTURE, apart, moved])))
+    reasons = _objections(fits, best, others, share_of_motion(best.chi_square[0], log))
+    if not reasons and moved > MOST_MOVED:
+        reasons = (EstimateCode.WEAKLY_HELD.note(percent=100.0 * moved, noise_percent=100.0 * std / value),)
+    return FormFit(believed, bound, best.chi_square[0], reasons, best.rig_slopes)
+
+
+def unseen(fit: GreyBoxFit, samples: int) -> float:
+    """Return by how many deviations a misfit that no test of the residuals shows may move what is fitted.
+
+    The sum of n squared residuals has a standard deviation of ``sqrt(2 n)``. A misfit of that size does not show, and
+    one that looks like the change of an unknown moves it by the root of that, in deviations. What a log holds firmly
+    is not moved far by so many; what it holds weakly is.
+
+    Parameters
+    ----------
+    fit : GreyBoxFit
+        The fit.
+    samples : int
+        How many residuals it has.
+
+    Returns
+    -------
+    float
+        12 for 10,000 residuals that are explained [dimensionless].
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> round(unseen(SimpleNamespace(chi_square=(1.0,)), 20_000), 1)
+    14.2
+    """
+    shown = float(np.clip(fit.chi_square[0], 1.0, EXPLAINED) - 1.0) * samples
+    return float(np.sqrt(1.0 + shown + np.sqrt(2.0 * samples)))
+
+
+def share_of_motion(chi_square: float, log: GreyBoxLog) -> float:
+    """Return the residuals over the motion, in the time over which a residual is told from drift.
+
+    Measured speed has noise, which is a random walk of position: what is older than ``sqrt(variance / walk)`` is
+    forgotten. How many times the encoder's noise a residual is says how fine the encoder is, not how wrong the model.
+
+    Parameters
+    ----------
+    chi_square : float
+        Mean squared normalised residual of a fit [dimensionless].
+    log : GreyBoxLog
+        Its log.
+
+    Returns
+    -------
+    float
+        Root mean square over that of the motion [fraction]; infinite where nothing moves.
+    """
+    (noise,), position = log.noise, log.measured[:, 0]
+    kept = np.sqrt(noise.variance / max(noise.walk * log.sample_time, np.finfo(float).tiny))
+    samples = int(np.clip(kept, 1, len(position) // 2))
+    steps = position[samples:] - position[:-samples]
+    moved = float(np.sqrt(np.nanmean(steps**2))) if np.any(np.isfinite(steps)) else 0.0
+    return float(np.sqrt(chi_square * noise.variance)) / moved if moved > 0.0 else float("inf")
+
+
+def motion_log(
+    record: Record, p: EhaParameters, uncertainties: Mapping[str, float], speed_variance: float
+) -> GreyBoxLog:
+    """Return a log as the motion form is fitted to it.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with position.
+    p : EhaParameters
+        The actuator.
+    uncertainties : Mapping[str, float]
+        Relative standard deviation of its parameters [fraction].
+    speed_variance : float
+        Measurement variance of motor speed [rad^2/s^2].
+
+    Returns
+    -------
+    GreyBoxLog
+        Its beginning of at most `MOST_SAMPLES`, averaged to `SHORTEST_SAMPLE`.
+    """
+    block = samples_a_block(record.sample_time, SHORTEST_SAMPLE)
+    sample_time = block * record.sample_time
+    speed, position = (block_means(record[name], block)[:MOST_SAMPLES] for name in ("motor_speed_rad_s", "position_m"))
+    moved = bridged(position)
+    drives = np.column_stack([bridged(speed), moved])
+    drift = (p.pump_displacement / p.piston_area) ** 2 * speed_variance * record.sample_time
+    return GreyBoxLog(
+        drives=drives,
+        measured=(position - moved[0])[:, None],
+        parameters=parameter_row(MotionParameters(**{one.name: getattr(p, one.name) for one in fields(p)})),
+        sample_time=sample_time,
+        steps=_steps(drives, sample_time),
+        noise=(OutputNoise(position_variance(record["position_m"]) / block, drift),),
+        uncertainties=uncertainties,
+    )
+
+
+def _steps(drives: Array, sample_time: float) -> NDArray[np.int64]:
+    """Return the model steps up to each sample: short ones where the piston turns or is set off."""
+    reach = max(1, round(5e-3 / sample_time))
+    sums = np.cumsum(np.pad(drives[:, 1] - drives[0, 1], (reach + 1, reach), mode="symmetric"))
+    pace = np.gradient(sums[2 * reach + 1 :] - sums[: -2 * reach - 1])  # in proportion to the mean velocity
+    turning = np.abs(pace) < TURNING * np.sqrt(np.mean(pace**2))
+    set_off = np.abs(np.diff(drives[:, 0], prepend=drives[0, 0])) > SET_OFF
+    fine, coarse = (steps_a_sample(sample_time, step) for step in (FINEST_STEP, LONGEST_STEP))
+    return np.where(turning | set_off, fine, coarse)
+
+
+def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
+    healthy = EhaParameters()
+    leakage = max(p.leakage_coefficient, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed / p.relief_pressure)
+    bias = max(p.flow_bias, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed)
+    quadratic = p.friction_quadratic or healthy.friction_quadratic
+    coulomb = p.friction_coulomb or healthy.friction_coulomb
+    return [
+        {
+            "bulk_modulus": bulk_modulus,
+            "leakage_coefficient": worse * leakage,
+            "flow_bias": biased * bias,
+            "makeup_conductance": p.makeup_conductance or healthy.makeup_conductance,
+            "case_leakage": DRAIN_START * leakage,
+            "speed_lead": LEAD_START,
+            "friction_quadratic": a1 * quadratic,
+            "friction_linear": a2 * p.friction_linear,
+            "friction_coulomb": a3 * coulomb,
+            "bristle_stiffness": a3 * coulomb / YIELDED,
+            "bristle_damping": DAMPING_START,
+        }
+        for worse, biased in FAULTS_TRIED
+        for a1, a2, a3 in FRICTION_TRIED
+    ]
+
+
+def _fitted(ended: list[Ended]) -> tuple[list[GreyBoxFit], list[float]]:
+    """Return the fits of both structures to the whole log, and other bulk moduli that explain it.
+
+    Other scales are looked for wherever the end explains the log, though no search said so: a gate passes on the end.
+    """
+    first, second = sorted(ended, key=lambda one: (not one.explains, one.point.cost))
+    search, best, others = first.search, first.point, list[float]()
+    part, whole, bounds = search.part, search.whole, search.bounds
+    if not first.explains:
+        wanted = _wanted(part, best, BEGINNING)
+        best = descend(part.at, best.theta, FINISHING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
+    asked = best.cost < explained(part)
+    if asked:
+        best, others = _rescaled(part, best, search)
+    hopeful = asked and not disagree([bulk_modulus(part, best), *others])
+    if hopeful:
+        best = descend(whole.at, best.theta, FINISHING, bounds)
+    else:
+        wanted = _wanted(whole, best)
+        best = descend(whole.at, best.theta, FINISHING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
+    if not asked and best.cost < explained(whole):
+        best, others = _rescaled(whole, best, search)
+    told = best.cost < explained(whole) and not disagree([bulk_modulus(whole, best), *others])
+    if told and not hopeful:
+        best = descend(whole.at, best.theta, FINISHING, bounds)
+    return [concluded(whole, best), *_rival(second, best, told=told)], others
+
+
+def _wanted(problem: FreedProblem, begun: Point, share: float = 1.0) -> float:
+    """Return the misfit that a search from a point has to come to, or it need not go on.
+
+    What explains the log, where the point leaves so little that no class is refused for it: how much exactly decides
+    nothing then. Any else, and on a log so short that its searches take little.
+    """
+    samples = len(problem.log.measured)
+    chi_square = 2.0 * problem.at(begun.theta).cost / samples  # where the search begins: it is not run twice
+    spared = chi_square < share * SPARED_NIS or share_of_motion(chi_square, problem.log) < share * SPARED_SHARE
+    return explained(problem) if spared and samples > SCREENED else np.inf
+
+
+def _rival(second: Ended, best: Point, *, told: bool) -> list[GreyBoxFit]:
+    """Return the fit of the other structure of friction to the whole log; none where it cannot matter."""
+    whole, bounds, thetas = second.search.whole, second.search.bounds, [best.theta, second.point.theta]
+    costs, wanted = whole.costs(thetas), explained(whole)
+    begun = thetas[int(np.argmin(costs))]
+    if told:
+        point = descend(whole.at, begun, NEARING, bounds, wanted=best.cost + UNLIKELY)
+    elif best.cost < wanted or float(np.min(costs)) > max(best.cost, HOPELESS * wanted):
+        return []
+    else:
+        point = descend(whole.at, begun, NEARING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
+        if point.cost < wanted:
+            point = descend(whole.at, point.theta, FINISHING, bounds)
+    return [concluded(whole, point)]
+
+
+def _rescaled(problem: FreedProblem, best: Point, search: MotionSearch) -> tuple[Point, list[float]]:
+    """Return the best optimum of forces on other scales, and other bulk moduli that explain the log."""
+    way = Way(rough(problem, WAYS[0][1]), NEARING, NEAR_ENOUGH, FINISHING, ENOUGH, search.bounds, explained(problem))
+    return rescaled(problem, best, way)
+
+
+def _objections(fits: list[GreyBoxFit], best: GreyBoxFit, others: list[float], share: float) -> tuple[Note, ...]:
+    reasons: list[Note] = []
+    if best.chi_square[0] > EXPLAINED:
+        large = {"ratio": best.chi_square[0] ** 0.5, "motion_percent": 100.0 * share}
+        reasons.append(EstimateCode.POSITION_RESIDUALS_LARGE.note(**large))
+    values = [fit.values["bulk_modulus"] for fit in fits if fit.cost < best.cost + ALIKE]
+    if disagree(values):
+        reasons.append(EstimateCode.FRICTION_LAWS_DISAGREE.note(least_pa=min(values), most_pa=max(values)))
+    scales = [*others, best.values["bulk_modulus"]]
+    if disagree(scales):
+        reasons.append(EstimateCode.FORCES_ON_ANY_SCALE.note(least_pa=min(scales), most_pa=max(scales)))
+    return tuple(reasons)

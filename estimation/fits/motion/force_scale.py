@@ -1,0 +1,168 @@
+"""Whether a log without pressure holds the scale of forces, by leaving its optimum and looking for it anew."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.fits.greybox.descent import Point, descend_together
+from estimation.fits.greybox.freed_problem import FreedProblem
+from plant.arrays import Array
+
+SCALES = (0.8, 1.25)
+"""Factors on all forces with which an optimum is left and looked for anew. Where no pressure is logged, pressures,
+friction and stiffness may grow together and move little that position shows: a search can end anywhere along such a
+valley, and the curvature where it ends does not say so [dimensionless]."""
+
+STIFFENED = (0.93, 1.07)
+"""The same on bulk modulus alone. Where the piston sticks and slips often, the misfit is rough: pits lie a few percent
+apart, and the curvature in one says nothing of the next [dimensionless]."""
+
+RESCALED = 3
+"""How often at most an optimum is left for a better one that was found so."""
+
+BETTER = 5.0
+"""Fall of the cost from which a better optimum is left in its turn [dimensionless]."""
+
+ELSEWHERE = 0.005
+"""Relative difference in bulk modulus from which the same [fraction]."""
+
+ALMOST, NEARBY = 1e-3, 0.3
+"""Relative difference in bulk modulus, and the same over its deviation, up to which an optimum that was come near to
+counts as the known one and is not sought more exactly [fraction]."""
+
+FAR_AWAY = 0.1
+"""The same from which an optimum is another one, however exactly it is sought [fraction]."""
+
+LARGEST_DISAGREEMENT = 0.05
+"""Relative difference in bulk modulus of two optima that explain a log, above which neither is believed [fraction]."""
+
+GROWING = (
+    "bulk_modulus",
+    "friction_quadratic",
+    "friction_linear",
+    "friction_coulomb",
+    "bristle_stiffness",
+    "bristle_damping",
+)
+"""What grows with the scale of forces."""
+
+FALLING = ("leakage_coefficient", "makeup_conductance", "case_leakage")
+"""What falls as forces grow, so that flows stay."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """How a search comes down from a start.
+
+    Parameters
+    ----------
+    near : FreedProblem
+        The problem on which a start is brought near, its noise made larger.
+    nearing : int
+        Evaluations of the model there.
+    near_enough : float
+        Cost that a further step must promise there [dimensionless].
+    finishing : int
+        Evaluations of the model on the problem itself.
+    enough : float
+        Cost that a further step must promise there [dimensionless].
+    bounds : tuple of ndarray, shape (unknowns,)
+        Lowest and highest coordinates [dimensionless].
+    explained : float
+        Misfit up to which an optimum explains the log [dimensionless].
+    """
+
+    near: FreedProblem
+    nearing: int
+    near_enough: float
+    finishing: int
+    enough: float
+    bounds: tuple[Array, Array]
+    explained: float
+
+
+def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[float]]:
+    """Look for optima with forces or stiffness on another scale, until some disagree.
+
+    Parameters
+    ----------
+    problem : FreedProblem
+        The problem, with the unknowns of the motion form.
+    best : Point
+        Its optimum, as far as it is known.
+    way : Way
+        How a search comes down.
+
+    Returns
+    -------
+    tuple of Point and list of float
+        The best optimum, and the bulk moduli of all others that explain the log [Pa].
+    """
+    found, moduli = [best], list[float]()
+    for _ in range(RESCALED):
+        for moved in _moved(problem.model.values(best.theta)):
+            found += _ended(problem, best, moved, way)
+            if disagree([bulk_modulus(problem, one) for one in found if one.cost < way.explained or one is best]):
+                break
+        lowest = min(found, key=lambda point: point.cost)
+        moved = abs(np.log(bulk_modulus(problem, lowest) / bulk_modulus(problem, best)))
+        over, best = lowest.cost > best.cost - BETTER, lowest
+        moduli = [bulk_modulus(problem, one) for one in found if one is not best and one.cost < way.explained]
+        if over or moved < ELSEWHERE or disagree([bulk_modulus(problem, best), *moduli]):
+            break
+    return best, moduli
+
+
+def disagree(moduli: Sequence[float]) -> bool:
+    """Return whether some bulk moduli lie farther apart than may be believed.
+
+    Parameters
+    ----------
+    moduli : sequence of float
+        The bulk moduli [Pa].
+
+    Returns
+    -------
+    bool
+        Whether the largest is over the least by more than `LARGEST_DISAGREEMENT`.
+    """
+    return max(moduli) > (1.0 + LARGEST_DISAGREEMENT) * min(moduli)
+
+
+def bulk_modulus(problem: FreedProblem, point: Point) -> float:
+    """Return the bulk modulus of a point [Pa]."""
+    return problem.model.values(point.theta)["bulk_modulus"]
+
+
+def _moved(values: Mapping[str, float]) -> Iterator[list[dict[str, float]]]:
+    """Yield where an optimum is left for: all forces on another scale, then another stiffness alone."""
+    scaled: list[dict[str, float]] = []
+    for factor in SCALES:
+        growing = {name: values[name] * factor for name in GROWING}
+        scaled.append(growing | {name: values[name] / factor for name in FALLING})
+    yield scaled
+    yield [{"bulk_modulus": values["bulk_modulus"] * factor} for factor in STIFFENED]
+
+
+def _ended(problem: FreedProblem, best: Point, moved: Sequence[Mapping[str, float]], way: Way) -> list[Point]:
+    """Return the optima downhill from another's, some of its values moved; searched side by side."""
+    values = problem.model.values(best.theta)
+    starts = [np.clip(problem.model.theta({**values, **some}), *way.bounds) for some in moved]
+    near = descend_together(way.near.at_each, starts, way.nearing, way.bounds, way.near_enough)
+    starts = [one.theta for one in near]
+    found = descend_together(problem.at_each, starts, way.finishing, way.bounds, way.enough, wanted=way.explained)
+    alike, here = max(ALMOST, NEARBY * _deviation(problem, best)), np.log(bulk_modulus(problem, best))
+    apart = [abs(np.log(bulk_modulus(problem, one)) - here) for one in found]
+    close = [i for i in range(len(found)) if found[i].cost < way.explained and alike < apart[i] < FAR_AWAY]
+    starts, enough = [found[i].theta for i in close], way.near_enough
+    ends = descend_together(problem.at_each, starts, way.finishing, way.bounds, enough)
+    for i, one in zip(close, ends, strict=True):
+        found[i] = one
+    return found
+
+
+def _deviation(problem: FreedProblem, point: Point) -> float:
+    """Return the relative standard deviation of bulk modulus at a point if residuals are white [fraction]."""
+    place = problem.model.unknowns.index("bulk_modulus")
+    return float(np.sqrt(np.linalg.pinv(point.gram, hermitian=True)[place, place]))

@@ -1,0 +1,327 @@
+"""`likeliest(searches) -> list[Ended]`: where searches for the motion form's unknowns end, on ever longer beginnings.
+
+A start is brought near under larger noise, then searched on the first seconds; what explains those goes on to more of
+the log. Both structures of friction are searched in turn, so that neither is searched in vain where the other explains.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from estimation.fits.greybox.descent import Point, descend, descend_together
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.problem import search_bounds
+from estimation.fits.greybox.side_by_side import LANES
+from estimation.fits.motion.force_scale import bulk_modulus
+from estimation.models.greybox import GreyBoxModel
+from estimation.models.motion import LINEAR, UNKNOWNS
+from plant.arrays import Array
+
+SCREENED = 4_000
+"""Samples on which starts are compared."""
+
+SEARCHED = 10_000
+"""Samples on which a start that explains those is carried on; a longer log goes on from where it ends."""
+
+UNCHANGED = (1.0, 1.0)
+"""Factors that leave the noise as it is [dimensionless]."""
+
+WAYS: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = (
+    ((1.0, 1e6), (1.0, 1e3)),
+    (UNCHANGED, UNCHANGED),
+    ((1e2, 1e6), (1.0, 1e3)),
+)
+"""Ways down to the optimum: factors on variance and random walk of the residual while starts are screened and while
+they are brought near. With the true, small noise the least misfit of leakage piles up into the position and hides other
+ways down; with a larger walk what counts is increments. Where the piston sticks, straight down is often the shorter."""
+
+SCREENING, NEARING, FINISHING = 10, 12, 25
+"""Evaluations of the model in the three stages."""
+
+NEAR_ENOUGH = 0.01
+"""Cost that a further step must promise while a start is only brought near [dimensionless]."""
+
+ENOUGH = 0.1
+"""The same while one is searched on a beginning of the log [dimensionless]."""
+
+FINALISTS = 3
+"""Starts that are carried on each way, the likeliest of each way first, until one explains the log."""
+
+ROUGHLY = 2
+"""By how many times model steps are longer while a start is only brought near."""
+
+MOST_WORK = 12_000_000
+"""Steps of eight runs side by side from which on no other start is tried; one that was begun is ended. A count, no
+clock, so that every machine finds the same."""
+
+EXPLAINED = 1.1
+"""Mean squared normalised residual up to which a form explains the log [dimensionless]."""
+
+HOPELESS = 3.0
+"""The same from which no other than the likeliest start of each way is tried [dimensionless]."""
+
+SLIGHT = 1e-3
+"""Cost that a further step must promise where nothing explains the log, over what would explain it [fraction]."""
+
+SLIGHT_SHARE = 0.002
+"""Share of the misfit that a further step must promise where no number will be believed [fraction]: how far the log is
+from explained is then known well enough. At a hundredth, long ways down were given up whose first steps
+promise little."""
+
+SAME_COST, SAME_MODULUS = 0.02, 0.01
+"""Relative difference of misfits, and of bulk moduli, up to which two starts came to the same pit [fraction]."""
+
+
+@dataclass(eq=False)
+class Begun:
+    """What all searches of a log share.
+
+    Parameters
+    ----------
+    screened : dict
+        Starts as they were screened, likeliest first, by way. Under larger noise the structures of friction hardly
+        differ: one screening serves both.
+    work : int
+        Steps of eight runs side by side that were taken [steps].
+    """
+
+    screened: dict[int, list[Point]] = field(default_factory=dict[int, list[Point]])
+    work: int = 0
+
+    def at(self, problem: FreedProblem) -> Callable[[Array], Point]:
+        """Return a problem's misfit as a function of the coordinates, its work counted."""
+        return partial(self._at, problem)
+
+    def at_each(self, problem: FreedProblem) -> Callable[[Sequence[Array]], list[Point]]:
+        """Return the same for several points side by side."""
+        return partial(self._at_each, problem)
+
+    def _at(self, problem: FreedProblem, theta: Array) -> Point:
+        self._count(problem, 1 + len(theta))
+        return problem.at(theta)
+
+    def _at_each(self, problem: FreedProblem, thetas: Sequence[Array]) -> list[Point]:
+        self._count(problem, len(thetas) * (1 + len(thetas[0])))
+        return problem.at_each(thetas)
+
+    def _count(self, problem: FreedProblem, runs: int) -> None:
+        self.work += int(np.sum(problem.log.steps)) * -(-runs // LANES)
+
+
+@dataclass(frozen=True, eq=False)
+class MotionSearch:
+    """The search for the unknowns under one structure of friction.
+
+    Parameters
+    ----------
+    whole : FreedProblem
+        The problem on the whole log.
+    part, short : FreedProblem
+        The same on its first `SEARCHED` and `SCREENED` samples.
+    guesses : list of ndarray, shape (unknowns,)
+        Where it begins [dimensionless].
+    bounds : tuple of ndarray, shape (unknowns,)
+        How far it may go [dimensionless].
+    """
+
+    whole: FreedProblem
+    part: FreedProblem
+    short: FreedProblem
+    guesses: list[Array]
+    bounds: tuple[Array, Array]
+
+    @classmethod
+    def of(cls, form: GreyBoxModel, log: GreyBoxLog, starts: Sequence[dict[str, float]]) -> "MotionSearch":
+        """Return the search of a form on a log.
+
+        Parameters
+        ----------
+        form : GreyBoxModel
+            One of `estimation.models.motion.MOTION_FORMS`.
+        log : GreyBoxLog
+            The log.
+        starts : sequence of dict
+            First guesses of the unknowns [SI].
+
+        Returns
+        -------
+        MotionSearch
+            The search.
+        """
+        whole = FreedProblem(form, log, UNKNOWNS, LINEAR)
+        guesses = [whole.model.theta(start) for start in starts]
+        bounds = search_bounds(whole.model, guesses, {"speed_lead": (0.0, 0.5 * log.sample_time)})
+        part, short = (whole.on(log.beginning(samples)) for samples in (SEARCHED, SCREENED))
+        return cls(whole, part, short, guesses, bounds)
+
+    def brought_near(self, rank: int, begun: Begun) -> Iterator[Array]:
+        """Yield where the starts of a rank lead on the short beginning under larger noise.
+
+        One whose misfit is over what explains the log with the larger noise too is left out, and one that comes to
+        where another of its rank did.
+
+        Parameters
+        ----------
+        rank : int
+            0 for the likeliest start of each way.
+        begun : Begun
+            What was screened so far, and the work; filled in here.
+
+        Yields
+        ------
+        ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        """
+        reached: list[Point] = []
+        for way, (first, second) in enumerate(WAYS):
+            if way not in begun.screened:
+                screen = begun.at_each(rough(self.short, first))
+                points = descend_together(screen, self.guesses, SCREENING, self.bounds, NEAR_ENOUGH)
+                begun.screened[way] = sorted(points, key=cost_of)
+            start = begun.screened[way][rank].theta
+            if second == UNCHANGED:
+                yield start
+                continue
+            near = descend(begun.at(rough(self.short, second)), start, NEARING, self.bounds, NEAR_ENOUGH)
+            if near.cost < explained(self.short) and not any(self.same_pit(near, other) for other in reached):
+                yield near.theta
+            reached.append(near)
+
+    def same_pit(self, one: Point, other: Point) -> bool:
+        """Return whether two points of the short beginning lie in the same pit."""
+        moved = abs(np.log(bulk_modulus(self.whole, one) / bulk_modulus(self.whole, other)))
+        return abs(one.cost - other.cost) < SAME_COST * other.cost and bool(moved < SAME_MODULUS)
+
+
+@dataclass(frozen=True, eq=False)
+class Ended:
+    """Where a search ended.
+
+    Parameters
+    ----------
+    search : MotionSearch
+        The search.
+    point : Point
+        The best point that it found, on the longest beginning that it came to.
+    explains : bool
+        Whether it explains the log's first `SEARCHED` samples.
+    """
+
+    search: MotionSearch
+    point: Point
+    explains: bool
+
+
+def likeliest(searches: Sequence[MotionSearch]) -> list[Ended]:
+    """Return where each of several searches ended, in their order; all end where one explains the log.
+
+    Parameters
+    ----------
+    searches : sequence of MotionSearch
+        One a structure of friction.
+
+    Returns
+    -------
+    list of Ended
+        One of each.
+    """
+    begun = Begun()
+    tries = [_Tries(search, begun) for search in searches]
+    for rank in range(FINALISTS):
+        for one in tries:
+            for near in one.search.brought_near(rank, begun):
+                if rank > 0 and begun.work > MOST_WORK:
+                    break
+                if (found := one.carried_on(near)) is not None:
+                    return [Ended(each.search, found if each is one else each.best, each is one) for each in tries]
+        if begun.work > MOST_WORK or all(one.best.cost > HOPELESS * explained(one.search.short) for one in tries):
+            break
+    likelier = min(tries, key=lambda one: one.best.cost)
+    return [Ended(one.search, one.ended() if one is likelier else one.best, explains=False) for one in tries]
+
+
+class _Tries:
+    """What one search tried.
+
+    Parameters
+    ----------
+    search : MotionSearch
+        The search.
+    begun : Begun
+        Its work is counted there.
+    """
+
+    def __init__(self, search: MotionSearch, begun: Begun) -> None:
+        self.search, self._begun = search, begun
+        self.best = search.short.at(search.guesses[0])
+        self._followed: list[tuple[Point, Point]] = []
+
+    def carried_on(self, near: Array) -> Point | None:
+        """Return where a start leads on the first `SEARCHED` samples if it explains them.
+
+        What explains the shorter beginning is followed once a pit, and once in all after `MOST_WORK`.
+        """
+        search, wanted = self.search, explained(self.search.short)
+        point = descend(self._begun.at(search.short), near, FINISHING, search.bounds, ENOUGH, wanted=wanted)
+        self.best = min(self.best, point, key=cost_of)
+        known = any(search.same_pit(point, other) for other, _ in self._followed)
+        if point.cost >= wanted or known or (self._followed and self._begun.work > MOST_WORK):
+            return None
+        wanted = explained(search.part)
+        more = descend(self._begun.at(search.part), point.theta, FINISHING, search.bounds, ENOUGH, wanted=wanted)
+        self._followed.append((point, more))
+        return more if more.cost < wanted else None
+
+    def ended(self) -> Point:
+        """Return where the search ends on the shorter beginning if nothing explains the log."""
+        search = self.search
+        if self._followed:
+            _, more = min(self._followed, key=lambda pair: pair[1].cost)
+            return search.short.at(more.theta)
+        if self._begun.work > MOST_WORK:
+            return self.best
+        promising = SLIGHT * explained(search.short)
+        return descend(search.short.at, self.best.theta, FINISHING, search.bounds, promising)
+
+
+def rough(problem: FreedProblem, factors: tuple[float, float]) -> FreedProblem:
+    """Return a problem with more noise and longer model steps.
+
+    Parameters
+    ----------
+    problem : FreedProblem
+        The problem.
+    factors : tuple of float
+        Factors on variance and random walk [dimensionless].
+
+    Returns
+    -------
+    FreedProblem
+        The other problem.
+    """
+    log = problem.log.softened(*factors)
+    return problem.on(replace(log, steps=np.maximum(log.steps // ROUGHLY, 1)))
+
+
+def explained(problem: FreedProblem) -> float:
+    """Return the misfit up to which a point explains a log [dimensionless].
+
+    Parameters
+    ----------
+    problem : FreedProblem
+        The problem.
+
+    Returns
+    -------
+    float
+        Half a sum of squares [dimensionless].
+    """
+    return 0.5 * EXPLAINED * len(problem.log.measured)
+
+
+def cost_of(point: Point) -> float:
+    """Return the misfit of a point [dimensionless]."""
+    return point.cost

@@ -1,0 +1,48 @@
+"""`share_at(record, parameters, values) -> float`: what the motion form leaves of a motion at another model's values.
+
+The search for the motion form's unknowns begins at the healthy actuator and a few faulty ones, and may end far from the
+log. Values that another model found say whether it did.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from estimation.fits.flow.search import LEAD_START
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.motion.fit import DAMPING_START, motion_log, share_of_motion
+from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+
+def share_at(record: Record, parameters: EhaParameters, values: Mapping[str, float], speed_variance: float) -> float:
+    """Return the share of the motion that the motion form leaves at given values of its unknowns.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with position.
+    parameters : EhaParameters
+        Geometry, pump and mass are taken from it.
+    values : Mapping[str, float]
+        The unknowns of `estimation.models.motion.UNKNOWNS` [SI]; without ``speed_lead`` and ``bristle_damping`` those
+        with which a search begins.
+    speed_variance : float
+        Measurement variance of motor speed [rad^2/s^2].
+
+    Returns
+    -------
+    float
+        See `estimation.fits.motion.fit.share_of_motion`; of the better structure of friction [fraction]. Infinite where
+        the model runs away.
+    """
+    log = motion_log(record, parameters, {}, speed_variance)
+    given = {"speed_lead": LEAD_START, "bristle_damping": DAMPING_START, **values}
+    squares: list[float] = []
+    for form in MOTION_FORMS:
+        problem = FreedProblem(form, log, UNKNOWNS, LINEAR)
+        (errors,) = problem.residuals_of(problem.model.theta(given), [log.parameters])
+        mean = float(np.sum(errors**2)) / max(int(np.count_nonzero(errors)), 1)
+        squares.append(mean if np.isfinite(mean) else float("inf"))
+    return share_of_motion(min(squares), log)

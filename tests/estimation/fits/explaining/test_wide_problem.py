@@ -1,0 +1,68 @@
+"""Where the searches for what is strange about a log begin."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.fits.explaining.wide_log import usual_values, widened
+from estimation.fits.explaining.wide_problem import POSITION_ZERO, flow_bounds, freed, own_starts
+from estimation.fits.greybox import freed_problem
+from estimation.fits.greybox.log import greybox_log
+from estimation.fits.hypotheses import BEGUN, ENCODER_ZERO, HYPOTHESES, OFFSET_AT_REST, Hypothesis
+from estimation.models.flow import FLOW_FORM
+from estimation.models.flow_parameters import flow_parameters
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from tests.estimation.fits.short_logs import wide
+
+RIG = EhaParameters()
+VARIANCES = {"differential_pressure_pa": 1e6}
+
+
+@pytest.mark.parametrize("one", HYPOTHESES, ids=[one.name for one in HYPOTHESES])
+def test_every_search_of_a_log_with_a_dead_pressure_sensor_begins_at_a_number(one: Hypothesis) -> None:
+    still = dict.fromkeys((*FLOW_FORM.drives, *FLOW_FORM.outputs), np.zeros(20))
+    log = widened(
+        greybox_log(FLOW_FORM, Record(1e-3, still), flow_parameters(RIG), longest_step=1e-3, variances=VARIANCES), RIG
+    )
+    model = freed(log, (one,)).model
+    known = dict.fromkeys(model.unknowns, 1.0)
+    for start in own_starts(log, one):
+        assert np.all(np.isfinite(model.theta({**known, **start})))
+
+
+def test_an_encoder_is_first_taken_to_read_zero_in_mid_travel() -> None:
+    moved = wide()
+    drives = moved.drives.copy()
+    drives[:, 1] = np.linspace(0.1, 0.16, len(drives))
+    last = own_starts(replace(moved, drives=drives), ENCODER_ZERO)[-1]
+    assert last[POSITION_ZERO] == pytest.approx(0.13)
+
+
+def test_an_offset_at_rest_is_first_taken_to_be_what_the_sensor_reads_there() -> None:
+    log = wide()
+    measured = np.full_like(log.measured, 1e5)
+    measured[0] = np.nan
+    assert list(own_starts(replace(log, measured=measured), OFFSET_AT_REST)) == [{"pressure_offset": 1e5}]
+
+
+@pytest.mark.parametrize("opening", [1e2, 1e4])
+@pytest.mark.parametrize("modulus", [5e7, 2e8, 1.5e9])
+def test_slopes_of_the_widest_make_up_valve_are_those_of_the_model_and_no_chatter(
+    modulus: float, opening: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = wide()
+    problem = freed(log, (BEGUN,))
+    values = {**usual_values(log), "bulk_modulus": modulus, "makeup_opening": opening, "case_leakage": 1e-13}
+    theta = problem.model.theta({**values, "leakage_coefficient": 2e-11, "speed_lead": 1e-5})
+    place = problem.model.unknowns.index("makeup_conductance")
+    theta[place] = flow_bounds(problem.model, [theta], log)[1][place]
+
+    def effects(nudge: float) -> np.ndarray:
+        monkeypatch.setattr(freed_problem, "NUDGE", nudge)
+        slopes = freed(log, (BEGUN,)).linearised(theta)[1]
+        return np.sqrt(np.einsum("ij,ij->j", slopes, slopes))
+
+    # a valve that opens within 100 Pa has a corner narrower than a nudge of 1e-3; chatter would grow tenfold here
+    assert effects(1e-6) == pytest.approx(effects(1e-5), rel=0.1, abs=1.0)

@@ -1,0 +1,175 @@
+"""What noise of the encoder does to a fit of the flow form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from estimation.eha.explained import lateness
+from estimation.fits.flow.fit import fit_flow
+from estimation.fits.flow.log import _swept_share, carried, flow_log, without_strays
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.problem import Problem
+from estimation.log_checks.measurement_noise import struck_variance
+from estimation.models.flow import FLOW_FORM, STIFFNESS
+from faults.conditions import CONDITIONS, parameters_for
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters, piston_areas
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+from tests.thinned import thinned
+
+HEALTHY = EhaParameters()
+NOISY = replace(BENCH, position_noise=3e-5, position_quantum=1e-5)
+"""A sensor of position as many rigs have it, where the reference bench has an encoder of 1 um."""
+
+
+def log(condition: str, seed: int, duration: float = 6.0) -> tuple[Record, float]:
+    rng = np.random.default_rng(seed)
+    p = circuit_of(parameters_for(CONDITIONS[condition]))
+    record = simulate(CIRCUIT, make_drive("steps", duration, 1e-3, p, rng), 1e-3, p, sensors=NOISY, rng=rng)
+    return record, p.bulk_modulus
+
+
+def deviations(record: Record, true: float) -> float:
+    fit = fit_flow(record, HEALTHY, 2e8)
+    value, std = fit.parameters["bulk_modulus"]
+    assert fit.reasons == ()
+    assert fit.explanation is None
+    assert value == pytest.approx(true, rel=0.015)
+    return (value - true) / std
+
+
+@pytest.mark.parametrize("condition", thinned(["normal", "major_leakage"], ["normal"]))
+def test_noise_of_position_does_not_pass_for_soft_oil(condition: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    record, true = log(condition, 5)
+    assert abs(deviations(record, true)) < 3.0
+    monkeypatch.setattr("estimation.fits.flow.log.FELT_NOISE", np.inf)  # as if all of it were the pressure sensor's
+    value, std = fit_flow(record, HEALTHY, 2e8).parameters["bulk_modulus"]
+    assert value < true - 5.0 * std
+
+
+def test_noise_of_position_does_not_pass_for_soft_oil_where_speeds_are_missing() -> None:
+    record, true = log("minor_leakage", 6)
+    speed = record["motor_speed_rad_s"].copy()
+    for reversal in np.flatnonzero(np.abs(np.diff(speed)) > 30.0)[::5]:
+        speed[reversal : reversal + 3] = np.nan
+    assert flow_log(*_sound(record.replace(motor_speed_rad_s=speed))).gaps.size
+    assert abs(deviations(record.replace(motor_speed_rad_s=speed), true)) < 3.0
+
+
+def test_noise_of_position_counts_where_it_is_felt_beside_the_pressure_sensor() -> None:
+    record, _ = log("normal", 7, duration=4.0)
+    noisy = flow_log(*_sound(record))
+    assert noisy.passes_on
+    assert noisy.noise[0].passed_on == pytest.approx(
+        HEALTHY.piston_area / HEALTHY.chamber_volume * np.hypot(3e-5, 1e-5 / 12.0**0.5), rel=0.1
+    )
+    rng = np.random.default_rng(8)
+    drive = make_drive("steps", 4.0, 1e-3, HEALTHY, rng)
+    quiet = flow_log(*_sound(simulate(CIRCUIT, drive, 1e-3, circuit_of(HEALTHY), sensors=BENCH, rng=rng)))
+    assert not quiet.passes_on
+    assert quiet.block < noisy.block
+
+
+def lagging(values: np.ndarray, lag: float) -> np.ndarray:
+    """Return what a sensor with a first-order lag [s] gives of samples 1 ms apart."""
+    kept = np.exp(-1e-3 / lag)
+    return lfilter([1.0 - kept], [1.0, -kept], values, zi=[kept * values[0]])[0]
+
+
+@pytest.mark.parametrize("condition", ["normal", pytest.param("minor_friction", marks=pytest.mark.slow)])
+def test_a_position_sensor_that_lags_is_named_and_its_number_is_right(condition: str) -> None:
+    rng = np.random.default_rng(9)
+    p = circuit_of(parameters_for(CONDITIONS[condition]))
+    drive = make_drive("prbs", 3.0, 1e-3, p, rng)
+    record = simulate(CIRCUIT, drive, 1e-3, p, sensors=BENCH, rng=rng)
+    assert fit_flow(record, HEALTHY, 2e8).reasons == ()
+    fit = fit_flow(record.replace(position_m=lagging(record["position_m"], 3e-3)), HEALTHY, 2e8)
+    assert fit.reasons == ()
+    assert fit.explanation is not None
+    assert fit.explanation.names == ("position_late",)
+    kept = np.exp(-1.0 / 3.0)  # in steps of 1 ms this is late by so many of them where signals are slow
+    assert lateness(fit.explanation, "position_m") == pytest.approx(1e-3 * kept / (1.0 - kept), abs=1e-4)
+    value, std = fit.parameters["bulk_modulus"]
+    assert value == pytest.approx(HEALTHY.bulk_modulus, abs=3.0 * std)
+
+
+@pytest.mark.parametrize("kind", [Problem, FreedProblem.of])
+def test_the_slope_of_the_cost_holds_what_the_variance_changes_by(kind: type[Problem]) -> None:
+    record, true = log("normal", 7, duration=4.0)
+    problem = kind(FLOW_FORM, flow_log(*_sound(record)))
+    start = {
+        "bulk_modulus": true,
+        "leakage_coefficient": HEALTHY.leakage_coefficient,
+        "flow_bias": HEALTHY.flow_bias,
+        "makeup_conductance": 1e-9,
+        "makeup_opening": 7e3,
+        "case_leakage": 2.4e-13,
+        "speed_lead": 1e-5,
+        STIFFNESS: 0.0,
+    }
+    theta = problem.model.theta(start)
+    place = problem.model.unknowns.index("bulk_modulus")
+    step = 1e-3 * np.eye(len(theta))[place]
+    slope = (problem.at(theta + step).cost - problem.at(theta - step).cost) / 2e-3
+    gradient = problem.at(theta).gradient[place]
+    assert gradient == pytest.approx(slope, rel=0.01)
+    held = gradient + problem.untilted(theta, problem.residuals(theta))[place]
+    assert abs(held - gradient) > 0.05 * abs(gradient)  # the test can tell
+
+
+def _sound(record: Record) -> tuple[Record, EhaParameters, dict[str, float], dict[str, float]]:
+    sound, variances = without_strays(record)
+    return sound, HEALTHY, {}, dict(variances)
+
+
+@pytest.mark.parametrize("difference", [0.0, 0.2])
+def test_what_position_squeezes_is_the_slope_of_the_chambers_logarithms(difference: float) -> None:
+    p = replace(HEALTHY, area_difference=difference)
+    area_1, area_2 = piston_areas(p)
+    position, step = 0.01 * np.sin(0.1 * np.arange(200)), 1e-7
+
+    def squeezed(x: np.ndarray) -> np.ndarray:
+        volume = 2.0 * p.chamber_volume
+        return np.log(volume + area_1 * x) - np.log(volume - area_2 * x)
+
+    slope = (squeezed(position + step) - squeezed(position - step)) / (2.0 * step)
+    assert _swept_share(position, p) == pytest.approx(np.sqrt(np.mean(slope**2)), rel=1e-5)
+
+
+def test_in_a_gap_the_pump_delivers_what_the_piston_swept_and_the_oil_yielded() -> None:
+    p = circuit_of(HEALTHY)
+    rng = np.random.default_rng(31)
+    record = simulate(CIRCUIT, make_drive("prbs", 3.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    true = record["motor_speed_rad_s"]
+    reversals = np.flatnonzero(np.abs(np.diff(true)) > 50.0)
+    first = int(reversals[reversals > 500][0]) - 20
+    gap = slice(first, first + 100)
+    lost = {name: record[name].copy() for name in ("motor_speed_rad_s", "position_m", "differential_pressure_pa")}
+    for values in lost.values():
+        values[gap] = np.nan
+    seen = flow_log(*_sound(record.replace(**lost)))
+    assert len(seen.gaps) == 1
+    turned = float(np.sum(true[gap])) * 1e-3
+    line = float(np.sum(np.linspace(true[first - 1], true[first + 100], 102)[1:-1])) * 1e-3
+    delivered = float(np.sum(seen.drives[gap, 0])) * 1e-3
+    assert abs(delivered - turned) < 0.1 * abs(line - turned)
+
+
+def test_noise_of_speed_stays_where_oil_is_stiff_and_hardly_leaks() -> None:
+    record, true = log("normal", 7)
+    seen = flow_log(*_sound(record))
+    found = {"bulk_modulus": 50.0 * true, "leakage_coefficient": HEALTHY.leakage_coefficient}
+    stiff, stiffer = (
+        carried(seen, HEALTHY, {**found, "bulk_modulus": times * true}).noise[0] for times in (50.0, 100.0)
+    )
+    kept = 50.0 * true / HEALTHY.chamber_volume * HEALTHY.pump_displacement
+    noise = min(seen.drive_std[0] ** 2, struck_variance(seen.drives[:, 0]))
+    assert stiff.walk == pytest.approx(kept**2 * noise * seen.sample_time)
+    assert stiffer.walk == pytest.approx(4.0 * stiff.walk)
+    assert replace(stiff, walk=0.0) == seen.noise[0]
+    assert carried(seen, HEALTHY, {**found, "leakage_coefficient": 1e4 * HEALTHY.leakage_coefficient}) is seen

@@ -1,0 +1,19 @@
+"""Noise of the drives adds to the variance what its draws do, whether they are kept or made one after another."""
+
+import numpy as np
+import pytest
+
+from estimation.fits.greybox import drive_noise
+from estimation.fits.greybox.drive_noise import drive_variance
+from tests.estimation.fits.short_logs import problem, usual
+
+
+def test_draws_for_a_long_log_are_those_for_a_short_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = problem()
+    theta = usual(one)
+    slopes = one.slopes(theta)
+    bread = np.asarray(np.linalg.inv(slopes.T @ slopes + np.eye(len(theta))), dtype=np.float64)
+    kept = drive_variance(one, theta, bread, slopes)
+    assert np.all(np.asarray(kept) > 0.0)
+    monkeypatch.setattr(drive_noise, "SAMPLES_KEPT", 10)
+    np.testing.assert_allclose(drive_variance(one, theta, bread, slopes), kept, rtol=1e-9)

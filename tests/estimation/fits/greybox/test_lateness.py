@@ -1,0 +1,45 @@
+"""Channels that are late or early by little, and a speed that comes before position and pressure."""
+
+import numpy as np
+import pytest
+
+from estimation.eha.explained import notes_of, set_right
+from estimation.fits.flow.fit import fit_flow
+from estimation.fits.greybox.lateness import LEAST_LATE, most_late
+from estimation.fits.hypotheses import LATEST
+from estimation.log_checks.clean import clean_log
+from estimation.notes import RigCode
+from tests.estimation.fits.strange_logs import HEALTHY, SPEED, explained, log
+
+
+def test_the_channel_whose_timing_explains_most_is_told_within_what_is_believed() -> None:
+    late = {"motor_speed_rad_s": (-3e-3, 12.0), "position_m": (1e-3, 9.0)}
+    assert most_late(late) == ("motor_speed_rad_s", -3e-3, 12.0)
+    assert most_late({}) == ("", 0.0, 0.0)
+    for behind, gain in ((0.9 * LEAST_LATE, 0.0), (1.1 * LEAST_LATE, 30.0), (-0.9 * LATEST, 30.0), (1.1 * LATEST, 0.0)):
+        assert most_late({"position_m": (behind, 30.0)}) == ("position_m", behind, gain)
+
+
+def test_a_speed_ahead_of_position_and_pressure_is_named_with_its_time_and_put_back() -> None:
+    record = log()
+    ahead = np.concatenate([record[SPEED][3:], np.full(3, record[SPEED][-1])])
+    given = record.replace(**{SPEED: ahead})
+    found = explained(given)
+    assert found.names == ("speed_early",)
+    (note,) = notes_of(found, HEALTHY)
+    assert note.code is RigCode.INPUT_EARLY
+    assert note.data["early_ms"] == pytest.approx(3.0, abs=0.1)
+    back = set_right(clean_log(given, HEALTHY), found).record[SPEED]
+    assert np.std((back - record[SPEED])[:-3]) < 0.1 * np.std(ahead - record[SPEED])
+
+
+def test_half_a_millisecond_of_a_position_is_taken_up_where_it_shows() -> None:
+    record = log(duration=3.0)
+    rows = np.arange(len(record))
+    given = record.replace(position_m=np.interp(rows - 0.5, rows, record["position_m"]))
+    found = explained(given)
+    assert found.names == ("position_late",)
+    assert notes_of(found, HEALTHY)[0].data["late_ms"] == pytest.approx(0.5, abs=0.25)
+    fit = fit_flow(given, HEALTHY, HEALTHY.bulk_modulus)
+    value, std = fit.parameters["bulk_modulus"]
+    assert abs(value - HEALTHY.bulk_modulus) < 2.0 * std

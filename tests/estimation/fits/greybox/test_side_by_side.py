@@ -1,0 +1,190 @@
+"""Residuals under parameter sets side by side are those of one run after the other."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from estimation.fits.explaining.wide_log import usual_values, widened
+from estimation.fits.explaining.wide_problem import freed
+from estimation.fits.greybox import freed_problem, side_by_side
+from estimation.fits.greybox.freed_problem import NUDGE, FreedProblem
+from estimation.fits.greybox.log import greybox_log
+from estimation.fits.greybox.loops import RUNAWAY
+from estimation.fits.greybox.problem import OUTLIER, Problem
+from estimation.fits.greybox.side_by_side import LANES, MANY, compile_side_by_side
+from estimation.fits.greybox.side_by_side_loops import residuals_side_by_side
+from estimation.fits.hypotheses import HYPOTHESES
+from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM
+from estimation.models.flow_parameters import flow_parameters
+from estimation.models.greybox import GreyBoxModel
+from estimation.models.wide_flow import TURBULENT_FLOW_FORM, WIDE_FLOW_FORM, WideFlowParameters
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.sensors.sensors import BENCH
+from plant.solvers.steps import parameter_names, parameter_row
+from tests.kernels import functions_of, on_memory, text_of
+
+HEALTHY = EhaParameters()
+VARIANCES = {"motor_speed_rad_s": 1e-4, "position_m": 1e-12, "differential_pressure_pa": 1e7}
+
+
+@pytest.fixture(scope="module")
+def problem() -> FreedProblem:
+    rng = np.random.default_rng(3)
+    record = simulate(CIRCUIT, make_drive("steps", 1.0, 1e-3, HEALTHY, rng), 1e-3, HEALTHY, sensors=BENCH, rng=rng)
+    pressure = record["differential_pressure_pa"].copy()
+    pressure[[20, 21, 22, 23, 300]] = np.nan
+    record = record.replace(differential_pressure_pa=pressure)
+    log = greybox_log(FLOW_FORM, record, flow_parameters(HEALTHY), longest_step=2.5e-4, variances=VARIANCES)
+    return freed(widened(log, HEALTHY), HYPOTHESES)
+
+
+def points(problem: FreedProblem, count: int) -> np.ndarray:
+    usual = problem.model.theta({**usual_values(problem.log), "case_leakage": 1e-13, "speed_lead": 1e-5})
+    return usual + 0.02 * np.random.default_rng(4).standard_normal((count, len(usual)))
+
+
+def alone(problem: FreedProblem, theta: np.ndarray) -> np.ndarray:
+    """One run by the kernel that also carries sensitivities and gaps."""
+    row = problem.log.parameters.copy()
+    for name, value in problem.model.values(theta).items():
+        row[parameter_names(WideFlowParameters).index(name)] = value
+    return Problem(TURBULENT_FLOW_FORM, problem.log).residuals(np.empty(0), parameters=row)
+
+
+def test_several_points_together_cost_what_each_costs_alone(problem: FreedProblem) -> None:
+    thetas = points(problem, 3)
+    for theta, point in zip(thetas, problem.at_each(thetas), strict=True):
+        here = alone(problem, theta).ravel()
+        assert np.max(np.abs(here)) > 1.0
+        weight = np.minimum(1.0, OUTLIER / np.maximum(np.abs(here), OUTLIER))
+        known = 0.5 * problem.prior @ (theta - problem.presumed) ** 2
+        assert point.cost == pytest.approx(float(np.sum((1.0 - 0.5 * weight) * weight * here**2) + known), rel=1e-7)
+        assert point.gradient == pytest.approx(problem.at(theta).gradient, rel=1e-12)
+
+
+def test_the_residuals_of_one_point_are_those_of_a_run_alone(problem: FreedProblem) -> None:
+    (theta,) = points(problem, 1)
+    np.testing.assert_allclose(problem.residuals(theta), alone(problem, theta), rtol=1e-7, atol=1e-7)
+
+
+def test_the_normal_equations_are_those_of_residuals_one_by_one(problem: FreedProblem) -> None:
+    (theta,) = points(problem, 1)
+    assert len(theta) + 1 > LANES
+    point, here = problem.at(theta), alone(problem, theta).ravel()
+    small = np.abs(here) < OUTLIER
+    for i in (0, 1, len(theta) - 1):
+        nudged = theta.copy()
+        nudged[i] += NUDGE
+        slope = (alone(problem, nudged).ravel() - here) / NUDGE
+        weight = np.where(small, 1.0, OUTLIER / np.maximum(np.abs(here), OUTLIER))
+        expected = float(slope @ (weight * here)) + problem.prior[i] * (theta[i] - problem.presumed[i])
+        assert point.gradient[i] == pytest.approx(expected, rel=1e-3, abs=1e-3)
+
+
+def test_a_run_that_escapes_keeps_a_finite_residual_and_leaves_its_neighbours_alone(problem: FreedProblem) -> None:
+    mad = problem.log.parameters.copy()
+    mad[parameter_names(WideFlowParameters).index("chamber_volume")] = np.nan
+    run = compile_side_by_side(WIDE_FLOW_FORM, LANES)
+    log, rows = problem.log, np.repeat(problem.log.parameters[None], LANES, axis=0)
+    rows[3] = mad
+    errors = np.zeros((1, len(log.measured), LANES))
+    noise = log.noise[0]
+    run(
+        rows,
+        log.drives[..., None],
+        log.measured,
+        log.sample_time,
+        log.steps,
+        1,
+        np.array([noise.variance]),
+        np.zeros((1, 1)),
+        np.zeros((1, 1)),
+        errors,
+    )
+    assert np.max(np.abs(errors[..., 3])) == RUNAWAY
+    others = np.delete(errors, 3, axis=-1)
+    assert np.all(others == others[..., :1])
+    assert np.max(np.abs(others)) < RUNAWAY
+
+
+@pytest.mark.parametrize("form", [FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM], ids=lambda form: form.name)
+def test_finite_differences_give_the_normal_equations_of_exact_derivatives(
+    problem: FreedProblem, form: GreyBoxModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(freed_problem, "NUDGE", 1e-7)  # exact derivatives do not see what lies behind the next corner
+    p = flow_parameters(HEALTHY)
+    log = replace(problem.log, drives=problem.log.drives[:, :2], parameters=parameter_row(p))
+    start = {"case_leakage": 1e-13, "speed_lead": 1e-5, "accumulator_stiffness": 1e8, "makeup_opening": 1e3}
+    theta = form.theta({**vars(p), **start})
+    near, exact = FreedProblem.of(form, log).at(theta), Problem(form, log).at(theta)
+    assert near.cost == pytest.approx(exact.cost, rel=1e-9)
+    assert near.gradient == pytest.approx(exact.gradient, rel=1e-4, abs=1e-4 * np.max(np.abs(exact.gradient)))
+    scale = np.sqrt(np.outer(np.diag(exact.gram), np.diag(exact.gram)))
+    np.testing.assert_allclose(near.gram / scale, exact.gram / scale, atol=1e-4)
+
+
+def test_costs_without_slopes_are_those_with_them(problem: FreedProblem) -> None:
+    thetas = [*points(problem, 3)]
+    assert problem.costs(thetas) == pytest.approx([problem.at(theta).cost for theta in thetas], rel=1e-9)
+
+
+@pytest.mark.parametrize("count", [LANES - 1, LANES + 3, MANY + 2])
+def test_any_number_of_points_is_run(problem: FreedProblem, count: int) -> None:
+    thetas = [*points(problem, count)]
+    together = problem.costs(thetas)
+    assert len(together) == count
+    for place in (0, count - 1):
+        assert together[place] == pytest.approx(problem.at(thetas[place]).cost, rel=1e-9)
+
+
+def test_what_was_run_at_one_of_the_last_two_points_is_not_run_again(
+    problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, (first, second, third) = problem.on(problem.log), points(problem, 3)
+    fresh = [problem.on(problem.log).linearised(theta) for theta in (first, second)]
+    for theta in (third, first, second):
+        own.at(theta)
+    monkeypatch.setattr(own, "_side_by_side", lambda *_: pytest.fail("this point was run"))
+    for theta, (errors, slopes) in zip((first, second), fresh, strict=True):
+        found = own.linearised(theta)
+        np.testing.assert_array_equal(found[0], errors)
+        np.testing.assert_array_equal(found[1], slopes)
+    with pytest.raises(pytest.fail.Exception, match="this point was run"):
+        own.at(third)
+
+
+def test_residuals_under_several_rigs_are_those_of_each(problem: FreedProblem) -> None:
+    (theta,) = points(problem, 1)
+    wider = problem.log.parameters.copy()
+    wider[parameter_names(WideFlowParameters).index("piston_area")] *= 1.01
+    both = problem.residuals_of(theta, [problem.log.parameters, wider])
+    assert np.max(np.abs(both[1] - both[0])) > 0.1
+    for found, row in zip(both, (problem.log.parameters, wider), strict=True):
+        np.testing.assert_allclose(found, problem.residuals(theta, parameters=row), rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["one_drive", "drives_of_each"])
+def test_the_loop_run_as_python_gives_what_its_kernel_gives(
+    problem: FreedProblem, own: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    n, rng = 10, np.random.default_rng(5)
+    rows = parameter_row(flow_parameters(HEALTHY)) * (1.0 + 0.01 * rng.standard_normal((LANES, 1)))
+    drives = problem.log.drives[200 : 200 + n, :2, None] * (1.0 + 0.1 * np.arange(LANES if own else 1))
+    measured = problem.log.measured[200 : 200 + n].copy()
+    measured[4:6] = np.nan
+    given = measured, 1e-3, np.array([0, *[2] * (n - 3), 3, 3]), 2, np.array([1e7])
+    given = *given, np.array([[1e6, 0.0, 2e6]]), np.array([[0.0, 3e7]])
+    text = text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(FLOW_FORM, LANES))
+    file = functions_of(text)
+    plain = SimpleNamespace(**vars(file))
+    plain.VECTOR = 1
+    for name in ("begin", "settle", "step", "show"):
+        setattr(plain, f"{name}_at", on_memory(file, getattr(file, name)))
+    found, wanted = (np.full((1, n // 2, LANES), np.nan) for _ in range(2))
+    residuals_side_by_side(plain, rows, drives, *given, found)
+    compile_side_by_side(FLOW_FORM, LANES)(rows, drives, *given, wanted)
+    np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9)

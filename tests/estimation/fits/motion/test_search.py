@@ -1,0 +1,128 @@
+"""Searches of two structures of friction take turns, and end where one explains the log or none can."""
+
+from collections.abc import Callable, Sequence
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.motion import search as motion_search
+from estimation.fits.motion.fit import unseen
+from estimation.fits.motion.search import (
+    FINALISTS,
+    HOPELESS,
+    MOST_WORK,
+    WAYS,
+    Begun,
+    MotionSearch,
+    explained,
+    likeliest,
+)
+
+SHORT, PART = 100, 400
+Misfit = Callable[[float], float]
+
+
+class Search:
+    """A search whose starts stand at 0, 1, 2, ..., a rank of `WAYS` each, and whose descents end where they begin."""
+
+    def __init__(self, misfit: Misfit, name: str, asked: list[str], steps: int = 1) -> None:
+        self._steps = steps
+        self.guesses, self.bounds = [np.zeros(1)], (np.full(1, -9.0), np.full(1, 99.0))
+        self.short, self.part = (self._problem(misfit, samples) for samples in (SHORT, PART))
+        self._name, self._asked = name, asked
+
+    def _problem(self, misfit: Misfit, samples: int) -> SimpleNamespace:
+        def at(theta: np.ndarray) -> Point:
+            return Point(theta, 0.5 * samples * misfit(float(theta[0])), np.zeros(1), np.eye(1))
+
+        return SimpleNamespace(at=at, log=SimpleNamespace(measured=np.zeros((samples, 1)), steps=[self._steps]))
+
+    def same_pit(self, one: Point, other: Point) -> bool:
+        return bool(one.theta[0] == other.theta[0])
+
+    def brought_near(self, rank: int, begun: Begun) -> Sequence[np.ndarray]:
+        assert isinstance(begun, Begun)
+        self._asked.append(f"{self._name}{rank}")
+        return [np.array([float(len(WAYS) * rank + way)]) for way in range(len(WAYS))]
+
+
+def ended(*misfits: Misfit, steps: int = 1) -> tuple[list[motion_search.Ended], list[str]]:
+    asked: list[str] = []
+    searches = [Search(misfit, name, asked, steps) for misfit, name in zip(misfits, "ab", strict=True)]
+    return likeliest(cast("list[MotionSearch]", searches)), asked
+
+
+def test_the_second_structure_is_tried_before_the_less_likely_starts_of_the_first() -> None:
+    (first, second), asked = ended(lambda _: 2.0, lambda at: 1.0 if at == 1.0 else 2.0)
+    assert asked == ["a0", "b0"]
+    assert not first.explains
+    assert second.explains
+    assert second.point.theta[0] == 1.0
+    assert second.point.cost < 0.5 * 1.1 * PART
+
+
+def test_less_likely_starts_are_tried_where_the_misfit_is_not_hopeless() -> None:
+    found, asked = ended(lambda _: 2.0, lambda at: 1.0 if at == 7.0 else 2.0)
+    assert asked == ["a0", "b0", "a1", "b1", "a2", "b2"]
+    assert [one.explains for one in found] == [False, True]
+
+
+def test_a_log_far_from_both_is_given_up_after_the_likeliest_starts() -> None:
+    far = 1.2 * HOPELESS
+    found, asked = ended(lambda at: far + at, lambda at: far + (at - 2.0) ** 2)
+    assert asked == ["a0", "b0"]
+    assert [float(one.point.theta[0]) for one in found] == [0.0, 2.0]
+    assert not any(one.explains for one in found)
+
+
+def test_every_start_is_tried_before_a_log_that_is_nearly_explained_is_given_up() -> None:
+    found, asked = ended(lambda _: 1.2, lambda _: 1.3)
+    assert len(asked) == 2 * FINALISTS
+    assert not any(one.explains for one in found)
+
+
+def test_no_other_start_is_tried_once_the_work_is_done() -> None:
+    for steps, ranks in ((1, FINALISTS), (MOST_WORK, 1)):
+        found, asked = ended(lambda _: 1.2, lambda _: 1.3, steps=steps)
+        assert len(asked) == 2 * ranks
+        assert not any(one.explains for one in found)
+
+
+def test_where_the_work_is_done_nothing_is_carried_to_the_end_that_explains_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    finished: list[float] = []
+    descended = motion_search.descend
+
+    def noted(at: Callable[..., Point], start: np.ndarray, evaluations: int, bounds: Any, *others: Any) -> Point:
+        finished.append(float(start[0]))
+        return descended(at, start, evaluations, bounds, *others)
+
+    monkeypatch.setattr(
+        motion_search, "descend", lambda *a, wanted=None, **k: descended(*a, **k) if wanted else noted(*a)
+    )
+    for steps, ends in ((1, 1), (MOST_WORK, 0)):  # the likelier structure alone is carried on
+        finished.clear()
+        ended(lambda _: 1.2, lambda _: 1.3, steps=steps)
+        assert len(finished) == ends
+
+
+def test_what_explains_the_first_seconds_alone_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    def longer(problem: SimpleNamespace) -> float:
+        return explained(cast("motion_search.FreedProblem", problem)) * (
+            0.5 if len(problem.log.measured) == PART else 1.0
+        )
+
+    monkeypatch.setattr(motion_search, "explained", longer)
+    found, _ = ended(lambda _: 1.0, lambda _: 1.0)
+    assert not any(one.explains for one in found)
+
+
+def test_the_less_a_log_holds_the_farther_an_unseen_misfit_may_move_it() -> None:
+    white, stained = (cast("GreyBoxFit", SimpleNamespace(chi_square=(chi,))) for chi in (0.9, 1.05))
+    assert unseen(white, 20_000) == pytest.approx((1.0 + 200.0) ** 0.5)
+    assert unseen(stained, 20_000) == pytest.approx((1.0 + 200.0 + 1000.0) ** 0.5)

@@ -1,0 +1,60 @@
+"""How far a log without pressure that nothing explains is searched on."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.fits.greybox.descent import Point
+from estimation.fits.motion import fit as motion_fit
+from estimation.fits.motion.fit import BEGINNING, SPARED_NIS, SPARED_SHARE
+from estimation.fits.motion.search import EXPLAINED, SCREENED, Ended
+
+BEGUN = Point(np.ones(1), 1.0, np.zeros(1), np.zeros((1, 1)))
+
+
+def problem_of(chi_square: float, samples: int) -> Any:
+    """Return a problem of which every point leaves so much."""
+    point = Point(np.ones(1), 0.5 * chi_square * samples, np.zeros(1), np.zeros((1, 1)))
+    return SimpleNamespace(log=SimpleNamespace(measured=np.zeros((samples, 1))), at=lambda _: point)
+
+
+@pytest.mark.parametrize("counts", [1.0, BEGINNING])
+@pytest.mark.parametrize(
+    ("large", "far", "samples", "ends"),
+    [
+        (0.99, 9.0, SCREENED + 1, True),  # no class is refused for so little noise
+        (1.01, 0.99, SCREENED + 1, True),  # nor for so small a share of the motion
+        (1.01, 1.01, SCREENED + 1, False),
+        (0.99, 0.99, SCREENED, False),  # short logs take little
+    ],
+)
+def test_a_search_need_not_go_on_that_cannot_come_to_explain_a_log_whose_class_stands(
+    large: float, far: float, samples: int, ends: bool, counts: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = problem_of(large * counts * SPARED_NIS, samples)
+    monkeypatch.setattr(motion_fit, "share_of_motion", lambda *_: far * counts * SPARED_SHARE)
+    found = motion_fit._wanted(problem, BEGUN, counts)
+    assert found == pytest.approx(0.5 * EXPLAINED * samples if ends else np.inf)
+
+
+@pytest.mark.parametrize(("chi_square", "spared"), [(9.9, (True, True)), (10.1, (False, True)), (50.1, (False, False))])
+def test_the_beginning_of_a_log_is_searched_on_further_than_the_whole(
+    chi_square: float, spared: tuple[bool, bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part, whole = problem_of(chi_square, 10_000), problem_of(chi_square, 20_000)
+    asked: list[bool] = []
+
+    def noted(*_: Any, wanted: float = np.inf, **__: Any) -> Point:
+        asked.append(np.isfinite(wanted))
+        return Point(np.ones(1), 1e9, np.zeros(1), np.zeros((1, 1)))
+
+    monkeypatch.setattr(motion_fit, "descend", noted)
+    monkeypatch.setattr(motion_fit, "share_of_motion", lambda *_: 1.0)
+    monkeypatch.setattr(motion_fit, "concluded", lambda *_: "concluded")
+    monkeypatch.setattr(motion_fit, "_rival", lambda *_, **__: [])
+    search: Any = SimpleNamespace(part=part, whole=whole, bounds=None)
+    ended = [Ended(search, BEGUN, explains=False)] * 2
+    assert motion_fit._fitted(ended) == (["concluded"], [])
+    assert tuple(asked) == spared
