@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from estimation.fits.greybox.convolution import smooth_length
+from estimation.fits.convolution import smooth_length
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
 from estimation.log_checks.order import median

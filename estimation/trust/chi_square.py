@@ -2,7 +2,7 @@
 
 import math
 
-from estimation.fits.greybox.root import root_between
+from estimation.fits.root import root_between
 
 
 def chi_square_tail(statistic: float, freedom: int) -> float:

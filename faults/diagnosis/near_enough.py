@@ -2,7 +2,7 @@
 
 Where pressure is logged, a model error that lasts is counted in how far a circuit may lie beside the nine
 (`class_regions.ClassFits.told`), as a balance of flows looks for other faults. Without, circuits with such faults are
-laid beside the log first (`outside`); only where none explains it the error counts.
+laid beside the log first (`other_faults`); only where none explains it the error counts.
 """
 
 from collections.abc import Sequence

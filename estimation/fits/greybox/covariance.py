@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 
-from estimation.fits.greybox.convolution import convolved, smooth_length
+from estimation.fits.convolution import convolved, smooth_length
 from estimation.notes import EstimateCode
 from plant.arrays import Array
 from plant.errors import LogWarning

@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.fits.greybox.root import root_between
+from estimation.fits.root import root_between
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from estimation.fits.greybox.root import root_between
+from estimation.fits.root import root_between
 
 if TYPE_CHECKING:
     from estimation.identification.model.linear_model import LinearModel

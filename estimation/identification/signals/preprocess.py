@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.arrays import Array
-from estimation.fits.greybox.convolution import smooth_length
+from estimation.fits.convolution import smooth_length
 from estimation.identification.notes import IdentificationCode
 from estimation.log_checks.bridging import bridged
 from plant.errors import HydrostateError, LogWarning

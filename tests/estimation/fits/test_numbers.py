@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from estimation.fits.convolution import convolved, smooth_length
 from estimation.fits.greybox.averaged import averaged, block_means, samples_a_block
-from estimation.fits.greybox.convolution import convolved, smooth_length
 from estimation.fits.greybox.covariance import _autocovariance, automatic_lags, least_squares_covariance
 from estimation.fits.greybox.descent import Point, descend, descend_together
 from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
-from estimation.fits.greybox.root import root_between
+from estimation.fits.root import root_between
 from estimation.fits.steady_state_fit import SteadyPoints, fit_friction, fit_leakage, steady_points
 from plant.arrays import Array
 from plant.log.record import Record

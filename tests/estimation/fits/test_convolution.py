@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.signal import oaconvolve
 
-from estimation.fits.greybox.convolution import convolved
+from estimation.fits.convolution import convolved
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from math import cos, tanh
 import pytest
 from scipy.optimize import brentq
 
-from estimation.fits.greybox.root import root_between
+from estimation.fits.root import root_between
 
 
 @pytest.mark.parametrize("tolerance", [1e-12, 1e-3, 0.1])
@@ -32,6 +32,6 @@ def test_ends_of_one_sign_are_refused() -> None:
 
 
 def test_a_root_that_is_not_reached_is_left_where_it_was_nearest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("estimation.fits.greybox.root.MOST_STEPS", 3)
+    monkeypatch.setattr("estimation.fits.root.MOST_STEPS", 3)
     found = root_between(lambda x: x**3 - x - 1.0, -5.0, 9.0, 1e-12)
     assert 1e-6 < abs(found - 1.3247179572447460) < 5.0
