@@ -45,6 +45,12 @@ class Hypothesis:
         Whether the search also begins with an encoder that reads zero in the middle of the log's travel.
     from_change : bool
         Whether the search begins where lost flow says that leakage steps.
+    from_entry : bool
+        Whether the search begins where lost flow says that air gets in, and looks for that all over the log.
+    at_end : tuple of str
+        What is freed only as the search comes to its end.
+    by_mass : bool
+        Whether the search balances mass whatever the plain form does: bubbles change the volume of what flows.
     beside : tuple of str
         What is fitted along with it, but is nothing that it promises.
     lower : bool
@@ -65,6 +71,9 @@ class Hypothesis:
     least: float = 0.0
     from_mid_travel: bool = False
     from_change: bool = False
+    from_entry: bool = False
+    at_end: tuple[str, ...] = ()
+    by_mass: bool = False
     beside: tuple[str, ...] = ()
     lower: bool = False
     known: bool = False
@@ -160,6 +169,18 @@ LEAKAGE_STEP = Hypothesis(
 LEAKAGE_TURBULENT = Hypothesis("leakage_turbulent", ("leakage_turbulent",))
 """A worn edge or a scratch leaks as an orifice does. A lag of the pressure took its place, bulk modulus 7 % too low."""
 
+AIR_MIDWAY = Hypothesis(
+    "air_midway",
+    ("air_softness", "air_onset"),
+    ({"air_softness": 1e3}, {"air_softness": 3e3}),
+    far=True,
+    from_entry=True,
+    at_end=("air_width",),
+    beside=CRACKS,
+    by_mass=True,
+)
+"""Where air gets in, lost flow says roughly. How long it takes is sought last: what is short stops a descent."""
+
 MAKEUP_BLOCKED = Hypothesis(
     "makeup_blocked",
     ("makeup_share_b",),
@@ -196,12 +217,7 @@ HYPOTHESES = (
     Hypothesis("volume", ("chamber_volume",)),
     START_LOAD,
     Hypothesis("air", ("air_softness",), ({"air_softness": 1e2}, {"air_softness": 1e3})),
-    Hypothesis(
-        "air_midway",
-        ("air_softness", "air_onset"),
-        tuple({"air_softness": 1e3, "air_onset": onset} for onset in (0.2, 0.5, 0.8)),
-        far=True,
-    ),
+    AIR_MIDWAY,
     Hypothesis(
         "relief_low", ("relief_pressure", "relief_conductance"), shares_of_peak=(0.6, 0.85), far=True, lower=True
     ),
@@ -234,6 +250,7 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "start_level": (-2.5e5, 1e7),
     "air_softness": (0.0, 1e5),
     "air_onset": (0.0, 1.0),
+    "air_width": (1e-3, 0.3),
     "leakage_growth": (-2.0, 2.0),
     "crack_pressure": (-1e5, 2e5),
     "crack_difference": (-5e4, 5e4),

@@ -23,9 +23,6 @@ from plant.units import si
 VAPOUR = 2e4
 """Absolute pressure about which a chamber that is short of oil becomes soft [Pa]; pressures stay positive."""
 
-AIR_RISE = 0.02
-"""Time in which air that gets in midway is there, in lengths of the log: what is shorter stops a descent [fraction]."""
-
 STIFFEST = 0.01
 """Least compliance of a chamber over that at the stated pressure: a search may try more air than there can be there."""
 
@@ -69,6 +66,7 @@ class WideFlowParameters(FlowParameters):
     )
     air_softness: float = si(0.0, "Pa", "a of 1/beta(p) = 1/beta_liquid + a/p^2", "fitted")
     air_onset: float = si(-1.0, "1", "when that air gets in, in lengths of the log", "fitted")
+    air_width: float = si(0.05, "1", "how long it takes to get in, in lengths of the log", "fitted last")
     stated_pressure: float = si(1e6, "Pa", "absolute pressure that bulk modulus is stated at", "chosen")
     leakage_growth: float = si(0.0, "1", "growth of leakage over the log, of its value halfway", "fitted")
     leakage_bend: float = si(0.0, "1", "part of that growth which goes with time squared", "fitted")
@@ -85,19 +83,30 @@ class WideFlowParameters(FlowParameters):
     by_mass: float = si(0.0, "1", "1: balanced by mass, 0: by volume", "chosen")
 
 
-def _stiffness(pressure: Scalar, elapsed: Scalar, p: SimpleNamespace) -> Scalar:
+def _air(elapsed: Scalar, p: SimpleNamespace) -> Scalar:
+    """Return how soft entrained air makes the oil now: ``a`` of ``a/p^2`` [Pa]."""
+    return p.air_softness * minimum(maximum((elapsed - p.air_onset) / p.air_width, 0.0), 1.0)
+
+
+def _bubbles(pressure: Scalar, air: Scalar) -> Scalar:
+    """Return the volume of entrained air over that of its oil [dimensionless]."""
+    return air / maximum(pressure, 0.05 * VAPOUR)
+
+
+def _stiffness(pressure: Scalar, air: Scalar, p: SimpleNamespace) -> Scalar:
     """Return the tangent bulk modulus of a chamber [Pa]: liquid, air that softens as 1/p^2, and vapour.
 
-    `bulk_modulus` is that at `stated_pressure`, air included; the liquid's where air gets in midway.
+    `bulk_modulus` is that at `stated_pressure`, air included; the liquid's where air gets in midway. By mass both are
+    of the room that the oil fills, bubbles included.
     """
     above = maximum(pressure, 0.05 * VAPOUR)
-    ratio = VAPOUR / above
+    ratio, bubbles = VAPOUR / above, _bubbles(pressure, air)
     short = ratio * ratio
-    air = p.air_softness * minimum(maximum((elapsed - p.air_onset) / AIR_RISE, 0.0), 1.0)
-    stated = where(p.air_onset < 0.0, air / (p.stated_pressure * p.stated_pressure), 0.0)
-    softer = air / (above * above) - stated
+    before = where(p.air_onset < 0.0, air / p.stated_pressure, 0.0)
+    softer = bubbles / above - before / p.stated_pressure
     oil = p.bulk_modulus - p.by_mass * (pressure - ATMOSPHERE)
-    return oil / maximum(1.0 + short * short + softer * oil, STIFFEST)
+    room = 1.0 + p.by_mass * (bubbles - before)
+    return oil * room / maximum(1.0 + short * short + softer * oil, STIFFEST)
 
 
 def _rates(
@@ -128,9 +137,11 @@ def _rates(
     drain = p.case_leakage * grown
     into_1 = fed_1 - p.drain_share_a * drain * (p1 - supply)
     into_2 = fed_2 - p.drain_share_b * drain * (p2 - supply)
-    at_1, at_2 = port_flows(pumped, leaked, dp, p.by_mass * dp / p.bulk_modulus)
-    rise = _stiffness(p1, elapsed, p) * (at_1 - area_1 * velocity + into_1) / volume_1
-    fall = _stiffness(p2, elapsed, p) * (area_2 * velocity - at_2 + into_2) / volume_2
+    air = _air(elapsed, p)
+    swelling = p.by_mass * (dp / p.bulk_modulus + _bubbles(p2, air) - _bubbles(p1, air))
+    at_1, at_2 = port_flows(pumped, leaked, dp, swelling)
+    rise = _stiffness(p1, air, p) * (at_1 - area_1 * velocity + into_1) / volume_1
+    fall = _stiffness(p2, air, p) * (area_2 * velocity - at_2 + into_2) / volume_2
     # how far the sensor is behind stays small where its lag is short, which a stiff step resolves
     offset = p.pressure_offset + p.pressure_drift * elapsed
     lagging = rise - fall - (behind + offset) / (p.pressure_lag + SHORTEST_LAG)

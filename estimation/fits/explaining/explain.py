@@ -13,6 +13,7 @@ import numpy as np
 
 from estimation.fits.explaining.form_fit import weighed
 from estimation.fits.explaining.promises import promised_beside, promising
+from estimation.fits.explaining.settled import NEAR, at_end, coarse, descended, gone, settled
 from estimation.fits.explaining.tried import Explanation, Tried
 from estimation.fits.explaining.wide_log import balanced_by, delayed, usual_pressure, usual_values, widened
 from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_starts
@@ -20,29 +21,20 @@ from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LATEST, Hypothesis
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, Hypothesis
 from estimation.models.flow import STIFFNESS
 from estimation.models.wide_flow import GROWTH, grown_leakage
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
-SCREENING, SETTLING, FINISHING = 7, 40, 12
-"""Evaluations of the model for a start, for one that is carried on, and for the last, with short model steps."""
+SCREENING, FINISHING = 7, 12
+"""Evaluations of the model for a start, and for the last search, with short model steps."""
 
 ROUNDS = 6
 """How often the last ones are made at most, while each gains what would tell a hypothesis from another [count]."""
 
-NEAR = 2.0
-"""First radius of a search [dimensionless]: it begins where the plain form ended, or a simpler hypothesis."""
-
 FINALISTS, CARRIED, NEARLY = 3, 2, 3.0
 """Hypotheses that are carried on, starts of each, and up to which share of the best start's cost the second is."""
-
-FINEST_DELAY = 1e-3
-"""Step in which a delay is sought [s]; what is left of it goes into the lag."""
-
-MAY_VANISH, VANISHED = ("leakage_coefficient", "flow_bias", "makeup_conductance"), 1e-2
-"""What a search may take for nothing by mistake, and the share of the rig's value below which it has."""
 
 NEARLY_AS_GOOD = 1.1
 """What the cost of a finished set is multiplied by before others are compared with it: their model steps are long, and
@@ -159,7 +151,7 @@ def _explained(tried: Tried, accepted: Accepted) -> bool:
 
 def _begun_again(log: GreyBoxLog, first: Tried) -> Mapping[str, float]:
     """Return where a hypothesis ended with long model steps, as the next search takes; nothing of it has vanished."""
-    return {**first.coarse, **_gone(log, first.coarse)}
+    return {**first.coarse, **gone(log, first.coarse)}
 
 
 def _delivery_open(log: GreyBoxLog, best: Tried) -> float:
@@ -190,7 +182,8 @@ def _screened(
     """Yield the best from each start after a few steps, with one model step a sample; fewer if it cannot be wanted."""
     absent = usual_values(log)
     asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
-    problems = [(delays, freed(delayed(log, delays).coarsened(), together)) for delays in asked]
+    found = at_end(together[:-1])
+    problems = [(delays, freed(coarse(log, delays, together), together, *found)) for delays in asked]
     begun = list(product(problems, own_starts(log, together[-1])))
     for start in starts:
         tried: list[Tried] = []
@@ -228,48 +221,6 @@ def _nearing(
         yield found
 
 
-def _settled(log: GreyBoxLog, tried: Tried, wanted: float = np.inf) -> Tried:
-    """Return a set of hypotheses brought to its optimum, with one model step a sample, if its cost may be as wanted."""
-    early = delayed(log, tried.delays).coarsened()
-    best = _descended(early, tried, tried.point.theta, SETTLING, wanted=wanted)
-    if (revived := _revived(log, best)) is not None:
-        best = min(best, _descended(early, best, revived, SETTLING, wanted=wanted), key=lambda one: one.cost)
-    if len(tried.together[-1].delays) == 1:
-        return best
-    channel, early = tried.together[-1].late, min(tried.together[-1].delays) < 0.0
-    least, most = (-LATEST, 0.0) if early else (0.0, LATEST)
-    for step in (FINEST_DELAY, -FINEST_DELAY):
-        while least <= (delay := best.delays.get(channel, 0.0) + step) <= most:
-            moved = replace(best, delays={channel: delay})
-            later = delayed(log, moved.delays).coarsened()
-            moved = _descended(later, moved, best.point.theta, SETTLING, wanted=best.cost)
-            if moved.cost >= best.cost:
-                break
-            best = moved
-    return best
-
-
-def _revived(log: GreyBoxLog, tried: Tried) -> Array | None:
-    """Return a start with the rig's value of what has all but vanished, from where a logarithm finds no way back."""
-    gone = _gone(log, tried.values)
-    return freed(log, tried.together).model.theta({**tried.values, **gone}) if gone else None
-
-
-def _gone(log: GreyBoxLog, values: Mapping[str, float]) -> dict[str, float]:
-    """Return the rig's values of what has all but vanished."""
-    usual = usual_values(log)
-    return {name: usual[name] for name in MAY_VANISH if values[name] < VANISHED * usual[name]}
-
-
-def _descended(
-    log: GreyBoxLog, tried: Tried, start: Array, evaluations: int, *more: str, wanted: float = np.inf
-) -> Tried:
-    problem = freed(log, tried.together, *more)
-    bounds = flow_bounds(problem.model, [start], log)
-    point = descend(problem.at, start, evaluations, bounds, radius=NEAR, wanted=wanted)
-    return replace(tried, point=point, values=problem.model.values(point.theta))
-
-
 def _finished(log: GreyBoxLog, tried: Tried) -> Tried:
     """Return a set of hypotheses fitted to the end, balanced by volume and by mass.
 
@@ -278,7 +229,8 @@ def _finished(log: GreyBoxLog, tried: Tried) -> Tried:
     """
     row = delayed(log, tried.delays)
     done: list[tuple[Tried, FreedProblem]] = []
-    for share, more in ((0.0, ()), (1.0, (STIFFNESS,))):
+    last = at_end(tried.together)
+    for share, more in ((0.0, last), (1.0, (STIFFNESS, *last))):
         own = balanced_by(row, share)
         problem, begun = freed(own, tried.together, *more), done[-1][0] if done else tried
         start = problem.model.theta({**usual_values(own), **begun.values})
@@ -300,9 +252,9 @@ def _concluded(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxF
 
 def _to_its_end(log: GreyBoxLog, tried: Tried, start: Array, *more: str) -> Tried:
     """Return the end of a search with short model steps: where long ones end may be far from it."""
-    best = _descended(log, tried, start, FINISHING, *more)
+    best = descended(log, tried, start, FINISHING, *more)
     for _ in range(ROUNDS - 1):
-        further = _descended(log, best, best.point.theta, FINISHING, *more)
+        further = descended(log, best, best.point.theta, FINISHING, *more)
         gained = best.cost - further.cost
         if gained > 0.0:
             best = further
@@ -321,9 +273,9 @@ def _likeliest(log: GreyBoxLog, tried: Iterable[Iterable[Tried]], known: float =
     first, *others = [_ranked(one) for one in tried]
     sets = [first, *sorted(others, key=lambda one: one[0].cost)[: FINALISTS - 1]]
     carried = [[one[0], *(start for start in one[1:CARRIED] if start.cost < NEARLY * one[0].cost)] for one in sets]
-    settled: list[Tried] = []
+    ended: list[Tried] = []
     for one in carried:
-        wanted = min((known, *(other.cost for other in settled))) + CLOSE
-        settled.append(_ranked(_settled(log, start, wanted) for start in one)[0])
-    best = min((known, *(one.cost for one in settled)))
-    return _ranked(_finished(log, one) for one in _ranked(settled) if one.cost <= best + CLOSE)
+        wanted = min((known, *(other.cost for other in ended))) + CLOSE
+        ended.append(_ranked(settled(log, start, wanted) for start in one)[0])
+    best = min((known, *(one.cost for one in ended)))
+    return _ranked(_finished(log, one) for one in _ranked(ended) if one.cost <= best + CLOSE)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimation.fits.explaining.air_entry import likeliest_entry
 from estimation.fits.explaining.leakage_step import likeliest_step
 from estimation.fits.explaining.wide_log import balanced_by, usual_values, widened
 from estimation.fits.explaining.wide_problem import freed
@@ -22,6 +23,9 @@ LIKELIEST = 4
 STEPPED = 0.25
 """Share that a step must explain of what one leakage leaves of the lost flow, to be tried first [fraction]; judged. A
 step that multiplies leakage is too large for slopes to promise it."""
+
+AIRED = 0.1
+"""The same of air that gets in within the log, of what oil that stays as it is leaves [fraction]; judged."""
 
 
 class Promise(NamedTuple):
@@ -151,9 +155,10 @@ def promising(
     """
     promises = _promises(log.coarsened(), together, found, asked)
     stepped = any(one.from_change for one in asked) and likeliest_step(log).share > STEPPED
-    gains = [np.inf if stepped and one.from_change else promises[i].gain for i, one in enumerate(asked)]
-    order = sorted(range(len(asked)), key=lambda i: -gains[i])
-    likely = [asked[i] for i in order if not asked[i].far][:LIKELIEST]
+    aired = any(one.from_entry for one in asked) and likeliest_entry(log).share > AIRED
+    first = [(stepped and one.from_change) or (aired and one.from_entry) for one in asked]
+    order = sorted(range(len(asked)), key=lambda i: (not first[i], -promises[i].gain))
+    likely = [asked[i] for i in order if first[i] or not asked[i].far][:LIKELIEST]
     return likely, [one for one in asked if one not in likely]
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.fits.explaining.air_entry import likeliest_entry
 from estimation.fits.explaining.form_fit import LONGEST_STEP
 from estimation.fits.explaining.leakage_step import likeliest_step
 from estimation.fits.explaining.wide_log import usual_values
@@ -47,6 +48,8 @@ LEAST_GAS = 1.0
 stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
 
 POSITION_ZERO = "position_zero"
+
+AIR_ONSET, AIR_WIDTH = "air_onset", "air_width"
 
 START_PRESSURE, START_LEVEL = "start_pressure", "start_level"
 
@@ -112,6 +115,8 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
         return [{START_PRESSURE: begun, START_LEVEL: share * _shut_in(log)} for share in LEVELS_TRIED]
     if one.from_change:
         return [likeliest_step(log).first or one.starts[0]]
+    if one.from_entry:
+        return [{**start, AIR_ONSET: likeliest_entry(log).onset} for start in one.starts]
     if one.from_mid_travel:
         read = log.drives[:, WIDE_FLOW_FORM.drives.index(POSITION)]
         return [*one.starts, {POSITION_ZERO: 0.5 * float(np.min(read) + np.max(read))}]

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from estimation.fits.explaining.explain import VANISHED, WORTH
+from estimation.fits.explaining.explain import WORTH
 from estimation.fits.explaining.left_open import wear_open
 from estimation.fits.explaining.objections import doubted, fit_explains
 from estimation.fits.explaining.promises import Promise, promised, promised_each, slopes_of
+from estimation.fits.explaining.settled import VANISHED
 from estimation.fits.flow.log import homed_at_stop, outruns_pump
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.greybox.fit import GreyBoxFit

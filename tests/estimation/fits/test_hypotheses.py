@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from estimation.eha.estimate import estimate_log
 from estimation.eha.explained import notes_of, rig_set_right, set_right
 from estimation.fits.explaining import explain as module
+from estimation.fits.explaining import settled
 from estimation.fits.explaining.left_open import OPEN_DELIVERY
 from estimation.fits.explaining.tried import Explanation, Tried
 from estimation.fits.flow import asked
@@ -156,11 +157,11 @@ def test_a_delay_is_sought_no_longer_than_a_sensor_may_have(monkeypatch: pytest.
         delay = tried.delays.get(late.late, 0.0)
         return replace(tried, point=Point(np.zeros(1), 1e3 - delay, np.zeros(1), np.eye(1)))
 
-    monkeypatch.setattr(module, "_descended", falling)
-    monkeypatch.setattr(module, "_revived", lambda *_: None)
-    monkeypatch.setattr(module, "delayed", lambda log, _: log)
+    monkeypatch.setattr(settled, "descended", falling)
+    monkeypatch.setattr(settled, "_revived", lambda *_: None)
+    monkeypatch.setattr(settled, "delayed", lambda log, _: log)
     begun = Tried((late,), Point(np.zeros(1), 1e3, np.zeros(1), np.eye(1)), {}, {}, {})
-    found = module._settled(cast("GreyBoxLog", plain), begun)
+    found = settled.settled(cast("GreyBoxLog", plain), begun)
     assert found.delays[late.late] == pytest.approx(LATEST, abs=1e-3)
 
 

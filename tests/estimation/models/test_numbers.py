@@ -135,7 +135,9 @@ def wide_flow_form() -> dict[str, Any]:
             where: list(wide_flow.WIDE_FLOW_FORM.rates((*pressures, 1e4, 4.4e5), drives, p, 0.25))
             for where, pressures in {**PRESSURES, "short": (5e3, 1e6), "void": (5e2, 1e6)}.items()
         }
-        told[name]["stiffness [Pa]"] = [wide_flow._stiffness(one, 0.4, p) for one in (2e2, 1e3, 2e4, 1e6)]
+        told[name]["stiffness [Pa]"] = [
+            wide_flow._stiffness(one, wide_flow._air(0.4, p), p) for one in (2e2, 1e3, 2e4, 1e6)
+        ]
     told["growth"] = [
         wide_flow.grown_leakage(elapsed, *changes)
         for elapsed in (0.0, 0.5, 0.9)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.fits.explaining import explain
+from estimation.fits.explaining import explain, settled
 from estimation.fits.explaining.delivery import contradicted
 from estimation.fits.explaining.explain import CLOSE, NEVER, ROUNDS
 from estimation.fits.explaining.tried import Tried
@@ -38,7 +38,7 @@ def ended(costs: Sequence[float], monkeypatch: pytest.MonkeyPatch) -> tuple[floa
         made.append(costs[len(made)])
         return SimpleNamespace(cost=made[-1], point=SimpleNamespace(theta=np.zeros(1)))
 
-    monkeypatch.setattr(explain, "_descended", descended)
+    monkeypatch.setattr(explain, "descended", descended)
     nothing: Any = None
     return explain._to_its_end(nothing, nothing, np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
 
@@ -60,7 +60,7 @@ def test_what_promises_most_is_settled_even_where_its_starts_are_not_what_it_say
         return SimpleNamespace(cost=cost)
 
     settled: list[float] = []
-    monkeypatch.setattr(explain, "_settled", lambda _, start, __: settled.append(start.cost) or start)
+    monkeypatch.setattr(explain, "settled", lambda _, start, __: settled.append(start.cost) or start)
     monkeypatch.setattr(explain, "_finished", lambda _, one: one)
     nothing: Any = None
     found = explain._likeliest(nothing, [[tried(np.inf), tried(np.inf)], [tried(9.0), tried(10.0), tried(90.0)]])  # pyright: ignore[reportPrivateUsage]
@@ -134,9 +134,9 @@ def test_all_else_is_asked_beside_a_hypothesis_where_what_slopes_promise_does_no
     monkeypatch.setattr(explain, "delayed", lambda log, _: log)
     monkeypatch.setattr(explain, "promising", lambda *_: ([likely], [far, hidden]))
     monkeypatch.setattr(explain, "own_starts", lambda *_: [{"offset": 1e5}])
-    monkeypatch.setattr(explain, "usual_values", lambda _: {"leakage_coefficient": 5e-12, "flow_bias": 2e-6} | FED)
+    monkeypatch.setattr(settled, "usual_values", lambda _: {"leakage_coefficient": 5e-12, "flow_bias": 2e-6} | FED)
     monkeypatch.setattr(explain, "_screened", screened)
-    monkeypatch.setattr(explain, "_settled", lambda _, start, __: start)
+    monkeypatch.setattr(explain, "settled", lambda _, start, __: start)
     monkeypatch.setattr(explain, "_finished", finished)
     nothing: Any = None
     at_end = {"leakage_coefficient": 1e-12, "flow_bias": 1e-6, "offset": 3e4, **FED}
