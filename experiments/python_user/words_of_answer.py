@@ -23,6 +23,10 @@ class Words:
         Kind of actuator, and what was asked of the log.
     options : Mapping[str, Any]
         The verb's options.
+    rig : str
+        Name of the rig.
+    record : Record
+        The log.
     said : sequence of LogWarning
         What reading the log brought up.
     """

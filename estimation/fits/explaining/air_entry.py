@@ -8,11 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimation.fits.explaining.leakage_step import EDGE, PIECES
-from estimation.fits.explaining.wide_log import usual_values
+from estimation.fits.explaining.lost_flow import EDGE, PIECES, lost_flow
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.log_checks.channel_names import POSITION, SPEED
-from estimation.models.wide_flow import WIDE_FLOW_FORM
 from plant.arrays import Array
 
 
@@ -73,22 +70,16 @@ def _averaged(log: GreyBoxLog) -> tuple[Array, Array, Array]:
     In any case that is pressure, the speed's sign and the rise of pressure; bubbles shrink by what the inverse of the
     loaded chamber's pressure loses. Each is of its own size.
     """
-    named = {name: log.drives[:, at] for at, name in enumerate(WIDE_FLOW_FORM.drives)}
-    rig = usual_values(log)
-    speed, position, pressure = named[SPEED], named[POSITION], log.measured[:, 0]
-    ends = np.unique(np.linspace(0, len(speed) - 1, PIECES + 1).astype(np.intp))
-    count, time = np.diff(ends), log.sample_time * np.diff(ends)
-    means = np.add.reduceat(np.stack([speed, pressure, np.sign(speed)])[:, : ends[-1]], ends[:-1], axis=1) / count
-    lost = rig["pump_displacement"] * means[0] - rig["piston_area"] * np.diff(position[ends]) / time
-    middle = 0.5 * (position[ends[1:]] + position[ends[:-1]])
-    volume = 1.0 + np.sign(means[1]) * rig["piston_area"] * middle / rig["chamber_volume"]
-    supply, at_ends = rig["accumulator_pressure"], pressure[ends]
-    bubbles = np.sign(at_ends) * np.abs(at_ends) / (supply + np.abs(at_ends))
-    rise, squeezed = volume * np.diff(at_ends) / time, volume * np.diff(bubbles) / time
-    there = np.isfinite(means[1]) & np.isfinite(rise)
-    others = np.column_stack([means[1], means[2], rise])[there]
+    flow = lost_flow(log)
+    rig, at_ends = flow.rig, flow.ends
+    middle = 0.5 * (flow.positions[1:] + flow.positions[:-1])
+    volume = 1.0 + np.sign(flow.pressure) * rig["piston_area"] * middle / rig["chamber_volume"]
+    bubbles = np.sign(at_ends) * np.abs(at_ends) / (rig["accumulator_pressure"] + np.abs(at_ends))
+    rise, squeezed = volume * np.diff(at_ends) / flow.time, volume * np.diff(bubbles) / flow.time
+    there = np.isfinite(flow.pressure) & np.isfinite(rise)
+    others = np.column_stack([flow.pressure, flow.sign, rise])[there]
     squeezed = squeezed[there]
-    return lost[there], others / _largest(others), squeezed / _largest(squeezed)
+    return flow.lost[there], others / _largest(others), squeezed / _largest(squeezed)
 
 
 def _largest(columns: Array) -> Array:

@@ -9,17 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimation.fits.explaining.wide_log import usual_values
+from estimation.fits.explaining.lost_flow import EDGE, PIECES, lost_flow
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.log_checks.channel_names import POSITION, SPEED
-from estimation.models.wide_flow import WIDE_FLOW_FORM
 from plant.arrays import Array
-
-PIECES = 200
-"""Pieces of the log in which flows and pressure are averaged [count]: a step is then known to half a percent of it."""
-
-EDGE = 0.05
-"""Share of the log before and after which no step is sought [fraction]."""
 
 FIRST_WIDTH = 0.02
 """Length of the step with which a search begins [fraction of the log]: four pieces."""
@@ -89,15 +81,8 @@ def _averaged(log: GreyBoxLog) -> tuple[Array, Array, Array]:
 
     That is the flow bias, with the speed's sign, and the rise of pressure; each of its own size.
     """
-    named = {name: log.drives[:, at] for at, name in enumerate(WIDE_FLOW_FORM.drives)}
-    rig = usual_values(log)
-    speed, position, pressure = named[SPEED], named[POSITION], log.measured[:, 0]
-    ends = np.unique(np.linspace(0, len(speed) - 1, PIECES + 1).astype(np.intp))
-    count, time = np.diff(ends), log.sample_time * np.diff(ends)
-    means = np.add.reduceat(np.stack([speed, pressure, np.sign(speed)])[:, : ends[-1]], ends[:-1], axis=1) / count
-    swept = rig["piston_area"] * np.diff(position[ends]) / time
-    lost = rig["pump_displacement"] * means[0] - swept
-    rise = np.diff(pressure[ends]) / time
-    there = np.isfinite(means[1]) & np.isfinite(rise)
+    flow = lost_flow(log)
+    rise = np.diff(flow.ends) / flow.time
+    there = np.isfinite(flow.pressure) & np.isfinite(rise)
     steepest = max(float(np.max(np.abs(rise[there]), initial=0.0)), 1.0)
-    return lost[there], means[1, there], np.column_stack([means[2], rise / steepest])[there]
+    return flow.lost[there], flow.pressure[there], np.column_stack([flow.sign, rise / steepest])[there]
