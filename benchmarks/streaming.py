@@ -18,8 +18,8 @@ import numpy as np
 
 from faults.watch.watch import Watch
 from plant.eha.model import EhaParameters
-from plant.log.csv_stream import CsvStream
-from plant.log.stream_source import Received, batch, stream_lines
+from plant.log.stream.csv_rows import CsvStream
+from plant.log.stream.source import Received, batch, stream_lines
 
 RATE, ROWS = 10_000, 1000
 TOPIC = "bench/rows"

@@ -20,8 +20,8 @@ from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError, LogError
 from plant.kept import read_kept, write_kept
 from plant.log.chamber_pressures import with_difference
-from plant.log.csv_stream import SAME_RATE
 from plant.log.record import Record
+from plant.log.stream.csv_rows import SAME_RATE
 from plant.solvers.steps import parameter_row
 
 FORMAT = "hydrostate filter 2"

@@ -99,7 +99,7 @@ def record_of(log: Path, wanted: Sequence[str], sample_time: float | None) -> "R
         If it cannot be read, or lacks one of them.
     """
     from plant.log.any_columns import read_any
-    from plant.log.clock import MOST_MISSING_TO_RELATE
+    from plant.log.clock.uniform import MOST_MISSING_TO_RELATE
 
     return read_any(log, wanted, sample_time=sample_time, most_missing=MOST_MISSING_TO_RELATE)
 

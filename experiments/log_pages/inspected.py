@@ -58,7 +58,7 @@ def _looked_at(
     from estimation.log_checks.channel_guess import guess_channels
     from plant.eha.model import EhaParameters
     from plant.log.columns import TIME
-    from plant.log.formats import open_tables
+    from plant.log.formats.detect import open_tables
     from plant.log.inspection import inspect_table
 
     p = rig.parameters if isinstance(rig.parameters, EhaParameters) else EhaParameters()

@@ -143,7 +143,7 @@ class Log(Shown):
         HydrostateError
             If the part has too few samples to be a log.
         """
-        from plant.log.clock import FEWEST_SAMPLES
+        from plant.log.clock.uniform import FEWEST_SAMPLES
 
         first, last = (round((at - self.record.start_time) / self.sample_time) for at in (begin, end))
         if not 0 <= first < last:

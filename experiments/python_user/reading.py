@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from experiments.command.logs import caught, overheard
 from plant.errors import SparseLogError
-from plant.log.clock import MOST_MISSING_TO_RELATE
+from plant.log.clock.uniform import MOST_MISSING_TO_RELATE
 from plant.log.notes import LogCode
 
 if TYPE_CHECKING:

@@ -102,7 +102,7 @@ class StreamTask:
     Parameters
     ----------
     address : str
-        As `plant.log.stream_source.stream_lines` takes it.
+        As `plant.log.stream.source.stream_lines` takes it.
     rig : Path or None
         Rig file.
     columns : tuple of tuple

@@ -9,7 +9,7 @@ from typing import Any
 
 from experiments.command.terminal import note
 from plant.errors import LogError
-from plant.log.stream_source import broker_of, broker_package
+from plant.log.stream.source import broker_of, broker_package
 
 PATIENCE = 5.0
 """How long the last messages to a broker may take [s]."""

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from estimation.eha.online import Asked
     from estimation.filters.online import OnlineFilter
-    from plant.log.csv_stream import CsvStream
     from plant.log.record import Record
+    from plant.log.stream.csv_rows import CsvStream
 
 LEARNING = 1.0
 """Time at the start of a stream from which noise and first belief are taken, if no log is named [s]."""
@@ -146,7 +146,7 @@ class Filtering:
         import numpy as np
 
         from estimation.eha.online import load_filter
-        from plant.log.csv_stream import LONGEST_GAP
+        from plant.log.stream.csv_rows import LONGEST_GAP
 
         filtered, last = load_filter(state, self.asked)
         T = filtered.problem.sample_time

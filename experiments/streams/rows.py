@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, TextIO
 
 from experiments.command.logs import noted, with_rig_columns
 from experiments.command.terminal import note
-from plant.log.stream_source import Received, bounded_lines
+from plant.log.stream.source import Received, bounded_lines
 
 if TYPE_CHECKING:
-    from plant.log.csv_stream import CsvStream
+    from plant.log.stream.csv_rows import CsvStream
 
 STANDARD_INPUT = "standard input"
 """What standard input is called in events and errors."""
@@ -48,7 +48,7 @@ def open_rows(
     LogError
         If they are not the rows of a log.
     """
-    from plant.log.csv_stream import CsvStream
+    from plant.log.stream.csv_rows import CsvStream
 
     rest = iter(lines)
     header = next((line for line in rest if line.strip()), "")

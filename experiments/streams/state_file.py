@@ -76,7 +76,7 @@ def require_same_rate(path: Path, kept: float, sample_time: float, source: str) 
     LogError
         If they differ.
     """
-    from plant.log.csv_stream import SAME_RATE
+    from plant.log.stream.csv_rows import SAME_RATE
 
     if abs(kept / sample_time - 1.0) > SAME_RATE:
         raise LogError(f"{path} was saved at {1.0 / kept:g} Hz, but the stream has {1.0 / sample_time:g} Hz", source)

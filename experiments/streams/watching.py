@@ -12,7 +12,7 @@ from experiments.streams.rows import open_rows, warn_if_cut, warn_of_lost
 from experiments.streams.state_file import require_same_rate, state_kept
 from experiments.streams.watch_events import WatchEvents
 from plant.errors import LogError
-from plant.log.stream_source import Received, stream_lines
+from plant.log.stream.source import Received, stream_lines
 
 if TYPE_CHECKING:
     import numpy as np
@@ -69,7 +69,7 @@ class WatchSettings:
         """
         from faults.watch.events import Alarm
         from faults.watch.watch import Watch
-        from plant.log.csv_stream import SAME_RATE
+        from plant.log.stream.csv_rows import SAME_RATE
 
         way: Any = {"false_alarms": self.false_alarms, "learning": self.learning, "start": start}
         made = Watch(self.rig.parameters, sample_time, pressure=pressure and not self.no_pressure, **way)
@@ -112,7 +112,7 @@ def watch_network(told: WatchEvents, address: str, settings: WatchSettings, stat
     Parameters
     ----------
     address : str
-        As `plant.log.stream_source.stream_lines` takes it.
+        As `plant.log.stream.source.stream_lines` takes it.
     state : Path or None
         File in which the watch is kept over a restart.
 
@@ -183,7 +183,7 @@ def _begun(
     import numpy as np
 
     from faults.watch.saved import load_state
-    from plant.log.csv_stream import LONGEST_GAP
+    from plant.log.stream.csv_rows import LONGEST_GAP
 
     remembered, kept_time, travelled = load_state(state)
     require_same_rate(state, kept_time, sample_time, source)

@@ -27,7 +27,7 @@ from experiments.streams.broker import published
 from experiments.streams.endings import end_told, say_line, stop_at_sigterm
 from experiments.streams.filtering import Filtering
 from experiments.streams.rows import STANDARD_INPUT, stream_input, warn_of_lost
-from plant.log.stream_source import Received, bounded_lines, is_stream, stream_lines
+from plant.log.stream.source import Received, bounded_lines, is_stream, stream_lines
 
 commands = typer.Typer()
 

@@ -26,7 +26,7 @@ from experiments.streams.rows import STANDARD_INPUT, stream_input
 from experiments.streams.watch_view import lines_wanted, viewed
 from experiments.streams.watched import Watched
 from experiments.streams.watching import LEARNING, WatchSettings, watch_file, watch_network, watch_rows
-from plant.log.stream_source import is_stream
+from plant.log.stream.source import is_stream
 
 commands = typer.Typer()
 

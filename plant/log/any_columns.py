@@ -11,9 +11,9 @@ import numpy as np
 from plant.arrays import Array
 from plant.errors import LogError, LogWarning
 from plant.log.checks import Clock, trusted
-from plant.log.clock import MOST_MISSING
+from plant.log.clock.uniform import MOST_MISSING
 from plant.log.columns import TIME, UNITS, Column, listed, resolve_columns
-from plant.log.formats import open_tables
+from plant.log.formats.detect import open_tables
 from plant.log.headings import Heading, cleaned
 from plant.log.notes import LogCode
 from plant.log.plausibility import implausible

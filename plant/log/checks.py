@@ -7,8 +7,8 @@ import numpy as np
 from plant.arrays import Array
 from plant.errors import LogError, NoChannelError, SparseLogError
 from plant.log.chamber_pressures import CHAMBERS, tells_difference, with_difference
-from plant.log.clock import FEWEST_SAMPLES, MOST_MISSING, Channels, Checked, long_enough, on_uniform_clock
-from plant.log.clock import Clock as Clock
+from plant.log.clock.uniform import FEWEST_SAMPLES, MOST_MISSING, Channels, Checked, long_enough, on_uniform_clock
+from plant.log.clock.uniform import Clock as Clock
 from plant.log.columns import TIME, TRUTH
 from plant.log.guess import absent
 from plant.log.notes import LogCode

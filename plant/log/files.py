@@ -12,10 +12,10 @@ import numpy as np
 from plant.atomic import replacing
 from plant.errors import LogError, LogWarning
 from plant.log.checks import REQUIRED, Clock, trusted
-from plant.log.clock import MOST_MISSING
+from plant.log.clock.uniform import MOST_MISSING
 from plant.log.columns import TIME
-from plant.log.csv import write_csv
-from plant.log.formats import open_tables
+from plant.log.formats.csv import write_csv
+from plant.log.formats.detect import open_tables
 from plant.log.notes import LogCode
 from plant.log.record import Record
 from plant.log.table import Table
@@ -122,12 +122,12 @@ def write_record(record: Record, path: str | Path) -> None:
                 notes.write(document.encode())
                 write_csv(table, file, compressed=path.suffix.lower() == ".gz")
         elif kind == "parquet":
-            from plant.log.parquet import write_parquet
+            from plant.log.formats.parquet import write_parquet
 
             with replacing(path) as file:
                 write_parquet(table, document, file)
         else:
-            from plant.log.mat import write_mat
+            from plant.log.formats.mat import write_mat
 
             with replacing(path) as file:
                 write_mat(table, document, file, str(path))

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from plant.arrays import Array
+from plant.log.clock.jitter import usual_step
 from plant.log.headings import Heading
-from plant.log.jitter import usual_step
 from plant.log.table import Table
 
 
@@ -103,7 +103,7 @@ def inspect_table(table: Table) -> TableFacts:
     Parameters
     ----------
     table : Table
-        As `plant.log.formats.open_tables` opens it.
+        As `plant.log.formats.detect.open_tables` opens it.
     """
     found = table.numbers()
     columns: list[ColumnFacts] = []

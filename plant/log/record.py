@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.errors import LogError, LogWarning
-from plant.log.cells import numbers
 from plant.log.checks import REQUIRED, trusted
 from plant.log.columns import CHANNELS as CHANNELS
 from plant.log.columns import converted, resolve_columns
+from plant.log.formats.cells import numbers
 
 if TYPE_CHECKING:
     import pandas as pd

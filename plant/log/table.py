@@ -87,7 +87,7 @@ def table_of(
     **more
         As `Table` takes them.
     """
-    from plant.log.cells import each_read, numbers
+    from plant.log.formats.cells import each_read, numbers
 
     names = list(named)
 

@@ -9,10 +9,10 @@ import numpy as np
 from plant.arrays import Array
 from plant.errors import LogError, MissingColumnError
 from plant.log.checks import alternatives
+from plant.log.clock.merging import Timed, merged
 from plant.log.columns import TIME, TRUTH, Column, converted, listed, resolve_columns
 from plant.log.guess import hint_of, missing_channels, overlooked
 from plant.log.headings import Heading, cleaned
-from plant.log.merging import Timed, merged
 from plant.log.table import Table
 from plant.notes import Note
 

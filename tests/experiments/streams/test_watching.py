@@ -17,7 +17,7 @@ from faults.watch.saved import load_state
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
 from plant.errors import HydrostateError, LogError
-from plant.log.stream_source import Received
+from plant.log.stream.source import Received
 
 T = 0.01
 SPEED = 50.0

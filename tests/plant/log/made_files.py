@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from plant.errors import HydrostateError
-from plant.log.mat_reader import DamagedMatError
+from plant.log.formats.mat_reader import DamagedMatError
 
 
 def or_refused(made: Any) -> Any:

@@ -60,9 +60,9 @@ import sys
 from pathlib import Path
 import pyarrow.csv, pyarrow.parquet
 from plant.errors import LogError
-from plant.log import packed
+from plant.log.formats import packed
 from plant.log.files import read_record
-from plant.log.formats import READERS, import_module
+from plant.log.formats.detect import READERS, import_module
 for reader in READERS.values():
     import_module(reader.partition(":")[0])
 packed.ALWAYS = 1 << 20

@@ -231,7 +231,7 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    for place in ("files.write_csv", "parquet.write_parquet", "mat.write_mat"):
+    for place in ("files.write_csv", "formats.parquet.write_parquet", "formats.mat.write_mat"):
         monkeypatch.setattr(f"plant.log.{place}", full)
     with pytest.raises(LogError, match=rf"{name}: cannot be written: No space left"):
         write_record(example(motor_voltage_v=SPEED), path)

@@ -11,7 +11,7 @@ from plant.log.inspection import clock_facts, inspect_table
 from plant.log.record import Record
 from plant.log.table import table_of
 from tests.numbers import Numbers, or_refused, told
-from tests.plant.log.made_stamps import NOISE, TICKS, T, jittering
+from tests.plant.log.clock.made_stamps import NOISE, TICKS, T, jittering
 
 NUMBERS = Numbers(__file__)
 

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from plant.errors import NoMemoryError
-from plant.log.formats import open_tables
+from plant.log.formats.detect import open_tables
 
 
 def test_a_column_that_memory_does_not_hold_is_not_taken_for_a_column_of_text(
@@ -17,6 +17,6 @@ def test_a_column_that_memory_does_not_hold_is_not_taken_for_a_column_of_text(
     def full(*_: object, **__: object) -> None:
         raise MemoryError("malloc of size 8 failed")
 
-    monkeypatch.setattr("plant.log.csv._read_fast", full)
+    monkeypatch.setattr("plant.log.formats.csv._read_fast", full)
     with pytest.raises(NoMemoryError, match=r"run\.csv: reading it as csv needs more memory than there is"):
         table.numbers()

@@ -1,0 +1,1 @@
+"""From the time stamps of a log to one uniform clock."""

@@ -1,0 +1,155 @@
+"""Two loggers of one test, put on one clock: that of the faster one, while both were running."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from plant.arrays import Array
+from plant.errors import LogError
+from plant.log.clock.jitter import GAP, Grid, resampled
+from plant.log.clock.uniform import FEWEST_SAMPLES, Checked, on_uniform_clock
+from plant.log.columns import TIME
+from plant.log.notes import LogCode
+from plant.notes import Note
+
+_LATEST = np.datetime64("2262-01-01", "ns")
+
+SAME = 1e-3
+"""Share of a step by which stamps of one clock may differ [fraction]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Timed:
+    """Channels of one logger, or of one group in a file.
+
+    Parameters
+    ----------
+    source : str
+        What messages call it.
+    time : ndarray, shape (n,)
+        When its rows were taken: seconds, or datetime64[ns].
+    channels : Mapping[str, ndarray, shape (n,)]
+        The rest, in SI.
+    label : str
+        The group in the file.
+    """
+
+    source: str
+    time: Any
+    channels: Mapping[str, Array]
+    label: str = ""
+
+    @property
+    def name(self) -> str:
+        """What a note calls it."""
+        return self.label or self.source.replace("\\", "/").rsplit("/", 1)[-1]
+
+
+@dataclass(frozen=True, eq=False)
+class Merged:
+    """Channels on one time.
+
+    Parameters
+    ----------
+    channels : Mapping[str, ndarray, shape (n,)]
+        ``time_s`` and the channels.
+    notes : tuple of Note
+        What was put together.
+    """
+
+    channels: Mapping[str, Any]
+    notes: tuple[Note, ...] = ()
+
+
+def merged(parts: Sequence[Timed], source: str) -> Merged:
+    """Return the channels of several loggers on the clock of the fastest, while all of them were running.
+
+    Stamps with dates are laid beside each other as they are; seconds are taken to count from one moment in all.
+
+    Parameters
+    ----------
+    parts : sequence of Timed
+        One a logger.
+    source : str
+        What messages call the log.
+
+    Returns
+    -------
+    Merged
+        Channels on one time; those of slower loggers are missing between their samples.
+
+    Raises
+    ------
+    LogError
+        If some have dates and others have not, they do not overlap, or the stamps of one are no clock's.
+    """
+    parts = [one for one in parts if one.channels]
+    if len(parts) == 1 or all(_same_time(parts[0].time, one.time) for one in parts[1:]):
+        together = {name: values for one in parts for name, values in one.channels.items()}
+        return Merged({TIME: parts[0].time, **together} if parts else {})
+    dated = [one.time.dtype.kind == "M" for one in parts]
+    if any(dated) and not all(dated):
+        raise LogError(
+            f"{parts[dated.index(True)].name} has dates and {parts[dated.index(False)].name} has not, so they cannot "
+            "be laid beside each other; give both the same kind of time",
+            source,
+        )
+    epoch = min(one.time[~np.isnat(one.time)].min(initial=_LATEST) for one in parts) if dated[0] else None
+    notes: list[Note] = []
+    checked = [_checked(one, epoch, source, notes) for one in parts]
+    fastest = min(checked, key=lambda one: one.sample_time)
+    T = fastest.sample_time
+    begin = max(one.start_time for one in checked)
+    end = min(one.start_time + one.sample_time * (_length(one) - 1) for one in checked)
+    first = int(np.ceil((begin - fastest.start_time) / T - SAME))
+    count = int(np.floor((end - fastest.start_time) / T + SAME)) - first + 1
+    if count < FEWEST_SAMPLES:
+        raise LogError(f"{' and '.join(one.name for one in parts)} do not overlap in time", source)
+    even: Array = fastest.start_time + T * (first + np.arange(count, dtype=np.float64))
+    channels: dict[str, Any] = {}
+    for one in checked:
+        channels |= _on(even, T, one, is_fastest=one is fastest, first=first)
+    names = " and ".join(one.name for one in parts)
+    notes.append(LogCode.LOGGERS_MERGED.note(loggers=names, duration_s=T * (count - 1), sample_time_s=T))
+    time: Any = even if epoch is None else epoch + np.rint(1e9 * even).astype("timedelta64[ns]")
+    return Merged({TIME: time, **channels}, tuple(notes))
+
+
+def _same_time(one: Any, other: Any) -> bool:
+    if len(one) != len(other) or one.dtype.kind != other.dtype.kind or len(one) < 2:
+        return False
+    apart, step = np.abs(one - other).max(), np.abs(one[-1] - one[0]) / (len(one) - 1)
+    return bool(apart <= SAME * step)
+
+
+def _length(one: Checked) -> int:
+    return len(next(iter(one.channels.values())))
+
+
+def _checked(one: Timed, epoch: Any, source: str, notes: list[Note]) -> Checked:
+    """Return a logger's channels on its own uniform clock."""
+    time = (
+        one.time if epoch is None else np.where(np.isnat(one.time), np.nan, (one.time - epoch).astype(np.int64) * 1e-9)
+    )
+    there = np.isfinite(time)
+    if there.sum() < FEWEST_SAMPLES:
+        raise LogError(f"{one.name} must have at least {FEWEST_SAMPLES} samples with a time, got {there.sum()}", source)
+    columns = {name: values[there] for name, values in {TIME: time, **one.channels}.items()}
+    return on_uniform_clock(columns, source, None, notes)
+
+
+def _on(even: Array, T: float, one: Checked, *, is_fastest: bool, first: int) -> dict[str, Array]:
+    """Return a logger's channels at the times of the common clock, missing where it has no sample near."""
+    if is_fastest:
+        return {name: values[first : first + len(even)] for name, values in one.channels.items()}
+    times: Array = one.start_time + one.sample_time * np.arange(_length(one), dtype=np.float64)
+    slots = np.unique(np.rint((times - even[0]) / T).astype(np.int64))
+    slots = slots[(slots >= 0) & (slots < len(even))]
+    grid = Grid(even[slots], one.sample_time, GAP * one.sample_time, 0.0, 0.0)
+    out: dict[str, Array] = {}
+    for name, values in one.channels.items():
+        out[name] = np.full(len(even), np.nan)
+        out[name][slots] = resampled(grid, times, values)
+    return out

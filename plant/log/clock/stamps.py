@@ -1,0 +1,174 @@
+"""Time stamps as dates and times of the day: text to nanoseconds since 1970, in universal time."""
+
+import re
+from collections.abc import Callable, Sequence
+from datetime import date, timedelta
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.log.formats.cells import MISSING
+
+Stamps = NDArray[np.datetime64]
+
+_CLOCK = r"(?P<h>\d{1,2}):(?P<m>\d{2})(?::(?P<s>\d{2})(?:[.,:](?P<f>\d{1,12}))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
+_ZONE = r"\s*(?P<zone>Z|UTC|GMT|[A-Z]{3,4}|[-+]\d{2}(?::?\d{2})?)?(?:\[[\w/+-]{1,40}\])?"
+_PATTERNS = tuple(
+    re.compile(rf"{day}{clock}{_ZONE}")
+    for day, clock in (
+        (r"(?P<Y>\d{4})[-/.](?P<M>\d{1,2})[-/.](?P<D>\d{1,2})", rf"(?:(?:\s*[T,_]\s*|\s+){_CLOCK})?"),
+        (r"(?P<D>\d{1,2})\.(?P<M>\d{1,2})\.(?P<Y>\d{4}|\d{2})", rf"(?:[ T,_]\s*){_CLOCK}"),
+        (r"(?P<one>\d{1,2})[/-](?P<two>\d{1,2})[/-](?P<Y>\d{4}|\d{2})", rf"(?:[ T,_]\s*){_CLOCK}"),
+        ("", _CLOCK),
+    )
+)
+_MINUTES = re.compile(r"(?P<m>\d{1,3}):(?P<s>\d{2})[.,](?P<f>\d{1,12})")
+_DAY, _SECOND = 86_400_000_000_000, 1_000_000_000
+_EPOCH = date(1970, 1, 1)
+_ISO = re.compile(r"(?:1[89]|2[01])\d{2}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}(?:\.(\d{1,9}))?(Z|[-+]\d{2}:?\d{2})?")
+
+_DIGITS = str.maketrans("123456789", "000000000")
+
+LONGEST = 48
+"""Characters of the longest stamp that is read."""
+
+
+def is_stamp(cell: str) -> bool:
+    """Return whether a cell is a date and a time, or a time of the day.
+
+    Examples
+    --------
+    >>> is_stamp("2026-03-01 12:00:00.001+02:00"), is_stamp("12:30:01,5"), is_stamp("1.5")
+    (True, True, False)
+    """
+    text = cell.strip()
+    return len(text) <= LONGEST and _shaped(text.translate(_DIGITS))
+
+
+@lru_cache(maxsize=64)
+def _shaped(text: str) -> bool:
+    """Return whether a stamp looks so; no pattern asks which digit it is, and all stamps of a column look alike."""
+    return any(one.fullmatch(text) for one in (*_PATTERNS, _MINUTES))
+
+
+def read_stamps(cells: Sequence[str], refuse: Callable[[int, str], Exception]) -> Stamps:
+    """Return stamps as times; those without a zone are taken for universal time.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        The stamps, empty where there is none.
+    refuse : callable
+        From a row, from 0, and its text to the error that is raised where that is no stamp.
+
+    Returns
+    -------
+    ndarray of datetime64[ns], shape (n,)
+        The times; what runs over midnight without a date goes on to the next day.
+
+    Examples
+    --------
+    >>> read_stamps(["23:59:59.5", "00:00:00.5"], lambda row, text: ValueError(text)).astype("i8").tolist()
+    [86399500000000, 86400500000000]
+    """
+    quick = _all_alike(cells)
+    if quick is not None:
+        return quick
+    months_first = _months_first(cells)
+    out = np.empty(len(cells), dtype=np.int64)
+    for row, cell in enumerate(cells):
+        text = cell.strip()
+        if text in MISSING:
+            out[row] = np.iinfo(np.int64).min
+            continue
+        value = _nanoseconds(text, months_first=months_first)
+        if value is None:
+            raise refuse(row, cell)
+        out[row] = value
+    return _over_midnight(out).view("datetime64[ns]")
+
+
+def _all_alike(cells: Sequence[str]) -> Stamps | None:
+    """Return stamps that all have the shape of the first one, which NumPy reads quickly; None for others."""
+    first = _ISO.fullmatch(cells[0].strip()) if cells else None
+    if first is None or any(len(cell) != len(cells[0]) for cell in cells):
+        return None
+    zone = first[2] or ""
+    if not all((found := _ISO.fullmatch(cell.strip())) and (found[2] or "") == zone for cell in cells):
+        return None
+    try:
+        stamps = np.array([cell.strip().removesuffix(zone).replace(" ", "T") for cell in cells], dtype="datetime64[ns]")
+    except ValueError:
+        return None
+    return (stamps.astype(np.int64) - _offset(zone)).view("datetime64[ns]")
+
+
+def _offset(zone: str) -> int:
+    """Return by how much a zone is ahead of universal time [ns]; one that is only named is the log's own."""
+    if zone[:1] not in ("+", "-"):
+        return 0
+    digits = zone[1:].replace(":", "").ljust(4, "0")
+    return int(zone[0] + "1") * (int(digits[:2]) * 3600 + int(digits[2:]) * 60) * _SECOND
+
+
+def _months_first(cells: Sequence[str]) -> bool:
+    """Return whether 3/4/2026 is in March: American, unless a first number is no month."""
+    found = (_PATTERNS[2].fullmatch(cell.strip()) for cell in cells)
+    return not any(one and int(one["one"]) > 12 for one in found)
+
+
+def _nanoseconds(text: str, *, months_first: bool) -> int | None:
+    if len(text) > LONGEST:
+        return None
+    found = next((match for one in _PATTERNS if (match := one.fullmatch(text))), None)
+    if found is None or (found["s"] is None and found["half"] is None and "Y" not in found.re.groupindex):
+        short = _MINUTES.fullmatch(text)
+        if short is not None:
+            return (int(short["m"]) * 60 + int(short["s"])) * _SECOND + _fraction(short["f"])
+    if found is None:
+        return None
+    part = found.groupdict()
+    try:
+        day = _day(part, months_first=months_first)
+    except (ValueError, OverflowError):
+        return None
+    hour, minute, second = (int(part[name] or 0) for name in "hms")
+    if part["half"]:
+        hour = hour % 12 + (12 if part["half"][0] in "pP" else 0)
+    if hour > 24 or minute > 59 or second > 60:
+        return None
+    clock = (hour * 3600 + minute * 60 + second) * _SECOND + _fraction(part["f"])
+    return day * _DAY + clock - _offset(part["zone"] or "")
+
+
+def _fraction(digits: str | None) -> int:
+    return int((digits or "0")[:9].ljust(9, "0"))
+
+
+def _day(part: "dict[str, Any]", *, months_first: bool) -> int:
+    """Return the day, counted from 1970; 0 where a stamp has none."""
+    if part.get("Y") is None:
+        return 0
+    year = int(part["Y"])
+    year += 2000 if year < 100 else 0
+    month, day = part.get("M"), part.get("D")
+    if month is None or day is None:
+        month, day = (part["one"], part["two"]) if months_first else (part["two"], part["one"])
+    found = (date(year, int(month), int(day)) - _EPOCH) // timedelta(days=1)
+    if not -100_000 < found < 100_000:
+        raise ValueError(year)
+    return found
+
+
+def _over_midnight(stamps: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Let times without a date that fall back by most of a day go on to the next one."""
+    there = stamps != np.iinfo(np.int64).min
+    if not there.any() or stamps[there].max() >= 2 * _DAY:
+        return stamps
+    inside = stamps[there]
+    days = np.concatenate(([0], np.cumsum(np.diff(inside) < -_DAY // 2)))
+    out = stamps.copy()
+    out[there] = inside + _DAY * days
+    return out

@@ -1,0 +1,285 @@
+"""The uniform clock of a log: samples left out are gaps, stamps that jitter, repeat or were rounded are mended."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.arrays import Array
+from plant.errors import LogError, SparseLogError
+from plant.log.clock.jitter import GAP, grid_of, resampled, rounded_clock, usual_step
+from plant.log.columns import TIME
+from plant.log.notes import LogCode
+from plant.notes import Note
+
+FEWEST_SAMPLES = 10
+
+MOST_MISSING, MOST_MISSING_TO_RELATE = 0.05, 0.5
+"""Share of a channel's samples, or of the clock's, that may be missing [fraction]: where an actuator is estimated, and
+where channels are related. There missing outputs are left out, and a log is split where inputs are missing."""
+
+MOST_JITTER = 0.35
+"""Root mean square by which steps may differ from the sample time and still be a clock's, over it [fraction]."""
+
+WHOLE = 0.01
+"""A step so near a whole number of sample times is one [fraction]."""
+
+ROUNDING = 1e-6
+
+Channels = Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A uniform clock.
+
+    Parameters
+    ----------
+    sample_time : float
+        Time between samples [s].
+    start_time : float
+        Time of the first sample [s].
+    """
+
+    sample_time: float
+    start_time: float
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A log on a uniform clock, and what was mended on the way.
+
+    Parameters
+    ----------
+    sample_time, start_time : float
+        The clock [s].
+    channels : Mapping[str, ndarray, shape (n,)]
+        Array in SI, NaN where a sample is missing.
+    notes : tuple[Note, ...]
+        What was resampled, masked, dropped, or looks wrong.
+    """
+
+    sample_time: float
+    start_time: float
+    channels: Channels
+    notes: tuple[Note, ...] = ()
+
+
+def on_uniform_clock(
+    columns: Channels, source: str, clock: Clock | None, notes: list[Note], most_missing: float = MOST_MISSING
+) -> Checked:
+    """Return a log on a uniform clock; what was mended is added to the notes.
+
+    Parameters
+    ----------
+    columns : Mapping[str, ndarray, shape (n,)]
+        ``time_s`` and the channels, in SI.
+    source : str
+        What messages call the log.
+    clock : Clock or None
+        The clock that the log was written with; used where the stamps agree with it.
+    notes : list of Note
+        Grows by what was mended.
+    most_missing : float
+        Share of the samples that rows of an even clock may leave out [dimensionless].
+
+    Returns
+    -------
+    Checked
+        Clock and channels.
+
+    Raises
+    ------
+    LogError
+        If the stamps are no clock's.
+    SparseLogError
+        If over 5 % of the samples, or the share that is told, are left out.
+    """
+    time = columns[TIME]
+    channels = {name: values for name, values in columns.items() if name != TIME}
+    if clock is not None and _agrees(time, clock):
+        return Checked(clock.sample_time, clock.start_time, channels)
+    _steps_of_a_clock(time, source)
+    if _own_times(channels):
+        return _merged(time, channels, source, notes)
+    ticks = _whole_ticks(time)
+    if ticks is None:
+        return _mended(time, channels, source, notes)
+    _few_left_out(len(time), float(ticks.sum()) + 1.0, source, most_missing)
+    sample_time = float((time[-1] - time[0]) / ticks.sum())
+    jitter = float(np.abs(np.diff(time) / sample_time - ticks).max())
+    if jitter > max(ROUNDING, _resolution(time, sample_time)):
+        return _mended(time, channels, source, notes)
+    slots = np.concatenate(([0.0], np.cumsum(ticks)))
+    return Checked(sample_time, float(time[0]), _spread(channels, slots.astype(np.int64)))
+
+
+def _steps_of_a_clock(time: Array, source: str) -> None:
+    """Refuse stamps whose steps are too large for a number."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        step = np.diff(time)
+        span = float(time[-1] - time[0])
+    if not (np.isfinite(step).all() and np.isfinite(span)):
+        row = int(np.argmin(np.isfinite(step)))
+        raise LogError(
+            f"steps of {TIME} must be finite, got {time[row + 1]:.6g} s after {time[row]:.6g} s in row {row + 2}",
+            source,
+        )
+
+
+def _mended(time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
+    """Put stamps that were rounded, repeat or jitter on a uniform clock; any other is no clock."""
+    step = np.diff(time)
+    again = np.flatnonzero(step == 0.0) + 1
+    if step.min() < 0.0 or len(again) == len(step):
+        raise _not_increasing(time, source)
+    copied = all(np.array_equal(one[again], one[again - 1], equal_nan=True) for one in channels.values())
+    if len(again) and copied:
+        return _without(again, time, channels, source, notes)
+    whole = step if len(again) else np.maximum(1.0, np.rint(step / usual_step(step)))
+    for slots in (np.arange(float(len(time))), np.concatenate(([0.0], np.cumsum(whole)))):
+        if (found := rounded_clock(time, slots)) is not None:
+            start, sample_time, quantum = found
+            _few_left_out(len(time), slots[-1] + 1.0, source)
+            notes.append(LogCode.TIME_ROUNDED.note(channel=TIME, quantum_s=quantum, sample_time_s=sample_time))
+            return Checked(sample_time, start, _spread(channels, slots.astype(np.int64)))
+    if not len(again):
+        return _resampled(time, channels, source, notes)
+    if len(again) > MOST_MISSING * len(time):
+        raise _not_increasing(time, source)
+    return _without(again, time, channels, source, notes)
+
+
+def _without(again: NDArray[np.int64], time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
+    """Leave out rows whose stamp was there before; those that said something new leave a gap."""
+    count, percent = len(again), 100.0 * len(again) / len(time)
+    notes.append(LogCode.TIME_REPEATS.note(channel=TIME, count=count, total=len(time), percent=percent))
+    kept = {name: np.delete(values, again) for name, values in {TIME: time, **channels}.items()}
+    long_enough(kept, source)
+    return on_uniform_clock(kept, source, None, notes)
+
+
+def _resampled(time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
+    shortest = GAP * usual_step(np.diff(time))
+    if not shortest > 0.0:
+        raise _not_increasing(time, source)
+    _few_left_out(len(time), (float(time[-1]) - float(time[0])) / shortest, source)
+    grid = grid_of(time)
+    if not grid.scatter <= MOST_JITTER:
+        raise LogError(
+            f"steps of {TIME} must scatter by at most {100.0 * MOST_JITTER:g} % of the sample time, "
+            f"got {100.0 * grid.scatter:.0f} % of {grid.sample_time:.6g} s",
+            source,
+        )
+    _few_left_out(len(grid.times) - int(grid.lacking(time).sum()), float(len(grid.times)), source)
+    notes.append(
+        LogCode.TIME_JITTERS.note(
+            channel=TIME,
+            percent=100.0 * grid.most,
+            rms_percent=100.0 * grid.scatter,
+            sample_time_s=grid.sample_time,
+        )
+    )
+    even = {name: resampled(grid, time, values) for name, values in channels.items()}
+    return Checked(grid.sample_time, float(time[0]), even)
+
+
+def _not_increasing(time: Array, source: str) -> LogError:
+    row = int(np.argmax(np.diff(time) <= 0.0))
+    got = f"{time[row + 1]:.12g} in row {row + 2} after {time[row]:.12g}"
+    return LogError(f"{TIME} must increase, got {got}", source)
+
+
+def _own_times(channels: Channels) -> bool:
+    """Return whether some channel was logged at times of its own, in rows that the fastest one is missing in."""
+    there = {name: np.isfinite(values) for name, values in channels.items()}
+    fastest = max(there.values(), key=np.count_nonzero)
+    if np.all(fastest) or np.count_nonzero(fastest) < FEWEST_SAMPLES:
+        return False
+    return any(2 * np.count_nonzero(one & ~fastest) > np.count_nonzero(one) > 0 for one in there.values())
+
+
+def _merged(time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
+    """Put channels that were logged at times of their own on the clock of the fastest.
+
+    A slower channel's sample goes to the nearest tick, as interpolated there between the channel's own samples.
+    """
+    there = {name: np.isfinite(values) for name, values in channels.items()}
+    fastest = max(there, key=lambda name: int(there[name].sum()))
+    own = time[there[fastest]]
+    if np.diff(time).min() < 0.0:
+        raise _not_increasing(time, source)
+    on_clock = on_uniform_clock({TIME: own, fastest: channels[fastest][there[fastest]]}, source, None, notes)
+    even = on_clock.start_time + on_clock.sample_time * np.arange(len(on_clock.channels[fastest]))
+    out = dict(on_clock.channels)
+    for name, values in channels.items():
+        if name != fastest and there[name].any():
+            when = time[there[name]]
+            slots = np.rint((when - even[0]) / on_clock.sample_time).astype(np.int64)
+            slots = slots[(slots >= 0) & (slots < len(even))]
+            out[name] = np.full(len(even), np.nan)
+            out[name][slots] = np.interp(even[slots], when, values[there[name]])
+    notes.append(LogCode.TIMES_OF_THEIR_OWN.note(channel=fastest, sample_time_s=on_clock.sample_time))
+    return Checked(on_clock.sample_time, on_clock.start_time, out)
+
+
+def _whole_ticks(time: Array) -> Array | None:
+    """Return how many sample times each step takes; None if one is no whole number of them, within 1 %."""
+    step = np.diff(time)
+    if step.min() <= 0.0:
+        return None
+    nominal = usual_step(step)
+    ticks = np.rint(step / nominal)
+    off = np.abs(step / nominal - ticks)
+    return ticks if np.all(ticks >= 1.0) and np.max(off) <= WHOLE + ROUNDING else None
+
+
+def _few_left_out(there: int, total: float, source: str, most: float = MOST_MISSING) -> None:
+    if not there >= (1.0 - most) * total:
+        said = "{:.0f} of {:.0f}" if total < 1e15 else "{:.3g} of {:.3g}"
+        left_out = said.format(total - there, total)
+        raise SparseLogError(f"{TIME} leaves out {left_out} samples, wanted at most {100.0 * most:g} %", source)
+
+
+def _agrees(time: Array, clock: Clock) -> bool:
+    error = np.abs(clock.start_time + clock.sample_time * np.arange(len(time)) - time).max()
+    return bool(error <= (ROUNDING + _resolution(time, clock.sample_time)) * clock.sample_time)
+
+
+def _resolution(time: Array, sample_time: float) -> float:
+    """Return what rounding of the times themselves to floats can look like, in sample times."""
+    return 4.0 * float(np.spacing(np.abs(time[[0, -1]]).max())) / sample_time
+
+
+def _spread(channels: Channels, slots: NDArray[np.int64]) -> Channels:
+    """Put the samples in their slots of the uniform clock, NaN in the slots that the log leaves out."""
+    total = int(slots[-1]) + 1
+    if total == len(slots):
+        return channels
+    out = {name: np.full(total, np.nan) for name in channels}
+    for name, values in channels.items():
+        out[name][slots] = values
+    return out
+
+
+def long_enough(columns: Channels, source: str) -> None:
+    """Refuse columns of several lengths, or too short.
+
+    Parameters
+    ----------
+    columns : Mapping[str, ndarray, shape (n,)]
+        ``time_s`` and the channels.
+    source : str
+        What messages call the log.
+
+    Raises
+    ------
+    LogError
+        If they are.
+    """
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise LogError(f"columns must have one length, got {lengths}", source)
+    if lengths[TIME] < FEWEST_SAMPLES:
+        raise LogError(f"at least {FEWEST_SAMPLES} samples are needed, got {lengths[TIME]}", source)

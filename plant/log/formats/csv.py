@@ -1,0 +1,143 @@
+"""CSV logs: what they hold as numbers; fast through pyarrow, and cell by cell to name what is wrong."""
+
+import csv
+import gzip
+import io
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import islice
+from pathlib import Path
+from typing import Any, BinaryIO, TextIO, cast
+
+import pyarrow as pa
+from pyarrow import csv as arrow_csv
+
+from plant.arrays import Array
+from plant.errors import LogError
+from plant.log.columns import Column
+from plant.log.formats.arrow import from_arrow, to_arrow
+from plant.log.formats.cells import MISSING
+from plant.log.formats.csv_cells import read_cells, stamps
+from plant.log.formats.csv_layout import BLANKS, Layout, layout_of
+from plant.log.formats.packed import opened, packing_of
+from plant.log.table import Table
+
+_BLOCK = 1 << 20
+"""Bytes that are unpacked at a time."""
+
+
+def open_csv(path: Path, metadata: str | None) -> Table:
+    """Open a text log: a CSV, or the like with tabs, semicolons or blanks, plain or packed by gzip or zstd.
+
+    Parameters
+    ----------
+    metadata : str or None
+        What stands beside it.
+
+    Raises
+    ------
+    LogError
+        If the file is empty or no text.
+    OSError
+        If the file cannot be read.
+    """
+    layout = layout_of(path)
+
+    def read(chosen: Sequence[Column]) -> dict[Column, Array]:
+        return _read(path, layout, chosen)
+
+    return Table(str(path), layout.headings, read, metadata)
+
+
+def _read(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
+    """Return columns as logged, NaN in empty cells; refuse a row of another width, or a cell that is no number."""
+    if layout.delimiter != BLANKS:
+        try:
+            return _read_fast(path, layout, chosen)
+        except (pa.ArrowInvalid, UnicodeError):  # stray bytes of another encoding harm nobody outside their cell
+            pass
+    return _read_cells(path, layout, chosen)
+
+
+def write_csv(columns: Mapping[str, Array], file: BinaryIO, *, compressed: bool) -> None:
+    """Write columns as CSV, shortest digits that read back exactly, missing samples as empty cells.
+
+    Parameters
+    ----------
+    columns : Mapping[str, ndarray, shape (n,)]
+        Values by column name.
+    file : BinaryIO
+        Where to, open for writing.
+    """
+    table = pa.table({name: to_arrow(values) for name, values in columns.items()})
+    if not compressed:
+        arrow_csv.write_csv(table, file)
+        return
+    with gzip.GzipFile(filename="", fileobj=file, mode="wb", mtime=0) as packed:
+        arrow_csv.write_csv(table, cast(BinaryIO, packed))
+
+
+@contextmanager
+def _text(path: Path, layout: Layout, errors: str = "replace") -> Generator[TextIO]:
+    encoding = "utf-8-sig" if layout.encoding == "utf-8" else layout.encoding
+    with opened(path) as file, io.TextIOWrapper(file, encoding=encoding, errors=errors, newline=None) as text:
+        yield text
+
+
+def _bytes(path: Path, layout: Layout) -> Any:
+    """Return what pyarrow reads: the file itself where it can, since it reads that in parallel; else its text in UTF-8.
+
+    No thread of pyarrow may call Python back: an error raised there, as of too large a file, ends or hangs the process.
+    """
+    if layout.encoding.startswith("utf-16"):
+        with _text(path, layout, errors="strict") as text:
+            return pa.BufferReader(text.read().encode())
+    if packing_of(path) is None:
+        return path
+    content = bytearray()
+    with opened(path) as file:
+        while part := file.read(_BLOCK):
+            content += part
+    return pa.BufferReader(content)
+
+
+def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
+    labels = [str(position) for position in range(len(layout.headings))]
+    wanted = [labels[column.position] for column in chosen]
+    texts = {labels[place] for place in layout.stamped}
+    kinds: dict[str, Any] = {one: pa.string() if one in texts else pa.float64() for one in wanted}
+    table = arrow_csv.read_csv(
+        _bytes(path, layout),
+        read_options=arrow_csv.ReadOptions(column_names=labels, skip_rows=layout.skipped),
+        parse_options=arrow_csv.ParseOptions(delimiter=layout.delimiter),
+        convert_options=arrow_csv.ConvertOptions(
+            include_columns=wanted,
+            column_types=kinds,
+            null_values=list(MISSING),
+            decimal_point=layout.decimal_point,
+        ),
+    )
+    out: dict[Column, Array] = {}
+    for column, label in zip(chosen, wanted, strict=True):
+        if label in texts:
+            out[column] = stamps(table.column(label).to_pylist(), column, str(path))
+        else:
+            out[column] = from_arrow(table.column(label))
+        table = table.drop_columns([label])  # hands each column's memory back before the next is copied
+    return out
+
+
+def _rows(text: TextIO, layout: Layout) -> Iterator[list[str]]:
+    lines = islice(text, layout.skipped, None)
+    if layout.delimiter == BLANKS:
+        return (line.split() for line in lines)
+    return csv.reader(lines, delimiter=layout.delimiter)
+
+
+def _read_cells(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
+    """Read what pyarrow will not, or say in which row and column it is no number."""
+    try:
+        with _text(path, layout) as text:
+            return read_cells(_rows(text, layout), layout, chosen, str(path))
+    except csv.Error as error:
+        raise LogError(f"cannot be read as CSV: {error}", str(path)) from error

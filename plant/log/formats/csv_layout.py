@@ -1,0 +1,289 @@
+"""How a text log is written: encoding, what separates cells, decimal comma, lines above the header, row of units."""
+
+import csv
+import io
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+from plant.errors import LogError
+from plant.log.clock.stamps import is_stamp
+from plant.log.formats.cells import MISSING
+from plant.log.formats.layouts_seen import remember, remembered
+from plant.log.formats.packed import opened
+from plant.log.headings import Heading, is_unit, unit_or_none
+
+LOOKED_AT = 1 << 18
+"""Bytes of a log that are looked at to tell how it is written."""
+
+LINES = 300
+"""Lines of it, at most."""
+
+BLANKS = " "
+"""The delimiter of a log whose cells are apart by any number of blanks."""
+
+DELIMITERS = (",", ";", "\t", "|", BLANKS)
+_NUMBER = re.compile(r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][-+]?\d+)?")
+COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
+"""How a line of comment begins."""
+
+_WIDEST = 10_000
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a text log is written.
+
+    Parameters
+    ----------
+    headings : tuple of Heading
+        What the columns are called.
+    skipped : int
+        Lines above the first row of data.
+    delimiter, decimal_point : str
+        One character each; a blank stands for any number of blanks.
+    encoding : str
+        As Python calls it.
+    stamped : frozenset of int
+        Columns of dates or times of the day.
+    """
+
+    headings: tuple[Heading, ...]
+    skipped: int
+    delimiter: str
+    decimal_point: str
+    encoding: str = "utf-8"
+    stamped: frozenset[int] = frozenset()
+
+
+def cells_of(line: str, delimiter: str) -> list[str]:
+    """Return the cells of a line.
+
+    Parameters
+    ----------
+    line : str
+        Without its end.
+    delimiter : str
+        One of `DELIMITERS`.
+    """
+    if delimiter == BLANKS:
+        return line.split()
+    if '"' not in line:
+        return line.split(delimiter)
+    try:
+        return next(csv.reader([line], delimiter=delimiter))
+    except (csv.Error, StopIteration):
+        return line.split(delimiter)
+
+
+def layout_of(path: Path) -> Layout:
+    """Return how a text log is written, told by its first lines.
+
+    Raises
+    ------
+    LogError
+        If it is empty, or no text.
+    OSError
+        If it cannot be read.
+    """
+    with opened(path) as file:
+        start = file.read(LOOKED_AT)
+    if (known := remembered(start, LINES)) is not None:
+        return known
+    encoding = _encoding(start, str(path))
+    text = start.decode(encoding, errors="replace").removeprefix("\ufeff")
+    lines = [line.rstrip("\n") for line in islice(io.StringIO(text, newline=None), LINES)]
+    if len(start) == LOOKED_AT and len(lines) < LINES:
+        lines = lines[:-1] or lines  # the last one is cut
+    layout = layout_of_lines(lines, encoding, str(path))
+    remember(start, LINES, layout)
+    return layout
+
+
+def _encoding(start: bytes, source: str) -> str:
+    if start[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16"
+    zeros = Counter(place % 2 for place, one in enumerate(start[:2000]) if not one)
+    if zeros:
+        half = len(start[:2000]) // 2
+        for side, name in ((1, "utf-16-le"), (0, "utf-16-be")):
+            if zeros[side] > 0.9 * half > 0 and not zeros[1 - side]:
+                return name
+        raise LogError("a text file is needed for a CSV log, got binary data", source)
+    try:
+        start.decode("utf-8")
+    except UnicodeDecodeError as error:
+        if len(start) - error.start >= 4:  # not the end of what was looked at, cut within a letter
+            return "cp1252"
+    return "utf-8"
+
+
+def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
+    """Return how a text log is written.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        Its first lines, without their ends.
+    encoding : str
+        As Python calls it.
+    source : str
+        What messages call the log.
+
+    Raises
+    ------
+    LogError
+        If there is nothing but blank lines, or no text.
+
+    Examples
+    --------
+    >>> made = layout_of_lines(["Bench 2", "Zeit [s];Weg [mm]", "0,0;1,5", "0,1;1,6"], "utf-8", "a.csv")
+    >>> made.delimiter, made.decimal_point, [one.bare for one in made.headings]
+    (';', ',', ['Zeit', 'Weg'])
+    """
+    if not any(line.strip() for line in lines):
+        raise LogError("a header line is needed, but the file is empty", source)
+    head = "\n".join(lines[:5])
+    strange = sum(one == "\ufffd" or (ord(one) < 32 and one not in "\t\n\x0c\x0b") for one in head)
+    if strange > 0.1 * len(head) or "\0" in head:
+        raise LogError("a text file is needed for a CSV log, got binary data", source)
+    absent = [one for one in DELIMITERS if one != BLANKS and not any(one in line for line in lines)]
+    # those that no line holds leave the same single cells: the first of them stands for all
+    tried = [one for one in DELIMITERS if one not in absent[1:]]
+    block = max((_block(lines, one) for one in tried), key=lambda one: one.score)
+    if not block.score or _header_parts_at_commas(lines, block):
+        return _by_header(lines, encoding)
+    return block.layout(lines, encoding)
+
+
+def _header_parts_at_commas(lines: Sequence[str], block: "_Block") -> bool:
+    """Return whether rows that read as one number each have the commas of the line above: `0,1` is two cells then."""
+    first, (cell, *others) = block.rows[0]
+    above = next((line for line in reversed(lines[:first]) if line.strip()), "")
+    commas = above.count(",")
+    return not others and cell.count(",") == commas > 0
+
+
+def _by_header(lines: Sequence[str], encoding: str) -> Layout:
+    """Return the layout of a log without a row of numbers: its first line is the header."""
+    first = next(place for place, line in enumerate(lines) if line.strip())
+    delimiter = max(",;\t", key=lines[first].count)
+    names = [COMMENT.sub("", name) for name in cells_of(lines[first], delimiter)]
+    return Layout(tuple(map(Heading, names)), first + 1, delimiter, ".", encoding)
+
+
+@dataclass(frozen=True)
+class _Block:
+    """The rows of numbers of a log, if cells are apart by one delimiter."""
+
+    delimiter: str
+    rows: "tuple[tuple[int, tuple[str, ...]], ...]" = ()
+    numeric: tuple[bool, ...] = ()
+
+    @property
+    def score(self) -> float:
+        """How much reads as numbers: rows count, and columns; blanks only where nothing else will do."""
+        wide = sum(self.numeric)
+        likes = 0.5 if self.delimiter in (BLANKS, "|") else 1.0
+        if not self.rows or (wide < 2 and len(self.numeric) > 1):
+            return 0.0
+        return likes * len(self.rows) * wide**2 / len(self.numeric)
+
+    def layout(self, lines: Sequence[str], encoding: str) -> Layout:
+        """Return the layout, with the names and units that stand above the rows."""
+        first, width = self.rows[0][0], len(self.numeric)
+        while first and _has_number(cells_of(lines[first - 1], self.delimiter), width):
+            first -= 1
+        closed = all(not row[-1] for _, row in self.rows)
+        names, units = _names_and_units(_above(lines[:first], self.delimiter, width, closed=closed), width)
+        numbers = "".join(cell for _, row in self.rows for cell in row if _NUMBER.fullmatch(cell))
+        comma = "," in numbers and "." not in numbers and self.delimiter != BLANKS
+        stamped = frozenset(
+            place
+            for place, one in enumerate(self.numeric)
+            if one and _mostly_stamps([row[place] for _, row in self.rows[:9]])
+        )
+        headings = tuple(
+            Heading(name, None if place in stamped else unit, place in stamped)
+            for place, (name, unit) in enumerate(zip(names, units, strict=True))
+        )
+        return Layout(headings, first, self.delimiter, "," if comma else ".", encoding, stamped)
+
+
+def _mostly_stamps(cells: Sequence[str]) -> bool:
+    return 2 * sum(is_stamp(cell) and not _NUMBER.fullmatch(cell) for cell in cells) > len(cells)
+
+
+def _has_number(cells: Sequence[str], width: int) -> bool:
+    """Return whether a line is a row of data, though a broken one."""
+    return len(cells) == width and any(_NUMBER.fullmatch(cell.strip()) or is_stamp(cell) for cell in cells)
+
+
+def _is_value(cell: str) -> bool:
+    text = cell.strip()
+    if not text or len(text) > 60:
+        return False
+    return bool(_NUMBER.fullmatch(text)) or text in MISSING or text.lower() in ("inf", "-inf") or is_stamp(text)
+
+
+def _block(lines: Sequence[str], delimiter: str) -> _Block:
+    """Return the rows of data if cells are apart by a delimiter: most columns of most rows are numbers."""
+    split = [
+        (place, tuple(cell.strip() for cell in cells_of(line, delimiter)))
+        for place, line in enumerate(lines)
+        if line.strip()
+    ]
+    judged = [(place, row, tuple(map(_is_value, row))) for place, row in split if len(row) <= _WIDEST]
+    judged = [one for one in judged if any(one[2])]
+    widths = Counter(len(row) for _, row, _ in judged)
+    if not widths:
+        return _Block(delimiter)
+    width = max(widths, key=lambda one: (widths[one], one))
+    judged = [one for one in judged if len(one[1]) == width]
+    numeric = tuple(2 * sum(column) > len(judged) for column in zip(*(values for _, _, values in judged), strict=True))
+    count = sum(numeric)
+    whole = [
+        (place, row)
+        for place, row, values in judged
+        if 2 * sum(one and (value or not cell) for one, value, cell in zip(numeric, values, row, strict=True)) > count
+    ]
+    return _Block(delimiter, tuple(whole), numeric) if whole else _Block(delimiter)
+
+
+def _above(lines: Sequence[str], delimiter: str, width: int, *, closed: bool) -> list[list[str]]:
+    """Return the lines right above the data that are as wide as it, from the top.
+
+    Where a delimiter closes every row of data, the header may lack that last, empty cell.
+    """
+    found: list[list[str]] = []
+    for line in reversed(lines):
+        if not line.strip():
+            if found:
+                break
+            continue
+        plain = COMMENT.sub("", line)
+        cells = [cell.strip().removeprefix("\ufeff") for cell in cells_of(plain, delimiter)]
+        if delimiter == BLANKS and len(cells) != width:
+            cells = [cell.strip() for cell in re.split(r"\s{2,}|\t", plain.strip())]
+        if closed and len(cells) == width - 1:
+            cells.append("")
+        if len(cells) != width or not any(cells):
+            break
+        found.insert(0, cells)
+    return found
+
+
+def _names_and_units(above: list[list[str]], width: int) -> tuple[list[str], list[str | None]]:
+    """Return names and units from the lines above the data; columns without a name are numbered."""
+    units: list[str | None] = [None] * width
+    names = above
+    for row in above[1:]:
+        if any(map(is_unit, row)) and all(unit_or_none(cell) is None or is_unit(cell) for cell in row):
+            units = [unit_or_none(cell.strip("[]()")) for cell in row]
+            names = [other for other in above if other is not row]
+            break
+    best = max(names, key=lambda row: len(set(row) - {""}), default=[""] * width)
+    return [name or f"column {place + 1}" for place, name in enumerate(best)], units

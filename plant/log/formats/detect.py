@@ -1,0 +1,144 @@
+"""Which format a log file is in, told by its first bytes, and the file opened as tables."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+
+from plant.arrays import Array
+from plant.errors import HydrostateError, LogError, NoMemoryError
+from plant.log.columns import Column
+from plant.log.formats.csv import open_csv
+from plant.log.formats.packed import require_regular
+from plant.log.table import Table
+
+SIGNS: Mapping[bytes, str] = {
+    b"PAR1": "parquet",
+    b"ARROW1": "feather",
+    b"FEA1": "feather",
+    b"TDSm": "tdms",
+    b"MDF     ": "mdf",
+    b"UnFinMF ": "mdf",
+    b"\x89HDF\r\n\x1a\n": "hdf5",
+    b"PK\x03\x04": "xlsx",
+    b"\xd0\xcf\x11\xe0": "xls",
+    b"\x1f\x8b": "csv",
+    b"\x28\xb5\x2f\xfd": "csv",
+}
+"""First bytes of each format; what has none of them is text, or a MAT."""
+
+READERS: Mapping[str, str] = {
+    "parquet": "plant.log.formats.parquet:open_parquet",
+    "feather": "plant.log.formats.parquet:open_feather",
+    "tdms": "plant.log.formats.tdms:open_tdms",
+    "mdf": "plant.log.formats.mdf:open_mdf",
+    "hdf5": "plant.log.formats.hdf5:open_hdf5",
+    "xlsx": "plant.log.formats.xlsx:open_xlsx",
+    "mat": "plant.log.formats.mat:open_mat",
+}
+"""What opens each; imported when a file of the kind comes."""
+
+SUFFIXES: Mapping[str, str] = {
+    **{f".{kind}": kind for kind in ("parquet", "mat", "feather", "tdms", "mdf", "hdf5", "xlsx", "xls")},
+    ".mf4": "mdf",
+    ".h5": "hdf5",
+    ".xlsm": "xlsx",
+}
+"""Formats that a damaged file is taken for by its suffix; all others are text."""
+
+OLD_EXCEL = "a workbook of Excel before 2007 (.xls), or one that is encrypted, cannot be read: save it as .xlsx or .csv"
+
+
+def format_of(path: Path) -> str:
+    """Return which format a file is in.
+
+    Raises
+    ------
+    LogError
+        If it is empty, or no regular file.
+    OSError
+        If it cannot be read.
+    """
+    require_regular(path)
+    with path.open("rb") as file:
+        start = file.read(520)
+    if not start:
+        raise LogError("a header line is needed, but the file is empty", str(path))
+    for sign, kind in SIGNS.items():
+        if start.startswith(sign):
+            return kind
+    if start[512:].startswith(b"\x89HDF"):
+        return "hdf5"
+    if start[126:128] in (b"IM", b"MI") and (start.startswith(b"MATLAB") or start[124:125] in (b"\x00", b"\x01")):
+        return "mat"
+    return _by_suffix(path, start)
+
+
+def _by_suffix(path: Path, start: bytes) -> str:
+    """Return what a file is taken for that no first bytes tell: text where it is text."""
+    kind = SUFFIXES.get(path.suffix.lower(), "csv")
+    return kind if b"\0" in start or kind in ("mat", "xls") else "csv"
+
+
+def open_tables(path: Path, metadata: str | None = None) -> tuple[Table, ...]:
+    """Open a log file.
+
+    Parameters
+    ----------
+    metadata : str or None
+        What stands in a file beside it.
+
+    Returns
+    -------
+    tuple of Table
+        One a clock in the file.
+
+    Raises
+    ------
+    LogError
+        If it is of no format that is read, damaged, or larger than a log is.
+    """
+    kind = "log"
+    try:
+        kind = format_of(path)
+        if kind == "xls":
+            raise LogError(OLD_EXCEL, str(path))
+        if kind == "csv":
+            return (_guarded(open_csv(path, metadata), kind, path),)
+        module, _, name = READERS[kind].partition(":")
+        reader: Callable[[Path], Table | tuple[Table, ...]] = getattr(import_module(module), name)
+        made = reader(path)
+        return tuple(_guarded(one, kind, path) for one in (made if isinstance(made, tuple) else (made,)))
+    except BaseException as error:
+        raise refusal(error, kind, path) from error
+
+
+def _guarded(table: Table, kind: str, path: Path) -> Table:
+    """Return a table whose columns are refused in a sentence where they are damaged."""
+
+    def read(columns: Sequence[Column]) -> dict[Column, Array]:
+        try:
+            return table.read(columns)
+        except BaseException as error:
+            raise refusal(error, kind, path) from error
+
+    return replace(table, read=read)
+
+
+def refusal(error: BaseException, kind: str, path: Path) -> BaseException:
+    """Return the error that is shown for one that a reader of files raised; a damaged file brings up any.
+
+    Parameters
+    ----------
+    kind : str
+        The format.
+    """
+    if isinstance(error, HydrostateError) or not isinstance(error, Exception | MemoryError):
+        panicked = type(error).__name__ == "PanicException"  # how a library in Rust says that a file is damaged
+        return LogError(f"cannot be read as {kind}", str(path)) if panicked else error
+    if isinstance(error, PermissionError):
+        return LogError("there is no permission to read it", str(path))
+    said = " ".join(str(error).split())[:200] or type(error).__name__
+    if isinstance(error, MemoryError):
+        return NoMemoryError(f"reading it as {kind} needs more memory than there is ({said})", str(path))
+    return LogError(f"cannot be read as {kind}: {said}", str(path))

@@ -1,0 +1,110 @@
+"""HDF5 logs, MAT 7.3 among them: vectors in groups, columns of a matrix, or fields of a table."""
+
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from plant.errors import LogError
+from plant.log.formats.extras import library
+from plant.log.formats.mat import METADATA, OBJECTS, STRUCT, spread
+from plant.log.formats.packed import most_unpacked, too_large
+from plant.log.table import Table, table_of
+
+UNITS = ("unit", "units", "Unit", "Units", "UNIT")
+NAMES = ("columns", "names", "column_names", "channels")
+
+MOST_OBJECTS = 10_000
+"""Groups and vectors of the largest file that is read."""
+
+
+def open_hdf5(path: Path) -> tuple[Table, ...]:
+    """Open an HDF5 file, or a MAT of version 7.3.
+
+    Returns
+    -------
+    tuple of Table
+        One a group.
+
+    Raises
+    ------
+    LogError
+        If h5py is not installed, or there is no vector of numbers.
+    """
+    h5py = library("h5py", "HDF5 and MAT 7.3", str(path))
+    most = most_unpacked(path.stat().st_size)
+    groups: dict[str, dict[str, Any]] = defaultdict(dict)
+    units: dict[str, dict[str, str | None]] = defaultdict(dict)
+    texts: dict[str, str] = {}
+    with h5py.File(path, "r") as file:
+        seen: list[Any] = []
+        file.visititems(lambda name, one: seen.append((name, one)) if len(seen) < MOST_OBJECTS else True)
+        for name, one in seen:
+            if not isinstance(one, h5py.Dataset) or name.startswith("#"):
+                continue
+            group, _, leaf = name.rpartition("/")
+            if _attribute(one, "MATLAB_class") == "char":
+                if leaf == METADATA:
+                    texts[group] = _text(one, most, str(path))
+                continue
+            for column, values in _columns(one, leaf, most, str(path)).items():
+                groups[group][column] = values
+                units[group][column] = next((said for key in UNITS if (said := _attribute(one, key))), None)
+    if STRUCT in groups and STRUCT in texts:
+        groups = defaultdict(dict, {STRUCT: groups[STRUCT]})
+    if not any(groups.values()):
+        raise LogError(OBJECTS if path.suffix.lower() == ".mat" else "it holds no vector of numbers", str(path))
+    return tuple(
+        table_of(str(path), columns, units=units[group], metadata=texts.get(group), label=group)
+        for group, columns in groups.items()
+    )
+
+
+def _columns(one: Any, leaf: str, most: int, source: str) -> dict[str, Any]:
+    """Return the columns that a data set holds, none where it holds no numbers."""
+    kind = one.dtype
+    if one.shape is None or not one.size > 0 or (kind.kind not in "fiub" and kind.names is None):
+        return {}
+    if one.size * kind.itemsize > most:
+        raise too_large(source, most)
+    values = np.asarray(one[()])
+    if kind.names is not None:
+        if values.ndim != 1:
+            return {}
+        return {name: values[name] for name in kind.names if kind[name].kind in "fiub" and kind[name].shape == ()}
+    values = values.squeeze()
+    if values.ndim == 2 and _attribute(one, "MATLAB_class"):
+        values = values.T  # MATLAB counts the other way
+    named = spread(leaf, values)
+    names = _names(one)
+    return dict(zip(names, named.values(), strict=True)) if len(names) == len(named) > 1 else named
+
+
+def _attribute(one: Any, name: str) -> str:
+    """Return an attribute as text, empty where there is none."""
+    try:
+        value = one.attrs.get(name)
+    except (OSError, KeyError, TypeError):
+        return ""
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.reshape(-1)[0]
+    if isinstance(value, bytes):
+        return value.decode(errors="replace").strip()
+    return value.strip() if isinstance(value, str) else ""
+
+
+def _names(one: Any) -> list[str]:
+    """Return the names that a data set gives its columns, none where it gives none."""
+    for name in NAMES:
+        value = one.attrs.get(name)
+        if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "OSU":
+            return [each.decode(errors="replace") if isinstance(each, bytes) else str(each) for each in value]
+    return []
+
+
+def _text(one: Any, most: int, source: str) -> str:
+    if 2 * one.size > most:
+        raise too_large(source, most)
+    letters = np.asarray(one[()]).reshape(-1)
+    return letters.astype("<u2").tobytes().decode("utf-16-le", errors="replace") if letters.dtype.kind in "iu" else ""

@@ -1,0 +1,93 @@
+"""Layouts of CSV logs that were read before: of a folder of like files only the first is puzzled over.
+
+A file has the layout of an earlier one if it begins with the same bytes up to the first row of data, and if its rows
+are plain numbers as theirs were: as many, with decimal points, apart by commas. Everything that decides a layout is
+then the same.
+"""
+
+import re
+from collections.abc import Mapping
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from plant.log.formats.csv_layout import Layout
+
+MOST_KEPT = 8
+"""Headers that are remembered; when another one comes all of them are forgotten [count]."""
+
+MOST_ABOVE = 20
+"""Lines above the data that a remembered header has at most [count]."""
+
+FEWEST_COLUMNS = 3
+"""Two columns of whole numbers may be one with a decimal comma [count]."""
+
+FEWEST_ROWS = 100
+"""Rows of plain numbers that must follow: many more than lines above them, so that they alone decide [count]."""
+
+_NUMBER = rb"[-+]?\d{1,17}(?:\.\d{0,35})?(?:[eE][-+]?\d{1,3})?"
+"""No longer than a cell that is read as a number."""
+
+_seen: dict[bytes, "Layout"] = {}
+
+
+def remembered(start: bytes, lines: int) -> "Layout | None":
+    """Return the layout of an earlier file that was written alike.
+
+    Parameters
+    ----------
+    start : bytes
+        What a file begins with.
+    lines : int
+        Lines of it that would be looked at.
+
+    Returns
+    -------
+    Layout or None
+        None if there was none.
+    """
+    for header, layout in _alike(start).items():
+        if _plain(start, header, layout, lines):
+            return layout
+    return None
+
+
+def _alike(start: bytes) -> Mapping[bytes, "Layout"]:
+    return {header: layout for header, layout in tuple(_seen.items()) if start.startswith(header)}
+
+
+def remember(start: bytes, lines: int, layout: "Layout") -> None:
+    """Keep a layout for files that are written alike.
+
+    Parameters
+    ----------
+    start : bytes
+        What its file begins with.
+    lines : int
+        Lines of it that were looked at.
+    layout : Layout
+        How it is written.
+    """
+    usual = layout.delimiter == "," and layout.decimal_point == "." and layout.encoding == "utf-8"
+    if not usual or layout.stamped or layout.skipped > MOST_ABOVE or len(layout.headings) < FEWEST_COLUMNS:
+        return
+    header = b"".join(line + b"\n" for line in start.split(b"\n", layout.skipped)[: layout.skipped])
+    if header.count(b"\r") == header.count(b"\r\n") and _plain(start, header, layout, lines):
+        if len(_seen) >= MOST_KEPT:
+            _seen.clear()
+        _seen[header] = layout
+
+
+def _plain(start: bytes, header: bytes, layout: "Layout", lines: int) -> bool:
+    """Return whether all lines that would be looked at, but those above the data, are rows of plain numbers."""
+    wanted = lines - layout.skipped
+    found = _rows(len(layout.headings), wanted).match(start, len(header))
+    if found is None:
+        return False
+    rows = start.count(b"\n", len(header), found.end())
+    return rows >= FEWEST_ROWS and (rows == wanted or found.end() == len(start))
+
+
+@cache
+def _rows(columns: int, most: int) -> re.Pattern[bytes]:
+    return re.compile(rb"(?:(?:%b,){%d}%b\r?\n){1,%d}+" % (_NUMBER, columns - 1, _NUMBER, most))

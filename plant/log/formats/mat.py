@@ -1,0 +1,156 @@
+"""MAT logs: structs whose fields are columns, or plain variables; versions 5 to 7 here, 7.3 as the HDF5 it is."""
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, BinaryIO, cast
+
+import numpy as np
+
+from plant.arrays import Array
+from plant.errors import LogError
+from plant.log.formats.mat_reader import DamagedMatError, Value, read_variables
+from plant.log.table import Table, table_of
+
+STRUCT = "record"
+METADATA = "metadata_json"
+
+MOST_SPREAD = 64
+"""Columns of the widest matrix that is read as columns."""
+
+OBJECTS = (
+    "it holds no vector of numbers; a table, timetable or timeseries can only be read by MATLAB: save its columns as "
+    "the fields of a struct, s.time_s = seconds(t.Time); s.position_m = t.Position; save('log.mat', '-struct', 's')"
+)
+
+
+def open_mat(path: Path) -> tuple[Table, ...]:
+    """Open a MAT file of version 5 to 7.
+
+    Returns
+    -------
+    tuple of Table
+        One a struct, and one of the plain variables.
+
+    Raises
+    ------
+    LogError
+        If it is of another version or damaged, or holds no numbers.
+    """
+    try:
+        content = read_variables(path.read_bytes(), str(path))
+    except DamagedMatError as error:
+        raise LogError(f"cannot be read as mat: {error}", str(path)) from error
+    return tables_of(content, str(path))
+
+
+def tables_of(content: Mapping[str, Value], source: str) -> tuple[Table, ...]:
+    """Return the tables of the variables of a MAT file.
+
+    Parameters
+    ----------
+    content : Mapping[str, ndarray of any shape, str, Mapping or Sequence]
+        Variables by name; structs are mappings.
+    source : str
+        What messages call the file.
+
+    Raises
+    ------
+    LogError
+        If there are no numbers.
+    """
+    if isinstance(record := content.get(STRUCT), Mapping):
+        content = {STRUCT: record}
+    made: list[Table] = []
+    plain = {name: value for name, value in content.items() if not isinstance(value, Mapping)}
+    structs = {name: value for name, value in content.items() if isinstance(value, Mapping)}
+    for name, value in {"": plain, **structs}.items():
+        columns, units = _columns(value)
+        text = value.get(METADATA)
+        if columns:
+            said = text if isinstance(text, str) else None
+            made.append(table_of(source, columns, units=units, metadata=said, label=name))
+    if not made:
+        raise LogError(OBJECTS, source)
+    return tuple(made)
+
+
+def _columns(struct: Mapping[str, Value], above: str = "") -> tuple[dict[str, Any], dict[str, str | None]]:
+    """Return a struct's columns by name, fields of structs within it as ``outer.inner``, and what units it gives."""
+    columns: dict[str, Any] = {}
+    units: dict[str, str | None] = {}
+    if "time" in struct and "signals" in struct:
+        return _simulink(struct)
+    for name, value in struct.items():
+        if isinstance(value, Mapping):
+            inner, said = _columns(value, f"{above}{name}.")
+            columns |= inner
+            units |= said
+        elif isinstance(value, np.ndarray):
+            columns |= spread(above + name, value)
+    return columns, units
+
+
+def _simulink(struct: Mapping[str, Value]) -> tuple[dict[str, Any], dict[str, str | None]]:
+    """Return the columns of what Simulink calls a structure with time: its time is in seconds."""
+    columns: dict[str, Any] = {"time": struct["time"]}
+    signals = struct["signals"]
+    many: Sequence[Any] = signals if isinstance(signals, Sequence) and not isinstance(signals, str) else [signals]
+    for number, one in enumerate(many, start=1):
+        if isinstance(one, Mapping) and isinstance(one.get("values"), np.ndarray):
+            label = one.get("label")
+            columns |= spread(label if isinstance(label, str) and label.strip() else f"signal {number}", one["values"])
+    return columns, {"time": "s"}
+
+
+def spread(name: str, values: Any) -> dict[str, Any]:
+    """Return a vector under its name, a matrix that is longer than wide as one column a column of it.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    values : ndarray
+        Any array.
+
+    Returns
+    -------
+    dict[str, ndarray]
+        Columns by name; none for a single number.
+
+    Examples
+    --------
+    >>> list(spread("data", np.zeros((9, 2)))), list(spread("gain", np.array(1.0)))
+    (['data 1', 'data 2'], [])
+    """
+    if values.size < 2:
+        return {}
+    if values.ndim == 2 and values.shape[1] < values.shape[0] and values.shape[1] <= MOST_SPREAD:
+        return {f"{name} {place + 1}": values[:, place] for place in range(values.shape[1])}
+    return {name: values}
+
+
+def write_mat(columns: Mapping[str, Array], metadata: str, file: BinaryIO, source: str) -> None:
+    """Write columns as the fields of one struct named ``record``.
+
+    Parameters
+    ----------
+    columns : Mapping[str, ndarray, shape (n,)]
+        Values by column name.
+    metadata : str
+        JSON text, kept in the field ``metadata_json``.
+    file : BinaryIO
+        Where to, open for writing.
+
+    Raises
+    ------
+    LogError
+        If a column's name cannot be a MATLAB field name.
+    """
+    from scipy.io import savemat
+
+    for name in columns:
+        if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,62}", name) is None:
+            raise LogError(f"a MATLAB field name is needed (63 letters, digits, _), got {name!r}", source)
+    struct = {STRUCT: {**columns, METADATA: metadata}}
+    savemat(cast(Any, file), struct, long_field_names=True, oned_as="column", do_compression=True)

@@ -1,0 +1,124 @@
+"""Parquet and Feather logs, both of Arrow's tables."""
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pyarrow as pa
+
+from plant.arrays import Array
+from plant.errors import LogError
+from plant.log.columns import Column
+from plant.log.formats.arrow import from_arrow, to_arrow
+from plant.log.formats.cells import each_read, numbers
+from plant.log.formats.packed import most_unpacked, too_large
+from plant.log.headings import Heading
+from plant.log.table import Table
+
+SCHEMA_KEY = b"hydrostate"
+
+
+def open_parquet(path: Path) -> Table:
+    """Open a Parquet file.
+
+    Raises
+    ------
+    LogError
+        If it holds more rows than a log of its size.
+    pyarrow.ArrowException
+        If it is damaged.
+    """
+    import pyarrow.parquet as pq
+
+    file = pq.ParquetFile(path, page_checksum_verification=True)
+    most = most_unpacked(path.stat().st_size)
+    if 8 * file.metadata.num_rows > most:
+        raise too_large(str(path), most)
+    schema = file.schema_arrow
+    return _table(path, schema, lambda place: file.read([schema.names[place]]).column(0))
+
+
+def open_feather(path: Path) -> Table:
+    """Open a Feather file, which is Arrow's own.
+
+    Raises
+    ------
+    LogError
+        If it unpacks to more than a log of its size.
+    pyarrow.ArrowException
+        If it is damaged.
+    """
+    import pyarrow.feather as feather
+
+    most = most_unpacked(path.stat().st_size)
+    table = feather.read_table(str(path), memory_map=False)
+    table.validate(full=True)
+    if table.nbytes > most:
+        raise too_large(str(path), most)
+    return _table(path, table.schema, table.column)
+
+
+def _table(path: Path, schema: pa.Schema, read: Any) -> Table:
+    kinds = [schema.field(place).type for place in range(len(schema.names))]
+    headings = tuple(
+        Heading(name, _said(schema.field(place)), pa.types.is_timestamp(kind))
+        for place, (name, kind) in enumerate(zip(schema.names, kinds, strict=True))
+    )
+    text = (schema.metadata or {}).get(SCHEMA_KEY)
+
+    def values(column: Column) -> Array:
+        return _values(read(column.position), column, str(path))
+
+    return Table(
+        str(path), headings, partial(each_read, read=values), None if text is None else text.decode(errors="replace")
+    )
+
+
+def _said(field: "pa.Field[Any]") -> str | None:
+    """Return the unit that a field gives; a duration is in seconds here."""
+    if pa.types.is_duration(field.type):
+        return "s"
+    metadata: Mapping[bytes, bytes] = field.metadata or {}
+    said = metadata.get(b"unit") or metadata.get(b"units")
+    return None if said is None else said.decode(errors="replace")
+
+
+def _values(values: "pa.ChunkedArray[Any]", column: Column, source: str) -> Any:
+    kind = values.type
+    if pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind):
+        return from_arrow(values if kind == pa.float64() else values.cast(pa.float64(), safe=False))
+    if pa.types.is_timestamp(kind):
+        whole: Any = values.cast(pa.timestamp("ns", kind.tz)).cast(pa.int64())
+        return np.array(whole.fill_null(np.iinfo(np.int64).min).to_numpy(), dtype=np.int64).view("datetime64[ns]")
+    if pa.types.is_duration(kind):
+        return from_arrow(values.cast(pa.duration("ns")).cast(pa.int64()).cast(pa.float64(), safe=False)) * 1e-9
+    if len(values) and isinstance(values[0].as_py(), str):
+        from plant.log.clock.stamps import is_stamp, read_stamps
+
+        texts = [cell or "" for cell in values.to_pylist()]
+        if is_stamp(texts[0]):
+            wrong = f"column {column.name!r} must hold times"
+            return read_stamps(
+                texts, lambda row, cell: LogError(f"{wrong}, got {cell[:40]!r} in row {row + 1}", source)
+            )
+    return numbers(np.array(values.to_pylist(), dtype=object), column.name, source)
+
+
+def write_parquet(columns: Mapping[str, Array], metadata: str, file: BinaryIO) -> None:
+    """Write columns as a Parquet file, metadata in its schema.
+
+    Parameters
+    ----------
+    columns : Mapping[str, ndarray, shape (n,)]
+        Values by column name.
+    metadata : str
+        JSON text.
+    file : BinaryIO
+        Where to, open for writing.
+    """
+    import pyarrow.parquet as pq
+
+    table = pa.table({name: to_arrow(values) for name, values in columns.items()})
+    pq.write_table(table.replace_schema_metadata({SCHEMA_KEY: metadata.encode()}), file)

@@ -1,0 +1,1 @@
+"""Rows of a log that is still being written."""

@@ -1,0 +1,47 @@
+"""Samples of jittering stamps are put on a uniform clock: moved along their slope, and kept on a sensor's quanta."""
+
+import numpy as np
+import pytest
+
+from plant.log.clock.jitter import POINTS, grid_of, resampled, rounded_clock
+
+TICKS = np.arange(40.0)
+OFF = 0.05 * np.random.default_rng(1).uniform(-1.0, 1.0, 40)
+
+
+def test_a_channel_of_one_sample_is_missing_everywhere() -> None:
+    grid = grid_of(TICKS + OFF)
+    values = np.full(40, np.nan)
+    values[3] = 1.0
+    assert np.isnan(resampled(grid, TICKS + OFF, values)).all()
+    assert len(resampled(grid, TICKS + OFF, values)) == len(grid.times)
+
+
+@pytest.mark.parametrize("count", [POINTS - 1, POINTS])
+def test_a_line_stays_a_line_however_few_its_samples(count: int) -> None:
+    time = (TICKS + OFF)[:count]
+    grid = grid_of(time)
+    np.testing.assert_allclose(resampled(grid, time, 2.0 * time + np.pi), 2.0 * grid.times + np.pi, atol=1e-12)
+
+
+def test_a_channel_that_stands_still_stays_what_it_is() -> None:
+    grid = grid_of(TICKS + OFF)
+    np.testing.assert_array_equal(resampled(grid, TICKS + OFF, np.full(40, 0.1)), np.full(len(grid.times), 0.1))
+
+
+def test_values_without_a_quantum_are_not_rounded_and_those_with_one_are() -> None:
+    time = TICKS + OFF
+    grid = grid_of(time)
+    smooth, counts = np.sin(0.3 * time), np.round(8.0 * np.sin(0.3 * time)) / 4.0
+    kept = resampled(grid, time, counts)
+    np.testing.assert_array_equal(4.0 * kept, np.rint(4.0 * kept))
+    assert np.abs(resampled(grid, time, smooth) - np.sin(0.3 * grid.times)).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    "time",
+    [0.5 * TICKS, np.round(0.3 * TICKS)[::-1], TICKS + OFF],
+    ids=["one step", "backward", "jitter"],
+)
+def test_stamps_that_rounding_does_not_explain_are_no_rounded_clock(time: np.ndarray) -> None:
+    assert rounded_clock(time, TICKS) is None

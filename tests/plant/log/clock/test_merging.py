@@ -1,0 +1,72 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from plant.errors import LogError, LogWarning
+from plant.log.clock.merging import SAME, _same_time
+from plant.log.files import read_record
+
+T = 1e-3
+
+
+def signal(time: np.ndarray) -> np.ndarray:
+    return 40.0 * np.sin(30.0 * time)
+
+
+def logger(path: Path, name: str, time: np.ndarray, stamps: np.ndarray | None = None) -> Path:
+    rows = zip(time if stamps is None else stamps, signal(time), strict=True)
+    path.write_text("\n".join([f"time_s,{name}", *(f"{t},{x:.9g}" for t, x in rows)]))
+    return path
+
+
+@pytest.mark.parametrize(("step", "late"), [(T, 0.3e-3), (T, 0.2), (4e-3, 0.0), (4e-3, 1.3e-3)])
+def test_two_loggers_are_put_on_the_clock_of_the_faster_while_both_run(
+    tmp_path: Path, step: float, late: float
+) -> None:
+    motor = logger(tmp_path / "a.csv", "motor_speed_rad_s", T * np.arange(2000))
+    piston = logger(tmp_path / "b.csv", "velocity_m_s", late + step * np.arange(round(2.0 / step)))
+    with pytest.warns(LogWarning) as caught:
+        record = read_record(motor, beside=[piston])
+    assert "loggers_merged" in [one.message.note.code for one in caught]
+    assert record.sample_time == pytest.approx(T)
+    there = np.isfinite(record["velocity_m_s"])
+    assert there.mean() == pytest.approx(T / step, rel=0.02)
+    assert np.abs(record["velocity_m_s"] - signal(record.time))[there].max() < 0.02
+    np.testing.assert_allclose(record["motor_speed_rad_s"], signal(record.time), atol=1e-6)
+
+
+def test_a_file_of_one_clock_is_merged_without_a_note(tmp_path: Path) -> None:
+    time = T * np.arange(200)
+    motor = logger(tmp_path / "a.csv", "motor_speed_rad_s", time)
+    record = read_record(motor, beside=[logger(tmp_path / "b.csv", "position_cm", time)])
+    assert list(record) == ["motor_speed_rad_s", "position_m"]
+
+
+def test_loggers_that_never_ran_together_are_refused(tmp_path: Path) -> None:
+    motor = logger(tmp_path / "a.csv", "motor_speed_rad_s", T * np.arange(200))
+    other = logger(tmp_path / "b.csv", "position_m", 5.0 + T * np.arange(200))
+    with pytest.raises(LogError, match=r"a\.csv and b\.csv do not overlap in time"):
+        read_record(motor, beside=[other])
+
+
+def test_a_channel_that_both_have_is_refused(tmp_path: Path) -> None:
+    motor = logger(tmp_path / "a.csv", "position_m", T * np.arange(200))
+    other = logger(tmp_path / "b.csv", "position_mm", T * np.arange(200))
+    with pytest.raises(LogError, match="both give position_m, wanted one"):
+        read_record(motor, beside=[other])
+
+
+def test_dates_and_seconds_are_not_laid_beside_each_other(tmp_path: Path) -> None:
+    time = T * np.arange(200)
+    dates = np.datetime64("2026-03-01T00:00:00", "ms") + np.arange(200)
+    motor = logger(tmp_path / "a.csv", "motor_speed_rad_s", time, dates)
+    with pytest.raises(LogError, match=r"a\.csv has dates and b\.csv has not"):
+        read_record(motor, beside=[logger(tmp_path / "b.csv", "position_m", time)])
+
+
+@pytest.mark.parametrize("begin", [0.0, 1000.0])
+def test_clocks_are_the_same_by_their_step_however_late_they_begin(begin: float) -> None:
+    time = begin + T * np.arange(200)
+    assert _same_time(time, time + 0.5 * SAME * T)
+    assert not _same_time(time, time + 2.0 * SAME * T)

@@ -1,0 +1,55 @@
+import numpy as np
+import pytest
+
+from plant.log.clock.stamps import is_stamp, read_stamps
+
+
+def read(*cells: str) -> list[str]:
+    return (
+        read_stamps(cells, lambda row, cell: ValueError(f"{row} {cell}")).astype("datetime64[ms]").astype(str).tolist()
+    )
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [
+        "2026-03-01 12:00:00.250",
+        "2026-03-01T12:00:00.250Z",
+        "2026-03-01T14:00:00.250+02:00",
+        "01.03.2026 12:00:00,250",
+        "3/1/2026 12:00:00.250 PM",
+        "2026/03/01 12:00:00.250",
+        "1.3.26 12:00:00.25",
+    ],
+)
+def test_one_moment_is_read_however_it_is_written(cell: str) -> None:
+    assert is_stamp(cell)
+    assert read(cell) == ["2026-03-01T12:00:00.250"]
+
+
+def test_a_day_that_is_no_month_comes_first() -> None:
+    assert read("1/2/2026 0:00:00", "13/2/2026 0:00:00") == ["2026-02-01T00:00:00.000", "2026-02-13T00:00:00.000"]
+
+
+def test_a_time_of_the_day_goes_on_over_midnight() -> None:
+    assert read("23:59:59.9", "00:00:00.1") == ["1970-01-01T23:59:59.900", "1970-01-02T00:00:00.100"]
+
+
+def test_summer_time_that_ends_within_a_log_does_not_set_it_back_where_the_zone_is_written() -> None:
+    before, after = read("2026-10-25T02:59:59+02:00", "2026-10-25T02:00:00+01:00")
+    assert (np.datetime64(after) - np.datetime64(before)) == np.timedelta64(1, "s")
+
+
+@pytest.mark.parametrize("cell", ["2026-13-01 00:00:00", "9999-01-01 00:00:00", "25:00:00", "1:2:3:4", "x", "9" * 500])
+def test_what_is_no_moment_is_refused_with_its_row(cell: str) -> None:
+    with pytest.raises(ValueError, match=r"^1 "):
+        read("2026-01-01 00:00:00", cell)
+
+
+def test_an_empty_cell_is_missing() -> None:
+    assert read("2026-01-01 00:00:00", "")[1] == "NaT"
+
+
+def test_minutes_and_seconds_alone_are_a_time() -> None:
+    stamps = read_stamps(["01:02.5", "01:03.25", "02:00.0"], lambda row, cell: ValueError(f"{row} {cell}"))
+    assert np.diff(stamps).astype("timedelta64[ms]").astype(int).tolist() == [750, 56_750]

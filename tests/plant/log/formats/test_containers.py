@@ -1,0 +1,227 @@
+"""Workbooks and HDF5 files hold more than numbers: what is no log is passed over, what is one keeps its meaning."""
+
+import re
+import zipfile
+from datetime import date, datetime, time, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from plant.errors import LogError
+from plant.log.columns import Column
+from plant.log.formats import hdf5, xlsx
+from plant.log.formats.hdf5 import OBJECTS, open_hdf5
+from plant.log.formats.mat import tables_of
+from plant.log.formats.xlsx import open_xlsx
+from plant.log.table import Table
+
+h5py = pytest.importorskip("h5py")
+openpyxl = pytest.importorskip("openpyxl")
+
+
+def workbook(path: Path, *sheets: list[list[Any]]) -> Path:
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for rows in sheets:
+        sheet = book.create_sheet()
+        for row in rows:
+            sheet.append(row)
+    book.save(path)
+    return path
+
+
+def names(table: Table) -> list[str]:
+    return [one.name for one in table.headings]
+
+
+def read(table: Table) -> dict[str, np.ndarray]:
+    return {table.headings[place].name: values for place, values in table.numbers().items()}
+
+
+NUMBERS = [["time_s", "position_m"], *([0.1 * k, 0.01 * k] for k in range(6))]
+
+
+def test_sheets_without_rows_of_numbers_are_passed_over(tmp_path: Path) -> None:
+    path = workbook(tmp_path / "log.xlsx", [["a title"]], NUMBERS, [[None, None]])
+    (table,) = open_xlsx(path)
+    assert names(table) == ["time_s", "position_m"]
+    with pytest.raises(LogError, match="no sheet has rows of numbers"):
+        open_xlsx(workbook(tmp_path / "none.xlsx", [["a title"]], []))
+
+
+def test_too_many_cells_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(xlsx, "MOST_CELLS", 5)
+    with pytest.raises(LogError, match="more than 5 cells"):
+        open_xlsx(workbook(tmp_path / "log.xlsx", NUMBERS))
+
+
+@pytest.mark.parametrize(
+    ("cell", "said"),
+    [
+        (datetime(2026, 1, 2, 3, 4, 5), "2026-01-02 03:04:05"),
+        (time(3, 4, 5), "03:04:05"),
+        (timedelta(seconds=1.5), "1.5"),
+        (date(2026, 1, 2), "2026-01-02"),
+        (None, ""),
+        (" a \n b ", "a b"),
+        (0.1, "0.1"),
+        (True, "1"),
+    ],
+)
+def test_a_cell_is_said_as_a_text_log_would_have_it(cell: Any, said: str) -> None:
+    assert xlsx._said(cell) == said
+
+
+def test_hdf5_gives_fields_named_columns_and_units_and_passes_over_what_is_no_vector(tmp_path: Path) -> None:
+    path = tmp_path / "log.h5"
+    rows = np.zeros(5, dtype=[("time_s", "f8"), ("name", "S3"), ("speed", "i4")])
+    rows["speed"] = np.arange(5)
+    with h5py.File(path, "w") as file:
+        file["table/rows"] = rows
+        file["table/grid"] = np.zeros((2, 2), dtype=rows.dtype)
+        file["table/text"] = "a title"
+        file["table/nothing"] = np.zeros(0)
+        file["matrix/data"] = np.arange(10.0).reshape(5, 2)
+        file["matrix/data"].attrs["columns"] = np.array([b"time_s", b"force_n"])
+        file["vector/position"] = np.arange(5.0)
+        file["vector/position"].attrs["unit"] = np.array([b"mm"])
+    found = {table.label: table for table in open_hdf5(path)}
+    assert sorted(found) == ["matrix", "table", "vector"]
+    assert names(found["table"]) == ["time_s", "speed"]
+    assert read(found["table"])["speed"] == pytest.approx(np.arange(5.0))
+    assert read(found["matrix"])["force_n"] == pytest.approx([1.0, 3.0, 5.0, 7.0, 9.0])
+    assert found["vector"].headings[0].said == "mm"
+
+
+def test_hdf5_of_matlab_counts_the_other_way_and_keeps_its_metadata(tmp_path: Path) -> None:
+    path = tmp_path / "log.mat"
+    with h5py.File(path, "w") as file:
+        file["record/data"] = np.arange(10.0).reshape(2, 5)
+        file["record/data"].attrs["MATLAB_class"] = np.bytes_("double")
+    (table,) = open_hdf5(path)
+    assert len(table.headings) == 2
+    assert read(table)[names(table)[1]] == pytest.approx(np.arange(5.0, 10.0))
+    with h5py.File(path, "w") as file:
+        file["text"] = "nothing else"
+    with pytest.raises(LogError, match=re.escape(OBJECTS)):
+        open_hdf5(path)
+    with h5py.File(tmp_path / "none.h5", "w") as file:
+        file["text"] = "nothing else"
+    with pytest.raises(LogError, match="no vector of numbers"):
+        open_hdf5(tmp_path / "none.h5")
+
+
+def test_an_archive_without_a_workbook_is_no_log(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "logs.xlsx", "w") as archive:
+        archive.writestr("log.csv", "time_s,position_m\n0,0\n")
+    with pytest.raises(LogError, match="a zip archive is no log: unpack it first"):
+        open_xlsx(tmp_path / "logs.xlsx")
+
+
+def test_columns_and_rows_that_hold_nothing_are_left_out_of_a_sheet() -> None:
+    rows = [["time_s", "position_m", None], *([0.1 * k, 0.01 * k, None] for k in range(6)), [None, None]]
+    table = xlsx._table(Path("log.xlsx"), "sheet", rows)
+    assert table is not None
+    assert names(table) == ["time_s", "position_m"]
+    assert read(table)["position_m"] == pytest.approx(0.01 * np.arange(6))
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [[" ", "  "]] * 4,
+        [["a;b;c;d", None], *[["1;2;3;4", None]] * 5, [None, "x"]],
+    ],
+    ids=["blanks", "text with delimiters"],
+)
+def test_a_sheet_of_text_is_no_table(rows: list[list[Any]]) -> None:
+    assert xlsx._table(Path("log.xlsx"), "sheet", rows) is None
+
+
+def test_a_sheet_is_read_with_its_dates_and_a_word_among_numbers_is_refused_with_its_row(tmp_path: Path) -> None:
+    noon = datetime(2026, 3, 1, 12)
+    rows = [["when", "force", "way_mm"], *([noon + timedelta(seconds=k), 0.5 * k, str(k)] for k in range(6))]
+    (table,) = open_xlsx(workbook(tmp_path / "log.xlsx", rows))
+    values = read(table)
+    np.testing.assert_array_equal(np.diff(values["when"]), np.timedelta64(1, "s"))
+    assert values["force"] == pytest.approx(0.5 * np.arange(6))
+    assert values["way_mm"] == pytest.approx(np.arange(6))
+    rows[4][1] = "broken"
+    (table,) = open_xlsx(workbook(tmp_path / "spoilt.xlsx", rows))
+    with pytest.raises(LogError, match=r"spoilt\.xlsx: .*force.*broken.*row 4"):
+        table.read([Column(1, "force", "force")])
+    rows[5][0] = "later"
+    (table,) = open_xlsx(workbook(tmp_path / "late.xlsx", rows))
+    with pytest.raises(LogError, match=r"when.*later.*row 5"):
+        table.read([Column(0, "when", "time_s")])
+
+
+def test_a_workbook_that_unpacks_to_more_than_a_log_or_breaks_off_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = workbook(tmp_path / "log.xlsx", NUMBERS)
+    with monkeypatch.context() as patch:
+        patch.setattr(xlsx, "most_unpacked", lambda _: 1000)
+        with pytest.raises(LogError, match="it unpacks to more than"):
+            open_xlsx(path)
+    infos = zipfile.ZipFile.infolist
+
+    def beyond(archive: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
+        found = infos(archive)
+        found[-1].header_offset = 10**6
+        return found
+
+    monkeypatch.setattr(zipfile.ZipFile, "infolist", beyond)
+    with pytest.raises(zipfile.BadZipFile, match="it ends too early"):
+        open_xlsx(path)
+
+
+def matlab(file: Any, name: str, text: str) -> None:
+    file[name] = np.frombuffer(text.encode("utf-16-le"), dtype="<u2")
+    file[name].attrs["MATLAB_class"] = np.bytes_("char")
+
+
+def test_hdf5_of_matlab_gives_the_record_that_was_written_and_nothing_beside_it(tmp_path: Path) -> None:
+    path = tmp_path / "log.mat"
+    with h5py.File(path, "w") as file:
+        file["record/position_m"] = np.arange(5.0)
+        matlab(file, "record/metadata_json", '{"rig": 7}')
+        matlab(file, "record/comment", "none")
+        file["beside/noise"] = np.arange(9.0)
+    (table,) = open_hdf5(path)
+    assert (names(table), table.metadata) == (["position_m"], '{"rig": 7}')
+
+
+@pytest.mark.parametrize("text", [False, True])
+def test_hdf5_of_more_than_a_log_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: bool) -> None:
+    path = tmp_path / "log.mat"
+    with h5py.File(path, "w") as file:
+        if text:
+            matlab(file, "record/metadata_json", "x" * 100)
+        else:
+            file["record/position_m"] = np.arange(100.0)
+    monkeypatch.setattr(hdf5, "most_unpacked", lambda _: 199)
+    with pytest.raises(LogError, match="it unpacks to more than"):
+        open_hdf5(path)
+
+
+def test_what_simulink_calls_a_structure_with_time_is_a_table() -> None:
+    signals = [
+        {"label": "speed", "values": np.arange(5.0)},
+        {"label": " ", "values": np.arange(10.0).reshape(5, 2)},
+        {"label": "text", "values": "none"},
+    ]
+    (table,) = tables_of({"out": {"time": np.arange(5.0), "signals": signals}}, "a.mat")
+    assert names(table) == ["time", "speed", "signal 2 1", "signal 2 2"]
+    assert table.headings[0].said == "s"
+    (alone,) = tables_of({"out": {"time": np.arange(5.0), "signals": signals[0]}}, "a.mat")
+    assert names(alone) == ["time", "speed"]
+
+
+def test_structs_within_structs_are_columns_with_both_names_and_none_is_refused() -> None:
+    (table,) = tables_of({"log": {"rod": {"way": np.arange(4.0)}, "speed": np.arange(4.0), "who": "me"}}, "a.mat")
+    assert names(table) == ["rod.way", "speed"]
+    with pytest.raises(LogError, match=re.escape(f"a.mat: {OBJECTS}")):
+        tables_of({"gain": np.array(1.0), "who": "me"}, "a.mat")

@@ -1,0 +1,115 @@
+"""Lines of a text log that are no rows of data: skipped, left out at the end, or refused."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from plant.errors import LogError, LogWarning
+from plant.log.files import read_record
+from plant.log.formats.csv_cells import MOST_AFTER, TOGETHER
+from plant.log.formats.detect import open_tables
+from plant.log.notes import LogCode
+from plant.log.record import Record
+from plant.notes import Note
+
+HEADER = "time_s,motor_speed_rad_s,position_m,said"
+ROWS = [f"{0.001 * k:.3f},{k % 7},{0.001 * k:.4f},text" for k in range(TOGETHER + 500)]
+
+
+def written(tmp_path: Path, *lines: str, end: str = "\n") -> Path:
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join((HEADER, *lines)) + end)
+    return path
+
+
+def read(path: Path) -> tuple[Record, list[Note]]:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        record = read_record(path)
+    return record, [one.message.note for one in caught if isinstance(one.message, LogWarning)]
+
+
+@pytest.mark.parametrize("line", ["# pressed the button", "% half way", "//", HEADER, "#0.01,1,2,3"])
+def test_a_comment_or_the_header_again_among_the_rows_is_skipped(line: str, tmp_path: Path) -> None:
+    record, notes = read(written(tmp_path, *ROWS[:40], line, *ROWS[40:]))
+    assert len(record) == len(ROWS)
+    assert notes == [LogCode.LINES_SKIPPED.note(count=1)]
+
+
+@pytest.mark.parametrize(
+    ("after", "end"),
+    [
+        (["1.500,3,0.0"], ""),
+        (["Mean,1,2,3", "Max,6,2,3"], "\n"),
+        (["", "Mean,1,2,3"], "\n"),
+        (["\0\0\0\0\0\0"], ""),
+        (["end of test"] * 15, "\n"),
+    ],
+)
+def test_a_cut_last_row_and_sums_below_the_data_are_left_out(after: list[str], end: str, tmp_path: Path) -> None:
+    record, notes = read(written(tmp_path, *ROWS, *after, end=end))
+    assert len(record) == len(ROWS)
+    np.testing.assert_allclose(record["position_m"], 0.001 * np.arange(len(ROWS)))
+    assert notes == [LogCode.END_LEFT_OUT.note(count=sum(map(bool, after)), taken=len(ROWS))]
+
+
+def test_sums_below_the_data_are_no_part_of_any_column_that_is_shown(tmp_path: Path) -> None:
+    (table,) = open_tables(written(tmp_path, *ROWS, "Mean,1,2,3"))
+    with pytest.warns(LogWarning, match="left out after row 1500, .*: 1"):
+        found = table.numbers()
+    assert {place: len(values) for place, values in found.items()} == dict.fromkeys((0, 1, 2), len(ROWS))
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ([*ROWS[:40], "Mean,1,2,3", *ROWS[40:]], "column 'time_s' must hold numbers, got 'Mean' in row 41"),
+        ([*ROWS[:40], "1,2", *ROWS[40:]], "every row must have 4 cells as the header has, got 2 in row 41"),
+        ([*ROWS, *["end of test"] * 16], f"got 1 in row {len(ROWS) + 1}"),
+        ([*ROWS * 2, *["end of test"] * (MOST_AFTER + 1)], f"got 1 in row {2 * len(ROWS) + 1}"),
+        ([*ROWS[:60], "0.060,x,0.06,text"], "column 'motor_speed_rad_s' must hold numbers, got 'x' in row 61"),
+    ],
+)
+def test_other_lines_are_refused_by_their_row(lines: list[str], said: str, tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=said):
+        read_record(written(tmp_path, *lines))
+
+
+def test_cells_that_loggers_and_spreadsheets_leave_for_nothing_are_missing(tmp_path: Path) -> None:
+    rows = list(ROWS)
+    for k, cell in enumerate(("-", "---", "OL", "#DIV/0!", "1.#QNAN", "-1.#IND")):
+        rows[10 * k] = rows[10 * k].replace(f",{0.01 * k:.4f},", f",{cell},")
+    record, _ = read(written(tmp_path, *rows))
+    assert np.flatnonzero(np.isnan(record["position_m"])).tolist() == [0, 10, 20, 30, 40, 50]
+
+
+@pytest.mark.parametrize(("delimiter", "cell"), [(",", '"-1,234.5"'), (";", "-1.234,5")])
+def test_thousands_may_be_apart_where_a_fraction_says_which_mark_is_which(
+    delimiter: str, cell: str, tmp_path: Path
+) -> None:
+    point = "," if delimiter == ";" else "."
+    rows = [delimiter.join((f"{0.001 * k:.3f}".replace(".", point), "1", "2", cell)) for k in range(99)]
+    path = tmp_path / "run.csv"
+    header = "time_s,motor_speed_rad_s,position_m,differential_pressure_pa".replace(",", delimiter)
+    path.write_text("\n".join((header, *rows)) + "\n")
+    record, _ = read(path)
+    assert set(record["differential_pressure_pa"]) == {-1234.5}
+
+
+def test_a_sheet_is_read_by_the_same_rules(tmp_path: Path) -> None:
+    book = pytest.importorskip("openpyxl").Workbook()
+    header = ("time_s", "motor_speed_rad_s", "position_m")
+    rows = [(0.001 * k, k % 7 or None, 0.01 * k if k % 2 else f"{0.01 * k:.2f}") for k in range(150)]
+    for row in (header, *rows[:70], ("# note", None, None), *rows[70:], (), ("Mean", 1, 2)):
+        book.active.append(row)
+    book.save(tmp_path / "run.xlsx")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        (table,) = open_tables(tmp_path / "run.xlsx")
+        found = table.numbers()
+    said = [one.message.note for one in caught if isinstance(one.message, LogWarning)]
+    assert said == [LogCode.LINES_SKIPPED.note(count=1), LogCode.END_LEFT_OUT.note(count=1, taken=150)]
+    np.testing.assert_allclose(found[2], 0.01 * np.arange(150))
+    assert np.isnan(found[1][::7]).all()

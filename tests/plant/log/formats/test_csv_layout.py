@@ -1,0 +1,96 @@
+from pathlib import Path
+
+import pytest
+
+from plant.errors import LogError
+from plant.log.formats import csv_layout
+from plant.log.formats.csv_layout import Layout, layout_of, layout_of_lines
+
+
+def layout(*lines: str) -> Layout:
+    return layout_of_lines(lines, "utf-8", "a.csv")
+
+
+def names(made: Layout) -> list[str]:
+    return [one.name for one in made.headings]
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", "|", "  "])
+def test_the_delimiter_that_gives_most_numbers_is_taken(delimiter: str) -> None:
+    made = layout(*(delimiter.join(row) for row in (("t", "x", "v"), ("0.0", "1.0", "2.0"), ("0.1", "1.5", "2.5"))))
+    assert (made.delimiter.strip(" "), names(made)) == (delimiter.strip(" "), ["t", "x", "v"])
+
+
+def test_lines_above_the_header_are_skipped() -> None:
+    made = layout("sep=;", "Bench;3", "Rate;1000", "", "t;x;v", "0,0;1,0;2", "0,1;1,5;3")
+    assert (made.skipped, names(made), made.decimal_point) == (5, ["t", "x", "v"], ",")
+
+
+def test_a_row_of_units_gives_the_units() -> None:
+    made = layout("Time,Speed,Note", "[s],[rpm],", "0.0,1.0,a", "0.1,1.5,b")
+    assert [(one.name, one.unit) for one in made.headings] == [("Time", "s"), ("Speed", "rpm"), ("Note", None)]
+
+
+def test_a_log_without_a_header_has_numbered_columns() -> None:
+    assert names(layout("0.0,1.0", "0.1,1.5")) == ["column 1", "column 2"]
+
+
+def test_a_delimiter_that_closes_every_row_makes_no_column_of_its_own() -> None:
+    assert names(layout("t;x", "0;1;", "1;2;")) == ["t", "x", "column 3"]
+
+
+def test_a_broken_first_row_is_a_row_and_no_header() -> None:
+    assert layout("t,x,v", "0.0,oops,oops", "0.1,1.5,2.5", "0.2,1.5,2.5").skipped == 1
+
+
+def test_dates_are_told_from_numbers() -> None:
+    assert layout("t,x", "12:00:00.1,1", "12:00:00.2,2").stamped == {0}
+
+
+def test_blank_lines_alone_are_refused() -> None:
+    with pytest.raises(LogError, match="a header line is needed, but the file is empty"):
+        layout("", " ")
+
+
+def test_wide_letters_without_a_mark_are_known_by_their_zeros(tmp_path: Path) -> None:
+    text = "t,x\n" + "".join(f"{k},{k}\n" for k in range(20))
+    for encoding in ("utf-16-le", "utf-16-be"):
+        path = tmp_path / encoding
+        path.write_bytes(text.encode(encoding))
+        made = layout_of(path)
+        assert (made.encoding, names(made)) == (encoding, ["t", "x"])
+    (tmp_path / "binary").write_bytes(bytes(range(64)) * 4)
+    with pytest.raises(LogError, match="a text file is needed for a CSV log, got binary data"):
+        layout_of(tmp_path / "binary")
+
+
+def test_the_last_line_that_was_looked_at_is_cut_and_does_not_count(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t,x\n0.0,1.0\n0.1,2.0\n")
+    whole = layout_of(path)
+    monkeypatch.setattr(csv_layout, "LOOKED_AT", 16)  # within the second row
+    assert layout_of(path) == whole
+
+
+def test_a_block_above_a_blank_line_is_not_the_header() -> None:
+    made = layout("bench,3", "rate,1000", "", "t,x", "", *(f"0.{k},{k}.0" for k in range(6)))
+    assert names(made) == ["t", "x"]
+
+
+def test_the_row_of_units_may_stand_below_another() -> None:
+    made = layout("t,x", "time,way", "s,mm", "0.0,1.0", "0.1,2.0")
+    assert [one.unit for one in made.headings] == ["s", "mm"]
+
+
+def test_a_log_without_a_number_has_its_first_line_for_a_header_and_all_others_for_rows() -> None:
+    made = layout("", "name;place", "press;hall", "lift;yard")
+    assert (names(made), made.skipped, made.delimiter) == (["name", "place"], 2, ";")
+    assert layout("name,place", "press,hall").skipped == 1
+
+
+def test_one_number_a_row_under_a_header_with_as_many_commas_is_two_cells() -> None:
+    made = layout("time_s,motor_speed_rad_s", "0,1", "1,x")
+    assert (names(made), made.delimiter, made.decimal_point) == (["time_s", "motor_speed_rad_s"], ",", ".")
+    assert layout("Weg", "0,1", "1,x").decimal_point == ","

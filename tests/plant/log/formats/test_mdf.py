@@ -1,0 +1,80 @@
+"""Groups of an MDF file become tables, each with its clock."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from plant.errors import LogError
+from plant.log.formats import mdf
+from plant.log.formats.mdf import open_mdf
+
+asammdf = pytest.importorskip("asammdf")
+TIME = 0.01 * np.arange(30)
+
+
+def written(path: Path, *groups: list[tuple[str, str, Any]]) -> Path:
+    with asammdf.MDF() as file:
+        for channels in groups:
+            signals = [asammdf.Signal(values, TIME, unit=unit, name=name) for name, unit, values in channels]
+            file.append(signals, acq_name="bench" if len(channels) > 1 else None)
+        return Path(file.save(path, overwrite=True))
+
+
+@pytest.fixture(scope="module")
+def two_groups(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("mdf")
+    return written(folder / "log.mf4", [("speed", "rpm", TIME), ("way", "", 2.0 * TIME)], [("force", "N", 3.0 * TIME)])
+
+
+def test_a_group_is_a_table_with_its_clock_and_units(two_groups: Path) -> None:
+    bench, other = open_mdf(two_groups)
+    assert [(one.name, one.said) for one in bench.headings] == [("time", "s"), ("speed", "rpm"), ("way", None)]
+    assert [(one.name, one.said) for one in other.headings] == [("time", "s"), ("force", "N")]
+    assert other.label == "group 1"
+    values = bench.numbers()
+    np.testing.assert_allclose(values[0], TIME)
+    np.testing.assert_allclose(values[2], 2.0 * TIME)
+
+
+def test_a_group_of_more_rows_than_a_log_is_refused(two_groups: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with asammdf.MDF(two_groups) as file:
+        largest = max(one.channel_group.samples_byte_nr * one.channel_group.cycles_nr for one in file.groups)
+    assert largest >= 8 * len(TIME)
+    monkeypatch.setattr(mdf, "most_unpacked", lambda _: largest - 1)
+    with pytest.raises(LogError, match="it unpacks to more than"):
+        open_mdf(two_groups)
+    monkeypatch.setattr(mdf, "most_unpacked", lambda _: largest)
+    assert len(open_mdf(two_groups)) == 2
+
+
+def test_a_file_without_a_channel_is_refused(tmp_path: Path) -> None:
+    with asammdf.MDF() as file:
+        path = Path(file.save(tmp_path / "none.mf4"))
+    with pytest.raises(LogError, match=r"none\.mf4: it holds no channel"):
+        open_mdf(path)
+
+
+def test_a_clock_alone_is_no_table(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.mf4", [("speed", "rpm", TIME), ("way", "", TIME)])
+    with asammdf.MDF(path) as file:
+        del file.groups[0].channels[1:]
+        with pytest.raises(LogError, match="it holds no channel"):
+            mdf._tables(_Opened(file), path)
+
+
+class _Opened:
+    """The library, whose file is open already."""
+
+    def __init__(self, file: Any) -> None:
+        self._file = file
+
+    def MDF(self, _: object) -> Any:  # noqa: N802  the library's name
+        return self._file
+
+
+def test_what_is_no_mdf_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "log.mf4").write_bytes(b"MDF     4.10" + bytes(200))
+    with pytest.raises(LogError, match="cannot be read as mdf"):
+        open_mdf(tmp_path / "log.mf4")

@@ -1,0 +1,76 @@
+"""Columns of Arrow's tables are read by their kind: numbers, times, durations, and text that is a time."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.feather as feather
+import pyarrow.parquet as pq
+import pytest
+
+from plant.errors import LogError
+from plant.log.columns import Column
+from plant.log.formats import parquet
+from plant.log.formats.parquet import open_feather, open_parquet
+
+NOON = np.datetime64("2026-03-01T12:00:00", "us")
+STAMPS = NOON + np.arange(4) * np.timedelta64(10, "ms")
+
+
+def written(path: Path, kind: str, **columns: object) -> Path:
+    table = pa.table(columns)
+    pq.write_table(table, path) if kind == "parquet" else feather.write_feather(table, str(path))
+    return path
+
+
+@pytest.mark.parametrize("kind", ["parquet", "feather"])
+def test_times_are_read_as_times_and_durations_as_seconds(tmp_path: Path, kind: str) -> None:
+    when = pa.array([*STAMPS[:3], None], pa.timestamp("us"))
+    path = written(
+        tmp_path / f"log.{kind}",
+        kind,
+        when=when,
+        since=pa.array((STAMPS - NOON).astype("timedelta64[ms]")),
+        said=[str(one) for one in STAMPS],
+        whole=pa.array([1, 2, None, 4], pa.int16()),
+    )
+    table = (open_parquet if kind == "parquet" else open_feather)(path)
+    assert [one.stamped for one in table.headings] == [True, False, False, False]
+    assert table.headings[1].said == "s"
+    values = table.numbers()
+    np.testing.assert_array_equal(values[0][:3], STAMPS[:3].astype("datetime64[ns]"))
+    assert np.isnat(values[0][3])
+    np.testing.assert_allclose(values[1], [0.0, 0.01, 0.02, 0.03])
+    np.testing.assert_array_equal(values[2], STAMPS.astype("datetime64[ns]"))
+    np.testing.assert_array_equal(values[3], [1.0, 2.0, np.nan, 4.0])
+
+
+def test_a_text_that_is_no_time_among_times_is_refused_with_its_row(tmp_path: Path) -> None:
+    said = [str(STAMPS[0]), "later", str(STAMPS[2])]
+    table = open_parquet(written(tmp_path / "log.parquet", "parquet", said=said))
+    with pytest.raises(LogError, match=r"log\.parquet: column 'said' must hold times, got 'later' in row 2"):
+        table.read([Column(0, "said", "time_s")])
+
+
+def test_text_that_is_no_number_is_no_column_of_numbers(tmp_path: Path) -> None:
+    table = open_parquet(written(tmp_path / "log.parquet", "parquet", who=["a", "b"], way=[1.0, 2.0]))
+    assert list(table.numbers()) == [1]
+
+
+@pytest.mark.parametrize("kind", ["parquet", "feather"])
+def test_more_rows_than_a_log_of_that_size_are_refused(
+    tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = written(tmp_path / f"log.{kind}", kind, way=np.arange(100.0))
+    opened = open_parquet if kind == "parquet" else open_feather
+    assert len(opened(path).numbers()[0]) == 100
+    monkeypatch.setattr(parquet, "most_unpacked", lambda _: 799)
+    with pytest.raises(LogError, match="it unpacks to more than"):
+        opened(path)
+
+
+def test_a_column_that_holds_nothing_is_missing_and_yes_and_no_are_numbers(tmp_path: Path) -> None:
+    table = open_parquet(written(tmp_path / "log.parquet", "parquet", none=pa.nulls(3), on=[True, None, False]))
+    values = table.numbers()
+    assert np.isnan(values[0]).all()
+    np.testing.assert_array_equal(values[1], [1.0, np.nan, 0.0])

@@ -1,0 +1,69 @@
+"""Groups of a LabVIEW file become tables with their units, steps and beginnings."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from plant.errors import LogError
+from plant.log.formats.tdms import open_tdms
+
+nptdms = pytest.importorskip("nptdms")
+START = np.datetime64("2026-03-01T12:00:00", "us")
+
+
+def written(path: Path, *channels: tuple[str, str, Any, dict[str, Any]]) -> Path:
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment([nptdms.ChannelObject(*one) for one in channels])
+    return path
+
+
+def test_channels_of_one_length_and_step_are_one_table(tmp_path: Path) -> None:
+    values = np.arange(20.0)
+    path = written(
+        tmp_path / "log.tdms",
+        ("Bench", "Speed", values, {"unit_string": "rpm", "wf_increment": 0.01, "wf_start_time": START}),
+        ("Bench", "Position", 2.0 * values, {"wf_increment": 0.01, "unit": "mm"}),
+        ("Bench", "Slow", values[:5], {"wf_increment": 0.04}),
+    )
+    fast, slow = open_tdms(path)
+    assert [(one.name, one.said) for one in fast.headings] == [("Speed", "rpm"), ("Position", "mm")]
+    assert (fast.label, fast.step, fast.began) == ("Bench", 0.01, START)
+    np.testing.assert_array_equal(fast.numbers()[1], 2.0 * values)
+    assert ([one.name for one in slow.headings], slow.step, slow.began) == (["Slow"], 0.04, None)
+
+
+@pytest.mark.parametrize("step", [0.0, -1.0, 1e7, "fast"])
+def test_a_step_that_is_none_is_not_taken_for_one(tmp_path: Path, step: Any) -> None:
+    (table,) = open_tdms(written(tmp_path / "log.tdms", ("Bench", "Speed", np.arange(5.0), {"wf_increment": step})))
+    assert table.step is None
+
+
+@pytest.mark.parametrize("start", [np.datetime64("1904-01-01T00:00:00", "us"), "noon"])
+def test_a_beginning_that_says_nothing_is_none(tmp_path: Path, start: Any) -> None:
+    (table,) = open_tdms(written(tmp_path / "log.tdms", ("Bench", "Speed", np.arange(5.0), {"wf_start_time": start})))
+    assert table.began is None
+
+
+def test_a_file_without_a_channel_is_refused(tmp_path: Path) -> None:
+    with nptdms.TdmsWriter(tmp_path / "none.tdms") as writer:
+        writer.write_segment([nptdms.RootObject({"operator": "A. N. Other"})])
+    with pytest.raises(LogError, match=r"none\.tdms: it holds no channel"):
+        open_tdms(tmp_path / "none.tdms")
+
+
+class _Longer:
+    """A channel that says it has a thousand million samples."""
+
+    name = "Speed"
+
+    def __len__(self) -> int:
+        return 10**9
+
+
+def test_a_file_that_says_it_is_longer_than_it_is_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = written(tmp_path / "log.tdms", ("Bench", "Speed", np.arange(5.0), {}))
+    monkeypatch.setattr(nptdms.TdmsGroup, "channels", lambda _: [_Longer()])
+    with pytest.raises(LogError, match=r"it ends before the 1000000000 samples that 'Speed' has"):
+        open_tdms(path)

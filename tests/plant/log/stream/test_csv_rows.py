@@ -1,0 +1,115 @@
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from plant.errors import LogError, LogWarning
+from plant.log.stream.csv_rows import CsvStream
+
+HEADER = "time_ms,motor_speed_rpm,position_mm\n"
+
+
+def _rows(count: int, start: int = 0) -> list[str]:
+    return [f"{k},{60 * k},{k}\n" for k in range(start, start + count)]
+
+
+def _taken(lines: list[str], most: int = 10) -> list[tuple[float, np.ndarray, bool]]:
+    return list(CsvStream(lines, source="bench").samples(most))
+
+
+def test_rows_become_si_samples_on_their_clock() -> None:
+    stream = CsvStream([HEADER, *_rows(100)], source="bench")
+    pieces = list(stream.samples(30))
+    assert stream.channels == ("motor_speed_rad_s", "position_m")
+    assert stream.sample_time == pytest.approx(1e-3)
+    assert [len(piece) for _, piece, _ in pieces] == [30, 30, 30, 10]
+    everything = np.concatenate([piece for _, piece, _ in pieces])
+    np.testing.assert_allclose(everything[:, 0], 2.0 * np.pi * np.arange(100))
+    np.testing.assert_allclose(everything[:, 1], 1e-3 * np.arange(100))
+    assert pieces[-1][0] == pytest.approx(0.099)
+
+
+def test_samples_come_before_the_stream_ends() -> None:
+    def endless() -> Iterator[str]:
+        yield HEADER
+        k = 0
+        while True:
+            yield f"{k},1,2\n"
+            k += 1
+
+    _, first, _ = next(CsvStream(endless(), source="bench").samples(5))
+    assert len(first) == 5
+
+
+def test_a_short_gap_is_filled_and_a_long_one_told() -> None:
+    short = _taken([HEADER, *_rows(60), *_rows(40, start=65)], most=1000)
+    ((_, samples, gap),) = short
+    assert not gap
+    assert np.flatnonzero(np.isnan(samples[:, 0])).tolist() == [60, 61, 62, 63, 64]
+    before, after = _taken([HEADER, *_rows(60), *_rows(40, start=5000)], most=1000)
+    assert (len(before[1]), before[2], len(after[1]), after[2]) == (60, False, 40, True)
+
+
+def test_empty_cells_are_missing_samples() -> None:
+    ((_, samples, _),) = _taken([HEADER, "0,,1\n", "1,NaN,1\n", "2,60,1\n"])
+    assert np.isnan(samples[:, 0]).tolist() == [True, True, False]
+
+
+def test_semicolons_and_decimal_commas_are_read() -> None:
+    ((_, samples, _),) = _taken(["time_s;motor_speed_rad_s;position_m\n", "0,0;1,5;2\n", "0,1;1,5;2\n"])
+    np.testing.assert_allclose(samples, [[1.5, 2.0], [1.5, 2.0]])
+
+
+def test_a_row_that_is_still_being_written_is_left_out() -> None:
+    stream = CsvStream([HEADER, *_rows(60), "60,1"], source="bench")
+    assert sum(len(piece) for _, piece, _ in stream.samples(10)) == 60
+    assert stream.cut
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ("100,abc,1\n", "column 'motor_speed_rpm' must hold numbers, got 'abc' in row 101"),
+        ("100,inf,1\n", "column 'motor_speed_rpm' must hold numbers, got 'inf' in row 101"),
+        (",1,1\n", "column 'time_ms' must hold numbers, got 'an empty cell' in row 101"),
+        ("100,1\n", "every row must have 3 cells as the header has, got 2 in row 101"),
+        ("50,1,1\n", "time_s must increase from row to row, got 0.05 s after 0.099 s in row 101"),
+    ],
+)
+def test_a_broken_row_is_named(row: str, said: str) -> None:
+    with pytest.raises(LogError, match=f"bench: {said}"):
+        _taken([HEADER, *_rows(100), row])
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ([], "a header line is needed"),
+        ([HEADER], "at least two rows are needed"),
+        ([HEADER, "5,1,1\n", "5,1,1\n"], "time_s must increase"),
+        (["motor_speed_rpm,position_mm\n", "1,1\n"], "a column time_s is needed"),
+        (["time_furlong,position_mm\n", "1,1\n"], "cannot become time_s"),
+    ],
+)
+def test_a_stream_without_a_beginning_is_refused(lines: list[str], said: str) -> None:
+    with pytest.raises(LogError, match=said):
+        _taken(lines)
+
+
+def test_a_long_gap_right_after_a_piece_is_told_with_the_next() -> None:
+    pieces = _taken([HEADER, *_rows(10), *_rows(5, 90_000)], most=10)
+    assert [(len(piece), gap) for _, piece, gap in pieces] == [(10, False), (5, True)]
+
+
+def test_blank_lines_and_quoted_cells_are_read() -> None:
+    lines = [HEADER, *(f'{k},"{60 * k}",{k}\n' for k in range(12))]
+    lines.insert(6, " \n")
+    (time, samples, _), *more = _taken(lines, most=20)
+    assert (time, more) == (pytest.approx(0.011), [])
+    np.testing.assert_allclose(samples[:, 0], 2.0 * np.pi * np.arange(12))
+
+
+def test_a_column_that_was_left_unread_and_may_be_pressure_is_named() -> None:
+    lines = ["time_ms,motor_speed_rpm,position_mm,Druck [bar]\n", *(f"{k},1,2,3\n" for k in range(5))]
+    with pytest.warns(LogWarning, match=r"column 'Druck \[bar\]' was not used, but it may be differential_pressure_pa"):
+        CsvStream(lines, source="bench")
