@@ -35,6 +35,9 @@ variance too much. Of 160 plain training logs none leaves more than 6 %."""
 CHANCE = 3.0
 """Standard deviations of the mean of squared noise that are no misfit [dimensionless]: they count in short logs."""
 
+CONTRADICTS = 4.0
+"""Deviations of the flow's offset of speed from that of teeth from which they are not of one log [dimensionless]."""
+
 LEAST_OFFSET = 0.01
 """Offset of speed from which it is told [rad/s]; judged: a tenth of a revolution a minute is what encoders drift by."""
 
@@ -234,11 +237,21 @@ def _shown(fit: GreyBoxFit, *, small: bool = False) -> list[ShownTeeth]:
 
     ``small`` ones matter where they move bulk modulus.
     """
-    ranked = sorted(fit.teeth.values(), key=lambda one: -one.gain)
+    ranked = sorted((one for one in fit.teeth.values() if _possible(one, fit)), key=lambda one: -one.gain)
     if not ranked or ranked[0].gain < TEETH_WORTH:
         return []
     large = ranked[0].teeth.amplitude > LEAST_TEETH or ranked[0].offset != 0.0
     return ranked if large or (small and _felt(fit) > MOST_LINEAR) else []
+
+
+def _possible(one: ShownTeeth, fit: GreyBoxFit) -> bool:
+    """Return whether the flow has the offset of speed with which teeth are shown, or they are surely large.
+
+    What a pump delivers tells an offset however its teeth stand, so that small ones which need another are chance.
+    """
+    differs = abs(one.offset - fit.speed_offset.value)
+    told = differs > max(CONTRADICTS * fit.speed_offset.std, KEPT * abs(one.offset))
+    return one.offset == 0.0 or not told or _surely_large(one)
 
 
 def _surely_large(one: ShownTeeth) -> bool:

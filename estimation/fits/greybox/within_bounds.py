@@ -80,7 +80,9 @@ def not_negative(spread: Array, found: dict[int, tuple[float, float]]) -> Array:
         if 0.0 < variance < inf:
             std, freely = sqrt(variance), wanted if wanted < 0.0 else here  # where a search ended counts as its optimum
             share = min(square_about(-freely / std, (here - freely) / std), 1.0)
-            kept -= np.outer(kept[place], kept[place]) * ((1.0 - share) / variance)
+            most = np.sqrt(np.maximum(np.diag(kept), 0.0) * variance)
+            follows = np.clip(kept[place], -most, most)  # rounding makes correlations beyond one of unknowns alike
+            kept -= np.outer(follows, follows) * ((1.0 - share) / variance)
     return kept
 
 

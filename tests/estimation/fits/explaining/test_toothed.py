@@ -175,7 +175,7 @@ def test_teeth_that_do_not_explain_the_log_or_do_not_stand_out_are_left() -> Non
 
 def test_teeth_that_may_be_as_small_as_any_pumps_are_left_only_where_they_move_bulk_modulus() -> None:
     def doubted(size: float, moved: float, offset: float = 0.0) -> bool:
-        rivals = fit(500.0, shown(12, 50.0, size, offset), shown(13, 40.0))
+        rivals = fit(500.0, shown(12, 50.0, size, offset), shown(13, 40.0), off=(offset, 0.0))
         felt = rivals.std["bulk_modulus"] / rivals.values["bulk_modulus"] * moved
         fitted, _ = told(replace(rivals, small_teeth=({"bulk_modulus": felt}, {"bulk_modulus": 0.0})))
         return bool(toothed(PLAIN, fitted, well).left)
@@ -332,7 +332,8 @@ def test_teeth_are_looked_for_without_the_offset_and_tell_what_is_left_of_it() -
 
 def test_teeth_however_small_that_tell_an_offset_are_taken_up() -> None:
     for offset, wanted in ((0.1, True), (0.0, False)):
-        fits = fit(900.0, shown(12, 60.0, 0.5 * LEAST_TEETH, offset)), fit(800.0, shown(12, 0.0))
+        one = shown(12, 60.0, 0.5 * LEAST_TEETH, offset)
+        fits = fit(900.0, one, off=(offset, 0.0)), fit(800.0, shown(12, 0.0))
         assert bool(toothed(PLAIN, told(*fits)[0], well).remarks) is wanted
 
 

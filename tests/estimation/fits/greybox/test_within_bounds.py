@@ -39,6 +39,14 @@ def test_covariance_at_a_bound_is_that_of_what_is_drawn_above_it() -> None:
     assert told[0, 0] < SPREAD[0, 0] - 0.5
 
 
+@pytest.mark.parametrize("beyond", [1e-12, 0.05])
+def test_unknowns_that_rounding_correlates_beyond_one_keep_a_variance(beyond: float) -> None:
+    alike = np.array([[4.0, 2.0 + 2.0 * beyond], [2.0 + 2.0 * beyond, 1.0]])
+    told = not_negative(alike, {1: (0.0, -1e7)})
+    assert np.all(np.diag(told) > 0.0)
+    assert told[0, 0] == pytest.approx(4.0 * told[1, 1], abs=1e-12)
+
+
 def test_an_unknown_that_is_open_beyond_measure_is_left_alone() -> None:
     assert np.isinf(not_negative(np.diag([1.0, inf]), {1: (0.0, 0.0)})[1, 1])
 

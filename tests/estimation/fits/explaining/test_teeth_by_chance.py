@@ -1,0 +1,34 @@
+"""Teeth that are shown with an offset of speed which the flow does not have."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.fits.explaining.toothed import CONTRADICTS, KEPT, LEAST_TEETH, ONE_SIDED_95, toothed
+from estimation.fits.greybox.teeth import ShownOffset, ShownTeeth, Teeth
+from tests.estimation.fits.short_logs import log, made_fit, seen
+
+STD = 0.01
+LARGEST_SMALL = LEAST_TEETH + ONE_SIDED_95 * STD
+
+
+@pytest.mark.parametrize(
+    ("size", "flow", "std", "left"),
+    [
+        (LARGEST_SMALL - 1e-4, 1.0 - KEPT - 1e-3, 1e-3, False),  # another offset: chance
+        (LARGEST_SMALL - 1e-4, KEPT + 1e-3, 1e-3, True),  # nearly the same
+        (LARGEST_SMALL - 1e-4, 0.0, 1.01 / CONTRADICTS, True),  # the flow does not tell
+        (LARGEST_SMALL - 1e-4, 0.0, np.inf, True),
+        (LARGEST_SMALL + 1e-4, 0.0, 1e-3, True),  # no chance, and no small ones
+    ],
+)
+def test_small_teeth_that_need_an_offset_of_speed_which_the_flow_contradicts_shut_no_gate(
+    size: float, flow: float, std: float, left: bool
+) -> None:
+    wandering = ShownTeeth(Teeth(14, size, 0.0), 12.0, STD, np.zeros(2), offset=-1.0, offset_std=1e-3)
+    rival = ShownTeeth(Teeth(13, 0.02, 0.0), 6.0, STD, np.zeros(2), beside=6.0)
+    offset = ShownOffset(-flow, 0.0, std, np.zeros(2))
+    fit = replace(made_fit(500.0, 2e8, 1e5), teeth={14: wandering, 13: rival}, speed_offset=offset)
+    found = toothed(seen(log(0.2)), lambda _: [fit], lambda _: False)
+    assert bool(found.left) is left
