@@ -225,7 +225,7 @@ class RigCode(Code):
     )
     WEAR_NOT_EXCLUDED = (
         "pump wear is not excluded: a pump that delivers up to {percent:.0f} % less would look like leakage at the "
-        "speeds of this log, and bulk modulus would be lower by as much"
+        "speeds of this log, and this bulk modulus would be too low by as much"
     )
     SINGLE_ROD = (
         "side B of the piston has {percent:.1f} ± {half_width:.2g} % of the area of side A (rig file: "

@@ -315,6 +315,17 @@ def test_wear_of_the_pump_is_not_excluded_by_a_log_at_one_speed() -> None:
     assert RigCode.WEAR_NOT_EXCLUDED not in [note.code for note in estimate_log(log("steps"), Rig(HEALTHY)).notes]
 
 
+def test_a_worn_pump_that_is_not_excluded_leaves_bulk_modulus_too_low_as_its_note_says() -> None:
+    worn = replace(parameters_for(CONDITIONS["major_leakage"]), pump_displacement=0.85 * HEALTHY.pump_displacement)
+    one_speed = 100.0 * np.where(np.arange(2000) // 50 % 2, -1.0, 1.0)
+    record = simulate(CIRCUIT, one_speed, 1e-3, worn, sensors=BENCH, rng=np.random.default_rng(3))
+    clean = clean_log(record, HEALTHY)
+    fit = fit_flow(clean.record, HEALTHY, HEALTHY.bulk_modulus, {}, clean.variances, LogTraits())
+    said = [str(note) for note in fit.remarks if note.code is RigCode.WEAR_NOT_EXCLUDED]
+    assert "too low by as much" in said[0]
+    assert fit.parameters["bulk_modulus"][0] == pytest.approx(0.85 * worn.bulk_modulus, rel=0.05)
+
+
 def test_leakage_may_rise_by_a_share_in_each_minute() -> None:
     elapsed = np.linspace(0.0, 1.0, 11)
     risen = grown_leakage(elapsed, 0.0, 0.0, np.log(12.5))
