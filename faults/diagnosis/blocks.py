@@ -39,8 +39,9 @@ motor passes through zero, and noise of logs that begin at rest is some 0.001.""
 LONGEST = 30.0
 """Longest stretch of a log that is simulated [s]."""
 
-RATE = 1e-3
-"""Sample time to which faster logs are averaged [s]."""
+RATE = 5e-4
+"""Sample time to which faster logs are averaged [s]. Over 1 ms the edges of a binary signal are blurred, and leakage
+comes out 0.3 to 1.3 % low."""
 
 LEAST_BEGUN = 0.1
 """Share of a log's pressure, root mean square, from which what it begins with is more than noise [fraction]."""
