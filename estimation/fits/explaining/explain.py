@@ -14,6 +14,7 @@ import numpy as np
 from estimation.fits.explaining.form_fit import weighed
 from estimation.fits.explaining.promises import promised_beside, promising
 from estimation.fits.explaining.settled import NEAR, at_end, coarse, descended, gone, settled
+from estimation.fits.explaining.thinned import left_by, skipping
 from estimation.fits.explaining.tried import Explanation, Tried
 from estimation.fits.explaining.wide_log import balanced_by, delayed, usual_pressure, usual_values, widened
 from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_starts
@@ -39,6 +40,17 @@ FINALISTS, CARRIED, NEARLY = 3, 2, 3.0
 NEARLY_AS_GOOD = 1.1
 """What the cost of a finished set is multiplied by before others are compared with it: their model steps are long, and
 have errors [dimensionless]."""
+
+MUCH = 0.2
+"""What the best set of hypotheses leaves at most of what was left, to be searched anew with all samples [fraction]."""
+
+UNFINISHED = 10.0
+"""Half the sum of squares over what noise alone makes of it, from which a set of hypotheses is not fitted with short
+model steps [dimensionless]; what explains a log comes to 1.2."""
+
+FINISHED = 0.7
+"""What a round of a search with short steps must bring the cost down to, of what does not explain the log yet, by what
+its steps gain or promise [fraction]: six of them make an eighth."""
 
 CLOSE = 60.0
 """Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""
@@ -69,7 +81,7 @@ def explain(
     paired: bool = True,
     hopeless: float = np.inf,
     by_mass: bool = False,
-) -> Explanation:
+) -> Explanation | None:
     """Return the hypotheses that explain a log best, alone or two together.
 
     Parameters
@@ -94,26 +106,34 @@ def explain(
 
     Returns
     -------
-    Explanation
-        The likeliest; whether it explains the log is for the gate to say.
+    Explanation or None
+        The likeliest; whether it explains the log is for the gate to say. None where it leaves far too much.
     """
     wide = balanced_by(widened(log, parameters, starts[0]), 1.0 if by_mass else 0.0)
     likely, others = promising(wide, (), starts[0], asked)
-    screened = [[*_screened(wide, (one,), starts)] for one in likely]
-    finished = _likeliest(wide, screened)
+    problem = freed(coarse(wide, {}, ()), ())
+    plain = problem.costs([problem.model.theta({**usual_values(wide), **starts[0]})])
+    left = left_by(wide, float(plain[0]))
+    every = skipping(wide, left)
+    screened = [[*_screened(wide, (one,), starts, every=every)] for one in likely]
+    finished = _likeliest(wide, screened, every=every)
+    finished = _anew(wide, finished, starts, accepted, every, left)
     if others and not _explained(finished[0], accepted):
         known = finished[0].cost
-        more = _likeliest(wide, _nearing(wide, others, starts, _hopeful(starts, screened), known), known)
-        finished = _ranked([*finished, *more])
+        more = _nearing(wide, others, starts, _hopeful(starts, screened), known, every)
+        others = _anew(wide, _likeliest(wide, more, known, every), starts, accepted, every, left, known)
+        finished = _ranked([*finished, *others])
     if paired and finished[0].cost < hopeless and not _explained(finished[0], accepted):
         first, second = finished[0], finished[1] if len(finished) > 1 else None
         pairs = _paired(wide, first, starts[0], accepted)
-        near = first.fit.chi_square[0] < NEARLY or (pairs and _explained(pairs[0], accepted))
+        near = left_by(wide, first.cost) < NEARLY or (pairs and _explained(pairs[0], accepted))
         if second and near and second.cost <= NEARLY_AS_GOOD * first.cost:
             pairs += _paired(wide, second, starts[0], accepted)
         finished = _distinct([first, *pairs])
     best = finished[0]
-    rivals = [one for one in finished[1:] if one.cost < best.cost + ALIKE]
+    if not best.fits:
+        return None
+    rivals = [one for one in finished[1:] if one.fits and one.cost < best.cost + ALIKE]
     found = weighed([fit for one in (best, *rivals) for fit in one.fits])
     values = {name: (value, best.fit.std[name]) for name, value in best.fit.values.items()} | dict(found)
     if any(name in values for name in GROWTH):  # what is told of a leakage is what it is at the end
@@ -135,23 +155,30 @@ def _paired(log: GreyBoxLog, first: Tried, plain: Mapping[str, float], accepted:
     taken = {one.name for one in first.together}
     likely, others = promising(late, first.together, first.values, [one for one in HYPOTHESES if one.name not in taken])
     begun = [_begun_again(log, first), {**plain, **own_starts(log, first.together[-1])[0]}]
+    left = left_by(log, first.cost)
+    every = skipping(log, left)
     tried = [*likely, *(one for one in others if one.far)]
-    pairs = _likeliest(late, [_screened(late, (*first.together, one), begun) for one in tried], first.cost)
+    screened = (_screened(late, (*first.together, one), begun, every=every) for one in tried)
+    useful = first.cost - WORTH
+    pairs = _likeliest(late, screened, first.cost, every, useful)
+    pairs = _anew(late, pairs, begun, accepted, every, left, first.cost, useful)
     if not pairs or not _explained(pairs[0], accepted):
         known = NEARLY_AS_GOOD * min(one.cost for one in (first, *pairs[:1]))
-        rest = [_screened(late, (*first.together, one), begun, known) for one in others if not one.far]
-        pairs = _ranked([*pairs, *_likeliest(late, rest)])
+        rest = [_screened(late, (*first.together, one), begun, known, every) for one in others if not one.far]
+        more = _likeliest(late, rest, every=every, useful=useful)
+        pairs = _ranked([*pairs, *_anew(late, more, begun, accepted, every, left, useful=useful)])
     better = (one for one in pairs if one.cost < first.cost - WORTH)
     return [replace(one, delays={**first.delays, **one.delays}) for one in better]
 
 
 def _explained(tried: Tried, accepted: Accepted) -> bool:
-    return not tried.void and accepted(tried.fit)
+    return not tried.void and bool(tried.fits) and accepted(tried.fit)
 
 
 def _begun_again(log: GreyBoxLog, first: Tried) -> Mapping[str, float]:
     """Return where a hypothesis ended with long model steps, as the next search takes; nothing of it has vanished."""
-    return {**first.coarse, **gone(log, first.coarse)}
+    ended = first.coarse or first.values
+    return {**ended, **gone(log, ended)}
 
 
 def _delivery_open(log: GreyBoxLog, best: Tried) -> float:
@@ -178,12 +205,13 @@ def _screened(
     together: tuple[Hypothesis, ...],
     starts: Sequence[Mapping[str, float]],
     wanted: float = np.inf,
+    every: int = 1,
 ) -> Iterator[Tried]:
-    """Yield the best from each start after a few steps, with one model step a sample; fewer if it cannot be wanted."""
+    """Yield the best from each start after a few steps, ``every`` samples one; fewer if it cannot be wanted."""
     absent = usual_values(log)
     asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
     found = at_end(together[:-1])
-    problems = [(delays, freed(coarse(log, delays, together), together, *found)) for delays in asked]
+    problems = [(delays, freed(coarse(log, delays, together, every), together, *found)) for delays in asked]
     begun = list(product(problems, own_starts(log, together[-1])))
     for start in starts:
         tried: list[Tried] = []
@@ -210,18 +238,19 @@ def _nearing(
     starts: Sequence[Mapping[str, float]],
     hopeful: Sequence[Mapping[str, float]],
     known: float,
+    every: int,
 ) -> Iterator[Sequence[Tried]]:
     """Yield hypotheses from their starts, those first of which slopes say nothing; none is followed far from the best.
 
     Those begin from every start, the others from the ``hopeful`` ones.
     """
     for one in sorted(asked, key=lambda each: not each.far):
-        found = [*_screened(log, (one,), starts if one.far else hopeful, NEARLY * known)]
+        found = [*_screened(log, (one,), starts if one.far else hopeful, NEARLY * known, every)]
         known = min(known, *(each.cost for each in found))
         yield found
 
 
-def _finished(log: GreyBoxLog, tried: Tried) -> Tried:
+def _finished(log: GreyBoxLog, tried: Tried, useful: float = np.inf) -> Tried:
     """Return a set of hypotheses fitted to the end, balanced by volume and by mass.
 
     Balanced by mass, the inner circuit yields as it does in the plain form. A log that does not tell the two apart is
@@ -234,7 +263,7 @@ def _finished(log: GreyBoxLog, tried: Tried) -> Tried:
         own = balanced_by(row, share)
         problem, begun = freed(own, tried.together, *more), done[-1][0] if done else tried
         start = problem.model.theta({**usual_values(own), **begun.values})
-        done.append((_to_its_end(own, begun, start, *more), problem))
+        done.append((_to_its_end(own, begun, start, *more, useful=useful), problem))
     done.sort(key=lambda one: one[0].cost)
     best = replace(done[0][0], coarse=tried.values)
     count = [one for one in done if one[0].cost <= best.cost + ALIKE]
@@ -250,11 +279,11 @@ def _concluded(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxF
     return concluded(problem, point, least=least, warned=False)
 
 
-def _to_its_end(log: GreyBoxLog, tried: Tried, start: Array, *more: str) -> Tried:
+def _to_its_end(log: GreyBoxLog, tried: Tried, start: Array, *more: str, useful: float = np.inf) -> Tried:
     """Return the end of a search with short model steps: where long ones end may be far from it."""
-    best = descended(log, tried, start, FINISHING, *more)
+    best = descended(log, tried, start, FINISHING, *more, wanted=min(useful, _hoped(log, tried.cost)))
     for _ in range(ROUNDS - 1):
-        further = descended(log, best, best.point.theta, FINISHING, *more)
+        further = descended(log, best, best.point.theta, FINISHING, *more, wanted=min(useful, _hoped(log, best.cost)))
         gained = best.cost - further.cost
         if gained > 0.0:
             best = further
@@ -263,11 +292,46 @@ def _to_its_end(log: GreyBoxLog, tried: Tried, start: Array, *more: str) -> Trie
     return best
 
 
-def _likeliest(log: GreyBoxLog, tried: Iterable[Iterable[Tried]], known: float = np.inf) -> list[Tried]:
+def _anew(
+    log: GreyBoxLog,
+    finished: Sequence[Tried],
+    starts: Sequence[Mapping[str, float]],
+    accepted: Accepted,
+    every: int,
+    left: float,
+    known: float = np.inf,
+    useful: float = np.inf,
+) -> list[Tried]:
+    """Return sets of hypotheses, the best searched anew with all samples where it comes near the log, but not to it.
+
+    Few samples may have a valley by themselves, or lead to one of several. ``left`` is what the plain form leaves, or
+    the first of two.
+    """
+    if every < 2 or not finished or _explained(finished[0], accepted):
+        return [*finished]
+    if left_by(log, finished[0].cost) > max(MUCH * left, UNFINISHED):
+        return [*finished]
+    again = _likeliest(log, [_screened(log, finished[0].together, starts)], known, useful=useful)
+    return _distinct([*again, *finished])
+
+
+def _hoped(log: GreyBoxLog, cost: float) -> float:
+    """Return the cost to which a search with short model steps must promise to come, lest it ends."""
+    return max(FINISHED * cost, 1.5 * cost / left_by(log, cost)) if np.isfinite(cost) else np.inf
+
+
+def _likeliest(
+    log: GreyBoxLog,
+    tried: Iterable[Iterable[Tried]],
+    known: float = np.inf,
+    every: int = 1,
+    useful: float = np.inf,
+) -> list[Tried]:
     """Return the likeliest of several sets of hypotheses, each tried from some starts, the best first.
 
     The first set is carried on in any case: a few steps from a start are no measure of what promises most. What cannot
-    come close to the best, or to what is known, is not followed to its optimum.
+    come close to the best, or to what is known, is not followed to its optimum. Where ``every`` few samples were one,
+    all of them count at the end. What leaves far more than any fit that explains a log is not fitted to the end.
     """
     known *= NEARLY_AS_GOOD
     first, *others = [_ranked(one) for one in tried]
@@ -276,6 +340,24 @@ def _likeliest(log: GreyBoxLog, tried: Iterable[Iterable[Tried]], known: float =
     ended: list[Tried] = []
     for one in carried:
         wanted = min((known, *(other.cost for other in ended))) + CLOSE
-        ended.append(_ranked(settled(log, start, wanted) for start in one)[0])
+        ended.append(_ranked(settled(log, start, wanted, every) for start in one)[0])
+    if every > 1:
+        ended = [*_with_all(log, ended, known)]
     best = min((known, *(one.cost for one in ended)))
-    return _ranked(_finished(log, one) for one in _ranked(ended) if one.cost <= best + CLOSE)
+    near = [one for one in _ranked(ended) if one.cost <= best + CLOSE]
+    return _ranked(_finished(log, one, useful) if left_by(log, one.cost) < UNFINISHED else one for one in near)
+
+
+def _with_all(log: GreyBoxLog, ended: Iterable[Tried], known: float) -> Iterator[Tried]:
+    """Yield sets of hypotheses led on where all samples count, as far as they may still explain the log."""
+    for place, one in enumerate(_ranked(ended)):
+        near = one.cost <= NEARLY_AS_GOOD * known + CLOSE
+        if near and (place == 0 or left_by(log, one.cost) < UNFINISHED):
+            problem = freed(coarse(log, one.delays, one.together), one.together, *at_end(one.together[:-1]))
+            theta = problem.model.theta({**usual_values(log), **one.values})
+            begun = replace(one, point=replace(one.point, theta=theta))
+            further = settled(log, begun, NEARLY_AS_GOOD * known + CLOSE)
+            known = min(known, further.cost)
+            yield further
+        else:
+            yield one

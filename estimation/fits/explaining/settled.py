@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.fits.explaining.thinned import thinned
 from estimation.fits.explaining.tried import Tried
 from estimation.fits.explaining.wide_log import balanced_by, delayed, usual_values
 from estimation.fits.explaining.wide_problem import AIR_ONSET, AIR_WIDTH, flow_bounds, freed
@@ -33,8 +34,8 @@ LEAST_BETTER = 10.0
 """Gain in log-likelihood for which air is led to another time [dimensionless]: the worth of a hypothesis."""
 
 
-def settled(log: GreyBoxLog, tried: Tried, wanted: float = np.inf) -> Tried:
-    """Return a set of hypotheses brought to its optimum, with one model step a sample.
+def settled(log: GreyBoxLog, tried: Tried, wanted: float = np.inf, every: int = 1) -> Tried:
+    """Return a set of hypotheses brought to its optimum, with one model step a sample, or every few samples.
 
     Parameters
     ----------
@@ -44,29 +45,31 @@ def settled(log: GreyBoxLog, tried: Tried, wanted: float = np.inf) -> Tried:
         The set, from where it has come.
     wanted : float
         Cost above which it is of no use, so that it is not followed there [dimensionless].
+    every : int
+        How many samples are one, see `thinned` [count].
 
     Returns
     -------
     Tried
         The set at its optimum.
     """
-    early, known = coarse(log, tried.delays, tried.together), at_end(tried.together[:-1])
+    early, known = coarse(log, tried.delays, tried.together, every), at_end(tried.together[:-1])
     best = descended(early, tried, tried.point.theta, SETTLING, *known, wanted=wanted)
     if (revived := _revived(log, best, *known)) is not None:
         best = min(best, descended(early, best, revived, SETTLING, *known, wanted=wanted), key=lambda one: one.cost)
     if len(tried.together[-1].delays) > 1:
-        best = _punctual(log, best, *known)
+        best = _punctual(log, best, every, *known)
     return _entered(early, best, wanted) if any(one.from_entry for one in tried.together) else best
 
 
-def _punctual(log: GreyBoxLog, best: Tried, *known: str) -> Tried:
+def _punctual(log: GreyBoxLog, best: Tried, every: int, *known: str) -> Tried:
     """Return a set of hypotheses with the delay of its last one sought in steps of `FINEST_DELAY`."""
     channel, early = best.together[-1].late, min(best.together[-1].delays) < 0.0
     least, most = (-LATEST, 0.0) if early else (0.0, LATEST)
     for step in (FINEST_DELAY, -FINEST_DELAY):
         while least <= (delay := best.delays.get(channel, 0.0) + step) <= most:
             moved = replace(best, delays={channel: delay})
-            later = coarse(log, moved.delays, moved.together)
+            later = coarse(log, moved.delays, moved.together, every)
             moved = descended(later, moved, best.point.theta, SETTLING, *known, wanted=best.cost)
             if moved.cost >= best.cost:
                 break
@@ -155,7 +158,9 @@ def descended(
     return replace(tried, point=point, values=problem.model.values(point.theta))
 
 
-def coarse(log: GreyBoxLog, delays: Mapping[str, float], together: tuple[Hypothesis, ...]) -> GreyBoxLog:
+def coarse(
+    log: GreyBoxLog, delays: Mapping[str, float], together: tuple[Hypothesis, ...], every: int = 1
+) -> GreyBoxLog:
     """Return a log with one model step a sample, as it is while a set of hypotheses is sought.
 
     Parameters
@@ -166,13 +171,15 @@ def coarse(log: GreyBoxLog, delays: Mapping[str, float], together: tuple[Hypothe
         How late channels come [s].
     together : tuple of Hypothesis
         The set; by mass if one of them says so.
+    every : int
+        How many samples are one, see `thinned` [count].
 
     Returns
     -------
     GreyBoxLog
         The log.
     """
-    row = delayed(log, delays).coarsened()
+    row = thinned(delayed(log, delays), every)
     return balanced_by(row, 1.0) if any(one.by_mass for one in together) else row
 
 

@@ -192,6 +192,8 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
         hopeless=_hopeless(plain.swinging, asked),
         by_mass=balances_mass(plain.swinging.model),
     )
+    if strange is None:
+        return None
     wanted = _wanted(strange.names, plain.best, plain.swinging, homed=homed_at_stop(plain.log), late=traits.filtered)
     believed = _known(strange.names, strange.fit) and explains(strange.fit) and strange.fit.cost < wanted
     return strange if believed else None

@@ -81,6 +81,10 @@ class FreedProblem(Problem):
         """
         return cls(replace(model, unknowns=(), linear=()), log, model.unknowns, dict(model.linear))
 
+    def _point(self, theta: Array, cost: float, gradient: Array, gram: Array) -> Point:
+        many = self.log.stands_for
+        return super()._point(theta, many * cost, many * gradient, many * gram)
+
     def on(self, log: GreyBoxLog) -> "FreedProblem":
         """Return the same problem of another log; see `Problem.on`."""
         return FreedProblem(self._bare, log, self.model.unknowns, self._sizes)
@@ -149,7 +153,7 @@ class FreedProblem(Problem):
         errors = errors[..., : len(points)]
         weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)
         misfit = np.einsum("ijk,ijk->k", (1.0 - 0.5 * weight) * weight * errors, errors)
-        return misfit + 0.5 * (points - self.presumed) ** 2 @ self.prior
+        return self.log.stands_for * misfit + 0.5 * (points - self.presumed) ** 2 @ self.prior
 
     def residuals_of(self, theta: Array, parameters: Sequence[Array]) -> list[Array]:
         """Return the normalised residuals under several parameters of the rig, side by side.

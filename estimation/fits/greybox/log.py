@@ -104,6 +104,8 @@ class GreyBoxLog:
         What was subtracted from motor speed [rad/s]; where it is not 0, it stays open too.
     course : Course, optional
         What is open of the motor's course between the samples of a slow log, see `estimation.fits.greybox.course` [Pa].
+    stands_for : float
+        How many residuals of a longer log each one stands for, by `FreedProblem` [count].
     """
 
     drives: Array
@@ -122,6 +124,7 @@ class GreyBoxLog:
     teeth: tuple["Teeth", ...] = ()
     speed_offset: float = 0.0
     course: "Course | None" = None
+    stands_for: float = 1.0
 
     def beginning(self, samples: int) -> "GreyBoxLog":
         """Return the log's first part.

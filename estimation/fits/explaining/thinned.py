@@ -1,0 +1,110 @@
+"""`thinned(log, every)`: a log of which every few samples count, for searches that only rank what may be strange."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.log_checks.channel_names import SPEED
+from estimation.models.wide_flow import WIDE_FLOW_FORM
+from plant.arrays import Array
+
+LONG_STEP, SHORT_STEP = 4e-3, 2e-3
+"""Step of the model while hypotheses are compared that have much to explain, or less [s]."""
+
+LOUD, FAINT = 10.0, 2.0
+"""Half the sum of squares that the plain form leaves, or the first of two, over what noise alone makes of it, from
+which steps are long, and below which all samples count [dimensionless]."""
+
+
+def thinned(log: GreyBoxLog, every: int) -> GreyBoxLog:
+    """Return a log of which every few samples count, with one model step from each to the next.
+
+    What is pumped and what is swept between two of them stay: motor speed is averaged as far as a straight line between
+    means needs, position is as it was read. A pressure is the mean over a block. Each sample left stands for as many
+    residuals as the log has, so that costs stay what they were, but for what white noise makes of them.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened; one with gaps in its speed is left as it is.
+    every : int
+        How many samples are one [count].
+
+    Returns
+    -------
+    GreyBoxLog
+        The log.
+    """
+    if every < 2 or log.gaps.size:
+        return log.coarsened()
+    block = min(max(1, round(log.block / log.sample_time)), every)
+    drives = log.drives[::every].copy()
+    speed = WIDE_FLOW_FORM.drives.index(SPEED)
+    drives[:, speed] = _smoothed(log.drives[:, speed], every)[::every]
+    return replace(
+        log,
+        drives=drives,
+        measured=_block_means(log.measured, block)[::every],
+        sample_time=every * log.sample_time,
+        steps=np.ones(len(drives), log.steps.dtype),
+        noise=tuple(one.scaled(1.0 / block) for one in log.noise),
+        stands_for=every / block,
+    )
+
+
+def _smoothed(speed: Array, every: int) -> Array:
+    """Return a speed averaged by a triangle as wide as two steps: straight lines between means then hold its sum."""
+    rising = np.arange(1.0, every + 1.0)
+    window = np.concatenate([rising, rising[-2::-1]]) / every**2
+    return np.convolve(np.pad(speed, every - 1, mode="edge"), window, "valid")
+
+
+def _block_means(measured: Array, block: int) -> Array:
+    """Return what was measured, each the mean of a block about it; missing where one of the block is."""
+    if block < 2:
+        return measured
+    before = block // 2
+    padded = np.pad(measured, ((before, block - 1 - before), (0, 0)), mode="edge")
+    sums = np.lib.stride_tricks.sliding_window_view(padded, block, axis=0)
+    return np.mean(sums, axis=-1)
+
+
+def left_by(log: GreyBoxLog, cost: float) -> float:
+    """Return a cost over what noise alone makes of a log.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log.
+    cost : float
+        Half the sum of squares [dimensionless].
+
+    Returns
+    -------
+    float
+        About 1 where the log is explained [dimensionless].
+    """
+    seen = np.count_nonzero(np.isfinite(log.measured[:, 0])) / max(1, round(log.block / log.sample_time))
+    return 2.0 * cost / max(seen, 1.0)
+
+
+def skipping(log: GreyBoxLog, left: float) -> int:
+    """Return how many samples are one while hypotheses are compared.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log.
+    left : float
+        What the plain form leaves, or the first of two, see `left_by` [dimensionless].
+
+    Returns
+    -------
+    int
+        One where little is left: small gains are then what matters [count].
+    """
+    if left < FAINT:
+        return 1
+    step = LONG_STEP if left > LOUD else SHORT_STEP
+    return max(1, round(step / log.sample_time))
