@@ -6,19 +6,19 @@ of, then under the others, then under pairs with the likeliest; what is freed wi
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import product
 from typing import TypeAlias
 
 import numpy as np
 
 from estimation.fits.explaining.form_fit import weighed
 from estimation.fits.explaining.promises import promised_beside, promising
-from estimation.fits.explaining.settled import NEAR, at_end, coarse, descended, gone, settled
-from estimation.fits.explaining.thinned import left_by, skipping
+from estimation.fits.explaining.screened import NEARLY, hopeful, nearing, screened
+from estimation.fits.explaining.settled import at_end, coarse, descended, gone, settled
+from estimation.fits.explaining.thinned import NOTHING_SPARED, Spared, left_by, skipping
 from estimation.fits.explaining.tried import Explanation, Tried
 from estimation.fits.explaining.wide_log import balanced_by, delayed, usual_pressure, usual_values, widened
 from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_starts
-from estimation.fits.greybox.descent import Point, descend
+from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
@@ -28,14 +28,14 @@ from estimation.models.wide_flow import GROWTH, grown_leakage
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
-SCREENING, FINISHING = 7, 12
-"""Evaluations of the model for a start, and for the last search, with short model steps."""
+FINISHING = 12
+"""Evaluations of the model for the last search, with short model steps."""
 
 ROUNDS = 6
 """How often the last ones are made at most, while each gains what would tell a hypothesis from another [count]."""
 
-FINALISTS, CARRIED, NEARLY = 3, 2, 3.0
-"""Hypotheses that are carried on, starts of each, and up to which share of the best start's cost the second is."""
+FINALISTS, CARRIED = 3, 2
+"""Hypotheses that are carried on, and starts of each."""
 
 NEARLY_AS_GOOD = 1.1
 """What the cost of a finished set is multiplied by before others are compared with it: their model steps are long, and
@@ -111,18 +111,14 @@ def explain(
     """
     wide = balanced_by(widened(log, parameters, starts[0]), 1.0 if by_mass else 0.0)
     likely, others = promising(wide, (), starts[0], asked)
-    problem = freed(coarse(wide, {}, ()), ())
-    plain = problem.costs([problem.model.theta({**usual_values(wide), **starts[0]})])
-    left = left_by(wide, float(plain[0]))
-    every = skipping(wide, left)
-    screened = [[*_screened(wide, (one,), starts, every=every)] for one in likely]
-    finished = _likeliest(wide, screened, every=every)
-    finished = _anew(wide, finished, starts, accepted, every, left)
+    left = _left_by_plain(wide, starts[0])
+    spared = Spared(skipping(wide, left), left, starts)
+    begun = [[*screened(wide, (one,), starts, every=spared.every)] for one in likely]
+    finished = _likeliest(wide, begun, spared=spared)
     if others and not _explained(finished[0], accepted):
         known = finished[0].cost
-        more = _nearing(wide, others, starts, _hopeful(starts, screened), known, every)
-        others = _anew(wide, _likeliest(wide, more, known, every), starts, accepted, every, left, known)
-        finished = _ranked([*finished, *others])
+        more = nearing(wide, others, starts, hopeful(starts, begun), known, spared.every)
+        finished = _ranked([*finished, *_likeliest(wide, more, known, spared)])
     if paired and finished[0].cost < hopeless and not _explained(finished[0], accepted):
         first, second = finished[0], finished[1] if len(finished) > 1 else None
         pairs = _paired(wide, first, starts[0], accepted)
@@ -157,18 +153,27 @@ def _paired(log: GreyBoxLog, first: Tried, plain: Mapping[str, float], accepted:
     begun = [_begun_again(log, first), {**plain, **own_starts(log, first.together[-1])[0]}]
     left = left_by(log, first.cost)
     every = skipping(log, left)
+    spared = Spared(every, left, begun)
     tried = [*likely, *(one for one in others if one.far)]
-    screened = (_screened(late, (*first.together, one), begun, every=every) for one in tried)
+    nearer = (screened(late, (*first.together, one), begun, every=every) for one in tried)
     useful = first.cost - WORTH
-    pairs = _likeliest(late, screened, first.cost, every, useful)
-    pairs = _anew(late, pairs, begun, accepted, every, left, first.cost, useful)
+    pairs = _likeliest(late, nearer, first.cost, spared, useful)
     if not pairs or not _explained(pairs[0], accepted):
         known = NEARLY_AS_GOOD * min(one.cost for one in (first, *pairs[:1]))
-        rest = [_screened(late, (*first.together, one), begun, known, every) for one in others if not one.far]
-        more = _likeliest(late, rest, every=every, useful=useful)
-        pairs = _ranked([*pairs, *_anew(late, more, begun, accepted, every, left, useful=useful)])
+        rest = [screened(late, (*first.together, one), begun, known, every) for one in others if not one.far]
+        pairs = _ranked([*pairs, *_likeliest(late, rest, spared=spared, useful=useful)])
     better = (one for one in pairs if one.cost < first.cost - WORTH)
     return [replace(one, delays={**first.delays, **one.delays}) for one in better]
+
+
+def _left_by_plain(log: GreyBoxLog, plain: Mapping[str, float]) -> float:
+    """Return what the plain form leaves of a log, over what noise alone makes."""
+    problem = freed(coarse(log, {}, ()), ())
+    return left_by(log, float(problem.costs([problem.model.theta({**usual_values(log), **plain})])[0]))
+
+
+def _cost(tried: Tried) -> float:
+    return tried.cost
 
 
 def _explained(tried: Tried, accepted: Accepted) -> bool:
@@ -189,7 +194,7 @@ def _delivery_open(log: GreyBoxLog, best: Tried) -> float:
 
 
 def _ranked(tried: Iterable[Tried]) -> list[Tried]:
-    return sorted(tried, key=lambda one: one.cost)
+    return sorted(tried, key=_cost)
 
 
 def _distinct(tried: Iterable[Tried]) -> list[Tried]:
@@ -198,56 +203,6 @@ def _distinct(tried: Iterable[Tried]) -> list[Tried]:
     for one in _ranked(tried):
         best.setdefault(frozenset(each.name for each in one.together), one)
     return [*best.values()]
-
-
-def _screened(
-    log: GreyBoxLog,
-    together: tuple[Hypothesis, ...],
-    starts: Sequence[Mapping[str, float]],
-    wanted: float = np.inf,
-    every: int = 1,
-) -> Iterator[Tried]:
-    """Yield the best from each start after a few steps, ``every`` samples one; fewer if it cannot be wanted."""
-    absent = usual_values(log)
-    asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
-    found = at_end(together[:-1])
-    problems = [(delays, freed(coarse(log, delays, together, every), together, *found)) for delays in asked]
-    begun = list(product(problems, own_starts(log, together[-1])))
-    for start in starts:
-        tried: list[Tried] = []
-        for (delays, problem), own in begun:
-            guess = problem.model.theta({**absent, **start, **own})
-            bounds = flow_bounds(problem.model, [guess], log)
-            point = descend(problem.at, guess, SCREENING, bounds, radius=NEAR, wanted=wanted)
-            tried.append(Tried(together, point, problem.model.values(point.theta), delays, absent))
-            wanted = min(wanted, NEARLY * tried[-1].cost)
-        yield min(tried, key=lambda one: one.cost)
-
-
-def _hopeful(starts: Sequence[Mapping[str, float]], screened: Sequence[Sequence[Tried]]) -> list[Mapping[str, float]]:
-    """Return the starts from which some of the hypotheses that came near ended near the best of their own."""
-    bests = [min(one.cost for one in each) for each in screened]
-    near = [each for each, best in zip(screened, bests, strict=True) if best <= NEARLY * min(bests)]
-    kept = [any(each[i].cost <= NEARLY * min(one.cost for one in each) for each in near) for i in range(len(starts))]
-    return [start for start, keep in zip(starts, kept, strict=True) if keep]
-
-
-def _nearing(
-    log: GreyBoxLog,
-    asked: Iterable[Hypothesis],
-    starts: Sequence[Mapping[str, float]],
-    hopeful: Sequence[Mapping[str, float]],
-    known: float,
-    every: int,
-) -> Iterator[Sequence[Tried]]:
-    """Yield hypotheses from their starts, those first of which slopes say nothing; none is followed far from the best.
-
-    Those begin from every start, the others from the ``hopeful`` ones.
-    """
-    for one in sorted(asked, key=lambda each: not each.far):
-        found = [*_screened(log, (one,), starts if one.far else hopeful, NEARLY * known, every)]
-        known = min(known, *(each.cost for each in found))
-        yield found
 
 
 def _finished(log: GreyBoxLog, tried: Tried, useful: float = np.inf) -> Tried:
@@ -292,29 +247,6 @@ def _to_its_end(log: GreyBoxLog, tried: Tried, start: Array, *more: str, useful:
     return best
 
 
-def _anew(
-    log: GreyBoxLog,
-    finished: Sequence[Tried],
-    starts: Sequence[Mapping[str, float]],
-    accepted: Accepted,
-    every: int,
-    left: float,
-    known: float = np.inf,
-    useful: float = np.inf,
-) -> list[Tried]:
-    """Return sets of hypotheses, the best searched anew with all samples where it comes near the log, but not to it.
-
-    Few samples may have a valley by themselves, or lead to one of several. ``left`` is what the plain form leaves, or
-    the first of two.
-    """
-    if every < 2 or not finished or _explained(finished[0], accepted):
-        return [*finished]
-    if left_by(log, finished[0].cost) > max(MUCH * left, UNFINISHED):
-        return [*finished]
-    again = _likeliest(log, [_screened(log, finished[0].together, starts)], known, useful=useful)
-    return _distinct([*again, *finished])
-
-
 def _hoped(log: GreyBoxLog, cost: float) -> float:
     """Return the cost to which a search with short model steps must promise to come, lest it ends."""
     return max(FINISHED * cost, 1.5 * cost / left_by(log, cost)) if np.isfinite(cost) else np.inf
@@ -324,13 +256,13 @@ def _likeliest(
     log: GreyBoxLog,
     tried: Iterable[Iterable[Tried]],
     known: float = np.inf,
-    every: int = 1,
+    spared: Spared = NOTHING_SPARED,
     useful: float = np.inf,
 ) -> list[Tried]:
     """Return the likeliest of several sets of hypotheses, each tried from some starts, the best first.
 
     The first set is carried on in any case: a few steps from a start are no measure of what promises most. What cannot
-    come close to the best, or to what is known, is not followed to its optimum. Where ``every`` few samples were one,
+    come close to the best, or to what is known, is not followed to its optimum. Where few samples were ``spared``,
     all of them count at the end. What leaves far more than any fit that explains a log is not fitted to the end.
     """
     known *= NEARLY_AS_GOOD
@@ -340,23 +272,30 @@ def _likeliest(
     ended: list[Tried] = []
     for one in carried:
         wanted = min((known, *(other.cost for other in ended))) + CLOSE
-        ended.append(_ranked(settled(log, start, wanted, every) for start in one)[0])
-    if every > 1:
-        ended = [*_with_all(log, ended, known)]
+        ended.append(_ranked(settled(log, start, wanted, spared.every) for start in one)[0])
+    if spared.every > 1:
+        ended = [*_with_all(log, ended, known, spared)]
     best = min((known, *(one.cost for one in ended)))
     near = [one for one in _ranked(ended) if one.cost <= best + CLOSE]
     return _ranked(_finished(log, one, useful) if left_by(log, one.cost) < UNFINISHED else one for one in near)
 
 
-def _with_all(log: GreyBoxLog, ended: Iterable[Tried], known: float) -> Iterator[Tried]:
-    """Yield sets of hypotheses led on where all samples count, as far as they may still explain the log."""
+def _with_all(log: GreyBoxLog, ended: Iterable[Tried], known: float, spared: Spared) -> Iterator[Tried]:
+    """Yield sets of hypotheses led on where all samples count, as far as they may still explain the log.
+
+    Few samples may have a valley by themselves. So the best set is sought anew with all, where it explains much.
+    """
     for place, one in enumerate(_ranked(ended)):
         near = one.cost <= NEARLY_AS_GOOD * known + CLOSE
-        if near and (place == 0 or left_by(log, one.cost) < UNFINISHED):
+        much = place == 0 and left_by(log, one.cost) < MUCH * spared.left
+        if near and (much or left_by(log, one.cost) < UNFINISHED):
             problem = freed(coarse(log, one.delays, one.together), one.together, *at_end(one.together[:-1]))
             theta = problem.model.theta({**usual_values(log), **one.values})
             begun = replace(one, point=replace(one.point, theta=theta))
             further = settled(log, begun, NEARLY_AS_GOOD * known + CLOSE)
+            if place == 0 and left_by(log, further.cost) < max(MUCH * spared.left, UNFINISHED):
+                again = _ranked(screened(log, one.together, spared.starts))[:CARRIED]
+                further = min(further, *(settled(log, start, further.cost) for start in again), key=_cost)
             known = min(known, further.cost)
             yield further
         else:

@@ -1,6 +1,8 @@
 """`thinned(log, every)`: a log of which every few samples count, for searches that only rank what may be strange."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,9 +14,33 @@ from plant.arrays import Array
 LONG_STEP, SHORT_STEP = 4e-3, 2e-3
 """Step of the model while hypotheses are compared that have much to explain, or less [s]."""
 
+FEW = 8_000
+"""Length of a log of which all samples count [samples]: it takes a second or two, and its valleys are narrow."""
+
 LOUD, FAINT = 10.0, 2.0
 """Half the sum of squares that the plain form leaves, or the first of two, over what noise alone makes of it, from
 which steps are long, and below which all samples count [dimensionless]."""
+
+
+class Spared(NamedTuple):
+    """What is spared while hypotheses are compared.
+
+    Parameters
+    ----------
+    every : int
+        How many samples are one [count].
+    left : float
+        What the plain form leaves, or the first of two, over the noise [dimensionless].
+    starts : sequence of Mapping[str, float]
+        Where searches begin [SI].
+    """
+
+    every: int
+    left: float
+    starts: Sequence[Mapping[str, float]]
+
+
+NOTHING_SPARED = Spared(1, 1.0, ())
 
 
 def thinned(log: GreyBoxLog, every: int) -> GreyBoxLog:
@@ -102,9 +128,9 @@ def skipping(log: GreyBoxLog, left: float) -> int:
     Returns
     -------
     int
-        One where little is left: small gains are then what matters [count].
+        One where little is left, since small gains are then what matters, and in short logs [count].
     """
-    if left < FAINT:
+    if left < FAINT or len(log.drives) < FEW:
         return 1
     step = LONG_STEP if left > LOUD else SHORT_STEP
     return max(1, round(step / log.sample_time))

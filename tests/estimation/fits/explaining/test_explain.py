@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.fits.explaining import explain, settled
+from estimation.fits.explaining import explain, screened, settled
 from estimation.fits.explaining.delivery import contradicted
 from estimation.fits.explaining.explain import CLOSE, NEVER, ROUNDS
 from estimation.fits.explaining.tried import Tried
@@ -34,13 +34,14 @@ def ended(costs: Sequence[float], monkeypatch: pytest.MonkeyPatch) -> tuple[floa
     """Return the cost at which searches end that reach these, one after another, and how many there were."""
     made: list[float] = []
 
-    def descended(*_: Any) -> Any:
+    def descended(*_: Any, **__: Any) -> Any:
         made.append(costs[len(made)])
         return SimpleNamespace(cost=made[-1], point=SimpleNamespace(theta=np.zeros(1)))
 
     monkeypatch.setattr(explain, "descended", descended)
+    monkeypatch.setattr(explain, "left_by", lambda *_: 1.0)
     nothing: Any = None
-    return explain._to_its_end(nothing, nothing, np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
+    return explain._to_its_end(nothing, SimpleNamespace(cost=np.inf), np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
 
 
 def test_a_search_goes_on_while_it_gains_what_tells_hypotheses_apart(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -60,8 +61,9 @@ def test_what_promises_most_is_settled_even_where_its_starts_are_not_what_it_say
         return SimpleNamespace(cost=cost)
 
     settled: list[float] = []
-    monkeypatch.setattr(explain, "settled", lambda _, start, __: settled.append(start.cost) or start)
-    monkeypatch.setattr(explain, "_finished", lambda _, one: one)
+    monkeypatch.setattr(explain, "settled", lambda _, start, *__: settled.append(start.cost) or start)
+    monkeypatch.setattr(explain, "_finished", lambda _, one, __: one)
+    monkeypatch.setattr(explain, "left_by", lambda *_: 1.0)
     nothing: Any = None
     found = explain._likeliest(nothing, [[tried(np.inf), tried(np.inf)], [tried(9.0), tried(10.0), tried(90.0)]])  # pyright: ignore[reportPrivateUsage]
     assert [one.cost for one in found] == [9.0]
@@ -91,7 +93,7 @@ def test_what_is_set_above_the_rig_files_or_has_no_interval_is_void(
     monkeypatch.setattr(explain, "balanced_by", lambda log, _: log)
     monkeypatch.setattr(explain, "freed", lambda *_: problem)
     monkeypatch.setattr(explain, "usual_values", lambda _: {})
-    monkeypatch.setattr(explain, "_to_its_end", lambda _, tried, *__: tried)
+    monkeypatch.setattr(explain, "_to_its_end", lambda _, tried, *__, **___: tried)
     monkeypatch.setattr(explain, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
     monkeypatch.setattr(explain, "concluded", lambda *_, **__: fit)
     nothing: Any = None
@@ -106,10 +108,10 @@ def test_starts_are_dropped_from_which_no_hypothesis_that_came_near_ended_near_i
         return [SimpleNamespace(cost=cost) for cost in costs]
 
     starts: Any = ["near", "near for one", "far", "near for what is far itself"]
-    screened = [each(100.0, 400.0, 500.0, 900.0), each(250.0, 700.0, 900.0, 900.0), each(950.0, 950.0, 950.0, 950.0)]
-    assert explain._hopeful(starts, screened) == ["near", "near for one"]  # pyright: ignore[reportPrivateUsage]
+    found = [each(100.0, 400.0, 500.0, 900.0), each(250.0, 700.0, 900.0, 900.0), each(950.0, 950.0, 950.0, 950.0)]
+    assert screened.hopeful(starts, found) == ["near", "near for one"]
     vain = [each(np.inf, np.inf, np.inf, np.inf)]
-    assert explain._hopeful(starts, vain) == starts  # pyright: ignore[reportPrivateUsage]
+    assert screened.hopeful(starts, vain) == starts
 
 
 @pytest.mark.parametrize(("explains", "asked"), [(True, "likely far"), (False, "likely far hidden")])
@@ -123,11 +125,11 @@ def test_all_else_is_asked_beside_a_hypothesis_where_what_slopes_promise_does_no
     begun: list[tuple[str, Any]] = []
     costs = {"likely": 80.0, "far": 90.0, "hidden": 70.0, "first": 100.0}
 
-    def screened(_: Any, together: Any, starts: Any, wanted: float = np.inf) -> Any:
+    def led(_: Any, together: Any, starts: Any, wanted: float = np.inf, *_more: Any, **__: Any) -> Any:
         begun.append((together[-1].name, list(starts)))
         return [SimpleNamespace(together=together, cost=costs[together[-1].name], wanted=wanted)]
 
-    def finished(_: Any, one: Any) -> Any:
+    def finished(_: Any, one: Any, *__: Any) -> Any:
         point, void = Point(np.zeros(1), one.cost, np.zeros(1), np.eye(1)), False
         return _Made(one.together, point, {}, {"late": 1e-3}, {}, (made_fit(one.cost, 2e8, 1e5),), void)
 
@@ -135,8 +137,10 @@ def test_all_else_is_asked_beside_a_hypothesis_where_what_slopes_promise_does_no
     monkeypatch.setattr(explain, "promising", lambda *_: ([likely], [far, hidden]))
     monkeypatch.setattr(explain, "own_starts", lambda *_: [{"offset": 1e5}])
     monkeypatch.setattr(settled, "usual_values", lambda _: {"leakage_coefficient": 5e-12, "flow_bias": 2e-6} | FED)
-    monkeypatch.setattr(explain, "_screened", screened)
-    monkeypatch.setattr(explain, "settled", lambda _, start, __: start)
+    monkeypatch.setattr(explain, "screened", led)
+    monkeypatch.setattr(explain, "skipping", lambda *_: 1)
+    monkeypatch.setattr(explain, "left_by", lambda *_: 1.0)
+    monkeypatch.setattr(explain, "settled", lambda _, start, *__: start)
     monkeypatch.setattr(explain, "_finished", finished)
     nothing: Any = None
     at_end = {"leakage_coefficient": 1e-12, "flow_bias": 1e-6, "offset": 3e4, **FED}
@@ -189,7 +193,10 @@ def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
     monkeypatch.setattr(explain, "widened", lambda *_: None)
     monkeypatch.setattr(explain, "balanced_by", lambda *_: None)
     monkeypatch.setattr(explain, "promising", lambda *_: ([], []))
-    monkeypatch.setattr(explain, "_likeliest", lambda *_: [tried(100.0, "relief"), tried(second, "worn")])
+    monkeypatch.setattr(explain, "_likeliest", lambda *_, **__: [tried(100.0, "relief"), tried(second, "worn")])
+    monkeypatch.setattr(explain, "_left_by_plain", lambda *_: 1.0)
+    monkeypatch.setattr(explain, "skipping", lambda *_: 1)
+    monkeypatch.setattr(explain, "left_by", lambda *_: chi)
     monkeypatch.setattr(explain, "_paired", paired)
     monkeypatch.setattr(explain, "weighed", lambda _: {})
     monkeypatch.setattr(explain, "usual_pressure", lambda *_: 0.0)

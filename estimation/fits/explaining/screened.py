@@ -1,0 +1,122 @@
+"""Where hypotheses lead in a few steps from each start: what ranks them before any is brought to its optimum."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import product
+
+import numpy as np
+
+from estimation.fits.explaining.settled import NEAR, at_end, coarse
+from estimation.fits.explaining.tried import Tried
+from estimation.fits.explaining.wide_log import usual_values
+from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_starts
+from estimation.fits.greybox.descent import descend
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypotheses import Hypothesis
+
+SCREENING = 7
+"""Evaluations of the model for a start [count]."""
+
+NEARLY = 3.0
+"""Up to which share of the best start's cost others count [dimensionless]."""
+
+
+def screened(
+    log: GreyBoxLog,
+    together: tuple[Hypothesis, ...],
+    starts: Sequence[Mapping[str, float]],
+    wanted: float = np.inf,
+    every: int = 1,
+) -> Iterator[Tried]:
+    """Yield the best from each start after a few steps; fewer if it cannot be wanted.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    together : tuple of Hypothesis
+        The set of hypotheses, what is new last.
+    starts : sequence of Mapping[str, float]
+        Where searches begin [SI].
+    wanted : float
+        Cost above which a result is of no use [dimensionless].
+    every : int
+        How many samples are one, see `thinned` [count].
+
+    Yields
+    ------
+    Tried
+        One a start.
+    """
+    absent = usual_values(log)
+    asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
+    found = at_end(together[:-1])
+    problems = [(delays, freed(coarse(log, delays, together, every), together, *found)) for delays in asked]
+    begun = list(product(problems, own_starts(log, together[-1])))
+    for start in starts:
+        tried: list[Tried] = []
+        for (delays, problem), own in begun:
+            guess = problem.model.theta({**absent, **start, **own})
+            bounds = flow_bounds(problem.model, [guess], log)
+            point = descend(problem.at, guess, SCREENING, bounds, radius=NEAR, wanted=wanted)
+            tried.append(Tried(together, point, problem.model.values(point.theta), delays, absent))
+            wanted = min(wanted, NEARLY * tried[-1].cost)
+        yield min(tried, key=lambda one: one.cost)
+
+
+def hopeful(
+    starts: Sequence[Mapping[str, float]], screened_each: Sequence[Sequence[Tried]]
+) -> list[Mapping[str, float]]:
+    """Return the starts from which some of the hypotheses that came near ended near the best of their own.
+
+    Parameters
+    ----------
+    starts : sequence of Mapping[str, float]
+        Where searches began [SI].
+    screened_each : sequence of sequence of Tried
+        What hypotheses came to from each.
+
+    Returns
+    -------
+    list of Mapping[str, float]
+        Some of the starts, or all.
+    """
+    bests = [min(one.cost for one in each) for each in screened_each]
+    near = [each for each, best in zip(screened_each, bests, strict=True) if best <= NEARLY * min(bests)]
+    kept = [any(each[i].cost <= NEARLY * min(one.cost for one in each) for each in near) for i in range(len(starts))]
+    return [start for start, keep in zip(starts, kept, strict=True) if keep]
+
+
+def nearing(
+    log: GreyBoxLog,
+    asked: Iterable[Hypothesis],
+    starts: Sequence[Mapping[str, float]],
+    likely: Sequence[Mapping[str, float]],
+    known: float,
+    every: int,
+) -> Iterator[Sequence[Tried]]:
+    """Yield hypotheses from their starts, those first of which slopes say nothing; none is followed far from the best.
+
+    Those begin from every start, the others from the ``likely`` ones.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    asked : iterable of Hypothesis
+        What is tried.
+    starts, likely : sequence of Mapping[str, float]
+        Where searches begin [SI].
+    known : float
+        The least cost so far [dimensionless].
+    every : int
+        How many samples are one, see `thinned` [count].
+
+    Yields
+    ------
+    sequence of Tried
+        One a start.
+    """
+    for one in sorted(asked, key=lambda each: not each.far):
+        found = [*screened(log, (one,), starts if one.far else likely, NEARLY * known, every)]
+        known = min(known, *(each.cost for each in found))
+        yield found

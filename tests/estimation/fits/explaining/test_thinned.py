@@ -1,0 +1,95 @@
+"""Logs of which every few samples count, while hypotheses are compared."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.fits.explaining import explain
+from estimation.fits.explaining.settled import coarse
+from estimation.fits.explaining.thinned import FEW, Spared, left_by, skipping, thinned
+from estimation.fits.explaining.tried import Tried
+from estimation.fits.explaining.wide_log import usual_values, widened
+from estimation.fits.explaining.wide_problem import freed
+from estimation.fits.flow.log import flow_log, without_strays
+from estimation.fits.flow.search import flow_starts
+from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.log import GreyBoxLog
+from tests.estimation.fits.short_logs import PAPER, log
+
+
+def seen() -> GreyBoxLog:
+    """Return a log of 3 s as the wide form sees it."""
+    record, variances = without_strays(log(3.0))
+    return widened(flow_log(record, PAPER, {}, variances), PAPER)
+
+
+@pytest.mark.parametrize("every", [2, 4])
+def test_what_is_pumped_and_swept_stays(every: int) -> None:
+    whole = seen()
+    few = thinned(whole, every)
+    assert few.sample_time == pytest.approx(every * whole.sample_time)
+    last = (len(few.drives) - 1) * every
+    assert few.drives[-1, 1] == whole.drives[last, 1]
+    pumped = np.trapezoid(few.drives[:, 0], dx=every)
+    assert pumped == pytest.approx(
+        np.trapezoid(whole.drives[: last + 1, 0]), abs=2.0 * every * np.ptp(whole.drives[:, 0])
+    )
+    ramp = replace(whole, drives=np.linspace(0.0, 1.0, len(whole.drives))[:, None] * np.ones(whole.drives.shape[1]))
+    inside = slice(1, -1)
+    assert thinned(ramp, every).drives[inside, 0] == pytest.approx(ramp.drives[::every, 0][inside])
+
+
+def test_a_cost_stays_what_it_was_where_far_more_than_noise_is_left() -> None:
+    whole = seen()
+    costs = []
+    for every in (1, 2, 4):
+        problem = freed(coarse(whole, {}, (), every), ())
+        theta = problem.model.theta({**usual_values(whole), **flow_starts(PAPER, 1.2e8)[0]})
+        costs.append(problem.at(theta).cost)
+        assert problem.costs([theta])[0] == pytest.approx(costs[-1])
+    assert costs[1:] == pytest.approx([costs[0]] * 2, rel=0.1)
+    assert left_by(whole, costs[0]) > 10.0
+
+
+def test_samples_are_spared_where_much_is_left_of_a_long_log() -> None:
+    long: Any = replace(seen(), drives=np.zeros((FEW, 1)))
+    assert [skipping(long, left) for left in (1.5, 5.0, 50.0)] == [1, 2, 4]
+    assert skipping(replace(long, sample_time=2e-4), 50.0) == 20
+    assert skipping(replace(long, sample_time=1e-2), 50.0) == 1
+    assert skipping(replace(long, drives=long.drives[1:]), 50.0) == 1
+
+
+def test_the_best_of_few_samples_is_sought_anew_with_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    place = Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1))
+    tried = Tried((), place, flow_starts(PAPER, 2e8)[0], {}, {})
+    begun = replace(tried, point=replace(place, cost=80.0))
+    led: list[float] = []
+
+    def settled(_: Any, one: Tried, *__: Any) -> Tried:
+        led.append(one.cost)
+        return replace(one, point=replace(one.point, cost=5.0 if one is begun else one.cost))
+
+    problem = freed(coarse(seen(), {}, ()), ())
+    monkeypatch.setattr(explain, "settled", settled)
+    monkeypatch.setattr(explain, "screened", lambda *_: [begun])
+    monkeypatch.setattr(explain, "freed", lambda *_: problem)
+    monkeypatch.setattr(explain, "left_by", lambda _, cost: cost)
+    spared = Spared(4, 1000.0, ())
+    (found,) = explain._with_all(seen(), [tried], np.inf, spared)  # pyright: ignore[reportPrivateUsage]
+    assert (found.cost, led) == (5.0, [90.0, 80.0])
+    led.clear()
+    (kept,) = explain._with_all(seen(), [tried], np.inf, spared._replace(left=100.0))  # pyright: ignore[reportPrivateUsage]
+    assert (kept.cost, led) == (90.0, [])
+
+
+def test_what_leaves_far_too_much_is_not_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    finished: list[float] = []
+    monkeypatch.setattr(explain, "settled", lambda _, one, *__: one)
+    monkeypatch.setattr(explain, "_finished", lambda _, one, __: finished.append(one.cost) or one)
+    monkeypatch.setattr(explain, "left_by", lambda _, cost: cost)
+    for cost in (9.0, 11.0):
+        tried = Tried((), Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), {}, {}, {})
+        explain._likeliest(seen(), [[tried]])  # pyright: ignore[reportPrivateUsage]
+    assert finished == [9.0]
