@@ -14,7 +14,7 @@ from estimation.fits.explaining.form_fit import weighed
 from estimation.fits.explaining.promises import promised_beside, promising
 from estimation.fits.explaining.screened import NEARLY, hopeful, nearing, screened
 from estimation.fits.explaining.settled import at_end, coarse, descended, gone, settled
-from estimation.fits.explaining.thinned import NOTHING_SPARED, Spared, left_by, skipping
+from estimation.fits.explaining.thinned import FEW, NOTHING_SPARED, Spared, left_by, skipping
 from estimation.fits.explaining.tried import Explanation, Tried
 from estimation.fits.explaining.wide_log import balanced_by, delayed, usual_pressure, usual_values, widened
 from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_starts
@@ -48,9 +48,9 @@ UNFINISHED = 10.0
 """Half the sum of squares over what noise alone makes of it, from which a set of hypotheses is not fitted with short
 model steps [dimensionless]; what explains a log comes to 1.2."""
 
-FINISHED = 0.7
+FINISHED, REACHED = 0.7, 1.5
 """What a round of a search with short steps must bring the cost down to, of what does not explain the log yet, by what
-its steps gain or promise [fraction]: six of them make an eighth."""
+its steps gain or promise: six of them make an eighth. None is asked below the second, over noise [fractions]."""
 
 CLOSE = 60.0
 """Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""
@@ -249,7 +249,14 @@ def _to_its_end(log: GreyBoxLog, tried: Tried, start: Array, *more: str, useful:
 
 def _hoped(log: GreyBoxLog, cost: float) -> float:
     """Return the cost to which a search with short model steps must promise to come, lest it ends."""
-    return max(FINISHED * cost, 1.5 * cost / left_by(log, cost)) if np.isfinite(cost) else np.inf
+    if len(log.drives) < FEW or not np.isfinite(cost):
+        return np.inf
+    return max(FINISHED * cost, REACHED * cost / left_by(log, cost))
+
+
+def _in_vain(log: GreyBoxLog, cost: float) -> bool:
+    """Return whether a long log is left so far from explained that short model steps bring it nowhere near."""
+    return len(log.drives) >= FEW and left_by(log, cost) >= UNFINISHED
 
 
 def _likeliest(
@@ -277,7 +284,7 @@ def _likeliest(
         ended = [*_with_all(log, ended, known, spared)]
     best = min((known, *(one.cost for one in ended)))
     near = [one for one in _ranked(ended) if one.cost <= best + CLOSE]
-    return _ranked(_finished(log, one, useful) if left_by(log, one.cost) < UNFINISHED else one for one in near)
+    return _ranked(one if _in_vain(log, one.cost) else _finished(log, one, useful) for one in near)
 
 
 def _with_all(log: GreyBoxLog, ended: Iterable[Tried], known: float, spared: Spared) -> Iterator[Tried]:

@@ -40,7 +40,7 @@ def ended(costs: Sequence[float], monkeypatch: pytest.MonkeyPatch) -> tuple[floa
 
     monkeypatch.setattr(explain, "descended", descended)
     monkeypatch.setattr(explain, "left_by", lambda *_: 1.0)
-    nothing: Any = None
+    nothing: Any = SimpleNamespace(drives=())
     return explain._to_its_end(nothing, SimpleNamespace(cost=np.inf), np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
 
 
@@ -64,7 +64,7 @@ def test_what_promises_most_is_settled_even_where_its_starts_are_not_what_it_say
     monkeypatch.setattr(explain, "settled", lambda _, start, *__: settled.append(start.cost) or start)
     monkeypatch.setattr(explain, "_finished", lambda _, one, __: one)
     monkeypatch.setattr(explain, "left_by", lambda *_: 1.0)
-    nothing: Any = None
+    nothing: Any = SimpleNamespace(drives=())
     found = explain._likeliest(nothing, [[tried(np.inf), tried(np.inf)], [tried(9.0), tried(10.0), tried(90.0)]])  # pyright: ignore[reportPrivateUsage]
     assert [one.cost for one in found] == [9.0]
     assert settled == [np.inf, 9.0, 10.0]
@@ -142,7 +142,7 @@ def test_all_else_is_asked_beside_a_hypothesis_where_what_slopes_promise_does_no
     monkeypatch.setattr(explain, "left_by", lambda *_: 1.0)
     monkeypatch.setattr(explain, "settled", lambda _, start, *__: start)
     monkeypatch.setattr(explain, "_finished", finished)
-    nothing: Any = None
+    nothing: Any = SimpleNamespace(drives=())
     at_end = {"leakage_coefficient": 1e-12, "flow_bias": 1e-6, "offset": 3e4, **FED}
     coarse = {"leakage_coefficient": 1e-29, "flow_bias": 3e-6, "offset": 4e4, **FED}
     place = Point(np.zeros(1), 100.0, np.zeros(1), np.eye(1))

@@ -87,6 +87,7 @@ def test_the_best_of_few_samples_is_sought_anew_with_all(monkeypatch: pytest.Mon
 def test_what_leaves_far_too_much_is_not_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     finished: list[float] = []
     monkeypatch.setattr(explain, "settled", lambda _, one, *__: one)
+    monkeypatch.setattr(explain, "FEW", 0)
     monkeypatch.setattr(explain, "_finished", lambda _, one, __: finished.append(one.cost) or one)
     monkeypatch.setattr(explain, "left_by", lambda _, cost: cost)
     for cost in (9.0, 11.0):
