@@ -15,7 +15,7 @@ import pytest
 
 from estimation.fits.explaining import explain as explaining
 from estimation.fits.explaining import promises as promising
-from estimation.fits.explaining import settled
+from estimation.fits.explaining import screened, settled
 from estimation.fits.flow import search as flow_search
 from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox import fit as greybox_fit
@@ -132,7 +132,7 @@ def plan_of_explanations() -> dict[str, Any]:
 
     for name, cost in costs.items():
         with (
-            planned(cost, explaining, settled) as plan,
+            planned(cost, explaining, screened, settled) as plan,
             patch.object(promising, "_promises", promised),
             patch.object(explaining, "concluded", concluded),
         ):
