@@ -141,6 +141,7 @@ def plan_of_explanations() -> dict[str, Any]:
                 found = explaining.explain(
                     short, PAPER, flow_starts(PAPER, 2e8)[:3], lambda _: False, asked=asked, paired=paired
                 )
+                assert found is not None
                 told[f"{name}, paired: {paired}"] = {
                     "descents": grouped(plan),
                     "names": list(found.names),

@@ -88,6 +88,7 @@ def hypotheses_about_strange_logs() -> dict[str, Any]:
             found = explain(
                 seen(one), PAPER, flow_starts(PAPER, 2e8)[:2], lambda fit: fit.chi_square[0] < 3.0, asked=asked
             )
+        assert found is not None
         told[name] = {
             "names": list(found.names),
             "rivals": found.rivals,

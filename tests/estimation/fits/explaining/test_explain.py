@@ -41,7 +41,8 @@ def ended(costs: Sequence[float], monkeypatch: pytest.MonkeyPatch) -> tuple[floa
     monkeypatch.setattr(explain, "descended", descended)
     monkeypatch.setattr(explain, "left_by", lambda *_: 1.0)
     nothing: Any = SimpleNamespace(drives=())
-    return explain._to_its_end(nothing, SimpleNamespace(cost=np.inf), np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
+    begun: Any = SimpleNamespace(cost=np.inf)
+    return explain._to_its_end(nothing, begun, np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
 
 
 def test_a_search_goes_on_while_it_gains_what_tells_hypotheses_apart(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -204,6 +205,7 @@ def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
     monkeypatch.setattr(explain, "ALIKE", 4.0)
     nothing: Any = None
     found = explain.explain(nothing, nothing, [{}], lambda fit: fit.cost < least, hopeless=hopeless)
+    assert found is not None
     assert " ".join(sorted(asked, reverse=True)) == beside
     assert found.names == names
     # the pair of both firsts is found twice and counts once
