@@ -5,7 +5,7 @@ import gc
 import os
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from importlib import import_module
@@ -36,32 +36,40 @@ internal error.
 Example: hydrostate simulate --condition minor_leakage --out run.csv, then hydrostate diagnose run.csv
 """
 
-VERBS = (
-    "nine_conditions.command",
-    "circuit.command",
-    "piezo_stack.command",
-    "diaphragm_motor.command",
-    "verbs.simulate",
-    "verbs.estimate",
-    "verbs.identify",
-    "library.command",
-    "verbs.diagnose",
-    "verbs.inspect",
-    "verbs.watch",
-    "verbs.filter_stream",
-    "verbs.identifiability",
-    "verbs.isolability",
-    "verbs.conditions",
-    "verbs.batch",
-    "verbs.compare",
-    "verbs.report",
-    "verbs.fleet",
-    "verbs.serve",
-    "motor_paper.command",
-    "papers.command",
-    "verbs.size_cylinder",
-)
-"""Modules that hold a verb each, in the order of the help."""
+VERBS: Mapping[str, Sequence[str]] = {
+    "What a log says": ("verbs.inspect", "verbs.diagnose", "verbs.estimate", "verbs.identify"),
+    "Many logs, and a running bench": (
+        "verbs.fleet",
+        "verbs.batch",
+        "verbs.report",
+        "verbs.compare",
+        "verbs.serve",
+        "verbs.watch",
+        "verbs.filter_stream",
+    ),
+    "Before a test": (
+        "verbs.rig",
+        "verbs.identifiability",
+        "verbs.isolability",
+        "verbs.simulate",
+        "verbs.conditions",
+        "verbs.size_cylinder",
+    ),
+    "Models and controllers": ("library.command", "verbs.export"),
+    "The papers and the benchmark": (
+        "nine_conditions.command",
+        "circuit.command",
+        "piezo_stack.command",
+        "diaphragm_motor.command",
+        "motor_paper.command",
+        "papers.command",
+        "open_benchmark.command",
+    ),
+}
+"""Modules that hold a verb each, by the heading that the help has over them, in its order."""
+
+GROUPS = {"verbs.rig": "rig", "verbs.export": "export", "open_benchmark.command": "benchmark"}
+"""Modules whose verbs have a name before theirs."""
 
 ALONE = {"estimate": "verbs.estimate", "diagnose": "verbs.diagnose", "identify": "verbs.identify"}
 """Verbs of a single log, whose module is imported without the others: these take a twentieth of a short run."""
@@ -94,8 +102,8 @@ def _root(
     del shown
 
 
-def _of(modules: Sequence[str]) -> typer.Typer:
-    """Return the command line with the verbs of some modules."""
+def _of(verbs: Mapping[str, Sequence[str]]) -> typer.Typer:
+    """Return the command line with the verbs of some modules, under their headings."""
     made = typer.Typer(
         name="hydrostate",
         cls=HydrostateGroup,
@@ -107,21 +115,19 @@ def _of(modules: Sequence[str]) -> typer.Typer:
         epilog=EPILOG,
     )
     made.callback()(_root)
-    for module in modules:
-        made.add_typer(import_module(f"experiments.{module}").commands)
+    for heading, modules in verbs.items():
+        for module in modules:
+            commands: typer.Typer = import_module(f"experiments.{module}").commands
+            for one in commands.registered_commands:
+                one.rich_help_panel = one.rich_help_panel if module in GROUPS else heading
+            named = {"name": GROUPS[module], "cls": HydrostateGroup} if module in GROUPS else {}
+            made.add_typer(commands, rich_help_panel=heading, **named)
     return made
 
 
 @cache
 def _whole() -> typer.Typer:
-    from experiments.open_benchmark import command as open_benchmark
-    from experiments.verbs import export, rig
-
-    made = _of(VERBS)
-    made.add_typer(rig.commands, name="rig", cls=HydrostateGroup)
-    made.add_typer(export.commands, name="export", cls=HydrostateGroup)
-    made.add_typer(open_benchmark.commands, name="benchmark", cls=HydrostateGroup)
-    return made
+    return _of(VERBS)
 
 
 def app_for(words: Sequence[str]) -> typer.Typer:
@@ -138,7 +144,7 @@ def app_for(words: Sequence[str]) -> typer.Typer:
         With all verbs, or with the one of a single log that is asked for.
     """
     alone = ALONE.get(words[0]) if words else None
-    return _whole() if alone is None else _of([alone])
+    return _whole() if alone is None else _of({"": [alone]})
 
 
 def main() -> None:
