@@ -92,6 +92,26 @@ def page_place(report: Path | None) -> Path | None:
     return report.with_suffix(".html")
 
 
+def pages_sentence(written: Sequence[Path]) -> str:
+    """Return where pages went.
+
+    Parameters
+    ----------
+    written : sequence of Path
+        At least one.
+
+    Examples
+    --------
+    >>> pages_sentence([Path("page.html")])
+    'written: page.html; open it in a browser'
+    >>> pages_sentence([Path("page-a.html"), Path("page-b.html")])
+    'written: page-a.html to page-b.html, 2 pages, one a log; open them in a browser'
+    """
+    if len(written) == 1:
+        return f"written: {written[0]}; open it in a browser"
+    return f"written: {written[0]} to {written[-1]}, {len(written)} pages, one a log; open them in a browser"
+
+
 def _labels(owners: Sequence[Owner]) -> list[str]:
     """Return a name for each, as short as tells them apart where letters have no case."""
     labels: list[str] = []

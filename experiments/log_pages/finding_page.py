@@ -11,8 +11,8 @@ from experiments.command.terminal import clauses
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.page.numbers import MISSING, number, percent_text, pretty_unit, shop_unit
 from experiments.page.render import render_page
+from experiments.page.sentences import left_unread, sentence
 from experiments.page.tables import Column
-from experiments.page.words import left_unread, sentence
 
 if TYPE_CHECKING:
     from estimation.finding import Finding, Quantity

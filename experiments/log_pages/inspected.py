@@ -101,7 +101,10 @@ def _reads(
         with caught() as said:
             record = read_log(log, {}, columns, kind.required, sample_time=sample_time, beside=beside)
     except HydrostateError as error:
-        return {"reads": False, "message": f"with these columns the log cannot be read: {error.message}"}
+        from plant.log.guess import INSPECT
+
+        why = error.message.replace(f"; {INSPECT}", "")
+        return {"reads": False, "message": f"with these columns the log cannot be read: {why}"}
     notes = "; ".join(dict.fromkeys(str(one.note) for one in said))
     about = f"{record.duration:g} s at {1.0 / record.sample_time:g} Hz, {', '.join(record)}"
     return {"reads": True, "message": f"with these columns the log reads: {about}" + (f"; {notes}" if notes else "")}

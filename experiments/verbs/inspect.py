@@ -9,7 +9,7 @@ import typer
 from experiments.command.json_output import Result, prepare_output, write_whole
 from experiments.command.logs import finish, run_logs
 from experiments.command.options import Beside, Json, Out, Plant, SampleTime, argument, load_actuator, option
-from experiments.command.output_paths import own_paths, page_place, require_place
+from experiments.command.output_paths import own_paths, page_place, pages_sentence, require_place
 from experiments.command.terminal import note, table, visible
 from experiments.log_pages.inspected import BLANK, block_of, looked_into
 from plant.errors import HydrostateError
@@ -60,7 +60,12 @@ def inspect(
         if log in pages:
             from experiments.log_pages.inspect_page import inspect_page
 
-            write_whole(pages[log], inspect_page({"file": str(log), **found}, tables), "--report")
+            page = inspect_page({"file": str(log), **found}, tables)
+            try:
+                write_whole(pages[log], page, "--report")
+                written.append(pages[log])
+            except HydrostateError as error:  # what was found is shown all the same
+                unwritten.append(str(error))
         if write is not None:
             _write_rig(write, found["columns"], kind)
             note(f"{write}: check units and parameters, then run: hydrostate diagnose {log} --rig {write}")
@@ -71,8 +76,12 @@ def inspect(
     pages = own_paths(page_place(report), logs)
     require_place("--write", write)
     prepare_output(out)
+    unwritten: list[str] = []
+    written: list[Path] = []
     batch = run_logs(logs, work, BLANK, "looking")
-    finish(batch, _screen, as_json=as_json, out=out)
+    for said in [*([pages_sentence(written)] if written else []), *unwritten]:
+        note(said)
+    finish(batch, _screen, as_json=as_json, out=out, lost=bool(unwritten))
 
 
 def _write_rig(path: Path, columns: Mapping[str, str], kind: "ActuatorKind") -> None:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.command.options import Plant, load_actuator
+from experiments.command.options import load_actuator, option
 from experiments.command.terminal import emit
 
 commands = typer.Typer(no_args_is_help=True, help="Write a file that describes your own actuator.")
@@ -16,7 +16,10 @@ def rig_init(
     path: Annotated[
         Path, typer.Argument(metavar="PATH", help="File to write; an existing file is not overwritten.")
     ] = Path("rig.toml"),
-    plant: Plant = None,
+    plant: Annotated[
+        str | None,
+        option("PLANT", "Kind of actuator: eha (gear pump), piezo-stack or diaphragm-motor.", show_default="eha"),
+    ] = None,
 ) -> None:
     """Write a commented rig file (TOML, SI) of the paper's actuator, for you to change into yours."""
     from plant.eha.rig import EHA, rig_template, write_rig_template

@@ -310,7 +310,7 @@ def write_rig_template(path: str | Path, template: str | None = None) -> None:
     """
     path = Path(path)
     if path.exists() or path.is_symlink():
-        raise RigError(f"{path}: the file exists already and is not overwritten")
+        raise RigError(f"{path}: the file exists already and is not overwritten; give another name")
     try:
         with replacing(path) as file:
             file.write((rig_template() if template is None else template).encode())

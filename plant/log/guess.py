@@ -277,6 +277,12 @@ def _gained_by(found: Collection[str]) -> list[str]:
     return [one for one in (*pressures, "position_m", "velocity_m_s") if one not in found]
 
 
+INSPECT = (
+    "`hydrostate inspect FILE --write rig.toml` guesses which column is which and in what unit, for --rig rig.toml"
+)
+"""The command that shows more; it leaves this out where it speaks itself."""
+
+
 def hint_of(channels: Sequence[str], headings: Sequence[Heading], more: Sequence[str] = ()) -> str:
     """Return which columns may be meant, as an option, and the command that shows more.
 
@@ -293,10 +299,9 @@ def hint_of(channels: Sequence[str], headings: Sequence[Heading], more: Sequence
     options = [shown[name] for name in in_order(shown)] if set(shown) & set(channels) else []
     may = f"; perhaps --columns '{','.join(options)}'" if options else ""
     put = ", with the unit of each for UNIT" if any(one.endswith(":UNIT") for one in options) else ""
-    inspect = "`hydrostate inspect FILE --write rig.toml` guesses which column is which and in what unit"
     timeless = "; to read a log without time, give --sample-time" if TIME in channels and TIME not in shown else ""
     other = "" if options or TIME in channels else "; if a second logger's file has it, add --with FILE"
-    return f"{may}{put}; {inspect}, for --rig rig.toml{other}{timeless}"
+    return f"{may}{put}; {INSPECT}{other}{timeless}"
 
 
 def in_order(channels: Iterable[str]) -> list[str]:

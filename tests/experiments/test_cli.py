@@ -256,7 +256,9 @@ def test_rig_init_writes_a_file_once(tmp_path: Path) -> None:
     path.write_text("# mine")
     again = invoke("rig", "init", path)
     assert again.exit_code == 2
-    assert again.stderr.splitlines() == [f"hydrostate: {path}: the file exists already and is not overwritten"]
+    assert again.stderr.splitlines() == [
+        f"hydrostate: {path}: the file exists already and is not overwritten; give another name"
+    ]
     assert path.read_text() == "# mine"
 
 

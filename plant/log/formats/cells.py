@@ -107,7 +107,10 @@ def each_read(columns: Iterable[Column], read: Callable[[Column], Array]) -> dic
 
 def wrong_width(source: str, wanted: int, got: int, row: int) -> LogError:
     """Return the error for a row that has not as many cells as the header; rows count from 0 here."""
-    return LogError(f"every row must have {wanted} cells as the header has, got {got} in row {row + 1}", source)
+    return LogError(
+        f"every row must have {wanted} cells as the header has, got {got} in row {row + 1}, counted below the header",
+        source,
+    )
 
 
 def not_a_number(source: str, name: str, row: int, value: object) -> LogError:

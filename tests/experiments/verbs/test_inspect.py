@@ -7,7 +7,9 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from experiments.cli import app
+from experiments.verbs import inspect as inspect_verb
 from plant.eha.rig import read_rig
+from plant.errors import HydrostateError
 
 TIME = 1e-3 * np.arange(3000)
 SPEED = 90.0 * np.sign(np.sin(9.0 * TIME)) * (1.0 - np.exp(-40.0 * (TIME % (np.pi / 9.0))))
@@ -45,6 +47,26 @@ def test_the_rig_file_that_it_writes_reads_the_log(strange: Path, tmp_path: Path
     assert tomllib.loads(rig.read_text())["columns"].keys() >= {"time_s", "position_m"}
     again = invoke(strange, "--write", rig)
     assert "is not overwritten" in again.stderr
+
+
+def test_a_page_that_cannot_be_written_costs_nothing_that_was_found(
+    strange: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, *_: object) -> None:
+        raise HydrostateError(f"--report {path}: cannot be written: No space left on device")
+
+    monkeypatch.setattr(inspect_verb, "write_whole", full)
+    done = invoke(strange, "--report", tmp_path / "page.html")
+    assert done.exit_code == 1
+    assert 'position_m = "Kolbenweg [mm]:mm"' in done.stdout
+    assert done.stderr.count("No space left on device") == 1
+
+
+def test_advice_to_inspect_is_not_given_by_inspect_itself(tmp_path: Path) -> None:
+    (tmp_path / "letter.txt").write_text("hello world\nthis is a letter\n")
+    done = invoke(tmp_path / "letter.txt")
+    assert "cannot be read: columns time_s" in done.stdout
+    assert "hydrostate inspect" not in done.stdout
 
 
 def test_json_says_how_sure_each_guess_is_and_why(strange: Path) -> None:
