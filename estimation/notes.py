@@ -230,7 +230,8 @@ class RigCode(Code):
     SINGLE_ROD = (
         "side B of the piston has {percent:.1f} ± {half_width:.2g} % of the area of side A (rig file: "
         "{rig_percent:.1f} %), chamber B has {volume_percent:.0f} % of the volume of chamber A (rig file: "
-        "{rig_volume_percent:.0f} %), and pilot_share is {pilot_share:.2g} (rig file: {rig_pilot_share:.2g})"
+        "{rig_volume_percent:.0f} %), and pilot-operated make-up valves pass {pilot_share:.2g} times the flow of "
+        "plain ones (pilot_share in the rig file: {rig_pilot_share:.2g})"
     )
     VOLUME_DIFFERS = "the chamber volume is {percent:.0f} ± {half_width:.0f} % of that in the rig file"
     STARTS_UNDER_LOAD = (
@@ -282,4 +283,4 @@ class RigCode(Code):
         "on average the make-up valves open {crack_pa:.3g} ± {half_width_pa:.2g} Pa below the accumulator pressure in "
         "the rig file; that of chamber {side} opens {later_pa:.3g} ± {later_half_width_pa:.2g} Pa lower than the other"
     )
-    EXPLAINED_OTHERWISE = "{count} other explanation(s) fit the log about as well; the interval includes them"
+    EXPLAINED_OTHERWISE = "other explanations that fit the log about as well: {count}; the interval includes them"

@@ -22,7 +22,7 @@ def circuit(
 
     The circuit plant has two chambers, make-up valves, relief valve, throttles, presliding friction and motor lag,
     which no filter here models. Takes one to six minutes, a quick one half a minute. The last line of standard output
-    is the manifest's path.
+    is the report's path.
     """
     from experiments.circuit.study import CIRCUIT
     from experiments.nine_conditions.settings import StudySettings, quick_settings

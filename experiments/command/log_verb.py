@@ -10,7 +10,7 @@ import typer
 from experiments.command.json_output import Result, prepare_output, write_whole
 from experiments.command.logs import finish, overheard, read_log, run_logs, with_remarks
 from experiments.command.options import load_actuator, load_columns, understood
-from experiments.command.output_paths import own_paths, page_place, require_place
+from experiments.command.output_paths import own_paths, page_place, pages_sentence, require_place
 from experiments.command.terminal import clauses, note
 from plant.errors import HydrostateError, require_known
 
@@ -62,6 +62,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     rig, prepared = chosen.prepare(bench, {**options, "seed": asked["seed"]})
     prepare_output(asked["out"])
     unwritten: list[str] = []
+    written: list[Path] = []
     figures, pages = own_paths(options.get("figure"), logs), own_paths(report, logs)
     about = {"plant": kind.name, "rig": bench.name, "seed": asked["seed"], "expected": expected}
     about |= {"condition": options["condition"]} if "condition" in options else {}
@@ -78,6 +79,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
             page = page_of(chosen, with_remarks({"file": str(log), **result}, said), found, record)
             try:
                 write_whole(pages[log], page, "--report")
+                written.append(pages[log])
             except HydrostateError as error:  # what was found is shown all the same
                 unwritten.append(str(error))
         return result
@@ -85,7 +87,8 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     batch = run_logs(logs, work, {**chosen.blank, **about}, doing)
     for remark in chosen.remarks(batch.results):
         note(remark)
-
+    if written:
+        note(pages_sentence(written))
     for sentence in unwritten:
         note(sentence)
     form: dict[str, Any] = {"as_json": asked["as_json"], "out": asked["out"], "lost": bool(unwritten)}

@@ -26,5 +26,6 @@ def finish_study(study: "Study[Settings]", settings: Settings, out: Path, *, as_
 
     begin = perf_counter()
     written = run_study(study, settings, out, Console(stderr=True))
-    done = {"outcome": "ok", study.ends_with: str(written), "seconds": perf_counter() - begin}
+    manifest = str(written.with_name("manifest.json"))
+    done = {"outcome": "ok", "report": str(written), "manifest": manifest, "seconds": perf_counter() - begin}
     emit(json_text([done]) if as_json else str(written))

@@ -14,7 +14,7 @@ commands = typer.Typer()
 def diaphragm_motor(out: Folder = Path("results/diaphragm-motor"), seed: Seed = SEED, as_json: Json = False) -> None:
     """Repeat sections 7.1 to 7.3 of the paper on the seven-chamber diaphragm motor: reversal, control, and what fails.
 
-    Takes about ten seconds. The last line of standard output is the path of the manifest.
+    Takes about ten seconds. The last line of standard output is the path of the report.
     """
     from experiments.diaphragm_motor.study import DIAPHRAGM_MOTOR
     from experiments.running.study import Seeded

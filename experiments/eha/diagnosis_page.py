@@ -13,8 +13,9 @@ from experiments.page.charts import Charts
 from experiments.page.numbers import percent_text
 from experiments.page.panels import Curve, Mark, Panel
 from experiments.page.render import render_page
+from experiments.page.sentences import sentence
 from experiments.page.severity_rows import severity_rows
-from experiments.page.words import in_words, sentence
+from experiments.page.words import in_words
 from faults.diagnosis.blocks import blocks_of
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from estimation.notes import RigCode
-from experiments.page.words import in_words, left_unread, sentence
+from experiments.page.condition_names import in_words
+from experiments.page.sentences import left_unread, sentence
 from faults.conditions import CONDITIONS
 from faults.notes import AdviceCode, AgainstCode
 
@@ -181,10 +182,25 @@ def what_to_do(result: Mapping[str, Any]) -> list[str]:
     list[str]
         Work on the actuator first, then how to read this log, then how to log next.
     """
-    found: list[str] = []
-    if not result["unknown"]:
-        levels = _levels(result)
-        work = WORK_ON_LEAKAGE.get(levels["leakage"] or ""), WORK_ON_FRICTION.get(levels["friction"] or "")
-        sound = not _soft_oil(result) and None not in levels.values()
-        found += [one for one in work if one] or (["Nothing needs repair."] if sound else [])
-    return [*found, *left_unread(result), *(sentence(one) for one in result["advice"])]
+    return [*work_on(result), *left_unread(result), *(sentence(one) for one in result["advice"])]
+
+
+def work_on(result: Mapping[str, Any]) -> list[str]:
+    """Return what to check on the actuator itself, as sentences.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of a diagnosis with probabilities.
+
+    Returns
+    -------
+    list[str]
+        Empty where the verdict is unknown or leaves leakage or friction open, and where only the oil is soft.
+    """
+    if result["unknown"]:
+        return []
+    levels = _levels(result)
+    work = WORK_ON_LEAKAGE.get(levels["leakage"] or ""), WORK_ON_FRICTION.get(levels["friction"] or "")
+    sound = not _soft_oil(result) and None not in levels.values()
+    return [one for one in work if one] or (["Nothing needs repair."] if sound else [])

@@ -6,6 +6,7 @@ from typing import Any
 
 from experiments.page.condition_names import in_words
 from experiments.page.numbers import decimals_of, percent_text, shop_unit
+from experiments.page.sentences import sentence
 
 SHOWN = {
     "leakage_flow": "leakage at rated pressure",
@@ -33,12 +34,15 @@ def verdict_lines(result: Mapping[str, Any]) -> list[str]:
     Returns
     -------
     list[str]
-        What it is, how bad in leakage, in friction and oil, whether it is reliable, what to measure next, and what the
-        library of transfer functions says where it says anything.
+        What it is, the same for a mechanic, how bad in leakage, in friction and oil, whether it is reliable, what to
+        do next, and what the library of transfer functions says where it says anything.
     """
+    from experiments.eha.plain_verdict import verdict
+
     library = library_sentence(result)
     return [
         f"{result['file']}: {headline(result)}",
+        f"  verdict   {verdict(result)}",
         f"  leakage   {amounts(result, ('leakage_flow', 'velocity_lost'))}",
         f"  friction  {amounts(result, ('added_friction', 'pressure_rise'))}",
         f"  oil       {amounts(result, ('bulk_modulus',))}",
@@ -58,13 +62,15 @@ def headline(result: Mapping[str, Any]) -> str:
     """
     ranked = sorted(result["probabilities"].items(), key=lambda item: -item[1])
     (best, first), (second, other) = ranked[:2]
+    if result["unknown"]:
+        nearest = f"{in_words(best)} ({percent_text(first)} % if it had to be one of them)"
+        return f"{NEAREST}{nearest}, then {in_words(second)} ({percent_text(other)} %)"
     parts = [
         f"{in_words(best)}, probability {percent_text(first)} %",
         since(result),
         f"second most likely {in_words(second)}, {percent_text(other)} %",
     ]
-    named = "; ".join(part for part in parts if part)
-    return f"{NEAREST}{named}" if result["unknown"] else named
+    return "; ".join(part for part in parts if part)
 
 
 def since(result: Mapping[str, Any]) -> str:
@@ -144,8 +150,10 @@ def believed(result: Mapping[str, Any]) -> str:
 
 
 def next_step(result: Mapping[str, Any]) -> str:
-    """Return what to do or to measure next."""
-    return "; ".join(result["advice"])
+    """Return what to do next, sentences: work on the actuator first, then what to measure."""
+    from experiments.eha.plain_verdict import work_on
+
+    return " ".join([*work_on(result), *map(sentence, result["advice"])])
 
 
 def library_sentence(result: Mapping[str, Any]) -> str:

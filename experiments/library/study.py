@@ -123,4 +123,4 @@ COLUMNS: Mapping[str, Columns] = {
     ),
 }
 
-LIBRARY = Study("library", "library/report.html", _find, LIBRARY_FIGURES, COLUMNS, asdict(RIG), _facts, "report")
+LIBRARY = Study("library", "library/report.html", _find, LIBRARY_FIGURES, COLUMNS, asdict(RIG), _facts)

@@ -15,7 +15,7 @@ def motor_paper(out: Folder = Path("results/motor-paper"), seed: Seed = SEED, as
     """Check the diaphragm-motor paper: Tables 1, 2, 4, 5, its regression (Figure 12), its linear models and hysteresis.
 
     Says what holds, what holds in one reading only, and what does not. Takes a few seconds.
-    The last line of standard output is the path of the manifest.
+    The last line of standard output is the path of the report.
     """
     from experiments.motor_paper.study import MOTOR_PAPER
     from experiments.running.study import Seeded

@@ -109,6 +109,4 @@ def _facts(tables: Tables, settings: StudySettings) -> Mapping[str, Any]:
     }
 
 
-NINE_CONDITIONS = Study(
-    "nine conditions", "nine_conditions/report.html", _find, FIGURES, COLUMNS, asdict(RIG), _facts, "report"
-)
+NINE_CONDITIONS = Study("nine conditions", "nine_conditions/report.html", _find, FIGURES, COLUMNS, asdict(RIG), _facts)

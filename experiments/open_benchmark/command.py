@@ -59,7 +59,7 @@ def baselines(
 ) -> None:
     """Score other classifiers next to `diagnose`: RMSE as published, learners on features, random kernels.
 
-    Takes about ten minutes. The last line of standard output is the path of the manifest.
+    Takes about ten minutes. The last line of standard output is the path of the report.
     """
     require_positive("--training", training, "logs")
     require_positive("--test", test, "logs")

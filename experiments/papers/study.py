@@ -45,7 +45,7 @@ def papers_study(parts: Path) -> Study[PapersSettings]:
         ours = {"bent plate": bent_plate(), "mode shapes": mode_shapes()}
         return Found({**tables, **shown, **drawn, **ours})
 
-    return Study("papers", "papers/report.html", find, PAPERS_FIGURES, COLUMNS, PARAMETERS, _facts, "report")
+    return Study("papers", "papers/report.html", find, PAPERS_FIGURES, COLUMNS, PARAMETERS, _facts)
 
 
 @tabled

@@ -23,7 +23,7 @@ def piezo_stack(
     """Repeat the flow experiments of the piezo-stack paper (Figures 10 to 14); maps, limits and best operating points.
 
     Also shows which runs identify the stack's hysteresis and which do not. Takes about a minute.
-    The last line of standard output is the path of the manifest.
+    The last line of standard output is the path of the report.
     """
     require_positive("--voltage-limit", voltage_limit, "V")
     require_positive("--power-limit", power_limit, "W")

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import pandas as pd
 from rich.console import Console
@@ -89,7 +89,6 @@ class Study(Generic[Settings]):
     columns: Mapping[str, Columns]
     parameters: Mapping[str, Any]
     facts: Callable[[Tables, Settings], Mapping[str, Any]] = _no_facts
-    ends_with: Literal["manifest", "report"] = "manifest"
 
 
 def run_study(study: Study[Settings], settings: Settings, out: Path, console: Console) -> Path:
@@ -103,7 +102,7 @@ def run_study(study: Study[Settings], settings: Settings, out: Path, console: Co
     Returns
     -------
     Path
-        The manifest or the report, by the study's `ends_with`.
+        The report.
 
     Raises
     ------
@@ -121,7 +120,7 @@ def run_study(study: Study[Settings], settings: Settings, out: Path, console: Co
     with Progress(*columns, console=console) as progress:
         found = study.find(settings, progress.track)
         in_one_piece(progress.track, "drawing and writing", lambda: write_result(study, settings, found, out))
-    return out / {"manifest": "manifest.json", "report": "report.html"}[study.ends_with]
+    return out / "report.html"
 
 
 def write_result(study: Study[Settings], settings: Settings, found: Found, out: Path) -> None:

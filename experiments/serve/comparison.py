@@ -16,7 +16,8 @@ from experiments.page.numbers import (
     pretty_unit,
     shop_unit,
 )
-from experiments.page.words import in_words, sentence
+from experiments.page.sentences import sentence
+from experiments.page.words import in_words
 
 if TYPE_CHECKING:
     import pandas as pd

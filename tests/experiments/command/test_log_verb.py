@@ -49,6 +49,13 @@ def test_a_page_says_first_what_reading_the_log_brought_up(verb: str, log: Path,
     assert f"<li>C{said[1:]}." in page
 
 
+def test_the_command_says_where_the_page_went(log: Path, tmp_path: Path) -> None:
+    done = invoke("diagnose", log, "--report", tmp_path / "page")
+    assert done.exit_code == 0, done.output
+    assert f"written: {tmp_path / 'page.html'}; open it in a browser" in done.stderr.splitlines()
+    assert "written" not in done.stdout
+
+
 def test_a_page_that_cannot_be_written_costs_no_verdict(
     log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

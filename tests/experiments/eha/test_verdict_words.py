@@ -6,6 +6,7 @@ import pytest
 
 from estimation.finding import Change, Finding, Gate, Outcome, Quantity
 from experiments.eha.entries import diagnosis_entries
+from experiments.eha.plain_verdict import verdict
 from experiments.eha.verdict_words import (
     SHOWN,
     amount,
@@ -18,6 +19,7 @@ from experiments.eha.verdict_words import (
     verdict_lines,
 )
 from experiments.page.condition_names import in_words
+from experiments.page.sentences import sentence
 from faults.conditions import CONDITIONS
 from faults.diagnosis.diagnose import EhaEvidence
 from faults.diagnosis.rmse import Scores
@@ -82,7 +84,7 @@ def test_a_verdict_that_something_speaks_against_says_so_first_and_why() -> None
     entries = diagnosis_entries(found_as("minor_leakage", against=AGAINST))
     assert headline(entries).startswith("UNKNOWN: none of the nine conditions fits; the nearest is minor leakage")
     assert believed(entries) == "no: " + "; ".join(map(str, AGAINST))
-    assert next_step(entries) == str(AdviceCode.CHECK_RIG.note())
+    assert next_step(entries) == sentence(str(AdviceCode.CHECK_RIG.note()))
     sound = diagnosis_entries(found_as("minor_leakage"))
     assert believed(sound).startswith("yes: ")
     assert believed(sound).endswith(str(ClassCode.BULK_MODULUS_NOT_VISIBLE.note()))
@@ -118,6 +120,24 @@ def with_library(found: Finding, best: str) -> Finding:
     return replace(found, severities={**unknown, **found.severities}, evidence=evidence)
 
 
+def test_a_mechanic_reads_the_verdict_and_the_work_to_do_on_the_terminal_as_on_the_page() -> None:
+    entries = diagnosis_entries(with_library(found_as("minor_leakage"), "minor_leakage"))
+    said = verdict_lines({"file": "run.csv", **entries})
+    assert said[1] == f"  verdict   {verdict(entries)}"
+    assert "(minor leakage)" in said[1]
+    (following,) = [line for line in said if line.startswith("  next ")]
+    assert following.startswith("  next      Plan a check of pump and piston seal.")
+    assert following.endswith(".")
+
+
+def test_an_unknown_verdict_gives_no_plain_probability_and_nothing_to_repair() -> None:
+    entries = diagnosis_entries(with_library(found_as("minor_leakage", against=AGAINST), "minor_leakage"))
+    said = verdict_lines({"file": "run.csv", **entries})
+    assert "probability" not in said[0]
+    assert "% if it had to be one of them" in said[0]
+    assert not any("pump and piston seal" in line for line in said)
+
+
 def test_the_library_agrees_or_names_another_and_changes_no_verdict() -> None:
     alone = {**diagnosis_entries(found_as("minor_leakage")), "severity": None}
     agrees = diagnosis_entries(with_library(found_as("minor_leakage"), "minor_leakage"))
@@ -129,7 +149,7 @@ def test_the_library_agrees_or_names_another_and_changes_no_verdict() -> None:
     for entries in (agrees, differs):
         said = verdict_lines({"file": "run.csv", **entries})
         assert said[-1].strip() == library_sentence(entries)
-        assert len(said) == 7
+        assert len(said) == 8
         assert {key for key in alone if alone[key] != entries[key]} == {
             "severity",
             "transfer_function_scores",
