@@ -197,6 +197,10 @@ def read(
     if not isinstance(sample_time, Real | None):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         refuse(f"sample_time must be a number of seconds, got {sample_time!r}")
     table = None if isinstance(path, str | Path) else path if is_frame(path) else by_name(path)
+    levels = getattr(getattr(table, "columns", None), "nlevels", 1)
+    if levels > 1:
+        how = "for example table.columns = table.columns.map(' '.join)"
+        refuse(f"each column of the table must have one name, got names of {levels} levels (MultiIndex); {how}")
     file = Path(path) if isinstance(path, str | Path) else None if table is None else frame_table(table)
     if file is None:
         got = repr(path) if isinstance(path, Real | bytes | list | tuple | None) else type(path).__name__
@@ -215,7 +219,8 @@ def read(
         if rig is not None or columns is not None or plant is not None or others:
             raise
         found, name = read_whole_or_sparse(partial(read_any, file, sample_time=sample_time)), ANY
-    return Log(found.record, bench, name, found.said, sparse=found.sparse, refusal=found.refusal)
+    kept: dict[str, Any] = {"sparse": found.sparse, "refusal": found.refusal}
+    return Log(found.record, bench, name, found.said, **kept, **({"name": file.name} if isinstance(file, Path) else {}))
 
 
 def load_model(path: "str | Path") -> "Relation":

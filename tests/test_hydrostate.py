@@ -87,6 +87,14 @@ def test_an_answer_turns_into_what_a_program_needs(verdict: hs.Answer) -> None:
     assert all(isinstance(axis, Axes) and axis.get_xlabel() for axis in verdict.plot())
 
 
+def test_a_log_shows_its_channels_in_a_notebook_and_its_answers_bear_its_name(log: hs.Log, tmp_path: Path) -> None:
+    assert "<th>position_m</th>" in log._repr_html_()
+    log.to_frame().to_csv(tmp_path / "press 7.csv")
+    read = hs.read(tmp_path / "press 7.csv")
+    assert "press 7.csv" in str(read.estimate())
+    assert "press 7.csv" in str(read.between(0.0, 1.5).estimate())
+
+
 def test_a_model_turns_into_python_controls(log: hs.Log) -> None:
     model = log.identify()
     assert isinstance(model.to_control(), control.TransferFunction)
@@ -115,6 +123,10 @@ MISTAKES: dict[str, tuple[Callable[[hs.Log, Path], object], str]] = {
     "text for a number": (lambda log, file: log.estimate(start_std="1e8"), "start_std must be a number, got '1e8'"),
     "text for a guess": (lambda log, file: log.estimate(start="5e7"), "start must be a number [Pa], got '5e7'"),
     "a page under another name": (lambda log, file: log.estimate().report("a.pdf"), "must end in .html, got 'a.pdf'"),
+    "names of two levels": (
+        lambda log, file: hs.read(pd.concat({"bench": pd.DataFrame({"time_s": [0.0, 1e-3]})}, axis=1)),
+        "must have one name, got names of 2 levels",
+    ),
     "a command stays as it is typed": (
         lambda log, file: hs.read(file, columns={"position_m": "X"}),
         "`hydrostate inspect FILE --write rig.toml` guesses which column is which and in what unit, for rig='rig.toml'",

@@ -64,10 +64,19 @@ class Answer(Shown):
         From a list of entries to what a terminal shows.
     page : callable
         From a title to the page of the log, as HTML.
+    name : str
+        What the log is called where the answer is printed.
     """
 
-    def __init__(self, finding: "Finding", entries: Mapping[str, Any], screen: Any, page: Callable[[str], str]) -> None:
-        self.finding, self._entries, self._screen, self._page = finding, entries, screen, page
+    def __init__(
+        self,
+        finding: "Finding",
+        entries: Mapping[str, Any],
+        screen: Any,
+        page: Callable[[str], str],
+        name: str = "log",
+    ) -> None:
+        self.finding, self._entries, self._screen, self._page, self._name = finding, entries, screen, page, name
 
     def __getattr__(self, name: str) -> Any:
         if not name.startswith("_") and name in type(self.finding).__dataclass_fields__:
@@ -100,7 +109,7 @@ class Answer(Shown):
     def __str__(self) -> str:
         from experiments.command.terminal import rendered
 
-        about = {"file": "log", "warnings": [], "expected": None, "rig": "", "condition": None}
+        about = {"file": self._name, "warnings": [], "expected": None, "rig": "", "condition": None}
         return rendered(*self._screen([{**about, **self.to_dict()}]))
 
     def _repr_html_(self) -> str:

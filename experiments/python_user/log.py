@@ -84,6 +84,7 @@ class Log(Shown):
         *,
         sparse: "Record | None" = None,
         refusal: str = "",
+        name: str = "log",
     ) -> None:
         from plant.eha.rig import Rig
         from plant.log.record import Record
@@ -93,7 +94,7 @@ class Log(Shown):
         if not isinstance(rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
             refuse(f"the rig of a Log must be a Rig, got {type(rig).__name__}; hydrostate.read_rig reads one")
         self.record, self.rig, self.plant, self._said = record, rig, plant, tuple(said)
-        self._sparse, self._refusal = sparse, refusal
+        self._sparse, self._refusal, self._name = sparse, refusal, name
         self._kept: tuple[Record, dict[Any, Any]] = record, {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -130,6 +131,12 @@ class Log(Shown):
         about = "" if self.plant == ANY else f"; rig {self.rig.name!r}"
         return f"{said}, {', '.join(self.channels)}{about}"
 
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        table = self.to_frame().agg(["min", "max"]).T.to_html(float_format="{:.5g}".format)
+        return f"<p>{escape(str(self))}</p>{table}"
+
     def between(self, begin: float, end: float) -> "Log":
         """Return a part of the log.
 
@@ -156,7 +163,8 @@ class Log(Shown):
                 f"log's, which is from {ends}"
             )
         sparse = None if self._sparse is None else self._sparse.slice(*span)
-        return Log(self.record.slice(*span), self.rig, self.plant, self._said, sparse=sparse, refusal=self._refusal)
+        kept: dict[str, Any] = {"sparse": sparse, "refusal": self._refusal, "name": self._name}
+        return Log(self.record.slice(*span), self.rig, self.plant, self._said, **kept)
 
     def whole(self) -> "Record":
         """Return the record, if few enough of its samples are missing to estimate an actuator.
@@ -285,7 +293,7 @@ class Log(Shown):
         entries = {**chosen.blank, **chosen.entries(found)}
 
         words = Words(self.plant, verb, asked, rig.name, record, self._said)
-        return Answer(found, entries, words.screen, partial(words.page, found, entries))
+        return Answer(found, entries, words.screen, partial(words.page, found, entries), self._name)
 
     def _found(self, chosen: "LogVerb", record: "Record", rig: "Rig[Any]", prepared: Any) -> "Finding":
         """Return what a verb finds, with what another verb of this log has left for it."""

@@ -262,6 +262,13 @@ def test_rig_init_writes_a_file_once(tmp_path: Path) -> None:
     assert path.read_text() == "# mine"
 
 
+def test_the_help_begins_with_what_a_log_says_and_ends_with_the_papers() -> None:
+    said = invoke("--help").stdout
+    headings = ["What a log says", "│ diagnose", "Many logs", "│ fleet", "Before a test", "│ rig ", "The papers"]
+    places = [said.index(one) for one in headings]
+    assert places == sorted(places)
+
+
 @pytest.mark.parametrize("as_json", [False, True])
 def test_study_ends_with_the_reports_path(as_json: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[str, object, Path]] = []
@@ -278,6 +285,7 @@ def test_study_ends_with_the_reports_path(as_json: bool, tmp_path: Path, monkeyp
     if as_json:
         (found,) = json.loads(done.stdout)
         assert (found["outcome"], found["report"]) == ("ok", str(tmp_path / "report.html"))
+        assert found["manifest"] == str(tmp_path / "manifest.json")
         assert found["seconds"] >= 0.0
     else:
         assert done.stdout.splitlines()[-1] == str(tmp_path / "report.html")
