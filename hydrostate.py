@@ -220,7 +220,8 @@ def read(
             raise
         found, name = read_whole_or_sparse(partial(read_any, file, sample_time=sample_time)), ANY
     kept: dict[str, Any] = {"sparse": found.sparse, "refusal": found.refusal}
-    return Log(found.record, bench, name, found.said, **kept, **({"name": file.name} if isinstance(file, Path) else {}))
+    kept |= {"name": file.name} if isinstance(file, Path) else {}
+    return Log(found.record, bench, name, found.said, **kept)
 
 
 def load_model(path: "str | Path") -> "Relation":

@@ -120,7 +120,7 @@ def _of(verbs: Mapping[str, Sequence[str]]) -> typer.Typer:
             commands: typer.Typer = import_module(f"experiments.{module}").commands
             for one in commands.registered_commands:
                 one.rich_help_panel = one.rich_help_panel if module in GROUPS else heading
-            named = {"name": GROUPS[module], "cls": HydrostateGroup} if module in GROUPS else {}
+            named: dict[str, Any] = {"name": GROUPS[module], "cls": HydrostateGroup} if module in GROUPS else {}
             made.add_typer(commands, rich_help_panel=heading, **named)
     return made
 
