@@ -13,6 +13,9 @@ from estimation.identification.free_run.polynomial_fit import PolynomialFit, Run
 START_STEPS = 12
 """Refinements of the first outputs of a polynomial run."""
 
+SMOOTHED = (8, 24)
+"""Samples through which a level and a straight line give first outputs without their noise."""
+
 
 @dataclass(frozen=True, eq=False)
 class PolynomialDynamics:
@@ -65,9 +68,23 @@ class PolynomialDynamics:
 
     def _begun(self, runs: Runs, y: Array) -> Array:
         """Return the run whose first outputs suit those that are there best; NaN from where it runs away."""
-        known, k, start = runs.used, self.coefficients.size, runs.start_values()
+        measured = runs.start_values()
+        if np.count_nonzero(runs.used) <= 4 * measured.size:
+            return self._refined(runs, y, measured, 1)[0]
+        best, cost = self._refined(runs, y, measured, START_STEPS)
+        # noise of the first outputs is a speed where sampling is fast, and may throw the run where nothing leads back
+        smooth = smoothed_starts(y, runs.begins[0] - measured.size, measured.size)
+        costs = [self._refined(runs, y, one, 1)[1] for one in smooth]
+        if smooth and min(costs) < cost:
+            other, less = self._refined(runs, y, smooth[int(np.argmin(costs))], START_STEPS)
+            best = other if less < cost else best
+        return best
+
+    def _refined(self, runs: Runs, y: Array, start: Array, steps: int) -> tuple[Array, float]:
+        """Return the best run that refinements of first outputs lead to, and its squared error; infinite if none."""
+        known, k = runs.used, self.coefficients.size
         best, cost = np.full(y.size, np.nan), np.inf
-        for _ in range(START_STEPS if np.count_nonzero(known) > 4 * start.size else 1):
+        for _ in range(steps):
             ran = runs.run(np.concatenate([self.coefficients, start, self.friction]))
             if ran is None:
                 break
@@ -76,11 +93,13 @@ class PolynomialDynamics:
             if not now < cost * (1.0 - 1e-6):
                 break
             best, cost = ran[0], now
+            if steps == 1:
+                break
             moved = runs.sensitivities(*ran, self.terms, starts=True)[known][:, k : k + start.size]
             if not np.isfinite(moved).all():
                 break
             start = start + np.linalg.lstsq(moved, left, rcond=None)[0]
-        return best
+        return best, cost
 
     def one_step(self, u: Array, y: Array) -> Array:
         """Return what the measured past gives for the next output; NaN where some of it is missing.
@@ -159,3 +178,36 @@ class PolynomialDynamics:
     def of(cls, fit: PolynomialFit) -> "PolynomialDynamics":
         """Return the dynamics of a fit."""
         return cls(fit.variables, fit.terms, fit.coefficients, fit.friction)
+
+
+def smoothed_starts(y: Array, first: int, count: int) -> list[Array]:
+    """Return first outputs on levels and straight lines through what follows them.
+
+    Parameters
+    ----------
+    y : ndarray, shape (n,)
+        Output; NaN where missing.
+    first : int
+        Sample of the first of them.
+    count : int
+        How many are wanted.
+
+    Returns
+    -------
+    list of ndarray, shape (count,)
+        None of them where too few outputs are there.
+
+    Examples
+    --------
+    >>> smoothed_starts(np.arange(8.0), 0, 2)[1].round(6).tolist()
+    [0.0, 1.0]
+    """
+    found = list[Array]()
+    for length in SMOOTHED:
+        part = y[first : first + length]
+        there = np.flatnonzero(np.isfinite(part))
+        for degree in (0, 1):
+            if there.size > degree + 1:
+                line = np.polynomial.Polynomial.fit(there, part[there], degree)
+                found.append(np.asarray(line(np.arange(count)), dtype=np.float64))
+    return found
