@@ -27,8 +27,8 @@ from experiments.open_benchmark.logger import PLAIN
 from experiments.running.executors import side_by_side
 from experiments.running.random_streams import stream
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.actuator import actuator_of
-from faults.diagnosis.circuit_runs import coordinates_of
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.circuit_runs import coordinates_of
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.severity import severities_at
 from faults.eha.inject import spread

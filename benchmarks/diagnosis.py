@@ -27,8 +27,8 @@ from benchmarks.population import TEST, Drawn, draw_logs
 from benchmarks.scores import calibration_error, share_interval
 from benchmarks.targets import Check, printed
 from estimation.finding import Finding
-from faults.diagnosis.actuator import Actuator, actuator_of
-from faults.diagnosis.circuit_runs import coordinates_of
+from faults.diagnosis.circuits.actuator import Actuator, actuator_of
+from faults.diagnosis.circuits.circuit_runs import coordinates_of
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.rmse import score_mathematical
 from faults.diagnosis.severity import severities_at

@@ -23,9 +23,9 @@ from benchmarks.population import (
 from benchmarks.targets import Check
 from estimation.finding import Finding
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.actuator import Actuator
-from faults.diagnosis.blocks import Blocks, blocks_of
-from faults.diagnosis.circuit_runs import coordinates_of, predicted
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import Blocks, blocks_of
+from faults.diagnosis.circuits.circuit_runs import coordinates_of, predicted
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.severity import severities_at
 from faults.eha.inject import abrupt

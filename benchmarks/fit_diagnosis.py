@@ -27,11 +27,11 @@ from experiments.open_benchmark.loaders import read_truth, rows_of
 from experiments.open_benchmark.score import COEFFICIENTS
 from experiments.published.library import read_library
 from faults.conditions import CONDITIONS
-from faults.diagnosis.actuator import Actuator, actuator_of
-from faults.diagnosis.circuit_runs import coordinates_of
-from faults.diagnosis.class_regions import ClassFits
+from faults.diagnosis.changes.onset import last_part
+from faults.diagnosis.circuits.actuator import Actuator, actuator_of
+from faults.diagnosis.circuits.circuit_runs import coordinates_of
+from faults.diagnosis.circuits.class_regions import ClassFits
 from faults.diagnosis.evidence import EVIDENCES, weigh
-from faults.diagnosis.onset import last_part
 from faults.diagnosis.severity import UNITS, severities, severities_at
 from plant.arrays import Array
 from plant.eha.model import EhaParameters

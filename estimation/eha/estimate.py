@@ -28,7 +28,7 @@ piston starts and stops, which decides no condition."""
 
 LARGEST_SHARE = 0.06
 """Share of the motion that a fit without pressure may leave where anything is concluded from the log [fraction]: as
-much as means over 0.1 s may differ from a circuit's (`faults.diagnosis.out_of_model`)."""
+much as means over 0.1 s may differ from a circuit's (`faults.diagnosis.circuits.out_of_model`)."""
 
 NOT_TOLD = frozenset({RigCode.MAKEUP_UNSEEN})
 """Remarks of a fit that say what a log does not tell, and nothing of the numbers that it does."""

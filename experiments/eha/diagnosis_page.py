@@ -16,7 +16,7 @@ from experiments.page.render import render_page
 from experiments.page.sentences import sentence
 from experiments.page.severity_rows import severity_rows
 from experiments.page.words import in_words
-from faults.diagnosis.blocks import blocks_of
+from faults.diagnosis.circuits.blocks import blocks_of
 
 if TYPE_CHECKING:
     from estimation.finding import Finding

@@ -10,8 +10,8 @@ import pandas as pd
 from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class, named
 from experiments.open_benchmark.loaders import read_truth, rows_of
 from experiments.python_user.log import Log
-from faults.diagnosis.actuator import actuator_of
-from faults.diagnosis.circuit_runs import coordinates_of
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.circuit_runs import coordinates_of
 from faults.diagnosis.severity import severities_at
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError

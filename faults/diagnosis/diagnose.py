@@ -18,24 +18,24 @@ from estimation.identification.model.linear_model import LinearModel
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.notes import RigCode
-from faults.diagnosis.actuator import Actuator, actuator_of
 from faults.diagnosis.advice import advice_for, oil_advice
-from faults.diagnosis.another_oil import whatever_the_oil
-from faults.diagnosis.blocks import LONGEST
+from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
+from faults.diagnosis.beyond_nine.drift import over_drift
+from faults.diagnosis.beyond_nine.load import Loaded, under_load
+from faults.diagnosis.beyond_nine.wear import whatever_fault, whatever_the_pump_delivers
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
-from faults.diagnosis.class_regions import how_near
-from faults.diagnosis.drift import over_drift
+from faults.diagnosis.circuits.actuator import Actuator, actuator_of
+from faults.diagnosis.circuits.blocks import LONGEST
+from faults.diagnosis.circuits.class_regions import how_near
+from faults.diagnosis.circuits.open_classes import circuits_left_open
+from faults.diagnosis.circuits.out_of_model import SOFT, reasons_against, sensors_disagree
 from faults.diagnosis.evidence import weigh
 from faults.diagnosis.failed_search import doubts_after
-from faults.diagnosis.load import Loaded, under_load
 from faults.diagnosis.models_verdict import models_verdict, ranked
-from faults.diagnosis.open_classes import circuits_left_open
-from faults.diagnosis.out_of_model import SOFT, reasons_against, sensors_disagree
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import healthy_severities, limits_of, severities, what_is_not_told, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
-from faults.diagnosis.wear import whatever_fault, whatever_the_pump_delivers
 from faults.eha.bank import mathematical_bank
 from faults.notes import ClassCode
 from plant.eha.model import EhaParameters

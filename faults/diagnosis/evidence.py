@@ -8,15 +8,15 @@ import numpy as np
 from estimation.finding import Change
 from estimation.identification.model.linear_model import LinearModel
 from faults.conditions import CONDITIONS
-from faults.diagnosis.actuator import Actuator
-from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.calibration import Calibration
-from faults.diagnosis.circuit_runs import COORDINATES
-from faults.diagnosis.class_regions import ClassFits, is_stuck, told_apart
+from faults.diagnosis.changes.onset import last_part
+from faults.diagnosis.changes.warming import Drift
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_regions import ClassFits, is_stuck, told_apart
 from faults.diagnosis.innovation_bank import innovation_scores
-from faults.diagnosis.onset import last_part
 from faults.diagnosis.rmse import score_transfer_functions
-from faults.diagnosis.warming import Drift
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
@@ -166,7 +166,7 @@ def within_reach(scores: Array, apart: Array) -> Array:
     scores : ndarray, shape (9,)
         Log-likelihoods of the conditions [dimensionless].
     apart : ndarray, shape (9, 9)
-        How far the log tells one condition from another, see `faults.diagnosis.class_regions.told_apart`.
+        How far the log tells one condition from another, see `faults.diagnosis.circuits.class_regions.told_apart`.
 
     Returns
     -------

@@ -11,12 +11,12 @@ from estimation.eha.result import BulkModulusEstimate
 from estimation.fits.motion.values import share_at
 from estimation.log_checks.clean import CleanLog
 from estimation.notes import EstimateCode
-from faults.diagnosis.actuator import Actuator, actuator_of
-from faults.diagnosis.circuit_runs import COLUMN, parameter_rows
-from faults.diagnosis.class_fit import PointFit
+from faults.diagnosis.circuits.actuator import Actuator, actuator_of
+from faults.diagnosis.circuits.circuit_runs import COLUMN, parameter_rows
+from faults.diagnosis.circuits.class_fit import PointFit
+from faults.diagnosis.circuits.out_of_model import UNEXPLAINED
+from faults.diagnosis.circuits.rivals import doubts_left
 from faults.diagnosis.evidence import Scoreboard
-from faults.diagnosis.out_of_model import UNEXPLAINED
-from faults.diagnosis.rivals import doubts_left
 from plant.eha.model import EhaParameters
 from plant.notes import Note
 
@@ -60,8 +60,8 @@ def doubts_after(
     Returns
     -------
     tuple of Note
-        Those of `faults.diagnosis.rivals.doubts_left`; none that rest on a fit of motion whose search failed, if the
-        motion form leaves no more at the circuit's values than a circuit may.
+        Those of `faults.diagnosis.circuits.rivals.doubts_left`; none that rest on a fit of motion whose search
+        failed, if the motion form leaves no more at the circuit's values than a circuit may.
     """
     left = doubts_left(doubts, board.blocks, board.fits.best)
     large = next((note for note in left if note.code is EstimateCode.POSITION_RESIDUALS_LARGE), None)

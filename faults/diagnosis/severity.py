@@ -9,11 +9,11 @@ import numpy as np
 from estimation.finding import Quantity
 from estimation.log_checks.order import percentile
 from faults.conditions import CONDITIONS
-from faults.diagnosis.actuator import Actuator
-from faults.diagnosis.circuit_runs import COORDINATES, friction_parts, parameter_rows
-from faults.diagnosis.class_fit import WEAK
-from faults.diagnosis.class_regions import ClassFits
-from faults.diagnosis.open_classes import OpenCircuit
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, friction_parts, parameter_rows
+from faults.diagnosis.circuits.class_fit import WEAK
+from faults.diagnosis.circuits.class_regions import ClassFits
+from faults.diagnosis.circuits.open_classes import OpenCircuit
 from faults.notes import ClassCode
 from plant.arrays import Array
 from plant.components.friction import quadratic_friction

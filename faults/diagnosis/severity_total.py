@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from estimation.eha.rig_share import Responses, with_total
 from estimation.finding import Quantity
-from faults.diagnosis.actuator import Actuator
+from faults.diagnosis.circuits.actuator import Actuator
 from plant.components.friction import quadratic_friction
 from plant.eha.doubts import PRESSURE_GAIN, Spread
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.actuator import actuator_of
-from faults.diagnosis.blocks import Blocks, blocks_of
-from faults.diagnosis.class_fit import (
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.blocks import Blocks, blocks_of
+from faults.diagnosis.circuits.class_fit import (
     PointFit,
 )
-from faults.diagnosis.class_regions import (
+from faults.diagnosis.circuits.class_regions import (
     ClassFits,
     fit_classes,
 )

@@ -11,14 +11,14 @@ from benchmarks.scores import calibration_error, share_interval
 from estimation.log_checks.clean import clean_log
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis import wear
-from faults.diagnosis.actuator import actuator_of
+from faults.diagnosis.beyond_nine import wear
+from faults.diagnosis.beyond_nine.other_faults import Outside
 from faults.diagnosis.calibration import Calibration, shipped_calibration
-from faults.diagnosis.circuit_runs import coordinates_of
 from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.circuit_runs import coordinates_of
 from faults.diagnosis.diagnose import diagnose_clean
 from faults.diagnosis.evidence import EVIDENCES
-from faults.diagnosis.other_faults import Outside
 from faults.diagnosis.severity import severities_at
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.drives import make_drive

@@ -7,11 +7,11 @@ import pytest
 
 from estimation.identification import LinearModel
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.actuator import actuator_of
-from faults.diagnosis.blocks import Blocks
 from faults.diagnosis.calibration import Calibration
-from faults.diagnosis.circuit_runs import COORDINATES
-from faults.diagnosis.class_regions import is_stuck
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_regions import is_stuck
 from faults.diagnosis.evidence import FARTHEST, Scoreboard, bounded, friction_left_open, weigh, within_reach
 from faults.diagnosis.rmse import score_transfer_functions
 from plant.eha.circuit_parameters import circuit_of

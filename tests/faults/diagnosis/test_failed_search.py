@@ -12,13 +12,13 @@ from estimation.models.motion import UNKNOWNS
 from estimation.notes import EstimateCode, SensorCode
 from faults.conditions import CONDITIONS
 from faults.diagnosis import failed_search
-from faults.diagnosis.actuator import actuator_of
-from faults.diagnosis.circuit_runs import coordinates_of
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.circuit_runs import coordinates_of
 from faults.diagnosis.evidence import Scoreboard
 from faults.diagnosis.failed_search import doubts_after, values_of
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
-from tests.faults.diagnosis.test_rivals import leaving, log
+from tests.faults.diagnosis.circuits.test_rivals import leaving, log
 
 PAPER = EhaParameters()
 ACTUATOR = actuator_of(PAPER)

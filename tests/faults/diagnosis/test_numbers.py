@@ -8,10 +8,10 @@ import pytest
 
 from estimation.finding import Quantity
 from faults.conditions import CONDITIONS
-from faults.diagnosis.blocks import Blocks, blocks_of
 from faults.diagnosis.calibration import shipped_calibration
-from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
-from faults.diagnosis.class_fit import (
+from faults.diagnosis.circuits.blocks import Blocks, blocks_of
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.circuits.class_fit import (
     WEAK,
     WITHIN,
     PointFit,
@@ -21,7 +21,7 @@ from faults.diagnosis.class_fit import (
     nominal_runs,
     scales_of,
 )
-from faults.diagnosis.class_regions import (
+from faults.diagnosis.circuits.class_regions import (
     believed_information,
     is_stuck,
     lasting_misfit,

@@ -7,12 +7,13 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from faults.diagnosis import class_fit, onset, out_of_model
-from faults.diagnosis.class_fit import _at, _step, fit_freely
-from faults.diagnosis.class_regions import fit_classes
-from faults.diagnosis.onset import _when, part_of
-from faults.diagnosis.out_of_model import _bias, _biases, _larger_pump, _least, _nearest_severity, _one_step
-from faults.diagnosis.split import likeliest_split
+from faults.diagnosis.changes import onset
+from faults.diagnosis.changes.onset import _when, part_of
+from faults.diagnosis.changes.split import likeliest_split
+from faults.diagnosis.circuits import class_fit, out_of_model
+from faults.diagnosis.circuits.class_fit import _at, _step, fit_freely
+from faults.diagnosis.circuits.class_regions import fit_classes
+from faults.diagnosis.circuits.out_of_model import _bias, _biases, _larger_pump, _least, _nearest_severity, _one_step
 from plant.arrays import Array
 from plant.log.record import Record
 from tests.faults.diagnosis.short_logs import ACTUATOR, OFF, blocks, classes, log, made_classes, noted

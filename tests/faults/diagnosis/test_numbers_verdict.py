@@ -10,20 +10,20 @@ import pytest
 from estimation.eha.result import BulkModulusEstimate
 from faults.conditions import severity
 from faults.diagnosis.advice import advice_for, speeds_held
-from faults.diagnosis.blocks import Blocks, blocks_of
+from faults.diagnosis.beyond_nine.force_balance import force_balance
+from faults.diagnosis.beyond_nine.load import first_guesses, under_load
 from faults.diagnosis.calibration import shipped_calibration
-from faults.diagnosis.circuit_runs import coordinates_of
-from faults.diagnosis.class_regions import fit_classes, region_scores
-from faults.diagnosis.end_stop import _stands, stopped
+from faults.diagnosis.changes.end_stop import _stands, stopped
+from faults.diagnosis.changes.onset import find_onset, part_of, parted
+from faults.diagnosis.changes.split import likeliest_split
+from faults.diagnosis.circuits.blocks import Blocks, blocks_of
+from faults.diagnosis.circuits.circuit_runs import coordinates_of
+from faults.diagnosis.circuits.class_regions import fit_classes, region_scores
+from faults.diagnosis.circuits.out_of_model import reasons_against, sensors_disagree
 from faults.diagnosis.evidence import Scoreboard, bounded, friction_left_open, weigh
-from faults.diagnosis.force_balance import force_balance
 from faults.diagnosis.innovation_bank import innovation_scores
-from faults.diagnosis.load import first_guesses, under_load
 from faults.diagnosis.models_verdict import margin, models_verdict
-from faults.diagnosis.onset import find_onset, part_of, parted
-from faults.diagnosis.out_of_model import reasons_against, sensors_disagree
 from faults.diagnosis.rmse import Scores, measured_velocity, score_mathematical
-from faults.diagnosis.split import likeliest_split
 from faults.eha.bank import mathematical_bank
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import circuit_of

@@ -7,10 +7,10 @@ import pytest
 
 from estimation.finding import Quantity
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.actuator import actuator_of
-from faults.diagnosis.circuit_runs import COORDINATES, coordinates_of
-from faults.diagnosis.class_fit import WEAK, PointFit
-from faults.diagnosis.class_regions import ClassFits
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of
+from faults.diagnosis.circuits.class_fit import WEAK, PointFit
+from faults.diagnosis.circuits.class_regions import ClassFits
 from faults.diagnosis.severity import (
     OF_KIND,
     UNITS,

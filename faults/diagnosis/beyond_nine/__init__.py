@@ -1,0 +1,1 @@
+"""Causes beyond the nine conditions: a load, an oil, a worn pump, a valve."""

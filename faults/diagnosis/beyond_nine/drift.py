@@ -1,0 +1,162 @@
+"""Classes of a log over which leakage drifts as with warming oil: where the rig file's oil stands is integrated out.
+
+A rig file has the leakage of one oil temperature, which nobody says. Over a log that warms, the condition that holds at
+its end is another than at its beginning: twice a minor leakage is nearly a major one. Conditions are scored with the
+rig file's oil at the end of the log, halfway and at the beginning, and summed.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.eha.explained import LEAKAGE_COURSE
+from estimation.finding import Quantity
+from estimation.log_checks.clean import CleanLog
+from estimation.notes import RigCode
+from faults.diagnosis.beyond_nine.load import Loaded
+from faults.diagnosis.beyond_nine.wear import whatever_fault
+from faults.diagnosis.calibration import Calibration, shipped_calibration
+from faults.diagnosis.changes.warming import with_course
+from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.circuits.actuator import Actuator, actuator_of
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_fit import LASTING, misfit
+from faults.diagnosis.circuits.class_regions import fit_classes
+from faults.diagnosis.evidence import Scoreboard, models_scores
+from faults.diagnosis.severity import severities
+from faults.notes import AgainstCode
+from plant.arrays import Array
+from plant.notes import Note
+
+EARLIER = (0.5, 0.0)
+"""Where the rig file's oil may stand besides the end of a log [fraction of it]: over the factor of 2 of a log that
+warms by some 15 K, neighbours are three deviations of actuators of one kind apart, and none is farther than 1.5."""
+
+PLACED = {AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS}
+"""What speaks against a log in one oil, and not in another."""
+
+
+def over_drift(diagnosed: Callable[[CleanLog], Loaded], log: CleanLog, notes: Sequence[Note]) -> Loaded:
+    """Return a diagnosis whose classes are weighed over where in a drift of leakage the rig file's oil stands.
+
+    Each place counts alike before the log is seen, and by how well the nine conditions hold the log there. What speaks
+    against all nine for where the circuit lies does so only where it does at every place.
+
+    Parameters
+    ----------
+    diagnosed : callable
+        Gives the diagnosis of a log.
+    log : CleanLog
+        The log, set right.
+    notes : sequence of Note
+        What explains it.
+
+    Returns
+    -------
+    Loaded
+        The diagnosis at the end of the log; with the classes of all places where `LEAKAGE_DRIFTS` is among the notes,
+        or where the diagnosis of a log without pressure found a drift, which then is one of its notes.
+    """
+    last = diagnosed(log)
+    if (drift := last.diagnosis.scoreboard.drift) is not None:
+        log, note = with_course(log, drift)
+        last, notes = diagnosed(log), (*notes, note)
+        last = last._replace(notes=(note, *last.notes))
+        if note.code is RigCode.LEAKAGE_GROWS:
+            return last._replace(diagnosis=replace(last.diagnosis, against=(note, *last.diagnosis.against)))
+    if all(note.code is not RigCode.LEAKAGE_DRIFTS for note in notes):
+        return last
+    course = log.record[LEAKAGE_COURSE]
+    there = [float(course[round(share * (len(course) - 1))]) for share in EARLIER]
+    found = [last.diagnosis, *(diagnosed(_with_oil_of(log, one)).diagnosis for one in there)]
+    placed = next((one for one in found if _is_placed(one)), found[0])
+    calibration = shipped_calibration()
+    if drift is not None:
+        actuator = actuator_of(last.parameters)
+        found[0] = _followed(found, [1.0, *there], actuator, calibration)
+        likeliest = max(range(len(found)), key=lambda place: _likely(found[place], calibration))
+        placed = found[likeliest] = whatever_fault(found[likeliest], actuator, calibration)
+    diagnosis = replace(
+        found[0],
+        probabilities=weighed(found, calibration),
+        against=placed.against,
+        severity={name: _whatever_the_oil(name, found) for name in found[0].severity},
+        not_told=placed.not_told if drift is not None else found[0].not_told,
+    )
+    return last._replace(diagnosis=diagnosis)
+
+
+def _likely(one: Diagnosis, calibration: Calibration) -> tuple[bool, float]:
+    """Return what a place is chosen by: whether the circuit lies in a condition there, then its evidence."""
+    return _is_placed(one), _evidence(one.scoreboard, calibration)
+
+
+def _is_placed(one: Diagnosis) -> bool:
+    return not any(note.code in PLACED for note in one.against)
+
+
+def _followed(
+    found: Sequence[Diagnosis], courses: Sequence[float], actuator: Actuator, calibration: Calibration
+) -> Diagnosis:
+    """Return the diagnosis at the end of a log, its circuit fitted on from another place's where that follows better.
+
+    A doubled leakage lies far from all conditions, and a search from these may end short.
+    """
+    misfits = [misfit(one.scoreboard.blocks, one.scoreboard.fits.best.fitted) for one in found]
+    best, last = int(np.argmin(misfits)), found[0]
+    if misfits[0] < misfits[best] + LASTING:
+        return last
+    start = found[best].scoreboard.fits.best.coordinates.copy()
+    start[COORDINATES.index("leakage")] -= np.log(courses[best])
+    board = last.scoreboard
+    fits = fit_classes(board.blocks, actuator, start=start)
+    severity = severities(fits, actuator, calibration.widths(board.blocks.pressure is not None))
+    return replace(last, scoreboard=replace(board, fits=fits), severity=severity)
+
+
+def weighed(found: Sequence[Diagnosis], calibration: Calibration) -> Mapping[str, float]:
+    """Return the probability of each condition over diagnoses of one log, which are alike beforehand.
+
+    Parameters
+    ----------
+    found : sequence of Diagnosis
+        They count by their evidences where all compare the same stretch of the log, else alike.
+    calibration : Calibration
+        Weights of the evidences.
+
+    Returns
+    -------
+    Mapping[str, float]
+        Probability by condition [probability].
+    """
+    boards = [one.scoreboard for one in found]
+    counts = boards[0].blocks.counts
+    alike = all(np.array_equal(board.blocks.counts, counts) for board in boards)
+    shares = np.array([_evidence(board, calibration) for board in boards]) if alike else np.zeros(len(boards))
+    shares = np.exp(shares - np.max(shares))
+    each: Array = np.array([list(one.probabilities.values()) for one in found])
+    return dict(zip(found[0].probabilities, (float(one) for one in shares @ each / np.sum(shares)), strict=True))
+
+
+def _evidence(board: Scoreboard, calibration: Calibration) -> float:
+    """Return how well the conditions together hold a log, with the weights of the evidences that know its drift."""
+    weights = calibration.weights(board.blocks.pressure is not None)
+    best = {"parameters": float(np.max(board.fits.scores)), "models": float(np.max(models_scores(board.fits)))}
+    below = np.sum([weights[name] * board.log_odds[name] for name in best], axis=0)
+    return sum(weights[name] * value for name, value in best.items()) + float(np.logaddexp.reduce(below))
+
+
+def _with_oil_of(log: CleanLog, leakage: float) -> CleanLog:
+    """Return a log with the rig file's oil where its leakage is so much of what it is at the end."""
+    course = log.record[LEAKAGE_COURSE] / leakage
+    return replace(log, record=log.record.replace(**{LEAKAGE_COURSE: course}))
+
+
+def _whatever_the_oil(name: str, found: Sequence[Diagnosis]) -> Quantity:
+    """Return a severity as at the end of a log, with a total interval that holds those of all places."""
+    each = [one.severity[name] for one in found]
+    ends = [one.ci95 for one in each if one.ci95 is not None]
+    if each[0].ci95 is None:
+        return each[0]
+    return replace(each[0], ci95_total=(min(low for low, _ in ends), max(high for _, high in ends)))

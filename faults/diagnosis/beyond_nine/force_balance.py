@@ -1,0 +1,187 @@
+"""The load on the rod by the force balance of a sliding piston, without a model of how it breaks loose.
+
+While the piston slides one way its friction is a smooth function of its speed. So pressure over area is linear in what
+holds the rod back, a constant force, a spring and an inertia, and in the coefficients of friction. If it slides one way
+only, friction at rest is known as far as conditions differ in it, and a constant force no better.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.class_fit import LASTING
+from plant.arrays import Array
+from plant.components.oil import ATMOSPHERE
+from plant.eha.model import EhaParameters
+
+BROKEN_LOOSE = 1e-4
+"""Travel after a reversal from which friction is that of sliding [m]: five times what strains the seals; judged."""
+
+HEARD = 4.0
+"""Noise over which velocity tells a way [dimensionless], in standard deviations."""
+
+FEWEST = 20
+"""Blocks of a sliding piston below which nothing is said [count]: 0.2 s."""
+
+UNLIKE = 0.3
+"""By how much friction at rest may differ within a condition, in its logarithm [dimensionless], as in `WEAK`."""
+
+FREE = 10.0
+"""How far its other coefficients may lie from none, over the largest that a condition has [dimensionless]."""
+
+SURE = 4.0
+"""Standard deviations from which a load is believed [dimensionless]. On 119 plain training logs none is 1.4."""
+
+LEAST = {"load_force": 0.05, "load_stiffness": 0.01, "moving_mass": 0.01}
+"""Share of the pressure's force, root mean square, from which a load matters [fraction]: a sensor's offset counts from
+0.05 on, and what depends on place or acceleration is none."""
+
+LAGGING = 8.0
+"""Standard deviation of an inertia that friction may hide, as it lags speed [kg]: of 60 to 300 kg up to 12 were hidden
+on training logs where the balance alone was sure to 4."""
+
+NAMES = tuple(LEAST)
+"""What holds a rod back, as the actuator has it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """What holds a rod back beyond what a rig file says.
+
+    Parameters
+    ----------
+    values : ndarray, shape (3,)
+        More constant force against extension [N], more stiffness of a spring that is free where position is zero [N/m],
+        and more mass that moves [kg].
+    std : ndarray, shape (3,)
+        Their standard deviations.
+    shares : ndarray, shape (3,)
+        How large a force each is, over that of the pressure, both root mean square [fraction].
+    """
+
+    values: Array
+    std: Array
+    shares: Array
+
+    @property
+    def sure(self) -> tuple[str, ...]:
+        """Those of `NAMES` that are more than doubt; springs and masses hold back."""
+        sure = np.abs(self.values) > SURE * self.std
+        sure[1:] &= self.values[1:] > 0.0
+        return tuple(name for name, one in zip(NAMES, sure, strict=True) if one)
+
+    @property
+    def believed(self) -> tuple[str, ...]:
+        """Those that are large enough to matter, too."""
+        large = dict(zip(NAMES, self.shares, strict=True))
+        return tuple(name for name in self.sure if large[name] > LEAST[name])
+
+    def of(self, name: str) -> tuple[float, float]:
+        """Return a load and its standard deviation [N, N/m or kg]."""
+        at = NAMES.index(name)
+        return float(self.values[at]), float(self.std[at])
+
+
+def force_balance(blocks: Blocks, p: EhaParameters) -> Loads | None:
+    """Return the load on the rod that the force balance shows where the piston slides.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    p : EhaParameters
+        The actuator, as its rig file has it.
+
+    Returns
+    -------
+    Loads or None
+        The load; None without pressure, and where the piston hardly slides.
+    """
+    if blocks.pressure is None:
+        return None
+    step = blocks.block * blocks.sample_time
+    velocity = np.nan_to_num(blocks.velocity)
+    position = blocks.place + step * (np.cumsum(velocity) - 0.5 * velocity)
+    use = sliding_blocks(blocks) & np.isfinite(blocks.pressure)
+    use[: blocks.first] = False
+    if np.count_nonzero(use) < FEWEST:
+        return None
+    v, dp, x, a = velocity[use], blocks.pressure[use], position[use], np.gradient(velocity, step)[use]
+    held = 2.0 * (p.accumulator_pressure - ATMOSPHERE)  # one chamber is at the inner circuit's pressure
+    push = (
+        p.piston_area * (dp + p.area_difference * (held + np.abs(dp)))
+        - p.moving_mass * a
+        - p.load_force
+        - p.load_stiffness * x
+    )
+    columns = np.column_stack([np.ones(len(v)), x, a, np.sign(v), v, v * np.abs(v)])
+    believed, spread = friction_believed(p)
+    count = len(NAMES)
+    found, covariance = _regressed(
+        columns, push, np.append(np.zeros(count), believed), np.append(np.full(count, np.inf), spread)
+    )
+    values, std = found[:count], np.sqrt(np.maximum(np.diag(covariance)[:count], 0.0))
+    # two unlike areas turn that pressure into a force, and nothing measures it
+    std = np.hypot(std, [p.piston_area * p.area_difference * held, 0.0, LAGGING])
+    size = p.piston_area * float(np.sqrt(np.mean(dp**2)))
+    forces = np.abs(values) * [1.0, float(np.std(x)), float(np.std(a))]
+    return Loads(values, std, forces / max(size, np.finfo(np.float64).tiny))
+
+
+def _regressed(columns: Array, push: Array, centre: Array, doubt: Array) -> tuple[Array, Array]:
+    """Return coefficients and their covariance, from what is believed of them and errors that last."""
+    sizes = np.maximum(np.max(np.abs(columns), axis=0), np.finfo(np.float64).tiny)
+    scaled, pull = columns / sizes, 1.0 / (doubt * sizes) ** 2
+    begun = centre * sizes
+    noise, found, known = float(np.var(push)), begun, np.eye(len(sizes))
+    for _ in range(2):  # once for the size of what is left, once with it
+        weight = 1.0 / (LASTING * max(noise, np.finfo(np.float64).tiny))
+        known = weight * scaled.T @ scaled + np.diag(pull + 1e-12 * weight * len(push))
+        found = begun + np.linalg.solve(known, weight * scaled.T @ (push - scaled @ begun))
+        noise = float(np.mean((push - scaled @ found) ** 2))
+    return found / sizes, np.linalg.inv(known) / np.outer(sizes, sizes)
+
+
+def sliding_blocks(blocks: Blocks) -> NDArray[np.bool_]:
+    """Return where the piston has slid one way for long enough that friction is that of sliding.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Whether it has, by block.
+    """
+    velocity, step = np.nan_to_num(blocks.velocity), blocks.block * blocks.sample_time
+    way = np.sign(velocity)
+    gone = np.cumsum(np.abs(velocity)) * step
+    turned = np.append(True, way[1:] != way[:-1])
+    since = gone - np.maximum.accumulate(np.where(turned, gone, 0.0))
+    same = np.append(way[1:] == way[:-1], False)
+    return np.isfinite(blocks.velocity) & same & (since > BROKEN_LOOSE) & (np.abs(velocity) > HEARD * blocks.noise[0])
+
+
+def friction_believed(p: EhaParameters) -> tuple[Array, Array]:
+    """Return what is believed of friction before a log is seen, whatever the condition.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The healthy actuator.
+
+    Returns
+    -------
+    tuple of ndarray, each of shape (3,)
+        Friction at rest [N], its linear [N s/m] and its quadratic part [N s^2/m^2], and how far each may be off.
+    """
+    each = [parameters_for(condition, p) for condition in CONDITIONS.values()]
+    rest, linear, bent = np.array([[q.friction_coulomb, q.friction_linear, q.friction_quadratic] for q in each]).T
+    middle = float(np.mean(rest))
+    spread = np.array([float(np.std(rest)) + UNLIKE * middle, FREE * np.max(np.abs(linear)), FREE * np.max(bent)])
+    return np.array([middle, 0.0, 0.0]), np.maximum(spread, np.finfo(np.float64).tiny)

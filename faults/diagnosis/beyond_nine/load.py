@@ -1,0 +1,203 @@
+"""The load on the rod, where a log shows one: what moves the force balance and leaves the flow balance alone.
+
+A constant force on the rod shifts differential pressure by as much as a sensor's offset does, yet no oil leaks for an
+offset. So where the flow form explains a log, what shifts its pressures is a load. How large it is the force balance of
+the sliding piston tells, and a circuit fitted under it has to follow the log.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from estimation.eha.result import BulkModulusEstimate
+from estimation.finding import interval_95
+from faults.diagnosis.beyond_nine.force_balance import LEAST, SURE, Loads, force_balance, friction_believed
+from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.class_fit import LASTING, misfit
+from faults.notes import AgainstCode, ClassCode
+from plant.eha.model import EhaParameters
+from plant.notes import Note
+
+LOADS_TRIED = 3
+"""Circuits that are fitted under a load at most: what a bias asks for is read off one linear step."""
+
+ASKING = {AgainstCode.PRESSURE_BIAS, AgainstCode.UNEXPLAINED}
+"""What speaks against a circuit that stands under another load than it is told."""
+
+
+class Loaded(NamedTuple):
+    """A diagnosis under the load that explains a log.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        What the circuit under the load says.
+    parameters : EhaParameters
+        The actuator with its load; the rig file's where no load explains the log.
+    notes : tuple of Note
+        The loads by name.
+    """
+
+    diagnosis: Diagnosis
+    parameters: EhaParameters
+    notes: tuple[Note, ...] = ()
+
+
+Diagnosed: TypeAlias = Callable[[EhaParameters, float], Diagnosis]
+"""What the circuit fitted around an actuator says of a log, where the force on its rod is known so well [N]."""
+
+
+def under_load(diagnosed: Diagnosed, parameters: EhaParameters, estimate: BulkModulusEstimate) -> Loaded:
+    """Return a diagnosis under the load that explains a log.
+
+    Parameters
+    ----------
+    diagnosed : callable
+        ``diagnosed(parameters, std)``: what the circuit fitted around an actuator says of the log, where the constant
+        force on its rod has this standard deviation [N].
+    parameters : EhaParameters
+        The actuator, as its rig file has it.
+    estimate : BulkModulusEstimate
+        What the flow form found.
+
+    Returns
+    -------
+    Loaded
+        The diagnosis, and the actuator with its load; those of the rig file where no load explains the log.
+    """
+    first = diagnosed(parameters, 0.0)
+    blocks = first.scoreboard.blocks
+    seen, asks = force_balance(blocks, parameters), _asks(first)
+    names = () if seen is None else seen.sure if asks else seen.believed
+    guesses: Iterable[EhaParameters] = ()
+    if seen is not None and names:
+        guesses = [with_loads(parameters, seen, names)]
+    elif asks and _open(seen, blocks, parameters):
+        guesses = first_guesses(blocks, parameters, estimate, seen)
+    found = _followed(diagnosed, guesses, seen, parameters)
+    return found if found is not None and (asks or _better(found.diagnosis, first)) else Loaded(first, parameters)
+
+
+def with_loads(p: EhaParameters, seen: Loads, names: Sequence[str]) -> EhaParameters:
+    """Return an actuator with loads of the force balance.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator, as its rig file has it.
+    seen : Loads
+        What the force balance shows beyond that.
+    names : sequence of str
+        Which of its loads.
+
+    Returns
+    -------
+    EhaParameters
+        It, with them.
+    """
+    return replace(p, **{name: getattr(p, name) + seen.of(name)[0] for name in names})
+
+
+def first_guesses(
+    blocks: Blocks, parameters: EhaParameters, estimate: BulkModulusEstimate, seen: Loads | None
+) -> Iterator[EhaParameters]:
+    """Yield the actuator under each load that a log may show and that the force balance is not sure of.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log, with pressure.
+    parameters : EhaParameters
+        The actuator, as its rig file has it.
+    estimate : BulkModulusEstimate
+        What the flow form found.
+    seen : Loads or None
+        What the force balance shows.
+
+    Yields
+    ------
+    EhaParameters
+        Under the likeliest constant force by that balance; under the load that holds the log's first pressure, if it
+        begins under one; under the load that holds its mean pressure.
+    """
+    if seen is not None:
+        yield with_loads(parameters, seen, ["load_force"])
+    found = {} if estimate.explanation is None else estimate.explanation.values
+    if parameters.load_force == 0.0 and "start_pressure" in found:
+        yield replace(parameters, load_force=found["start_pressure"][0] * parameters.piston_area)
+    if blocks.pressure is not None:
+        yield replace(parameters, load_force=float(np.nanmean(blocks.pressure)) * parameters.piston_area)
+
+
+def _followed(
+    diagnosed: Diagnosed,
+    guesses: Iterable[EhaParameters],
+    seen: Loads | None,
+    rig: EhaParameters,
+) -> Loaded | None:
+    """Return the first load under which a circuit follows the log, each corrected by the bias that is left of it."""
+    std = _force(seen, rig)[1]
+    for guess in guesses:
+        loaded = guess
+        for _ in range(LOADS_TRIED):
+            found = diagnosed(loaded, std if loaded.load_force != rig.load_force else 0.0)
+            if not _asks(found):
+                return _told(found, loaded, seen, rig)
+            biases = [float(note.data["bias_pa"]) for note in found.against if note.code is AgainstCode.PRESSURE_BIAS]
+            if not biases:
+                break
+            loaded = replace(loaded, load_force=loaded.load_force + biases[0] * loaded.piston_area)
+    return None
+
+
+def _told(found: Diagnosis, loaded: EhaParameters, seen: Loads | None, rig: EhaParameters) -> Loaded | None:
+    """Return a diagnosis with its loads by name; None where the force balance has them otherwise."""
+    more = loaded.load_force - rig.load_force
+    force, std = _force(seen, rig)
+    if seen is not None and more != 0.0 and abs(more - force) > SURE * std:
+        return None
+    notes: list[Note] = []
+    if more != 0.0:
+        value, (low, high) = loaded.load_force, interval_95(loaded.load_force, std)
+        bias = value / loaded.piston_area
+        notes.append(ClassCode.LOAD_ON_ROD.note(force_n=value, low=low, high=high, pressure_pa=bias))
+    if seen is not None and (value := loaded.load_stiffness) != rig.load_stiffness:
+        low, high = interval_95(value, seen.of("load_stiffness")[1])
+        notes.append(ClassCode.SPRING_ON_ROD.note(value=value, low=low, high=high, rig=rig.load_stiffness))
+    if seen is not None and (value := loaded.moving_mass) != rig.moving_mass:
+        low, high = interval_95(value, seen.of("moving_mass")[1])
+        notes.append(ClassCode.MASS_ON_ROD.note(value=value, low=low, high=high, rig=rig.moving_mass))
+    return Loaded(found, loaded, tuple(notes))
+
+
+def _asks(found: Diagnosis) -> bool:
+    return any(note.code in ASKING for note in found.against)
+
+
+def _better(found: Diagnosis, first: Diagnosis) -> bool:
+    """Return whether a circuit under a load follows a log better than one without, and no more speaks against it."""
+    (under, loaded), (free, without) = ((one.scoreboard.blocks, one.scoreboard.fits) for one in (found, first))
+    if len(found.against) > len(first.against):
+        return False
+    if not np.array_equal(under.counts, free.counts):
+        return True
+    return misfit(under, loaded.best.fitted) < misfit(free, without.best.fitted) - LASTING
+
+
+def _open(seen: Loads | None, blocks: Blocks, p: EhaParameters) -> bool:
+    """Return whether the force balance leaves room for a constant force that matters."""
+    if seen is None or blocks.pressure is None:
+        return True
+    size = p.piston_area * float(np.sqrt(np.nanmean(blocks.pressure**2)))
+    return SURE * seen.of("load_force")[1] > LEAST["load_force"] * size
+
+
+def _force(seen: Loads | None, p: EhaParameters) -> tuple[float, float]:
+    """Return the constant force and its standard deviation [N]; friction holds a piston that sticks either way."""
+    if seen is not None:
+        return seen.of("load_force")
+    rest, spread = (one[0] for one in friction_believed(p))
+    return 0.0, float(rest + spread)

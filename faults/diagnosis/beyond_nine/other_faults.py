@@ -1,0 +1,321 @@
+"""Faults outside the nine conditions, without pressure: does one explain the log better than any of the nine.
+
+Where pressure is logged, the balance of flows looks for a worn pump, for make-up valves that stick or leak and for a
+relief valve that is set low. Without pressure, a circuit with each of these faults is compared with a sound one over
+the regions of all nine conditions (`class_regions`): the difference of their scores is the logarithm of a Bayes factor.
+What no rig file knows of a sound circuit (its case drain, its make-up valves) may explain more than a fault does, so
+the best of several sound circuits is taken.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.eha.rig_share import DELIVERY_ENTRY
+from estimation.fits.hypotheses import PRESUMED
+from faults.conditions import CONDITIONS
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
+from faults.diagnosis.circuits.class_fit import LASTING, PointFit, misfit, nominal_runs
+from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes, is_stuck
+from faults.notes import AgainstCode, ClassCode
+from plant.arrays import Array
+from plant.eha.circuit_parameters import CircuitParameters
+from plant.eha.one_sided import one_sided
+from plant.notes import Note
+
+GAIN = 4.0
+"""Log-likelihood over all regions that a fault must gain to be believed, in `LASTING` blocks that count as one
+[dimensionless]: a Bayes factor of 55. It is as likely as not then, which is what is presumed of such a fault."""
+
+NOT_EXCLUDED = -3.0
+"""The same, from which a fault is not excluded [dimensionless]: a Bayes factor of a twentieth."""
+
+HOPELESS = 20.0
+"""Log-likelihood below the sound circuit at which a rough search leaves a fault [dimensionless]: a thorough one gained
+up to 26 on it, but few. A search that would not come to it in the steps that are left ends there too."""
+
+WORN = "a worn pump"
+"""What that fault is called."""
+
+EARLY = "a relief valve that opens early"
+"""What that one is called."""
+
+DELIVERIES = (0.7, 0.8, 0.9)
+"""Shares of its displacement that a worn pump delivers [dimensionless]."""
+
+LIKELIER = 10.0
+"""How many times likelier than a sound pump a well worn one must be to be believed [dimensionless]: evidence is called
+strong from there on (Jeffreys, Theory of Probability, 1961, appendix B). Of 16 sound training logs under major leakage
+and friction none comes to more than 1.4."""
+
+WORTH_SAYING = 0.01
+"""Probability of a fault from which it is said beside its name [probability]."""
+
+WELL_WORN = 0.8
+"""Share up to which a pump is a worn one whatever the rig file's displacement is worth [dimensionless]: an entry may be
+off by 5 %, and what is presumed of wear has a deviation of 15 %."""
+
+SEATS = (0.4, 1.0)
+"""Leakage past the seat of a make-up valve, over all the leakage of an actuator with major leakage [dimensionless]."""
+
+SETTINGS = (0.75, 0.9)
+"""Settings of a relief valve, over the largest pressure that the sound circuit comes to in the log [dimensionless]."""
+
+SO_SET = math.log(math.log(SETTINGS[1] / SETTINGS[0]) / math.log(10.0))
+"""Log-likelihood that a low relief valve is set so, before a log is seen [dimensionless]: it may be set to a tenth of
+what it should be, below which no piston slides, and each of `SETTINGS` stands for those about it."""
+
+WIDER = 5.0
+"""By how much wider make-up valves are tried [dimensionless]: no rig file knows them."""
+
+
+class Outside(NamedTuple):
+    """What is said of faults outside the nine conditions.
+
+    Parameters
+    ----------
+    against : tuple of Note
+        The fault that a log shows, which speaks against all nine.
+    open : tuple of Note
+        The faults that it does not tell.
+    worn : ndarray, shape (1 + pumps, 9), optional
+        How well each condition holds it with a sound pump, then with one that delivers each of `DELIVERIES`:
+        log-likelihoods [dimensionless]; None where a worn pump is excluded.
+    faulty : float
+        Probability that one of the faults that the log does not tell is there [probability].
+    """
+
+    against: tuple[Note, ...] = ()
+    open: tuple[Note, ...] = ()
+    worn: Array | None = None
+    faulty: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A circuit, and how well it explains a log within the regions of the nine conditions."""
+
+    actuator: Actuator
+    fits: ClassFits
+
+    @property
+    def score(self) -> float:
+        return float(np.max(self.fits.scores))
+
+
+@dataclass(frozen=True)
+class _Fault:
+    """A fault: what is said where it is there, what it is called where it is not excluded, and a circuit with it.
+
+    The search for one that moves the log into another condition begins in that, any other at the sound circuit.
+    What is presumed is the log-likelihood of its size before a log is seen [dimensionless].
+    """
+
+    note: Note
+    name: str
+    circuit: CircuitParameters
+    elsewhere: bool = False
+    presumed: float = 0.0
+
+
+def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outside:
+    """Return the fault outside the nine conditions that a log without pressure shows, and those that it does not tell.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks, without pressure.
+    fits : ClassFits
+        The circuits fitted to it.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    Outside
+        What is said of them; nothing with pressure, and where the piston sticks.
+    """
+    if blocks.pressure is not None or is_stuck(blocks, actuator):
+        return Outside()
+    runs = nominal_runs(blocks, actuator)
+    sound = _sound(blocks, fits, actuator, runs)
+    gains, worn = dict[str, float](), list[_Tried]()
+    found: tuple[float, _Fault, _Tried] | None = None
+    for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best, sound.actuator)):
+        tried = _with(fault, blocks, sound, runs)
+        gain = tried.score - sound.score + fault.presumed
+        gains[fault.name] = max(gain, gains.get(fault.name, gain))
+        worn += [tried] if fault.name == WORN else []
+        if found is None or gain > found[0]:
+            found = gain, fault, tried
+    best, delivered = sound.fits.scores, [one.score for one in worn]
+    wear = odds_of_wear(delivered, sound.score)
+    if found is not None and (found[0] > GAIN or wear > math.log(LIKELIER)):
+        # a search may end short of the best: the sound circuit is asked again from where the faulty one ended, and anew
+        _, fault, tried = found
+        starts = (tried.fits.best.coordinates, None)
+        again = [fit_classes(blocks, sound.actuator, runs=runs, start=start).scores for start in starts]
+        best = max([best, *again], key=lambda scores: float(np.max(scores)))
+        gains[fault.name] = tried.score - float(np.max(best)) + fault.presumed
+        if gains[fault.name] > GAIN:
+            return Outside((fault.note,))
+        wear = odds_of_wear(delivered, float(np.max(best)))
+        if wear > math.log(LIKELIER):
+            return Outside((_delivering(DELIVERIES[int(np.argmax(delivered))]),))
+    odds = {name: gain - GAIN for name, gain in gains.items() if gain > NOT_EXCLUDED}
+    if WORN in odds:
+        odds[WORN] = wear
+    chances = probabilities_of(odds)
+    # a setting just under the largest pressure leaves no trace: no log excludes it, and saying so tells nothing
+    open_ = {name: chance for name, chance in chances.items() if name != EARLY or chance > WORTH_SAYING}
+    scores = np.array([best, *(one.fits.scores for one in worn)]) if WORN in odds else None
+    return Outside((), _not_excluded(open_), scores, sum(chances.values()))
+
+
+def _not_excluded(faults: Mapping[str, float]) -> tuple[Note, ...]:
+    """Return a note that names the faults that a log does not exclude, each with its probability."""
+    named = [f"{one} ({100.0 * chance:.0f} %)" if chance > WORTH_SAYING else one for one, chance in faults.items()]
+    return (ClassCode.NOT_EXCLUDED.note(faults=", ".join(named)),) if named else ()
+
+
+def probabilities_of(odds: Mapping[str, float]) -> dict[str, float]:
+    """Return the probability of each of several faults, of which at most one is there.
+
+    Parameters
+    ----------
+    odds : Mapping[str, float]
+        How much likelier each is than none: logarithms of ratios, by name [dimensionless].
+
+    Returns
+    -------
+    dict[str, float]
+        Probability by name [probability]; what is left is that of none.
+
+    Examples
+    --------
+    >>> {name: round(chance, 2) for name, chance in probabilities_of({"one": 0.0, "other": 0.0}).items()}
+    {'one': 0.33, 'other': 0.33}
+    >>> probabilities_of({"one": -math.inf})
+    {'one': 0.0}
+    """
+    together = np.logaddexp.reduce([0.0, *odds.values()])
+    return {name: math.exp(one - together) for name, one in odds.items()}
+
+
+def odds_of_wear(scores: Sequence[float], sound: float) -> float:
+    """Return how much likelier a log makes a well worn pump than a sound one, with what is presumed of wear.
+
+    What is presumed of wear before a log is seen is that of `faults.diagnosis.beyond_nine.wear.summed_over_wear`.
+
+    Parameters
+    ----------
+    scores : sequence of float
+        How well pumps that deliver each of `DELIVERIES` explain a log [dimensionless].
+    sound : float
+        The same of a sound pump [dimensionless].
+
+    Returns
+    -------
+    float
+        Logarithm of the ratio of pumps that deliver `WELL_WORN` at most to sound ones [dimensionless].
+
+    Examples
+    --------
+    >>> odds_of_wear([-9.0, 0.0, 9.0], 0.0) < 0.0 < odds_of_wear([-9.0, 2.0, 0.0], 0.0)
+    True
+    """
+    well = np.array(DELIVERIES) <= WELL_WORN
+    return float(np.logaddexp.reduce((np.array(scores) - sound + presumed_of_wear(DELIVERIES))[well]))
+
+
+def presumed_of_wear(shares: Sequence[float]) -> Array:
+    """Return the log-likelihoods of what pumps deliver before a log is seen.
+
+    Parameters
+    ----------
+    shares : sequence of float
+        What they deliver over their displacement [dimensionless].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Half a normal distribution of the logarithm of deviation `PRESUMED`, 0 for a sound pump [dimensionless].
+    """
+    return np.asarray(-0.5 * (np.log(shares) / PRESUMED[DELIVERY_ENTRY]) ** 2, dtype=np.float64)
+
+
+def largest_pressure(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float:
+    """Return the largest pressure that a fitted circuit comes to in a log without pressure.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    fit : PointFit
+        The circuit.
+    actuator : Actuator
+        The actuator around it.
+
+    Returns
+    -------
+    float
+        Mean over a block [Pa].
+    """
+    seen = replace(blocks, pressure=np.zeros(len(blocks.velocity)))
+    rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
+    return float(np.max(np.abs(predicted(seen, rows)[0, blocks.first :, 1])))
+
+
+def _with(fault: _Fault, blocks: Blocks, sound: _Tried, runs: Array) -> _Tried:
+    """Return the circuit with a fault that explains a log best."""
+    faulty = replace(sound.actuator, circuit=fault.circuit)
+    wanted = LASTING * (HOPELESS - sound.score)  # no region holds a circuit better than its misfit says
+    if not fault.elsewhere:
+        start = sound.fits.best.coordinates
+        return _Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
+    runs = nominal_runs(blocks, faulty)
+    start = faulty.conditions[int(np.argmin([misfit(blocks, run) for run in runs]))]
+    roughly = _Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
+    if roughly.score < sound.score - HOPELESS:
+        return roughly
+    anew = _Tried(faulty, fit_classes(blocks, faulty, runs=runs, wanted=wanted))
+    return max(roughly, anew, key=lambda one: one.score)
+
+
+def _sound(blocks: Blocks, fits: ClassFits, actuator: Actuator, runs: Array) -> _Tried:
+    """Return the circuit without a fault that explains a log best, among some that differ in what no rig file knows."""
+    tried, healthy = [_Tried(actuator, fits)], actuator.circuit
+    undrained = replace(healthy, pump_case_leakage=0.0)
+    wider = {"makeup_conductance": WIDER * healthy.makeup_conductance}
+    for circuit in (undrained, replace(healthy, **wider), replace(undrained, **wider)):
+        other = replace(actuator, circuit=circuit)
+        tried.append(_Tried(other, fit_classes(blocks, other, runs=runs, start=fits.best.coordinates)))
+    return max(tried, key=lambda one: one.score)
+
+
+def _delivering(share: float) -> Note:
+    return AgainstCode.PUMP_DELIVERS_LESS.note(percent=100.0 * share)
+
+
+def _faults(actuator: Actuator, pressure: float) -> Iterator[_Fault]:
+    """Yield the faults that are looked for, where the sound circuit comes to a pressure [Pa]."""
+    sound = actuator.circuit
+    for share in DELIVERIES:
+        worn = replace(sound, pump_displacement=share * sound.pump_displacement)
+        yield _Fault(_delivering(share), WORN, worn, elsewhere=True)
+    for share in SETTINGS if 0.0 < pressure < math.inf else ():
+        early = replace(sound, relief_pressure=share * pressure)
+        yield _Fault(AgainstCode.RELIEF_EARLY.note(), EARLY, early, presumed=SO_SET)
+    major = actuator.conditions[list(CONDITIONS).index("major_leakage"), COORDINATES.index("leakage")]
+    for side in "ab":
+        stuck = one_sided(sound, **{f"makeup_shut_{side}": 1.0})
+        note = AgainstCode.MAKEUP_STUCK.note(side=side.upper())
+        yield _Fault(note, "a make-up valve that is stuck shut", stuck)
+        for size in SEATS:
+            leaking = one_sided(sound, **{f"seat_leakage_{side}": size * float(np.exp(major))})
+            yield _Fault(AgainstCode.MAKEUP_LEAKS.note(), "a make-up valve that leaks", leaking)

@@ -1,0 +1,1 @@
+"""What changed within a log, and when."""

@@ -1,0 +1,68 @@
+"""Did the piston run into a stop that no rig file names? A circuit with one is laid beside the circuit without."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.class_fit import LASTING, misfit
+from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
+
+RESTS = 0.05
+"""Least time that a piston stands at the farthest place it reached before that may be a stop [s]."""
+
+NEAR = 2e-4
+"""How near to its farthest place a piston is taken to stand there [m]: a stop yields, and an encoder has its steps."""
+
+POOR = 0.06
+"""Share of velocity or of pressure, root mean square, that a circuit must leave before a stop is looked for [fraction]:
+half of what makes a log unknown."""
+
+GAIN = 10.0
+"""Log-likelihood that a stop must gain, in `LASTING` blocks that count as one [dimensionless]."""
+
+
+def stopped(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[Blocks, ClassFits]:
+    """Return a log with the stop that its piston ran into, and the circuits fitted with it.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    fits : ClassFits
+        The circuits fitted without a stop.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    tuple of Blocks and ClassFits
+        As they came where the piston does not stand at its farthest place, where a circuit without a stop follows it,
+        or where a stop there explains no more than friction does. What the log holds while the piston stands at the
+        stop is then missing: how a stop yields would be taken for friction.
+    """
+    if np.all(fits.best.scales <= POOR * blocks.sizes) or not _stands(blocks):
+        return blocks, fits
+    with_stop = replace(blocks, stop=blocks.reach)
+    again = fit_classes(with_stop, actuator)
+    gained = misfit(blocks, fits.best.fitted) - misfit(with_stop, again.best.fitted)
+    if gained <= GAIN * LASTING:
+        return blocks, fits
+    there = _at_farthest(blocks)
+    pressure = None if blocks.pressure is None else np.where(there, np.nan, blocks.pressure)
+    free = replace(with_stop, velocity=np.where(there, np.nan, blocks.velocity), pressure=pressure)
+    return free, fit_classes(free, actuator, start=again.best.coordinates)
+
+
+def _stands(blocks: Blocks) -> bool:
+    """Return whether the piston stands long enough at the farthest place that it reaches."""
+    there = _at_farthest(blocks)
+    return blocks.reach > 2.0 * NEAR and int(np.sum(there)) * blocks.block * blocks.sample_time > RESTS
+
+
+def _at_farthest(blocks: Blocks) -> NDArray[np.bool_]:
+    """Return in which blocks the piston is at the farthest place that it reaches."""
+    gone = np.abs(np.cumsum(np.nan_to_num(blocks.velocity))) * blocks.block * blocks.sample_time
+    return gone > blocks.reach - NEAR

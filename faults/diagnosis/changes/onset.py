@@ -1,0 +1,295 @@
+"""Did the condition change within a log, and when? Two circuits, one before and one after, against one for all.
+
+The derivatives of a fit give, for every time of change at once, what two circuits would explain more than one (the
+generalised likelihood ratio, linearised: Basseville and Nikiforov, Detection of Abrupt Changes, 1993, section 2.4.3).
+Where that is much, both are fitted; it is a change if they are in different conditions.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.finding import Change
+from faults.conditions import CONDITIONS
+from faults.diagnosis.changes.change_odds import believed, gain_of
+from faults.diagnosis.changes.end_stop import stopped
+from faults.diagnosis.changes.split import GAIN, in_one_condition, likeliest_split
+from faults.diagnosis.changes.warming import Drift, drift_of
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import LONGEST, Blocks, blocks_of
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
+from faults.diagnosis.circuits.class_fit import least_scales, nominal_runs
+from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes, lasting_misfit
+from faults.diagnosis.circuits.out_of_model import unexplained
+from faults.notes import AgainstCode
+from faults.watch.events import SLOW, Alarm
+from faults.watch.watch import LEAST_LEARNING, SLOWEST, watch_record
+from plant.arrays import Array
+from plant.log.record import Record
+from plant.notes import Note
+from plant.solvers.adaptive import LANES
+
+SOFTENED = 30.0
+"""The same where both are in one condition, from which the oil is asked whether it softened [dimensionless]: steady
+training logs of the open benchmark gain up to 27, those into which air gets 95 to 126."""
+
+ONE_SIDED = 1.645
+"""Deviations by which bulk modulus must have fallen then [dimensionless]: one chance in twenty, beside that gain."""
+
+LATE, EARLY = 0.8, 0.1
+"""How much later, or earlier, than it came a change may be seen [s]."""
+
+MOST_ALARMS = 3
+"""Alarms of a watch that are looked into, from the last."""
+
+LIKELY = 1.92
+"""Log-likelihood below the best up to which a time is in the 95 % interval [dimensionless]: half of chi-squared's."""
+
+
+@dataclass(frozen=True, eq=False)
+class LastPart:
+    """A log, as far as it is in the condition in which it ends.
+
+    Parameters
+    ----------
+    window : Record
+        The stretch that was looked at.
+    record : Record
+        What of it is in the last condition.
+    blocks : Blocks
+        The stretch in blocks; what is in another condition is missing.
+    fits : ClassFits
+        Circuits fitted to them.
+    onset : Change or None
+        When the condition began; None if it did so before the log.
+    against : tuple of Note
+        What changed within the log and is no change of condition.
+    drift : Drift or None
+        How its leakage drifts, which was not taken up; without pressure.
+    """
+
+    window: Record
+    record: Record
+    blocks: Blocks
+    fits: ClassFits
+    onset: Change | None
+    against: tuple[Note, ...] = ()
+    drift: Drift | None = None
+
+
+class Parted(NamedTuple):
+    """A log in two parts, of which each is fitted by itself.
+
+    Parameters
+    ----------
+    place : int
+        First block of the second.
+    parts : list of Blocks
+        Both.
+    fits : list of ClassFits
+        Circuits fitted to each.
+    gain : float
+        Log-likelihood that they gain on one circuit for all [dimensionless].
+    whole : ClassFits
+        Circuits fitted to all.
+    """
+
+    place: int
+    parts: list[Blocks]
+    fits: list[ClassFits]
+    gain: float
+    whole: ClassFits
+
+    @property
+    def conditions(self) -> tuple[int, int]:
+        """Places of the conditions in which the parts are."""
+        first, last = (int(np.argmax(one.scores)) for one in self.fits)
+        return first, last
+
+
+def last_part(record: Record, actuator: Actuator) -> LastPart:
+    """Return the part of a log that is in the condition in which it ends.
+
+    Parameters
+    ----------
+    record : Record
+        The log. Of one longer than `LONGEST` the stretch about the last change that `watch_record` finds is looked at,
+        or its beginning if there is none.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    LastPart
+        The part, fitted.
+
+    Raises
+    ------
+    LogError
+        If the log has neither position nor velocity, or is too short.
+    """
+    for window in _about_alarms(record, actuator):
+        found = _last_of(window, actuator)
+        if found.onset is not None:
+            return found
+    return _last_of(record, actuator)
+
+
+def _last_of(window: Record, actuator: Actuator) -> LastPart:
+    blocks = blocks_of(window)
+    blocks, fits = stopped(blocks, fit_classes(blocks, actuator), actuator)
+    two, drift = parted(blocks, fits, actuator), drift_of(blocks, fits, actuator)
+    if drift is not None and (two is None or drift.gain > two.gain):
+        return LastPart(window, window, blocks, fits, None, drift=drift)
+    found = None if two is None else find_onset(blocks, two, actuator)
+    if found is None:
+        return LastPart(window, window, blocks, fits, None, () if two is None else softened(two))
+    onset, blocks, fits = found
+    rest = window.slice(round(onset.since / window.sample_time), None)
+    ends = onset.ci95[0] + window.start_time, onset.ci95[1] + window.start_time
+    return LastPart(window, rest, blocks, fits, Change(onset.since + window.start_time, ends, onset.before))
+
+
+def _about_alarms(record: Record, actuator: Actuator) -> Iterator[Record]:
+    """Yield stretches about the last alarms of a watch, the last first, of logs too long to be fitted whole."""
+    if record.duration <= LONGEST + LEAST_LEARNING or record.sample_time > SLOWEST:
+        return
+    events = watch_record(record, actuator.circuit, learning=LEAST_LEARNING)
+    sudden = (event for event in events if isinstance(event, Alarm) and event.balance != SLOW)
+    changes = [event.since - record.start_time for event in sudden]
+    for since in changes[: -MOST_ALARMS - 1 : -1]:
+        first = round(max(since - 0.5 * LONGEST, 0.0) / record.sample_time)
+        yield record.slice(first, first + round(LONGEST / record.sample_time) + 1)
+
+
+def parted(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Parted | None:
+    """Return a log in two parts, where two circuits one after the other may explain it much better than one.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    fits : ClassFits
+        The circuits fitted to all of it.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    Parted or None
+        Both parts; None where one circuit will do, or where both would be in one condition.
+    """
+    split = likeliest_split(blocks, fits.best)
+    if split is None:
+        return None
+    if blocks.pressure is not None and in_one_condition(split, blocks, actuator):  # without, the oil may have softened
+        return None
+    place = split.place
+    parts = [part_of(blocks, 0, place), part_of(blocks, place, len(blocks.velocity))]
+    runs, start = nominal_runs(blocks, actuator), fits.best.coordinates
+    found = [fit_classes(part, actuator, runs=runs, start=start) for part in parts]
+    return Parted(place, parts, found, gain_of(fits, parts, found), fits)
+
+
+def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change, Blocks, ClassFits] | None:
+    """Return when the condition changed, and the part of the log after that.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    two : Parted
+        Its parts.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    tuple of Change, Blocks and ClassFits, or None
+        The change, the log with all before it taken as missing, and the circuits that fit the rest, which go on from
+        where the circuit before had brought the piston; None for a log in one condition throughout, and where no
+        circuit follows what came before.
+    """
+    (before, after), (first, last) = two.fits, two.conditions
+    if two.gain < GAIN or first == last:
+        return None
+    if unexplained(two.parts[0], before, actuator):  # what comes and goes has no last condition, but a quiet stretch
+        return None
+    if not believed(blocks, two.parts, two.fits, two.whole, actuator):
+        return None
+    row = parameter_rows(before.best.coordinates[None], actuator.circuit, actuator.rated)[0]
+    low, best, high = _when(blocks, row, after.best.coordinates, two.place, actuator)
+    step = blocks.block * blocks.sample_time
+    onset = Change(best * step, (low * step, high * step), list(CONDITIONS)[first])
+    rest = replace(part_of(blocks, best, len(blocks.velocity)), earlier=(best * blocks.block, row))
+    return onset, rest, fit_classes(rest, actuator)
+
+
+def softened(two: Parted) -> tuple[Note, ...]:
+    """Return a note where the oil of a log without pressure softened: air got in, which no condition has.
+
+    Parameters
+    ----------
+    two : Parted
+        The log in two parts.
+
+    Returns
+    -------
+    tuple of Note
+        None with pressure, from which the flow balance tells it.
+    """
+    first, last = two.conditions
+    if two.parts[0].pressure is not None or first != last or two.gain < SOFTENED:
+        return ()
+    at = COORDINATES.index("bulk_modulus")
+    fallen = float(two.fits[1].best.coordinates[at] - two.fits[0].best.coordinates[at])
+    if fallen > -ONE_SIDED * float(np.sqrt(sum(one.spread[at, at] for one in two.fits))):
+        return ()
+    begun = two.place * two.parts[0].block * two.parts[0].sample_time
+    return (AgainstCode.OIL_SOFTENS.note(share=float(np.exp(fallen)), at_s=begun),)
+
+
+def part_of(blocks: Blocks, begin: int, end: int) -> Blocks:
+    """Return a log with all but some of its blocks taken as missing; the drive stays whole.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    begin, end : int
+        First block that stays, and the one after the last.
+
+    Returns
+    -------
+    Blocks
+        The part.
+    """
+    there = np.arange(len(blocks.velocity))
+    away = (there < begin) | (there >= end)
+    pressure = None if blocks.pressure is None else np.where(away, np.nan, blocks.pressure)
+    return replace(blocks, velocity=np.where(away, np.nan, blocks.velocity), pressure=pressure)
+
+
+def _when(blocks: Blocks, before: Array, after: Array, place: int, actuator: Actuator) -> tuple[int, int, int]:
+    """Return the likeliest block of the change, between the ends of its 95 % interval: both circuits in one run.
+
+    A circuit takes its time to show what changed, so most candidates lie before the place at which it was seen.
+    """
+    step = blocks.block * blocks.sample_time
+    first = max(place - round(LATE / step), blocks.first)
+    candidates = np.arange(first, min(place + round(EARLY / step), len(blocks.velocity) - 1))
+    (row,) = parameter_rows(after[None], actuator.circuit, actuator.rated)
+    costs: list[float] = []
+    least, best = np.inf, before
+    for some in np.array_split(candidates, range(LANES, len(candidates), LANES)):
+        changing = replace(blocks, earlier=(blocks.block * some, before))
+        for run in predicted(changing, np.repeat(row[None], len(some), axis=0)):
+            left = (blocks.outputs - run)[blocks.first :] / least_scales(blocks)
+            costs.append(0.5 * float(np.nansum(left**2)))
+            if costs[-1] < least:
+                least, best = costs[-1], run
+    room = LIKELY * max(1.0, lasting_misfit(best, blocks) ** 2)
+    likely = candidates[np.array(costs) <= least + room]
+    return int(likely[0]) - 1, int(candidates[int(np.argmin(costs))]), int(likely[-1]) + 1

@@ -1,0 +1,207 @@
+"""Without pressure: does the oil warm or cool within a log? A circuit whose leakage drifts against one that stays.
+
+Where pressure is logged, the balance of flows finds a leakage that drifts (`estimation.eha.changing_leakage`). Without,
+the circuit that explains the log best gets an eighth unknown, how far leakage drifts. Viscous friction falls as leakage
+rises. What it promises by its slope tells whether it is worth a search, which for most logs it is not.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.eha.changing_leakage import changed_note
+from estimation.eha.explained import LEAKAGE_COURSE
+from estimation.log_checks.clean import CleanLog
+from faults.conditions import CONDITIONS
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import LONGEST, Blocks
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
+from faults.diagnosis.circuits.class_fit import LASTING, PointFit, fit_freely, misfit
+from faults.diagnosis.circuits.class_regions import ClassFits, is_stuck
+from faults.diagnosis.circuits.out_of_model import UNEXPLAINED
+from plant.arrays import Array
+from plant.notes import Note
+
+LIKELIER = 10.0
+"""How many times likelier a circuit whose leakage drifts must be than one whose leakage stays [dimensionless]: evidence
+is called strong from there on (Jeffreys, Theory of Probability, 1961, appendix B)."""
+
+LEAST = 0.2
+"""Least drift, as a logarithm [dimensionless]: less than two deviations of actuators of one kind moves no class."""
+
+PRESUMED = 1.0
+"""Standard deviation of the drift before a log is seen, as a logarithm [dimensionless]: oil that warms by 25 K."""
+
+PROMISED = 1.0
+"""Log-likelihood that a drift must promise by its slope to be searched for [dimensionless], in `LASTING` blocks that
+count as one."""
+
+FIRST = 0.5 * LEAST
+"""Least first step of a search that may come to `LEAST` [dimensionless]."""
+
+DOUBLED = float(np.log(2.0))
+"""Drift from which a search begins where slopes lead nowhere [dimensionless]."""
+
+FARTHEST, NEAR, ROUNDS = 0.7, 0.05, 4
+"""Longest step in the logarithm, the step that ends a search [dimensionless], and how many it takes at most."""
+
+NUDGE = 0.02
+"""Step of the finite difference in the logarithm [dimensionless]."""
+
+_LEAKS_MORE = np.array([1.0 if name == "leakage" else 0.0 for name in COORDINATES])
+
+
+class Drift(NamedTuple):
+    """A drift of leakage over a log.
+
+    Parameters
+    ----------
+    logarithm : float
+        Of leakage at the end over that at the beginning [dimensionless].
+    fit : PointFit
+        The circuit; its leakage is that at the end.
+    gain : float
+        Log-likelihood that it gains on a circuit whose leakage stays, in `LASTING` blocks that count as one
+        [dimensionless].
+    """
+
+    logarithm: float
+    fit: PointFit
+    gain: float
+
+    @property
+    def shown(self) -> bool:
+        """Whether the log shows it."""
+        return abs(self.logarithm) >= LEAST and self.gain - 0.5 * (self.logarithm / PRESUMED) ** 2 > np.log(LIKELIER)
+
+
+def drift_of(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Drift | None:
+    """Return the drift of leakage that a log without pressure shows.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    fits : ClassFits
+        The circuits fitted to it whose leakage stays.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    Drift or None
+        None with pressure, where the log shows none, where no circuit with one follows it, and of logs that are longer
+        than what is fitted.
+    """
+    whole = len(blocks.speed) * blocks.sample_time <= LONGEST
+    if blocks.pressure is not None or blocks.course is not None or not whole or is_stuck(blocks, actuator):
+        return None
+    condition, none = list(CONDITIONS)[int(np.argmax(fits.scores))], Drift(0.0, fits.best, 0.0)
+    promised, moved, step = _step(blocks, none, actuator)
+    most = UNEXPLAINED[0] * blocks.sizes[0]
+    if promised > PROMISED and abs(moved) >= FIRST:
+        starts = [(moved, step)]
+    elif none.fit.scales[0] > most:
+        starts = [(way * DOUBLED, 0.5 * way * DOUBLED * _LEAKS_MORE) for way in (1.0, -1.0)]
+    else:
+        return None
+    found = max((_searched(blocks, none, *one, condition, actuator) for one in starts), key=lambda one: one.gain)
+    followed = found.fit.scales[0] <= most  # what follows the log no better than one must explains nothing
+    return found if found.shown and followed else None
+
+
+def drifting(blocks: Blocks, logarithm: float) -> Blocks:
+    """Return a log over which leakage drifts, its logarithm evenly, to what it is at the end.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    logarithm : float
+        Of leakage at the end over that at the beginning [dimensionless].
+
+    Returns
+    -------
+    Blocks
+        The same log.
+    """
+    return replace(blocks, course=course_of(logarithm, len(blocks.speed)))
+
+
+def course_of(logarithm: float, samples: int) -> Array:
+    """Return leakage over what it is at the end.
+
+    Parameters
+    ----------
+    logarithm : float
+        Of leakage at the end over that at the beginning [dimensionless].
+    samples : int
+        How many [samples].
+
+    Returns
+    -------
+    ndarray, shape (samples,)
+        Dimensionless.
+
+    Examples
+    --------
+    >>> course_of(float(np.log(4.0)), 3).round(6).tolist()
+    [0.25, 0.5, 1.0]
+    """
+    return np.asarray(np.exp(logarithm * (np.linspace(0.0, 1.0, samples) - 1.0)), dtype=np.float64)
+
+
+def with_course(log: CleanLog, found: Drift) -> tuple[CleanLog, Note]:
+    """Return a log with the drift that it shows, and what that is called.
+
+    Parameters
+    ----------
+    log : CleanLog
+        The log.
+    found : Drift
+        Its drift.
+
+    Returns
+    -------
+    tuple of CleanLog and Note
+        The log with a `LEAKAGE_COURSE`; that leakage drifts as oil warms or cools, or that it grows by more than that.
+    """
+    factor, last = float(np.exp(found.logarithm)), float(np.exp(found.fit.coordinates @ _LEAKS_MORE))
+    course = course_of(found.logarithm, len(log.record))
+    return replace(log, record=log.record.replace(**{LEAKAGE_COURSE: course})), changed_note(factor, last)
+
+
+def _searched(blocks: Blocks, none: Drift, moved: float, step: Array, condition: str, actuator: Actuator) -> Drift:
+    """Return where a search ends that begins so far from a circuit without a drift."""
+    found = none
+    for _ in range(ROUNDS):
+        there = drifting(blocks, found.logarithm + moved)
+        fit = fit_freely(there, actuator, condition, found.fit.coordinates + step)
+        gain = (misfit(blocks, none.fit.fitted) - misfit(there, fit.fitted)) / LASTING
+        if found is not none and not gain > found.gain:
+            break
+        found = Drift(found.logarithm + moved, fit, gain)
+        _, moved, step = _step(blocks, found, actuator)
+        if not abs(moved) >= NEAR:
+            break
+    return found
+
+
+def _step(blocks: Blocks, found: Drift, actuator: Actuator) -> tuple[float, float, Array]:
+    """Return what the next step of a drift promises to gain, the step, and that of the coordinates.
+
+    All are moved at once (Gauss and Newton's step); the promise is that of the drift alone.
+    """
+    drift, fit, _ = found
+    rows = parameter_rows((fit.coordinates + 0.5 * NUDGE * _LEAKS_MORE)[None], actuator.circuit, actuator.rated)
+    moved = predicted(drifting(blocks, drift + NUDGE), rows)[0]  # halfway its leakage is as before
+    slopes = np.concatenate([fit.slopes, ((moved - fit.fitted) / NUDGE)[None]])[:, blocks.first :] / fit.scales
+    slopes = np.where(blocks.seen, slopes, 0.0).reshape(len(slopes), -1)
+    uphill = slopes @ np.nan_to_num((blocks.outputs - fit.fitted)[blocks.first :] / fit.scales).ravel()
+    uphill[-1] -= LASTING * drift / PRESUMED**2
+    covariance = np.linalg.inv(slopes @ slopes.T + np.eye(len(slopes)) * LASTING / PRESUMED**2)
+    step = covariance @ uphill
+    promised = 0.5 * float(step[-1] ** 2 / covariance[-1, -1]) / LASTING
+    step *= min(1.0, FARTHEST / float(np.max(np.abs(step))))
+    return promised, float(step[-1]), step[:-1] + 0.5 * step[-1] * _LEAKS_MORE

@@ -1,0 +1,1 @@
+"""Circuits fitted to a log, and what they say of the nine conditions."""

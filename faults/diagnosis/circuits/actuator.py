@@ -1,0 +1,62 @@
+"""A healthy actuator and the points at which its nine conditions lie, among circuits that are fitted to logs."""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.circuits.circuit_runs import coordinates_of
+from plant.arrays import Array
+from plant.eha.circuit_parameters import CircuitParameters, circuit_of, longest_stroke
+from plant.eha.model import EhaParameters
+from plant.eha.steady_state import steady_state
+
+
+@dataclass(frozen=True, eq=False)
+class Actuator:
+    """A healthy actuator and its nine conditions as points.
+
+    Parameters
+    ----------
+    circuit : CircuitParameters
+        The healthy circuit.
+    rated : float
+        Its velocity at rated speed [m/s].
+    conditions : ndarray, shape (9, 7)
+        Coordinates of the nine nominal circuits, in the order of `CONDITIONS`.
+    load_doubt : float
+        Standard deviation of the constant force on its rod, where a log had to tell that [N]; 0 as the rig file has it.
+    """
+
+    circuit: CircuitParameters
+    rated: float
+    conditions: Array
+    load_doubt: float = 0.0
+
+
+@lru_cache(maxsize=8)
+def actuator_of(parameters: EhaParameters) -> Actuator:
+    """Return the actuator of a rig with its nine conditions, kept for the next log.
+
+    Parameters
+    ----------
+    parameters : EhaParameters
+        The healthy actuator.
+
+    Returns
+    -------
+    Actuator
+        It, and its conditions.
+
+    Raises
+    ------
+    RigError
+        If no circuit fits around it.
+    """
+    rated = steady_state(parameters.rated_speed, parameters)[0]
+    points = [coordinates_of(parameters_for(condition, parameters), rated) for condition in CONDITIONS.values()]
+    circuit = circuit_of(parameters)
+    if parameters.stroke is None:
+        circuit = replace(circuit, stroke=float(longest_stroke(circuit)))
+    return Actuator(circuit, rated, np.array(points))

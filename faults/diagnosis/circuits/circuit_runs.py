@@ -1,0 +1,276 @@
+"""Circuits run under a log's motor speed, and what is compared with the log: mean velocity and pressure over blocks.
+
+Eight circuits run side by side in one kernel, so a Gauss-Newton step with all its derivatives costs one of them.
+"""
+
+from dataclasses import fields, replace
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from estimation.arrays import IntArray
+from estimation.log_checks.channel_names import PRESSURE
+from faults.diagnosis.circuits.blocks import Blocks
+from plant.arrays import Array
+from plant.eha.circuit_parameters import CircuitParameters, circuit_values, longest_stroke
+from plant.eha.circuit_start import at_rest, under_pressure
+from plant.eha.model import EhaParameters
+from plant.eha.one_sided import as_wide, circuit_groups, circuit_plant
+from plant.eha.simulate import CIRCUIT
+from plant.solvers.block_means import block_means
+from plant.solvers.steps import parameter_row
+
+COORDINATES = ("leakage", "bias", "friction_rest", "friction_quadratic", "friction_rated", "bulk_modulus", "presliding")
+"""What is fitted, as logarithms of: leakage coefficient, flow bias, friction force at rest, its quadratic part at rated
+velocity, all of it at rated velocity, bulk modulus, and presliding displacement over the rig's. The last is judged and
+differs from seal to seal; held where it is wrong, it bends friction and leakage."""
+
+PRESLIDING_REACH = 3.0
+"""Farthest that presliding displacement is taken from the rig's, as a logarithm [dimensionless]: 20 times."""
+
+AT_STOP = 0.02
+"""A log shows a stop if its piston turned this near to one, as a share of half the stroke [fraction]."""
+
+ALLOWED = {"tolerance": 1e-4, "drive_tolerance": 2e-3}
+"""Errors allowed in the runs [dimensionless], see `plant.solvers.adaptive.controlled_groups`: far below what counts."""
+
+LEAST_FLOW = 1e-3
+"""Least leakage at the relief setting, and least flow bias, over the rated pump flow [fraction]: a rig file may have
+none, and no logarithm begins at zero. Judged: no log tells so little from nothing."""
+
+LEAST_FORCE = 1e-3
+"""Least friction at rest, of its quadratic part and of the whole at rated velocity, over the force of the relief
+setting on the piston [fraction]: a rig file may have none, and no logarithm begins at zero. Judged: 5 N on the paper's
+actuator, of whose friction these are 436, 122 and 651 N."""
+
+DRIFT_STEPS = 50
+"""Steps in which leakage drifts over a log without pressure: over a factor of two 1.4 % each, a tenth of how actuators
+of one kind differ."""
+
+COLUMN = {field.name: i for i, field in enumerate(fields(CircuitParameters))}
+
+
+def coordinates_of(p: EhaParameters, rated: float) -> Array:
+    """Return a circuit's coordinates.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+    rated : float
+        Rated velocity [m/s].
+
+    Returns
+    -------
+    ndarray, shape (7,)
+        In the order of `COORDINATES`.
+    """
+    parts, force = friction_parts(p, rated)
+    forces = (max(one, force) for one in parts)
+    least = LEAST_FLOW * p.pump_displacement * p.rated_speed
+    leakage, bias = max(p.leakage_coefficient, least / p.relief_pressure), max(p.flow_bias, least)
+    return np.log([leakage, bias, *forces, p.bulk_modulus, 1.0])
+
+
+def friction_parts(p: EhaParameters, rated: float) -> tuple[tuple[float, float, float], float]:
+    """Return the three parts of friction that are fitted, and the least of each that a logarithm holds.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+    rated : float
+        Rated velocity [m/s].
+
+    Returns
+    -------
+    tuple of (tuple of float, float)
+        Friction at rest, its quadratic part at rated velocity, all of it there; and the least, see `LEAST_FORCE` [N].
+    """
+    rest, bent = p.friction_coulomb, p.friction_quadratic * rated**2
+    return (rest, bent, rest + p.friction_linear * rated + bent), LEAST_FORCE * p.relief_pressure * p.piston_area
+
+
+def parameter_rows(points: Array, rig: CircuitParameters, rated: float) -> Array:
+    """Return the circuits at coordinates, as rows of parameters.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 7)
+        Coordinates.
+    rig : CircuitParameters
+        The circuit around them.
+    rated : float
+        Rated velocity [m/s].
+
+    Returns
+    -------
+    ndarray, shape (n, parameters)
+        Rows for the circuit plant; the motor follows the logged speed at once.
+    """
+    leakage, bias, rest, bent, full, modulus = np.exp(points[:, :-1].T)
+    yielding = np.exp(np.clip(points[:, -1], -PRESLIDING_REACH, PRESLIDING_REACH))
+    linear = np.maximum(full - rest - bent, -1.9 * np.sqrt(bent * rest))  # friction must oppose motion at every speed
+    rows = np.tile(_at_once(rig), (len(points), 1))
+    for name, values in (
+        ("leakage_coefficient", leakage),
+        ("flow_bias", bias),
+        ("friction_quadratic", bent / rated**2),
+        ("friction_linear", linear / rated),
+        ("friction_coulomb", rest),
+        ("bulk_modulus", modulus),
+        ("presliding_displacement", rig.presliding_displacement * yielding),
+    ):
+        rows[:, COLUMN[name]] = values
+    share = np.minimum(1.0, leakage / rig.leakage_coefficient) if rig.leakage_coefficient > 0.0 else np.ones(len(rows))
+    for name in ("pump_crossport_leakage", "pump_case_leakage"):
+        rows[:, COLUMN[name]] *= share
+    return rows
+
+
+@lru_cache(maxsize=16)
+def _at_once(rig: CircuitParameters) -> Array:
+    """Return the row of a circuit whose motor follows the logged speed at once."""
+    return parameter_row(replace(rig, motor_lag=0.0))
+
+
+def predicted(blocks: Blocks, rows: Array) -> Array:
+    """Return what circuits do under the logged motor speed.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    rows : ndarray, shape (m, parameters)
+        The circuits.
+
+    Returns
+    -------
+    ndarray, shape (m, n, outputs)
+        Mean velocity [m/s] over each block, and mean pressure [Pa] where it is logged.
+    """
+    rows = _as_logged(blocks, rows)[None]
+    if blocks.earlier is not None:
+        until, before = blocks.earlier
+        if isinstance(until, int) and until % blocks.block == 0 and blocks.course is None:
+            brought, place = _brought(blocks, rows.shape[-1])
+            gone_on = _run(blocks, np.repeat(place, rows.shape[1], axis=0), rows, until)
+            return np.concatenate([np.repeat(brought, rows.shape[1], axis=0), gone_on], axis=1)
+        before = as_wide(_as_logged(blocks, before[None])[0], rows.shape[-1])
+        rows = _after(until, before, rows[0], len(blocks.speed))
+    if blocks.course is not None:
+        if blocks.pressure is None and len(rows) == 1:
+            return _in_steps(blocks, blocks.course, rows)
+        rows = rows * _drift(blocks.course, rows.shape[-1])[:, None, :]
+    return _run(blocks, _starts(blocks, rows[0]), rows)
+
+
+@lru_cache(maxsize=2)
+def _brought(blocks: Blocks, width: int) -> tuple[Array, Array]:
+    """Return what the circuit before a change shows up to it, and the states that it leaves, each of one circuit.
+
+    All that are tried after it begin there, so it is run once.
+    """
+    until, before = blocks.earlier or (0, np.empty(0))
+    rows = as_wide(_as_logged(blocks, before[None])[0], width)[None, None]
+    (states,) = circuit_groups(_starts(blocks, rows[0]), blocks.speed[: until + 1], rows, blocks.sample_time, **ALLOWED)
+    return _outputs(blocks, states, rows), np.ascontiguousarray(states[-1].T)
+
+
+def _run(blocks: Blocks, starts: Array, rows: Array, since: int = 0) -> Array:
+    """Return what circuits do from a sample on, in which they are at some states, shape (m, blocks, outputs)."""
+    groups = circuit_groups(starts, blocks.speed[since:], rows, blocks.sample_time, **ALLOWED)
+    found, first = list[Array](), 0
+    for states in groups:
+        last = first + states.shape[2]
+        found.append(_outputs(blocks, states, rows[:, first:last]))
+        first = last
+    return found[0] if len(found) == 1 else np.concatenate(found)
+
+
+def _in_steps(blocks: Blocks, course: Array, rows: Array) -> Array:
+    """Return what circuits do whose leakage drifts in small steps, shape (m, blocks, outputs).
+
+    Rows of parameters for every sample take some 50 MB and five times as long.
+    """
+    count = (len(blocks.speed) - 1) // blocks.block
+    ends = blocks.block * np.unique(np.linspace(0, count, min(DRIFT_STEPS, count) + 1).astype(np.intp))
+    found, starts = list[Array](), _starts(blocks, rows[0])
+    for first, last in pairwise(ends.tolist()):
+        here = rows * _drift(course[[(first + last) // 2]], rows.shape[-1])[:, None, :]
+        speed = blocks.speed[first : last + 1]
+        states = [*circuit_groups(starts, speed, here, blocks.sample_time, **ALLOWED)]
+        together = states[0] if len(states) == 1 else np.concatenate(states, axis=2)
+        found.append(_outputs(blocks, together, here))
+        starts = np.ascontiguousarray(together[-1].T)
+    return np.concatenate(found, axis=1)
+
+
+def _after(until: int | IntArray, before: Array, rows: Array, samples: int) -> Array:
+    """Return what circuits are at each sample if another one ran up to a sample, shape (samples, m, parameters)."""
+    ends = np.broadcast_to(until, len(rows))
+    first, last = int(np.min(ends)), int(np.max(ends))
+    found = np.empty((samples, *rows.shape))
+    found[:first], found[last:] = before, rows
+    between = np.arange(first, last)[:, None] < ends
+    found[first:last] = np.where(between[..., None], before, rows)
+    return found
+
+
+def _starts(blocks: Blocks, rows: Array) -> Array:
+    """Return the states in which circuits begin, shape (m, states): at rest, or as the log does.
+
+    Under a load rest is at the pressure that holds it: a log that begins at another is in motion, and says which.
+    """
+    p = circuit_values(rows)
+    begun = blocks.opening if blocks.begun is None and np.any(p.load_force) else blocks.begun
+    states = at_rest(p) if begun is None else under_pressure(*begun, p)
+    found = np.empty((len(rows), len(states)))
+    for place, state in enumerate(states):
+        found[:, place] = state
+    return found
+
+
+def _drift(course: Array, width: int) -> Array:
+    """Return the factors on a circuit's parameters, shape (samples, parameters): viscosity falls as leakage rises."""
+    factors = np.ones((len(course), width))
+    factors[:, [COLUMN[name] for name in _LEAKAGES]] = course[:, None]
+    factors[:, COLUMN["friction_linear"]] = 1.0 / course
+    return factors
+
+
+_LEAKAGES = ("leakage_coefficient", "pump_crossport_leakage", "pump_case_leakage", "cylinder_drain_leakage")
+
+
+def _as_logged(blocks: Blocks, rows: Array) -> Array:
+    """Return circuits as a log has them: positions are counted from where it begins, a spring is strained there."""
+    rows = _between_stops(blocks, rows)
+    rows[:, COLUMN["load_force"]] += rows[:, COLUMN["load_stiffness"]] * blocks.place
+    return rows
+
+
+def _between_stops(blocks: Blocks, rows: Array) -> Array:
+    """Return circuits with the stops of the rig's stroke where the log may show one, without stops elsewhere.
+
+    A piston that turned back before it came to a stop, or that went past it, shows none. A stop that the log itself
+    has shown goes before the rig's.
+    """
+    rows = rows.copy()
+    if blocks.stop is not None:
+        rows[:, COLUMN["stroke"]] = 2.0 * blocks.stop
+        return rows
+    half = 0.5 * rows[:, COLUMN["stroke"]]
+    shown = np.abs(blocks.reach - half) <= AT_STOP * half
+    rows[:, COLUMN["stroke"]] = np.where(shown, 2.0 * half, longest_stroke(circuit_values(rows)))
+    return rows
+
+
+def _outputs(blocks: Blocks, states: Array, rows: Array) -> Array:
+    """Return what is compared, of states, shape (samples, states, m), and rows, shape (1 or samples, m, parameters)."""
+    velocity = np.diff(states[:: blocks.block, 2], axis=0) / (blocks.block * blocks.sample_time)
+    if blocks.pressure is None:
+        return np.ascontiguousarray(velocity.T)[..., None]
+    whose = circuit_plant(rows.shape[-1]).parameter_class
+    pressure = block_means(CIRCUIT.observe, PRESSURE, states[:-1], rows, blocks.block, whose)
+    return np.stack([velocity.T, pressure.T], axis=-1)

@@ -1,0 +1,342 @@
+"""How well does each condition explain a log? Fitted circuits are laid beside the conditions' regions.
+
+In a condition leakage, flow bias, friction and bulk modulus differ from the nominal ones as actuators of one kind do, a
+Gaussian region; integrating the likelihood over it in closed form (Laplace's method: MacKay, Information Theory, 2003,
+chapter 27) scores the condition. What a log says nothing of, as friction beyond what a stuck piston is pushed with,
+counts for none.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from faults.conditions import CONDITIONS
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_fit import (
+    GAINED,
+    LASTING,
+    STARTS,
+    WEAK,
+    WITHIN,
+    PointFit,
+    about,
+    fit_freely,
+    least_scales,
+    misfit,
+    nominal_runs,
+    scales_of,
+)
+from faults.diagnosis.circuits.model_doubt import doubt_of, lasting_power, seldom_known_slopes, spreads_of
+from faults.diagnosis.circuits.rivals import behind, between_fits, creeps, explains, other_friction
+from plant.arrays import Array
+
+ROUGHLY_GAINED = 10.0
+"""Gain in log-likelihood below which a search from near by ends [dimensionless]: a third of what counts as one."""
+
+YIELDING = 5.0
+"""Travel in presliding displacements below which a piston counts as stuck [dimensionless]."""
+
+STRUCTURAL = 100.0
+"""By how much a residual that no sensor makes widens what is believed [dimensionless], in variance: it lasts, and it is
+not what the derivatives say that it is."""
+
+ALIKE, ALIKE_COUNT = 0.25, 1.0
+"""Squared deviation of actuators of one kind, in units of `WITHIN`, before a log is seen, and how many deviations that
+belief counts as [dimensionless]: 0.25 are some 10 % in leakage and friction."""
+
+_NO_FRICTION = np.array([0.0 if name.startswith("friction") else 1.0 for name in COORDINATES])
+
+PRESSURE_SCALE = np.array([-1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
+"""Direction in which all pressures scale and no motion changes [dimensionless]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClassFits:
+    """What the circuit model says about a log.
+
+    Parameters
+    ----------
+    best : PointFit
+        The circuit that fits best.
+    information : ndarray, shape (7, 7)
+        What is believed to be known of its coordinates: inverse covariance without a prior.
+    nominal : ndarray, shape (9,)
+        Misfit of each condition's nominal circuit [dimensionless].
+    nominal_scales : ndarray, shape (9, outputs)
+        Root mean square of what it leaves [m/s, Pa].
+    scores : ndarray, shape (9,)
+        How well each condition's region holds the fitted circuits: log-likelihoods [dimensionless].
+    spread : ndarray, shape (7, 7)
+        Covariance of the coordinates for intervals [dimensionless], see
+        `faults.diagnosis.circuits.model_doubt`, and without pressure `spread_of`.
+    lasting : float
+        By what a model error that lasts divides the information [dimensionless], see `lasting_misfit`; 1 at the least,
+        and without pressure.
+    """
+
+    best: PointFit
+    information: Array
+    nominal: Array
+    nominal_scales: Array
+    scores: Array
+    spread: Array
+    lasting: float
+
+    @property
+    def told(self) -> Array:
+        """What the log tells of the coordinates where a lasting model error is counted, shape (7, 7) [dimensionless].
+
+        By it a circuit is judged to lie between the conditions. Intervals have `spread`, which is narrower where a
+        model error lasts: with it more such circuits are seen on the lumped plant, but one more plain log in 150 is
+        falsely unknown.
+        """
+        return self.information / self.lasting
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the coordinates under the weak prior, shape (7, 7) [dimensionless]."""
+        return np.asarray(np.linalg.inv(self.information + np.linalg.inv(WEAK)), dtype=np.float64)
+
+
+def fit_classes(
+    blocks: Blocks,
+    actuator: Actuator,
+    *,
+    runs: Array | None = None,
+    start: Array | None = None,
+    wanted: float = np.inf,
+) -> ClassFits:
+    """Fit circuits to a log from the nearest conditions and weigh all nine.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    actuator : Actuator
+        The healthy actuator.
+    runs : ndarray, shape (9, n, outputs), optional
+        What the nine nominal circuits do [m/s, Pa]; run here if not given.
+    start : ndarray, shape (7,), optional
+        Coordinates of a circuit near by [dimensionless]: one search begins there, in place of one from each condition
+        that is near, and ends where it gains little.
+    wanted : float
+        Cost above which a circuit is of no use, see `fit_freely` [dimensionless].
+
+    Returns
+    -------
+    ClassFits
+        The best circuit, and the conditions' scores.
+    """
+    runs = nominal_runs(blocks, actuator) if runs is None else runs
+    nominal = np.array([misfit(blocks, run) for run in runs])
+    order = np.argsort(nominal)[: STARTS if start is None else 1]
+    near = [int(i) for i in order if nominal[i] <= nominal[order[0]] + len(blocks.velocity)]
+    gained = GAINED if start is None else ROUGHLY_GAINED
+    fits: list[PointFit] = []
+    for name in [list(CONDITIONS)[place] for place in near or [int(order[0])]]:
+        if not fits or not explains(blocks, fits[-1]):
+            fits.append(fit_freely(blocks, actuator, name, start, gained, wanted))
+        elif about(blocks, actuator, name, fits[-1]).cost < fits[-1].cost:  # the same circuit is nearer to this one
+            fits.append(fit_freely(blocks, actuator, name, fits[-1], gained))
+    stuck, first = is_stuck(blocks, actuator), min(fits, key=lambda fit: fit.cost)
+    if start is None and blocks.pressure is not None and not stuck and creeps(blocks, first):
+        nearest = int(np.argmax(region_scores(first, believed_information(first, blocks), actuator)))
+        fits += other_friction(blocks, actuator, first, list(CONDITIONS)[nearest])
+    known = [believed_information(fit, blocks, stuck=stuck) for fit in fits]
+    least = int(np.argmin([fit.cost for fit in fits]))
+    worse = behind(fits, fits[least], blocks)
+    scores = [
+        region_scores(fit, information, actuator) - lead
+        for fit, information, lead in zip(fits, known, worse, strict=True)
+    ]
+    held = np.max(scores, axis=0) - misfit(blocks, fits[least].fitted) / LASTING
+    centre = actuator.conditions[np.argmax(held)]
+    best = fits[least] if blocks.pressure is not None else _scaled(fits[least], centre)
+    # without pressure no balance of flows looks for another pump or other faults, so regions alone have to
+    lasting = 1.0 if blocks.pressure is None else max(1.0, lasting_misfit(best.fitted, blocks))
+    if blocks.pressure is None:
+        spread = spread_of(best, known[least], blocks, centre)
+    else:
+        seen, seldom = _NO_FRICTION if stuck else np.ones(len(COORDINATES)), seldom_known_slopes(best, blocks, actuator)
+        spread = doubt_of(best, seldom, blocks, actuator.conditions, held, seen, spreads_of(actuator))
+        spread = spread + between_fits(fits, best, worse)
+    errors = np.array([scales_of(blocks, run) for run in runs])
+    return ClassFits(best, known[least], nominal, errors, held, spread, lasting)
+
+
+def _scaled(fit: PointFit, centre: Array) -> PointFit:
+    """Return a fit without pressure at the scale that is the most likely within a condition."""
+    pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
+    shift = float(pull @ (centre - fit.coordinates)) / float(pull @ PRESSURE_SCALE)
+    return replace(fit, coordinates=fit.coordinates + shift * PRESSURE_SCALE)
+
+
+def spread_of(fit: PointFit, information: Array, blocks: Blocks, centre: Array) -> Array:
+    """Return the covariance of a fit's coordinates without pressure, for intervals that know how well the model holds.
+
+    What is left of a log that the model describes is the sensors' noise, which averages away; the error of a wrong
+    model lasts. So variances grow with what is left after averaging over a tenth of a second, over what white noise
+    would leave. The common scale of pressure is known only as far as actuators of one kind are alike, and an
+    actuator that differs much from its kind in what its log tells is taken to do so in what it does not tell.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    information : ndarray, shape (7, 7)
+        What is believed of it, see `believed_information`.
+    blocks : Blocks
+        Its log, without pressure.
+    centre : ndarray, shape (7,)
+        Coordinates of the condition that it is in.
+
+    Returns
+    -------
+    ndarray, shape (7, 7)
+        Covariance under the weak prior [dimensionless].
+    """
+    known = information / max(1.0, lasting_misfit(fit.fitted, blocks)) + np.linalg.inv(WEAK)
+    weight = information @ np.linalg.inv(np.eye(len(WITHIN)) + WITHIN @ information)
+    off, told = fit.coordinates - centre, float(np.trace(WITHIN @ weight))
+    unlike = (ALIKE_COUNT * ALIKE + float(off @ weight @ off)) / (ALIKE_COUNT + told)
+    pull = np.linalg.solve(WITHIN, PRESSURE_SCALE)
+    known = known + np.outer(pull, pull) / (unlike * float(pull @ PRESSURE_SCALE))
+    return np.asarray(np.linalg.inv(known), dtype=np.float64)
+
+
+def lasting_misfit(fitted: Array, blocks: Blocks) -> float:
+    """Return how far what a model leaves of a log over a tenth of a second exceeds white noise of the sensors.
+
+    Parameters
+    ----------
+    fitted : ndarray, shape (n, outputs)
+        What the model does [m/s, Pa].
+    blocks : Blocks
+        Its log.
+
+    Returns
+    -------
+    float
+        Ratio of root mean squares, the larger of the outputs' [dimensionless]: 1 or less where noise alone is left.
+    """
+    power = lasting_power((blocks.outputs - fitted)[blocks.first :])
+    return float(np.max(np.sqrt(power) / least_scales(blocks)))
+
+
+def is_stuck(blocks: Blocks, actuator: Actuator) -> bool:
+    """Return whether the piston only yields on its seals.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    bool
+        Whether it moves no more than a few presliding displacements.
+    """
+    return blocks.travel < YIELDING * actuator.circuit.presliding_displacement
+
+
+def believed_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) -> Array:
+    """Return what a fit may be believed to know: residuals beyond the sensors' noise are a model error that lasts.
+
+    Without pressure nothing is believed of `PRESSURE_SCALE`: motion is the same at twice the pressure, with half the
+    leakage and twice the friction and bulk modulus, but for the inertia, which is less than a model's error.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    blocks : Blocks
+        Its log.
+    stuck : bool
+        Whether the piston sticks: then nothing is believed of friction, as what moves is the seals' unknown stiffness.
+
+    Returns
+    -------
+    ndarray, shape (7, 7)
+        Inverse covariance of the coordinates, without a prior.
+    """
+    unexplained = float(np.max(1.0 - (blocks.noise / fit.scales) ** 2))
+    believed = fit.information / (1.0 + STRUCTURAL * max(unexplained, 0.0))
+    if stuck:
+        believed = believed * np.outer(_NO_FRICTION, _NO_FRICTION)
+    if blocks.pressure is not None:
+        return believed
+    along = believed @ PRESSURE_SCALE
+    curvature = float(PRESSURE_SCALE @ along)
+    return believed - np.outer(along, along) / curvature if curvature > 0.0 else believed
+
+
+def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Array:
+    """Return how well each condition's region holds a fitted circuit: the log of the likelihood over the region.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The circuit.
+    information : ndarray, shape (7, 7)
+        Inverse covariance of its coordinates; directions of which a log says nothing do not count.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (9,)
+        Log-likelihoods [dimensionless] up to a constant.
+    """
+    off = fit.coordinates - actuator.conditions
+    weight = information @ np.linalg.inv(np.eye(len(information)) + WITHIN @ information)
+    return -0.5 * np.einsum("ci,ij,cj->c", off, weight, off)
+
+
+def how_near(fits: ClassFits, blocks: Blocks, actuator: Actuator) -> float:
+    """Return how well the condition that is nearest to a log holds it.
+
+    Without pressure searches from several conditions end at circuits that follow a log nearly alike, some within a
+    condition and some far from all. A log is outside only where each is, or explains so much less.
+
+    Parameters
+    ----------
+    fits : ClassFits
+        The circuits fitted to the log.
+    blocks : Blocks
+        The log.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    float
+        Log-likelihood of the region that holds the best circuit [dimensionless], 0 at its middle; without pressure of
+        any circuit, less what the best explains more.
+    """
+    best = float(np.max(region_scores(fits.best, fits.told, actuator)))
+    if blocks.pressure is not None:
+        return best
+    return max(best, float(np.max(fits.scores)) + misfit(blocks, fits.best.fitted) / LASTING)
+
+
+def told_apart(spread: Array, actuator: Actuator) -> Array:
+    """Return how well a log tells each condition from each other one, as an expected log-likelihood ratio.
+
+    Parameters
+    ----------
+    spread : ndarray, shape (7, 7)
+        Covariance of the coordinates for intervals, see `ClassFits`.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (9, 9)
+        Half the squared distance of their regions, each blurred by the log, in deviations [dimensionless].
+    """
+    between = actuator.conditions[:, None] - actuator.conditions
+    return 0.5 * np.einsum("abi,ij,abj->ab", between, np.linalg.inv(WITHIN + spread), between)

@@ -1,0 +1,248 @@
+"""How far off may a fitted circuit be? The doubt of severities where pressure is logged.
+
+A circuit that is fitted to a log has the rig's seals, make-up valves, mass and accumulator, and a judged share of its
+leakage in the pump. Where those are others, what is fitted gives way. So they are unknowns beside the fitted ones for
+one linear step, each with the spread that is judged of it: what the log leaves open of them widens the intervals, and
+so does what it says of them, because the fit did not go that way (consider covariance: Tapley, Schutz and Born,
+Statistical Orbit Determination, 2004, chapter 6). The file may also be right about all of them: both count, as likely
+as they make the log. What is left of a log that no sensor makes is a wrong model's error, which a longer log does not
+average away; that is counted here, once, and where it is.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.circuit_runs import COLUMN, parameter_rows, predicted
+from faults.diagnosis.circuits.class_fit import WEAK, PointFit
+from plant.arrays import Array
+
+_CASE = "pump_case_leakage"
+"""What draws oil from both sides, so that make-up valves open the more: it acts otherwise where it grows than where it
+falls, and is nudged both ways."""
+
+SELDOM_KNOWN: Mapping[str, float] = MappingProxyType(
+    {
+        "presliding_damping": 0.53,
+        "makeup_opening": 0.93,
+        "moving_mass": 0.15,
+        "accumulator_pressure": 0.23,
+        _CASE: 0.03,
+        "pump_crossport_leakage": 0.26,
+    }
+)
+"""Standard deviations, judged: of logarithms, and of the pump's two leakages as shares of the whole [dimensionless]."""
+
+NUDGE = 0.05
+"""Step of the finite differences in logarithms and shares [dimensionless]."""
+
+_STEPS: Mapping[str, float] = MappingProxyType({"pump_crossport_leakage": -NUDGE, _CASE: SELDOM_KNOWN[_CASE]})
+"""Steps of shares: the cylinder leaks the rest."""
+
+RIGHT = 0.25
+"""Share of the rig files that are right about all of `SELDOM_KNOWN` [fraction], judged."""
+
+NOISE_ALONE = 1.1
+"""Residuals over the sensors' noise, root mean square, up to which nothing else is left [dimensionless]: the noise is
+known to a twentieth, and a log of 1000 blocks tells the size of what is left no better."""
+
+LOOKS = 10.0
+"""Independent looks that a log gives at a wrong model's error, however long it is [dimensionless]."""
+
+AVERAGED = 10
+"""Blocks over which residuals are averaged to see what lasts of them, and to either side of one over which a wrong
+model's error is as large as there [dimensionless]: a tenth of a second."""
+
+
+def spreads_of(actuator: Actuator) -> Array:
+    """Return how far off what is seldom known may be of an actuator.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Standard deviations of `SELDOM_KNOWN`, and of the force on its rod over itself where a log had to tell that.
+    """
+    spreads = list(SELDOM_KNOWN.values())
+    if actuator.load_doubt > 0.0:
+        spreads.append(actuator.load_doubt / max(abs(actuator.circuit.load_force), actuator.load_doubt))
+    return np.array(spreads)
+
+
+def seldom_known_slopes(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
+    """Return how the outputs answer `SELDOM_KNOWN` and the force on the rod, by one run of circuits side by side.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    blocks : Blocks
+        Its log.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (m, n, outputs)
+        Derivatives with respect to logarithms and shares, in the order of `spreads_of` [m/s, Pa].
+    """
+    (row,) = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
+    leakage, case = row[COLUMN["leakage_coefficient"]], row[COLUMN[_CASE]]
+    steps = [(name, _STEPS.get(name, NUDGE)) for name in SELDOM_KNOWN]
+    if actuator.load_doubt > 0.0:
+        steps.append(("load_force", NUDGE))
+    unknowns = len(steps)
+    if case > 0.0:
+        steps.append((_CASE, -min(SELDOM_KNOWN[_CASE], case / leakage)))
+    rows = np.tile(row, (1 + len(steps), 1))  # circuits that run side by side share their steps' errors
+    for nudged, (name, step) in zip(rows[1:], steps, strict=True):
+        at = COLUMN[name]
+        if name == "load_force":
+            nudged[at] += step * max(abs(row[at]), actuator.load_doubt)
+        elif name in _STEPS:
+            nudged[at] += step * leakage
+        else:
+            nudged[at] *= np.exp(step)
+    runs = predicted(blocks, rows)
+    slopes = (runs[1:] - runs[0]) / np.array([step for _, step in steps])[:, None, None]
+    if case > 0.0:
+        at = list(SELDOM_KNOWN).index(_CASE)
+        slopes[at] = 0.5 * (slopes[at] + slopes[-1])
+    return slopes[:unknowns]
+
+
+def lasting_power(left: Array) -> Array:
+    """Return the power of residuals averaged over `AVERAGED` blocks, as white noise of one block would have it.
+
+    Parameters
+    ----------
+    left : ndarray, shape (n, outputs)
+        Residuals [m/s, Pa]; NaN where unknown.
+
+    Returns
+    -------
+    ndarray, shape (outputs,)
+        Mean square of white noise, and `AVERAGED` times that of an error that lasts [m^2/s^2, Pa^2].
+    """
+    size = min(AVERAGED, len(left))
+    parts = left[: len(left) // size * size].reshape(-1, size, left.shape[1])
+    there = np.sum(np.isfinite(parts), axis=(0, 1))
+    return np.asarray(np.sum(np.nansum(parts, axis=1) ** 2, axis=0) / np.maximum(there, 1), dtype=np.float64)
+
+
+def model_error(fit: PointFit, blocks: Blocks) -> Array:
+    """Return the variance of what a fit leaves of a log that its sensors do not make.
+
+    It is what is left beyond the noise as far as that is known, in the blocks or in their averages: an error that
+    lasts shows in these where noise hides it in a block.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    blocks : Blocks
+        Its log.
+
+    Returns
+    -------
+    ndarray, shape (outputs,)
+        Nothing where noise alone is left [m^2/s^2, Pa^2].
+    """
+    noise, power = (NOISE_ALONE * blocks.noise) ** 2, fit.scales**2
+    lasting = (lasting_power((blocks.outputs - fit.fitted)[blocks.first :]) - noise) / AVERAGED
+    return np.asarray(np.clip(np.maximum(power - noise, lasting), 0.0, power), dtype=np.float64)
+
+
+def near_by(left: Array, seen: NDArray[np.bool_]) -> Array:
+    """Return how large residuals are about each block, in variance, over all of the log.
+
+    Parameters
+    ----------
+    left : ndarray, shape (n, outputs)
+        Residuals [m/s, Pa], 0 where unknown.
+    seen : ndarray, shape (n, outputs)
+        Which are known.
+
+    Returns
+    -------
+    ndarray, shape (n, outputs)
+        Mean squares over `AVERAGED` blocks to either side, over that of all [dimensionless]; 1 where nothing is left.
+    """
+    sums = np.concatenate([np.zeros((1, 2 * left.shape[1])), np.cumsum(np.hstack([left**2, seen]), axis=0)])
+    at = np.arange(len(left))
+    within = sums[np.minimum(at + AVERAGED + 1, len(left))] - sums[np.maximum(at - AVERAGED, 0)]
+    power, counts = np.hsplit(within, 2)
+    whole = np.sum(left**2, axis=0) / np.maximum(np.sum(seen, axis=0), 1)
+    local = power / np.maximum(counts, 1.0)
+    return np.where(whole > 0.0, local / np.where(whole > 0.0, whole, 1.0), 1.0)
+
+
+def doubt_of(
+    fit: PointFit,
+    seldom: Array,
+    blocks: Blocks,
+    centres: Array,
+    odds: Array,
+    seen: Array,
+    spreads: Array,
+) -> Array:
+    """Return the second moment of a fit's error in its coordinates.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    seldom : ndarray, shape (m, n, outputs)
+        How the outputs answer what is seldom known, see `seldom_known_slopes`.
+    blocks : Blocks
+        Its log, with pressure.
+    centres : ndarray, shape (conditions, 7)
+        Coordinates of the conditions about which the weak prior may lie.
+    odds : ndarray, shape (conditions,)
+        Log-likelihoods of the conditions [dimensionless], up to a constant.
+    seen : ndarray, shape (7,)
+        1 for what the log can tell, 0 for what it cannot, as friction of a piston that sticks.
+    spreads : ndarray, shape (m,)
+        Standard deviations of what is seldom known, see `spreads_of`.
+
+    Returns
+    -------
+    ndarray, shape (7, 7)
+        Covariance, and the squares of the steps that prior and log ask for [dimensionless].
+    """
+    known, left = len(fit.coordinates), np.where(blocks.seen, (blocks.outputs - fit.fitted)[blocks.first :], 0.0)
+    lasts = model_error(fit, blocks) * blocks.counts / LOOKS
+    weight = np.sqrt(fit.scales**2 + lasts)
+    slopes = np.concatenate([fit.slopes * seen[:, None, None], seldom])[:, blocks.first :]
+    slopes = np.where(blocks.seen, slopes / weight, 0.0)
+    errs = np.sqrt(fit.scales**2 + lasts * near_by(left, blocks.seen)) / weight
+    told, erring = (part @ part.T for part in (one.reshape(len(slopes), -1) for one in (slopes, slopes * errs)))
+    prior = np.zeros((len(slopes), len(slopes)))
+    prior[:known, :known] = np.linalg.inv(WEAK)
+    prior[known:, known:] = np.diag(spreads**-2.0)
+    pulls = (slopes.reshape(len(slopes), -1) @ (left / weight).ravel())[:, None]
+    pulls = pulls + prior[:, :known] @ (centres - fit.coordinates).T
+    whole = np.arange(len(slopes))
+    right = np.delete(whole, slice(known, known + len(SELDOM_KNOWN)))  # a force on the rod is open in any case
+    shares = np.exp(odds - np.max(odds))
+    shares /= np.sum(shares)
+    evidence, found = list[float](), list[Array]()
+    for free in (right, whole):
+        its = np.ix_(free, free)
+        covariance = np.linalg.inv((told + prior)[its])
+        steps, likeliest = covariance @ pulls[free], int(np.argmax(odds))
+        volumes = np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(prior[its])[1]
+        evidence.append(0.5 * float(pulls[free, likeliest] @ steps[:, likeliest] + volumes))
+        spread = (covariance @ (erring + prior)[its] @ covariance)[:known, :known]
+        found.append(spread + (steps[:known] * shares) @ steps[:known].T)
+    odds_right = RIGHT / (1.0 - RIGHT) * np.exp(min(evidence[0] - evidence[1], 700.0))
+    share = odds_right / (1.0 + odds_right)
+    return np.asarray(share * found[0] + (1.0 - share) * found[1], dtype=np.float64)

@@ -1,0 +1,69 @@
+"""Where a log leaves two classes open, its severities hold the circuits of both.
+
+A log whose piston moves at a fifth of its rated velocity may be followed nearly as well by friction that rises with the
+velocity's square as by friction that does not. The fit that explains it best then says little of friction at rated
+velocity, though its covariance, which knows one valley alone, is narrow.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from faults.conditions import CONDITIONS
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.class_fit import fit_freely
+from faults.diagnosis.circuits.class_regions import ClassFits, is_stuck
+from plant.arrays import Array
+
+OPEN = 0.025
+"""Least probability of a class whose circuit counts [probability]: an interval leaves out as much at either end."""
+
+
+class OpenCircuit(NamedTuple):
+    """A circuit that a log leaves open.
+
+    Parameters
+    ----------
+    coordinates : ndarray, shape (7,)
+        In the order of `faults.diagnosis.circuits.circuit_runs.COORDINATES`.
+    probability : float
+        Of its class [probability].
+    """
+
+    coordinates: Array
+    probability: float
+
+
+def circuits_left_open(
+    blocks: Blocks, fits: ClassFits, actuator: Actuator, probabilities: Mapping[str, float]
+) -> list[OpenCircuit]:
+    """Return the circuit that follows a log best about each class that the log leaves open.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    fits : ClassFits
+        The circuits fitted to it.
+    actuator : Actuator
+        The healthy actuator.
+    probabilities : Mapping[str, float]
+        Of the conditions [probability].
+
+    Returns
+    -------
+    list of OpenCircuit
+        The best one of all first, whatever the probability of its class. It is alone where the log tells the class;
+        where pressure is not logged, and leakage and friction have one scale in common; and where the piston sticks, so
+        that friction is open in any case.
+    """
+    nearest = list(CONDITIONS)[int(np.argmax(fits.scores))]
+    found = [OpenCircuit(fits.best.coordinates, max(OPEN, probabilities[nearest]))]
+    if blocks.pressure is None or is_stuck(blocks, actuator):
+        return found
+    for name, probability in probabilities.items():
+        if name != nearest and probability >= OPEN:
+            found.append(OpenCircuit(fit_freely(blocks, actuator, name).coordinates, probability))
+    return found

@@ -1,0 +1,310 @@
+"""Is the log one that the nine conditions can explain? Else the verdict is "unknown", with what speaks against.
+
+A log is looked at from five sides: do its sensors work, do position and velocity agree, does any circuit follow it,
+does the circuit that does lie in or between the conditions' regions, and would a sensor's bias or another pump explain
+it better. The limits leave room for rigs that no circuit describes to the last digit.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.fits.greybox.averaged import samples_a_block
+from estimation.notes import SensorCode
+from faults.conditions import CONDITIONS, severity
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import Blocks, blocks_of
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.circuits.class_fit import LASTING, SEALS, STEP, WEAK, PointFit, fit_freely
+from faults.diagnosis.circuits.class_regions import ClassFits, region_scores
+from faults.notes import AgainstCode
+from plant.eha.circuit_parameters import CircuitParameters
+from plant.log.record import Record
+from plant.notes import Note
+
+UNEXPLAINED = (0.12, 0.08)
+"""Share of velocity and of pressure, root mean square, that the best circuit may leave [dimensionless]."""
+
+EARLIER = 0.1
+"""Time over which velocity is averaged once more where pressure is logged [s]: a piston that hardly moves breaks loose
+some blocks sooner or later than the circuit's, and goes as far."""
+
+UNEXPLAINED_LONGER = 0.06
+"""Share of velocity that means over `EARLIER` may leave [dimensionless]: half of what blocks may."""
+
+YIELDING = 0.015
+"""Share of the velocity at which the pump's whole flow would move the piston, root mean square, that may be left in any
+case where pressure is followed [dimensionless]: a piston that hardly moves yields on its seals, which no circuit
+describes to the last digit."""
+
+STICKS = math.exp(SEALS)
+"""How far seals may yield, over the rig's presliding displacement [dimensionless]: a standard deviation more, 54 um."""
+
+FARTHEST_OUT = 7.0
+"""Least log-likelihood of the nearest condition's region, below its centre's [dimensionless]."""
+
+FARTHEST_BESIDE = 10.4
+"""The same of the circuit that is the best of all severities, where pressure is logged [dimensionless]: two severities
+reach 7.0 by chance in one case of 1100, and five other coordinates in as many reach this. Without pressure nothing else
+tells some faults."""
+
+SOFT = 0.55
+"""Share of the rig's bulk modulus below which the oil holds air [dimensionless]; it is too stiff above the inverse."""
+
+STANDARD_ERRORS = 2.0
+"""Standard errors from zero at which a bias is believed [dimensionless]; they hold the model's error already."""
+
+LEAST_BIAS = {"pump": 0.08, "differential_pressure_pa": 0.05, "motor_speed_rad_s": 0.03}
+"""Biases that matter: of the pump's flow a radian, of pressure and of motor speed over their root mean square."""
+
+GRID = 9
+"""Severities of leakage, and of friction, between none and major that are tried."""
+
+FREE_PUMP = 0.3
+"""Standard deviation of the pump's displacement where a fit may change it [dimensionless]."""
+
+SMALLEST_PUMP = 0.3
+"""Share of the rig's displacement below which no pump is tried [dimensionless]."""
+
+PUMP_GAIN, PUMP_GAIN_WITHOUT = 20.0, 3.0
+"""Log-posterior that another pump must gain, with pressure and without, in `LASTING` blocks that count as one
+[dimensionless]. On logs of other physics a pump 10 % off gained up to 15 without being there; on nine steps one 15 %
+off gains 44 to 154, and 9 to 18 where leakage and friction are major. With pressure the balance of flows looks for a
+worn pump too; without, nothing else does."""
+
+AGREEMENT = 0.05
+"""Share by which velocity and the slope of position may differ, root mean square [dimensionless]."""
+
+BREAK = 3.0
+"""Standard deviations of its noise by which velocity may differ from the slope of position in any case."""
+
+
+def reasons_against(blocks: Blocks, fits: ClassFits, region: float, actuator: Actuator) -> list[Note]:
+    """Return what speaks against a log being in any of the nine conditions.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks.
+    fits : ClassFits
+        The circuits fitted to it.
+    region : float
+        Log-likelihood of the nearest condition's region, relative to its centre [dimensionless].
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    list[Note]
+        None for a log that fits.
+    """
+    left = [] if sticks_and_slips(blocks, fits.best, actuator) else unexplained(blocks, fits, actuator)
+    return [*left, *_biases(blocks, fits, actuator), *_outside(blocks, fits, region, actuator)]
+
+
+def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
+    """Compare a velocity sensor with the encoder, over the blocks.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    blocks : Blocks
+        The same in blocks.
+
+    Returns
+    -------
+    tuple of Note
+        One where they differ by more than their noise and `AGREEMENT`.
+    """
+    if "velocity_m_s" not in record or "position_m" not in record:
+        return ()
+    other = blocks_of(record.replace(position_m=None))
+    apart = (other.velocity - blocks.velocity)[blocks.first :]
+    there = np.isfinite(apart)
+    size = float(np.sqrt(np.nanmean(blocks.velocity**2)))
+    noise = BREAK * float(np.hypot(blocks.noise[0], other.noise[0]))
+    allowed = max(AGREEMENT * size, float(np.hypot(noise, _between_samples(record, other))))
+    differs = float(np.sqrt(np.mean(apart[there] ** 2))) if np.any(there) else 0.0
+    return () if differs <= allowed else (SensorCode.SENSORS_DISAGREE.note(difference_m_s=differs),)
+
+
+def _between_samples(record: Record, blocks: Blocks) -> float:
+    """Return how far the means of sampled velocities are off those of velocity itself, root mean square [m/s].
+
+    Between two samples velocity changes at a moment that no sample tells, so that a sample stands for too much or too
+    little of it: by a share of the change that is even between 0 and 1. Changes that are noise count there already.
+    """
+    rows = round(blocks.block * blocks.sample_time / record.sample_time)
+    steps = np.diff(record["velocity_m_s"])
+    steps = steps[np.isfinite(steps)]
+    if not len(steps):  # a channel slower than the rows: no two of its samples are neighbours
+        return 0.0
+    changes = float(np.mean(steps**2)) - 2.0 * rows * float(blocks.noise[0]) ** 2
+    return (max(changes, 0.0) / (3.0 * rows)) ** 0.5
+
+
+def unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
+    """Return a note for each output of which the best circuit leaves more than it may.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks.
+    fits : ClassFits
+        The circuits fitted to it.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    list[Note]
+        None where a circuit follows the log.
+    """
+    shares = fits.best.scales / np.maximum(blocks.sizes, np.finfo(float).tiny)
+    pump = actuator.circuit.pump_displacement / actuator.circuit.piston_area
+    yielding = YIELDING * pump * float(np.sqrt(np.mean(blocks.speed**2)))
+    least = np.array([0.0] if blocks.pressure is None else [yielding, 0.0])
+    heard = fits.best.scales > np.maximum(2.0 * blocks.noise, least)
+    if blocks.pressure is not None:
+        heard[0] &= _left_longer(blocks, fits.best) > UNEXPLAINED_LONGER * blocks.sizes[0]
+    names = ("velocity", "differential pressure")
+    return [
+        AgainstCode.UNEXPLAINED.note(percent=100.0 * share, channel=name)
+        for name, share, limit, loud in zip(names, shares, UNEXPLAINED, heard, strict=False)
+        if share > limit and loud
+    ]
+
+
+def sticks_and_slips(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
+    """Return whether a circuit misses only when the piston breaks loose and jumps, and not how far it goes.
+
+    Minor friction falls with speed, so that a piston pushed slowly sticks and slips: some twenty jumps a second, each
+    of a tenth of a millimetre. When one begins rests on seals that no circuit describes to the last digit, and the next
+    follows from it; how far the piston goes follows from pressure and flow. So where pressure is followed, and motion
+    over `EARLIER` to what seals may yield, jumps that come at other times speak against no condition.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks.
+    fit : PointFit
+        The circuit that explains it best.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    bool
+        Whether it is so; never without pressure, of which nothing then tells that the piston sticks.
+    """
+    if blocks.pressure is None or fit.scales[1] > max(UNEXPLAINED[1] * blocks.sizes[1], 2.0 * blocks.noise[1]):
+        return False
+    return EARLIER * _left_longer(blocks, fit) <= STICKS * actuator.circuit.presliding_displacement
+
+
+def _left_longer(blocks: Blocks, fit: PointFit) -> float:
+    """Return what a circuit leaves of the mean velocity over `EARLIER`, root mean square [m/s]."""
+    left = (blocks.velocity - fit.fitted[:, 0])[blocks.first :]
+    together = samples_a_block(blocks.block * blocks.sample_time, EARLIER)
+    parts = left[: len(left) // together * together].reshape(-1, together)
+    there = np.isfinite(parts)
+    means = np.where(there, parts, 0.0).sum(axis=1) / np.maximum(there.sum(axis=1), 1)
+    known = np.any(there, axis=1)
+    return float(np.sqrt(np.mean(means[known] ** 2))) if np.any(known) else float("inf")
+
+
+def _biases(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
+    """Return a note for each sensor that is biased, and for a pump that is another than the rig's.
+
+    Both are looked for in one linear step from the best circuit. A pump that is off bends the other coordinates, so it
+    is put into the circuit and the step taken again; it counts if the circuit then explains the log better.
+    """
+    size = float(np.sqrt(np.mean(blocks.speed**2)))
+    if size == 0.0:
+        return []
+    trust = float(np.trace(fits.information) / np.trace(fits.best.information))
+    sizes = {"pump": 1.0, "motor_speed_rad_s": size}
+    if blocks.pressure is not None:
+        sizes["differential_pressure_pa"] = float(np.sqrt(np.nanmean(blocks.pressure**2)))
+    found = _one_step(blocks, fits.best, trust, actuator, sizes)
+    matters = {name: abs(value) > _least(name, error, sizes) for name, (value, error) in found.items()}
+    pump = found["pump"][0]
+    if blocks.pressure is None and pump < 0.0:  # `other_faults` looks for a worn pump
+        matters["pump"] = False
+    if matters["pump"]:
+        healthy = actuator.circuit
+        other = replace(healthy, pump_displacement=healthy.pump_displacement * max(1.0 + pump, SMALLEST_PUMP))
+        tried = replace(actuator, circuit=other)
+        nearest = list(CONDITIONS)[int(np.argmax(fits.scores))]
+        without, again = (fit_freely(blocks, one, nearest) for one in (actuator, tried))
+        least = PUMP_GAIN_WITHOUT if blocks.pressure is None else PUMP_GAIN
+        matters["pump"] = without.cost - again.cost > least * LASTING
+        pump = (1.0 + pump) * (1.0 + _one_step(blocks, again, trust, tried, sizes)["pump"][0]) - 1.0
+    return [_bias(name, pump if name == "pump" else found[name][0]) for name in found if matters[name]]
+
+
+def _least(name: str, error: float, sizes: Mapping[str, float]) -> float:
+    return max(STANDARD_ERRORS * error, LEAST_BIAS[name] * sizes[name])
+
+
+def _one_step(
+    blocks: Blocks, fit: PointFit, trust: float, actuator: Actuator, sizes: Mapping[str, float]
+) -> Mapping[str, tuple[float, float]]:
+    """Return the pump's share and each sensor's bias with its standard error, by one linear step from a fit."""
+    first = blocks.first
+    rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
+    nudge = 0.01 * sizes["motor_speed_rad_s"]
+    faster = predicted(replace(blocks, speed=blocks.speed + nudge), rows)[0]
+    larger = predicted(blocks, parameter_rows(fit.coordinates[None], _larger_pump(actuator.circuit), actuator.rated))[0]
+    columns = [*fit.slopes, (larger - fit.fitted) / STEP, (faster - fit.fitted) / nudge]
+    if blocks.pressure is not None:
+        columns.append(np.column_stack([np.zeros(len(blocks.velocity)), np.ones(len(blocks.velocity))]))
+    weighted = np.where(blocks.seen, np.array(columns)[:, first:] / fit.scales, 0.0).reshape(len(columns), -1)
+    left = np.where(blocks.seen, (blocks.outputs - fit.fitted)[first:] / fit.scales, 0.0).ravel()
+    pull, pump = np.zeros((len(columns), len(columns))), len(WEAK)
+    pull[:pump, :pump] = np.linalg.inv(WEAK)
+    pull[pump, pump] = 1.0 / FREE_PUMP**2
+    covariance = np.linalg.pinv(trust * weighted @ weighted.T + pull)
+    found = covariance @ (trust * weighted @ left)
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return {name: (float(found[at]), float(errors[at])) for at, name in enumerate(sizes, start=pump)}
+
+
+def _larger_pump(circuit: CircuitParameters) -> CircuitParameters:
+    return replace(circuit, pump_displacement=circuit.pump_displacement * math.exp(STEP))
+
+
+def _bias(name: str, value: float) -> Note:
+    if name == "pump":
+        return AgainstCode.PUMP_OFF.note(percent=100.0 * value)
+    if name == "motor_speed_rad_s":
+        return AgainstCode.SPEED_BIAS.note(bias_rad_s=-value)
+    return AgainstCode.PRESSURE_BIAS.note(bias_pa=value)
+
+
+def _outside(blocks: Blocks, fits: ClassFits, region: float, actuator: Actuator) -> list[Note]:
+    stiffness = float(np.exp(fits.best.coordinates[COORDINATES.index("bulk_modulus")]))
+    share = stiffness / actuator.circuit.bulk_modulus
+    known = fits.covariance[5, 5] ** 0.5
+    if share < SOFT * np.exp(-2.0 * known) or share > np.exp(2.0 * known) / SOFT:
+        return [(AgainstCode.OIL_SOFT if share < 1.0 else AgainstCode.OIL_STIFF).note(share=share)]
+    if region >= -FARTHEST_OUT:
+        return []
+    leakage, friction, between = _nearest_severity(fits, actuator)
+    if between >= -FARTHEST_OUT:
+        return [AgainstCode.BETWEEN_CONDITIONS.note(leakage=leakage, friction=friction)]
+    farthest = FARTHEST_OUT if blocks.pressure is None else FARTHEST_BESIDE
+    return [AgainstCode.OUTSIDE_CONDITIONS.note()] if between < -farthest else []
+
+
+def _nearest_severity(fits: ClassFits, actuator: Actuator) -> tuple[float, float, float]:
+    """Return severities of leakage and friction whose region holds the circuit best, and how well."""
+    levels = np.linspace(0.0, 2.0, GRID)
+    each = [(float(leakage), float(friction)) for leakage in levels for friction in levels]
+    points = [coordinates_of(severity(*pair, actuator.circuit), actuator.rated) for pair in each]
+    scores = region_scores(fits.best, fits.told, replace(actuator, conditions=np.array(points)))
+    best = int(np.argmax(scores))
+    return (*each[best], float(scores[best]))

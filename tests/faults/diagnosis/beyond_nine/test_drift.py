@@ -1,0 +1,132 @@
+"""A log that warms: its classes are weighed over where in the drift of leakage the rig file's oil stands."""
+
+from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.eha.explained import LEAKAGE_COURSE
+from estimation.log_checks.clean import CleanLog, clean_log
+from estimation.notes import RigCode
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.beyond_nine.drift import over_drift, weighed
+from faults.diagnosis.beyond_nine.load import Loaded
+from faults.diagnosis.calibration import shipped_calibration
+from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.diagnose import diagnose_clean
+from faults.diagnosis.severity import severities_at
+from faults.diagnosis.severity_total import with_totals
+from faults.notes import AgainstCode
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.parameter_path import ParameterPath
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.sensors.sensors import BENCH
+
+HEALTHY = EhaParameters()
+ACTUATOR = actuator_of(HEALTHY)
+SECONDS, TWICE = 4.0, 2.0
+DRIFTS = (RigCode.LEAKAGE_DRIFTS.note(factor=TWICE, first=1e-11, last=2e-11),)
+
+
+@cache
+def warming(condition: str, first: float) -> CleanLog:
+    """Return a log whose viscosity halves, and whose leakage begins at a multiple of the condition's."""
+    p, rng = circuit_of(parameters_for(CONDITIONS[condition])), np.random.default_rng(5)
+    times = np.linspace(0.0, SECONDS, 9)
+    warm = [
+        replace(p, leakage_coefficient=factor * p.leakage_coefficient, friction_linear=p.friction_linear / factor)
+        for factor in first * TWICE ** (times / SECONDS)
+    ]
+    path = ParameterPath((1e-6, *times[1:]), tuple(warm), "linear")
+    drive = make_drive("prbs", SECONDS, 1e-3, HEALTHY, rng)
+    found = clean_log(simulate(CIRCUIT, drive, 1e-3, path, sensors=BENCH, rng=rng), HEALTHY)
+    course = TWICE ** (np.linspace(0.0, 1.0, len(found.record)) - 1.0)
+    return replace(found, record=found.record.replace(**{LEAKAGE_COURSE: course}))
+
+
+def diagnosed(log: CleanLog) -> Loaded:
+    return Loaded(diagnose_clean(log, ACTUATOR), HEALTHY)
+
+
+@cache
+def weighed_over_drift(condition: str, first: float) -> Diagnosis:
+    return over_drift(diagnosed, warming(condition, first), DRIFTS).diagnosis
+
+
+@pytest.mark.parametrize("condition", ["minor_leakage", "major_leakage"])
+def test_a_condition_of_cold_oil_is_no_other_when_it_is_warm(condition: str) -> None:
+    at_end = diagnosed(warming(condition, 1.0)).diagnosis
+    assert at_end.condition != condition or at_end.unknown
+    found = weighed_over_drift(condition, 1.0)
+    assert (found.condition, found.unknown) == (condition, False)
+    assert sum(found.probabilities.values()) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("first", [TWICE**-0.5, 1.0 / TWICE])
+def test_nor_is_one_of_oil_that_is_warm_halfway_or_at_the_end(first: float) -> None:
+    found = weighed_over_drift("minor_leakage", first)
+    assert (found.condition, found.unknown) == ("minor_leakage", False)
+
+
+def test_severities_are_those_at_the_end_and_the_total_holds_the_drift() -> None:
+    found, at_end = weighed_over_drift("minor_leakage", 1.0), diagnosed(warming("minor_leakage", 1.0)).diagnosis
+    flow = found.severity["leakage_flow"]
+    assert (flow.value, flow.ci95) == (at_end.severity["leakage_flow"].value, at_end.severity["leakage_flow"].ci95)
+    names = list(CONDITIONS)
+    begun = severities_at(ACTUATOR.conditions[names.index("minor_leakage")], ACTUATOR)["leakage_flow"]
+    low, high = with_totals(found.severity, ACTUATOR, {}, pressure=True)["leakage_flow"].ci95_total or (0.0, 0.0)
+    assert flow.ci95 is not None
+    assert low < begun < flow.ci95[0]
+    assert high == pytest.approx(flow.ci95[1])
+
+
+def test_a_log_that_does_not_drift_is_diagnosed_once() -> None:
+    asked: list[CleanLog] = []
+    log: Any = SimpleNamespace()
+
+    def once(one: CleanLog) -> Loaded:
+        asked.append(one)
+        steady: Any = SimpleNamespace(scoreboard=SimpleNamespace(drift=None))
+        return Loaded(steady, HEALTHY)
+
+    grows = RigCode.LEAKAGE_GROWS.note(factor=5.0, first=1e-11, last=5e-11)
+    assert over_drift(once, log, (grows,)).parameters is HEALTHY
+    assert asked == [log]
+
+
+def test_what_speaks_against_all_nine_in_any_oil_speaks_against_a_log() -> None:
+    first = weighed_over_drift("minor_leakage", 1.0)
+    outside, bias = AgainstCode.OUTSIDE_CONDITIONS.note(), AgainstCode.PRESSURE_BIAS.note(bias_pa=1e5)
+
+    def against(*each: tuple[Any, ...]) -> tuple[Any, ...]:
+        left = iter(each)
+        return over_drift(
+            lambda _: Loaded(replace(first, against=next(left)), HEALTHY), warming("minor_leakage", 1.0), DRIFTS
+        ).diagnosis.against
+
+    assert against((outside,), (outside,), ()) == ()
+    assert against((outside,), (outside,), (outside,)) == (outside,)
+    assert against((bias,), (), ()) == (bias,)
+    assert against((outside,), (bias,), ()) == (bias,)
+
+
+def test_places_count_by_their_evidence_and_alike_where_they_compare_other_stretches() -> None:
+    one = weighed_over_drift("minor_leakage", 1.0)
+    sure = {name: {"normal": 1.0}.get(name, 0.0) for name in CONDITIONS}
+    other = {name: {"major_friction": 1.0}.get(name, 0.0) for name in CONDITIONS}
+    calibration = shipped_calibration()
+    less = 2.0 / calibration.weights(True)["parameters"]
+    fits = replace(one.scoreboard.fits, scores=one.scoreboard.fits.scores - less)
+    worse = replace(one.scoreboard, fits=fits)
+    two = replace(one, probabilities=sure), replace(one, probabilities=other, scoreboard=worse)
+    found = weighed(two, calibration)
+    assert found["normal"] / found["major_friction"] == pytest.approx(np.exp(2.0))
+    cut = replace(one.scoreboard.blocks, velocity=one.scoreboard.blocks.velocity * np.nan)
+    elsewhere = replace(two[1], scoreboard=replace(worse, blocks=cut))
+    assert weighed((two[0], elsewhere), calibration)["normal"] == pytest.approx(0.5)

@@ -1,0 +1,129 @@
+"""The force balance of a sliding piston tells force, spring and inertia on its rod, and how well."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.beyond_nine.force_balance import (
+    BROKEN_LOOSE,
+    LAGGING,
+    Loads,
+    force_balance,
+    friction_believed,
+    sliding_blocks,
+)
+from faults.diagnosis.circuits.blocks import Blocks
+from plant.arrays import Array
+from plant.components.oil import ATMOSPHERE
+from plant.eha.model import EhaParameters
+
+PAPER = EhaParameters()
+STEP, PLACE = 0.01, -0.006
+TIME = STEP * np.arange(600)
+NOISE = np.array([1e-5, 500.0])
+
+
+def to_and_fro(one_way: bool = False) -> Array:
+    """Return velocities over blocks [m/s], of two frequencies that no place belongs to one speed."""
+    swing = 0.02 * np.sin(2.0 * np.pi * 0.7 * TIME) + 0.01 * np.sin(2.0 * np.pi * 1.9 * TIME)
+    return 0.001 + np.abs(swing) if one_way else swing
+
+
+def blocks_under(
+    p: EhaParameters, velocity: Array, force: float = 0.0, stiffness: float = 0.0, mass: float = 0.0
+) -> Blocks:
+    """Return a log of a piston that slides under a load, by equation 5.9 with 3 N of noise."""
+    position = PLACE + STEP * (np.cumsum(velocity) - 0.5 * velocity)
+    rubbing = (
+        p.friction_quadratic * velocity * np.abs(velocity)
+        + p.friction_linear * velocity
+        + p.friction_coulomb * np.sign(velocity)
+    )
+    inertia = (p.moving_mass + mass) * np.gradient(velocity, STEP)
+    noise = np.random.default_rng(3).normal(0.0, 3.0, len(velocity))
+    push = rubbing + inertia + p.load_force + force + (p.load_stiffness + stiffness) * position + noise
+    return Blocks(np.zeros(6001), 1e-3, 10, velocity, push / p.piston_area, NOISE, place=PLACE)
+
+
+def seen(blocks: Blocks, p: EhaParameters = PAPER) -> Loads:
+    found = force_balance(blocks, p)
+    assert found is not None
+    return found
+
+
+def test_force_spring_and_inertia_come_back_within_their_intervals_at_once() -> None:
+    true = {"load_force": -700.0, "load_stiffness": 9e3, "moving_mass": 250.0}
+    found = seen(blocks_under(PAPER, to_and_fro(), *true.values()))
+    assert found.believed == tuple(true)
+    for name, value in true.items():
+        got, std = found.of(name)
+        assert abs(got - value) < 2.0 * std
+    assert found.of("load_force")[1] < 10.0
+    assert found.of("load_stiffness")[1] < 0.2 * true["load_stiffness"]
+    assert LAGGING < found.of("moving_mass")[1] < 0.2 * true["moving_mass"]
+
+
+def test_a_rod_without_a_load_shows_none() -> None:
+    found = seen(blocks_under(PAPER, to_and_fro()))
+    assert found.sure == ()
+    assert abs(found.of("load_force")[0]) < 5.0
+
+
+def test_a_load_too_small_to_matter_is_sure_and_not_believed() -> None:
+    found = seen(blocks_under(PAPER, to_and_fro(), force=20.0))
+    assert (found.sure, found.believed) == (("load_force",), ())
+
+
+def test_the_rigs_own_load_and_two_areas_are_no_finding() -> None:
+    rig = replace(PAPER, load_force=400.0, load_stiffness=5e3)
+    assert seen(blocks_under(rig, to_and_fro()), rig).sure == ()
+    rod = replace(PAPER, area_difference=0.2)
+    one = blocks_under(PAPER, to_and_fro())
+    assert one.pressure is not None
+    # what pushes a piston of two areas holds the pressure of both chambers, of which one is the inner circuit's
+    difference = one.pressure - 0.2 * 2.0 * (PAPER.accumulator_pressure - ATMOSPHERE)
+    difference = np.where(difference > 0.0, difference / 1.2, difference / 0.8)
+    assert seen(replace(one, pressure=difference), rod).believed == ()
+
+
+def test_a_force_as_small_as_the_inner_circuits_on_two_unlike_areas_is_not_told() -> None:
+    rod = replace(PAPER, area_difference=0.2)
+    own = PAPER.piston_area * 0.2 * 2.0 * (PAPER.accumulator_pressure - ATMOSPHERE)
+    one = blocks_under(PAPER, to_and_fro(), force=own)
+    assert seen(one).sure == ("load_force",)
+    assert one.pressure is not None
+    assert seen(replace(one, pressure=one.pressure / (1.0 + 0.2 * np.sign(one.pressure))), rod).sure == ()
+    assert seen(one, rod).of("load_force")[1] == pytest.approx(own, rel=0.05)
+
+
+@pytest.mark.parametrize("condition", ["normal", "major_friction"])
+def test_of_a_piston_that_slides_one_way_friction_at_rest_is_left_open(condition: str) -> None:
+    p = parameters_for(CONDITIONS[condition], PAPER)
+    found = seen(blocks_under(p, to_and_fro(one_way=True), force=2000.0))
+    force, std = found.of("load_force")
+    assert std == pytest.approx(friction_believed(PAPER)[1][0], rel=0.05)
+    assert abs(force - 2000.0) < std
+    assert found.believed == ("load_force",)
+
+
+def test_nothing_is_said_without_pressure_or_of_a_piston_that_stands() -> None:
+    moving = blocks_under(PAPER, to_and_fro(), force=500.0)
+    assert force_balance(replace(moving, pressure=None), PAPER) is None
+    standing = blocks_under(PAPER, 1e-6 * to_and_fro(), force=500.0)
+    assert force_balance(standing, PAPER) is None
+
+
+def test_a_piston_slides_once_it_has_gone_on_after_a_turn() -> None:
+    velocity = np.concatenate([np.full(40, 0.002), np.full(40, -0.002), np.zeros(10)])
+    velocity[60] = np.nan
+    blocks = Blocks(np.zeros(901), 1e-3, 10, velocity, velocity, NOISE)
+    found = sliding_blocks(blocks)
+    strained = round(BROKEN_LOOSE / (0.002 * STEP))
+    assert not np.any(found[: strained + 1])
+    assert np.all(found[strained + 1 : 39])
+    assert not np.any(found[39 : 40 + strained])
+    assert np.all(found[42 + strained : 59])
+    assert not np.any(found[59 : 61 + strained])
+    assert not np.any(found[79:])

@@ -1,0 +1,33 @@
+"""A circuit beside the nine conditions, without pressure: a model error that lasts counts in how far off it is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS
+from faults.diagnosis.beyond_nine.near_enough import lies_beside, only_beside
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_regions import fit_classes
+from faults.notes import AgainstCode
+from tests.faults.diagnosis.short_logs import ACTUATOR, blocks
+
+LOG = blocks(pressure=False)
+FITS = fit_classes(LOG, ACTUATOR)
+
+
+def test_only_a_place_beside_the_nine_is_one() -> None:
+    outside, soft = AgainstCode.OUTSIDE_CONDITIONS.note(), AgainstCode.OIL_SOFT.note(share=0.3)
+    assert only_beside(())
+    assert only_beside((outside, AgainstCode.BETWEEN_CONDITIONS.note(leakage=0.5, friction=0.0)))
+    assert not only_beside((outside, soft))
+
+
+@pytest.mark.parametrize(("error", "beside"), [(0.0, True), (0.05, False)])
+def test_what_lies_beside_them_does_not_where_what_it_leaves_lasts(error: float, beside: bool) -> None:
+    far = FITS.best.coordinates + (np.array(COORDINATES) == "bulk_modulus")
+    best = replace(FITS.best, coordinates=far)
+    fits = replace(FITS, best=best, scores=np.full(len(CONDITIONS), -1e3), information=100.0 * np.eye(len(far)))
+    slow = error * float(LOG.sizes[0]) * np.sin(np.linspace(0.0, 12.0, len(LOG.velocity)))
+    log = replace(LOG, velocity=FITS.best.fitted[:, 0] + slow)
+    assert lies_beside(log, fits, ACTUATOR) == beside

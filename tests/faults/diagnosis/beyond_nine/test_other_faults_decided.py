@@ -1,0 +1,263 @@
+"""Which fault outside the nine conditions is named or not excluded, by what circuits gain, with their fits made up."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.clean import clean_log
+from faults.conditions import CONDITIONS
+from faults.diagnosis import diagnose
+from faults.diagnosis.beyond_nine import other_faults, wear
+from faults.diagnosis.beyond_nine.other_faults import Outside, faults_outside
+from faults.diagnosis.calibration import shipped_calibration
+from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.evidence import Scoreboard
+from faults.notes import AgainstCode, ClassCode
+from plant.eha.circuit_parameters import CircuitParameters
+from tests.faults.diagnosis.short_logs import ACTUATOR, PAPER, PRESSURE, blocks, log
+
+SOUND = ACTUATOR.circuit
+LOG = blocks(pressure=False)
+MAJOR = float(np.exp(ACTUATOR.conditions[list(CONDITIONS).index("major_leakage"), COORDINATES.index("leakage")]))
+Score = Callable[[CircuitParameters], float]
+
+
+def fits(score: float) -> Any:
+    return SimpleNamespace(scores=np.array([score - 9.0, score]), best=SimpleNamespace(coordinates=np.full(7, score)))
+
+
+def decided(monkeypatch: pytest.MonkeyPatch, score: Score) -> tuple[Any, Any, list[tuple[Any, bool]]]:
+    """Return what is said where each circuit explains the log so well, and which were fitted from which starts."""
+    found, asked = looked(monkeypatch, score)
+    return found.against, found.open, asked
+
+
+def looked(
+    monkeypatch: pytest.MonkeyPatch, score: Score, pressure: float = 1e6
+) -> tuple[Outside, list[tuple[Any, bool]]]:
+    asked: list[tuple[Any, bool]] = []
+
+    def fitted(_: Any, actuator: Any, *, runs: Any, start: Any = None, **_limits: float) -> Any:  # noqa: ARG001
+        asked.append((actuator.circuit, start is not None))
+        return fits(score(actuator.circuit))
+
+    monkeypatch.setattr(other_faults, "fit_classes", fitted)
+    monkeypatch.setattr(other_faults, "nominal_runs", lambda *_: np.zeros((9, 1, 1)))
+    monkeypatch.setattr(other_faults, "misfit", lambda *_: 0.0)
+    monkeypatch.setattr(other_faults, "largest_pressure", lambda *_: pressure)
+    return faults_outside(LOG, fits(0.0), ACTUATOR), asked
+
+
+def worn(circuit: CircuitParameters) -> float:
+    return round(circuit.pump_displacement / SOUND.pump_displacement, 6)
+
+
+@pytest.mark.parametrize(("gain", "named"), [(3.9, False), (4.1, True)])
+def test_a_fault_is_named_from_a_gain_of_four(gain: float, named: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    against, open_, _ = decided(
+        monkeypatch, lambda one: gain if worn(one) == 0.9 else -30.0 if worn(one) < 0.9 else 0.0
+    )
+    if named:
+        assert [(note.code, note.data["percent"]) for note in against] == [
+            (AgainstCode.PUMP_DELIVERS_LESS, pytest.approx(90.0))
+        ]
+        assert open_ == ()
+    else:
+        assert against == ()
+        assert "worn pump" in open_[0].data["faults"]
+
+
+@pytest.mark.parametrize(("gain", "open_"), [(-2.9, True), (-3.1, False)])
+def test_a_fault_is_excluded_below_a_gain_of_minus_three(
+    gain: float, open_: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sound = {"makeup_conductance", "pump_case_leakage"}
+
+    def score(one: CircuitParameters) -> float:
+        same = all(
+            getattr(one, name) == getattr(SOUND, name) for name in SOUND.__dataclass_fields__ if name not in sound
+        )
+        return 0.0 if same and type(one) is type(SOUND) else gain if worn(one) == 0.7 else -9.0
+
+    against, found, _ = decided(monkeypatch, score)
+    assert against == ()
+    assert [(note.code, note.data["faults"]) for note in found] == (
+        [(ClassCode.NOT_EXCLUDED, "a worn pump")] if open_ else []
+    )
+
+
+@pytest.mark.parametrize(("best", "open_"), [(-2.9, True), (-3.1, False)])
+def test_what_worn_pumps_leave_of_the_conditions_is_told_where_they_are_not_excluded(
+    best: float, open_: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scores = {1.0: 0.0, 0.7: -8.0, 0.8: best, 0.9: -5.0}
+    found, _ = looked(monkeypatch, lambda one: scores[worn(one)] if type(one) is type(SOUND) else 1.0)
+    assert "a make-up valve that leaks" in found.open[0].data["faults"]
+    if open_:
+        assert found.worn is not None
+        assert found.worn.tolist() == [[score - 9.0, score] for score in (0.0, -8.0, best, -5.0)]
+    else:
+        assert found.worn is None
+
+
+@pytest.mark.parametrize("gain", [-2.9, -1.0, 1.0, 3.0])
+def test_a_well_worn_pump_that_is_not_excluded_takes_its_probability_from_the_conditions(
+    gain: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scores = {1.0: 0.0, 0.7: -9.0, 0.8: gain, 0.9: -9.0}
+    found, _ = looked(monkeypatch, lambda one: scores[worn(one)] if type(one) is type(SOUND) else -9.0, np.nan)
+    odds = np.exp(gain - 0.5 * (np.log(0.8) / 0.15) ** 2) + np.exp(-9.0 - 0.5 * (np.log(0.7) / 0.15) ** 2)
+    share = odds / (1.0 + odds)
+    assert found.faulty == pytest.approx(share)
+    assert found.open[0].data["faults"] == f"a worn pump ({100.0 * share:.0f} %)"
+    monkeypatch.setattr(wear, "faults_outside", lambda *_: found)
+    nothing = {name: np.zeros(9) for name in ("models", "innovations", "parameters")}
+    board = Scoreboard(nothing, LOG, SimpleNamespace(), None, None)  # type: ignore[arg-type]
+    told = Diagnosis({}, (), {}, {}, {}, (), board)
+    monkeypatch.setattr(wear, "summed_over_wear", lambda *_: {"normal": 0.75, "minor_leakage": 0.25})
+    probabilities = wear.whatever_fault(told, ACTUATOR, shipped_calibration()).probabilities
+    assert probabilities == pytest.approx({"normal": 0.75 * (1.0 - share), "minor_leakage": 0.25 * (1.0 - share)})
+
+
+@pytest.mark.parametrize("gain", [-2.9, 0.0, 3.9])
+def test_a_valve_that_is_not_excluded_is_as_likely_as_not_where_it_would_be_believed(
+    gain: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def score(one: CircuitParameters) -> float:
+        stuck = getattr(one, "makeup_shut_b", 0.0) == 1.0
+        return gain if stuck else 0.0 if type(one) is type(SOUND) and worn(one) == 1.0 else -9.0
+
+    found, _ = looked(monkeypatch, score, np.nan)
+    odds = np.exp(gain - 4.0)
+    assert found.faulty == pytest.approx(odds / (1.0 + odds))
+    said = f" ({100.0 * found.faulty:.0f} %)" if gain >= 0.0 else ""
+    assert found.open[0].data["faults"] == f"a make-up valve that is stuck shut{said}"
+
+
+@pytest.mark.parametrize(("gain", "named", "said"), [(6.6, True, False), (6.4, False, True), (0.0, False, False)])
+def test_a_low_relief_valve_gains_over_all_settings_that_it_may_have(
+    gain: float, named: bool, said: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def score(one: CircuitParameters) -> float:
+        return gain if one.relief_pressure == 9e5 else 0.0 if one == SOUND else -9.0
+
+    against, open_, _ = decided(monkeypatch, score)
+    assert [note.code for note in against] == ([AgainstCode.RELIEF_EARLY] if named else [])
+    assert bool(open_ and other_faults.EARLY in open_[0].data["faults"]) == said
+
+
+def test_a_search_for_a_fault_need_not_come_nearer_than_twenty_to_the_sound_circuit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    wanted: list[float] = []
+
+    def fitted(_: Any, actuator: Any, **how: Any) -> Any:
+        wanted.extend([how["wanted"]] if "wanted" in how else [])
+        return fits(3.0 if actuator.circuit.makeup_conductance != SOUND.makeup_conductance else 0.0)
+
+    looked(monkeypatch, lambda _: 0.0)
+    monkeypatch.setattr(other_faults, "fit_classes", fitted)
+    faults_outside(LOG, fits(0.0), ACTUATOR)
+    assert len(wanted) == 14  # three pumps twice, two settings, two valves that stick and two seats of each
+    assert set(wanted) == {30.0 * (20.0 - 3.0)}
+
+
+def test_a_worn_pump_is_weighed_against_the_sound_one_as_it_is_found_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    scores, asked = {1.0: 0.0, 0.7: -9.0, 0.8: 5.0, 0.9: -9.0}, list[float]()
+
+    def score(one: CircuitParameters) -> float:
+        if type(one) is not type(SOUND):
+            return -9.0
+        asked.append(worn(one))
+        return 3.0 if worn(one) == 1.0 and 0.9 in asked else scores[worn(one)]
+
+    found, _ = looked(monkeypatch, score, np.nan)
+    assert found.worn is not None
+    assert found.worn[:, 1].tolist() == [3.0, -9.0, 5.0, -9.0]
+    odds = np.exp(2.0 - 0.5 * (np.log(0.8) / 0.15) ** 2)
+    assert found.faulty == pytest.approx(odds / (1.0 + odds), rel=1e-3)
+
+
+@pytest.mark.parametrize(("rough", "thorough"), [(-19.9, True), (-20.1, False)])
+def test_a_worn_pump_is_sought_thoroughly_unless_a_rough_search_leaves_it_twenty_behind(
+    rough: float, thorough: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, _, asked = decided(monkeypatch, lambda one: rough if worn(one) < 1.0 else 0.0)
+    tries = {share: [begun for one, begun in asked if worn(one) == share] for share in (0.7, 0.8, 0.9)}
+    assert tries == dict.fromkeys((0.7, 0.8, 0.9), [True, False] if thorough else [True])
+
+
+@pytest.mark.parametrize(
+    ("pressure", "settings"), [(1e6, {7.5e5, 9e5}), (0.0, set()), (np.nan, set()), (np.inf, set())]
+)
+def test_a_relief_valve_is_tried_below_the_largest_pressure_if_there_is_one(
+    pressure: float, settings: set[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, asked = looked(monkeypatch, lambda _: 0.0, pressure)
+    assert {round(one.relief_pressure, 3) for one, _ in asked} - {SOUND.relief_pressure} == settings
+
+
+def test_faults_are_tried_on_the_sound_circuit_that_explains_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    wide = 5.0 * SOUND.makeup_conductance
+
+    def score(one: CircuitParameters) -> float:
+        return 50.0 if one.makeup_conductance == wide and one.pump_case_leakage == 0.0 else 0.0
+
+    _, _, asked = decided(monkeypatch, score)
+    sound = [(one.makeup_conductance / SOUND.makeup_conductance, one.pump_case_leakage > 0.0) for one, _ in asked[:3]]
+    assert sound == [(1.0, False), (pytest.approx(5.0), True), (pytest.approx(5.0), False)]
+    faulty = [one for one, _ in asked[3:]]
+    assert all(one.pump_case_leakage == 0.0 and one.makeup_conductance == wide for one in faulty)
+    seats = {
+        (side, round(getattr(one, f"seat_leakage_{side}") / MAJOR, 6))
+        for one in faulty
+        for side in "ab"
+        if getattr(one, f"seat_leakage_{side}", 0.0) > 0.0
+    }
+    assert seats == {(side, size) for side in "ab" for size in (0.4, 1.0)}
+    shut = {side for one in faulty for side in "ab" if getattr(one, f"makeup_shut_{side}", 0.0) == 1.0}
+    assert shut == {"a", "b"}
+
+
+@pytest.mark.parametrize(
+    ("said", "lies", "found", "left"),
+    [
+        (AgainstCode.BETWEEN_CONDITIONS, False, None, []),
+        (AgainstCode.OUTSIDE_CONDITIONS, True, None, [AgainstCode.OUTSIDE_CONDITIONS]),
+        (
+            AgainstCode.OUTSIDE_CONDITIONS,
+            True,
+            AgainstCode.RELIEF_EARLY,
+            [AgainstCode.RELIEF_EARLY, AgainstCode.OUTSIDE_CONDITIONS],
+        ),
+        (AgainstCode.BETWEEN_CONDITIONS, False, AgainstCode.RELIEF_EARLY, [AgainstCode.RELIEF_EARLY]),
+        (AgainstCode.NONE_FITS, False, AgainstCode.RELIEF_EARLY, [AgainstCode.NONE_FITS]),
+    ],
+)
+def test_what_lies_beside_the_nine_is_asked_for_faults_before_what_lasts_of_its_misfit_counts(
+    said: AgainstCode,
+    lies: bool,
+    found: AgainstCode | None,
+    left: list[AgainstCode],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    data = {AgainstCode.BETWEEN_CONDITIONS: {"leakage": 0.5, "friction": 0.0}, AgainstCode.NONE_FITS: {"percent": 90.0}}
+    monkeypatch.setattr(wear, "faults_outside", lambda *_: Outside(() if found is None else (found.note(),)))
+    monkeypatch.setattr(wear, "lies_beside", lambda *_: lies)
+    board = Scoreboard({}, LOG, SimpleNamespace(), None, None)  # type: ignore[arg-type]
+    told = Diagnosis({"normal": 1.0}, (said.note(**data.get(said, {})),), {}, {}, {}, (), board)
+    after = wear.whatever_fault(told, ACTUATOR, shipped_calibration())
+    assert [note.code for note in after.against] == left
+
+
+@pytest.mark.parametrize("near", [-1.0, -1e3])
+def test_a_diagnosis_asks_every_circuit_whether_a_log_is_outside(near: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(diagnose, "how_near", lambda *_: near)
+    monkeypatch.setattr(diagnose, "whatever_fault", lambda found, *_: found)
+    clean = clean_log(log().replace(**{PRESSURE: None}), PAPER)
+    codes = {note.code for note in diagnose.diagnose_clean(clean, ACTUATOR).against}
+    assert bool(codes & {AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS}) == (near < -100.0)

@@ -1,0 +1,139 @@
+"""A log that does not tell a worn pump from leakage: its classes are weighed over what the pump may deliver."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.eha.rig_share import DELIVERY_ENTRY
+from estimation.finding import Gate
+from estimation.fits.hypotheses import PRESUMED
+from estimation.notes import RigCode
+from experiments.open_benchmark.kinds import make
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.beyond_nine import wear
+from faults.diagnosis.beyond_nine.other_faults import DELIVERIES
+from faults.diagnosis.beyond_nine.wear import probabilities_over_wear, whatever_the_pump_delivers
+from faults.diagnosis.calibration import shipped_calibration
+from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.diagnose import diagnose_log
+from faults.diagnosis.evidence import Scoreboard, bounded, weigh
+from faults.notes import AgainstCode
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+from tests.faults.diagnosis.short_logs import ACTUATOR as RIG
+from tests.faults.diagnosis.short_logs import OFF, blocks, log, made_classes
+
+HEALTHY = EhaParameters()
+ACTUATOR = actuator_of(HEALTHY)
+OPEN = (RigCode.WEAR_NOT_EXCLUDED.note(percent=30.0),)
+BETWEEN = 0.4
+"""How far the leakage is from minor to major, in its logarithm [fraction]."""
+
+
+@pytest.fixture(scope="module")
+def board() -> Scoreboard:
+    minor, major = (parameters_for(CONDITIONS[name]) for name in ("minor_leakage", "major_leakage"))
+    between = {
+        name: getattr(minor, name) ** (1.0 - BETWEEN) * getattr(major, name) ** BETWEEN
+        for name in ("leakage_coefficient", "flow_bias")
+    }
+    worn = circuit_of(replace(minor, **between, pump_displacement=0.9 * minor.pump_displacement))
+    rng = np.random.default_rng(5)
+    drive = make_drive("prbs", 2.0, 1e-3, HEALTHY, rng)
+    return weigh(simulate(CIRCUIT, drive, 1e-3, worn, sensors=BENCH, rng=rng), ACTUATOR)
+
+
+def test_what_a_worn_pump_would_explain_is_not_all_leakage(board: Scoreboard) -> None:
+    sound = board.probabilities(shipped_calibration())
+    found = probabilities_over_wear(board, ACTUATOR, OPEN, shipped_calibration())
+    assert found is not None
+    assert sum(found.values()) == pytest.approx(1.0)
+    assert found["minor_leakage"] > 2.0 * sound["minor_leakage"] > 0.0
+    assert found["major_leakage"] < sound["major_leakage"]
+
+
+def test_classes_stay_where_the_log_tells_what_the_pump_delivers(board: Scoreboard) -> None:
+    assert probabilities_over_wear(board, ACTUATOR, (), shipped_calibration()) is None
+
+
+def test_conditions_are_summed_over_pumps_by_what_is_presumed_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = blocks()
+    told = {"models": np.linspace(0.0, -6.0, 9), "parameters": np.linspace(-3.0, 0.0, 9)}
+    board = Scoreboard(told, one, made_classes(OFF, one), log(), None)
+    scores = {share: np.random.default_rng(round(10.0 * share)).normal(size=9) for share in DELIVERIES}
+    sound = RIG.circuit.pump_displacement
+
+    def fitted(_: Any, actuator: Any, start: Any) -> Any:
+        assert np.array_equal(start, board.fits.best.coordinates)
+        share = round(actuator.circuit.pump_displacement / sound, 6)
+        return SimpleNamespace(scores=scores[share])
+
+    monkeypatch.setattr(wear, "fit_classes", fitted)
+    found = probabilities_over_wear(board, RIG, OPEN, shipped_calibration())
+    likely = np.exp(board.fits.scores)
+    for share, score in scores.items():
+        likely = likely + np.exp(score) * np.exp(-(np.log(share) ** 2) / (2.0 * PRESUMED[DELIVERY_ENTRY] ** 2))
+    exact = replace(board, log_odds={**told, "parameters": bounded(np.log(likely))}).probabilities(
+        shipped_calibration()
+    )
+    assert found == pytest.approx(dict(exact))
+    without = replace(board, blocks=blocks(pressure=False))
+    assert probabilities_over_wear(without, RIG, OPEN, shipped_calibration()) is None
+
+
+def said(*names: str, **changed: Any) -> Any:
+    explanation = SimpleNamespace(names=names) if names else None
+    plain = {"form": "flow", "gate": Gate(passed=True, reasons=()), "remarks": (), "explanation": explanation}
+    return SimpleNamespace(**{**plain, **changed})
+
+
+PUMP, SPEED = AgainstCode.PUMP_OFF, AgainstCode.SPEED_BIAS
+
+
+@pytest.mark.parametrize(
+    ("estimate", "kept"),
+    [
+        (said(), []),
+        (said("encoder_zero"), []),
+        (said("pressure_offset"), [SPEED]),
+        (said("pressure_late", "pressure_drift"), [SPEED]),
+        (said(form="motion"), [PUMP, SPEED]),
+        (said(gate=Gate(passed=False, reasons=())), [PUMP, SPEED]),
+    ],
+)
+def test_a_balance_that_holds_knows_pump_and_speed_better_than_a_circuit(
+    board: Scoreboard, estimate: Any, kept: list[AgainstCode]
+) -> None:
+    others = AgainstCode.OUTSIDE_CONDITIONS
+    against = (PUMP.note(percent=-15.0), SPEED.note(bias_rad_s=4.7), others.note())
+    found = board.probabilities(shipped_calibration())
+    diagnosis = Diagnosis(found, against, {}, {}, {}, (), board)
+    judged = whatever_the_pump_delivers(diagnosis, ACTUATOR, estimate)
+    assert [note.code for note in judged.against] == [*kept, others]
+    assert judged.probabilities == found
+
+
+def test_a_circuit_may_doubt_the_pump_where_the_balance_leaves_wear_open(board: Scoreboard) -> None:
+    found = board.probabilities(shipped_calibration())
+    off = AgainstCode.PUMP_OFF.note(percent=-15.0)
+    judged = whatever_the_pump_delivers(Diagnosis(found, (off,), {}, {}, {}, (), board), ACTUATOR, said(remarks=OPEN))
+    assert judged.against == (off,)
+    assert judged.probabilities != found
+
+
+@pytest.mark.slow
+def test_a_plain_log_of_another_law_of_friction_is_not_laid_to_the_pump() -> None:
+    made = make("plain", "training", 100)
+    channels = {name: made.log[name].to_numpy() for name in made.setup.logger.channels}
+    finding = diagnose_log(Record(1e-3, channels), Rig())
+    assert finding.condition == made.setup.condition == "major_friction"
+    assert finding.against == ()

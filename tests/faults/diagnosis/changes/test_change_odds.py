@@ -1,0 +1,96 @@
+"""A change of condition is believed where two circuits are so much likelier than one, with all that was chosen."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from faults.diagnosis.changes import change_odds, onset
+from faults.diagnosis.changes.change_odds import CHANGES, LIKELIER, believed, gain_of, odds_of_change
+from faults.diagnosis.changes.onset import find_onset, part_of, parted
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.class_fit import LASTING, WITHIN
+from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
+from tests.faults.diagnosis.short_logs import ACTUATOR, blocks
+
+
+@cache
+def whole() -> ClassFits:
+    return fit_classes(blocks(), ACTUATOR)
+
+
+def fits(*scores: tuple[int, float], deviation: float = 0.02) -> list[ClassFits]:
+    """Return circuits in the middle of a condition, known to a deviation, in the condition of that place by a lead."""
+    found: list[ClassFits] = []
+    for place, lead in scores:
+        one = np.full(9, -lead)
+        one[place] = 0.0
+        best = replace(whole().best, coordinates=ACTUATOR.conditions[place])
+        found.append(replace(whole(), best=best, scores=one, information=np.eye(7) * 2 * LASTING / deviation**2))
+    return found
+
+
+def odds(gain: float, parts: Sequence[ClassFits], of: Blocks | None = None, deviation: float = 0.02) -> float:
+    (all_of_it,) = fits((0, 99.0), deviation=deviation)
+    return odds_of_change(gain, parts, all_of_it, of or blocks(), ACTUATOR)
+
+
+def test_all_that_was_chosen_is_priced() -> None:
+    parts, log = fits((0, 300.0), (3, 300.0)), blocks()
+    volume = 0.5 * float(np.linalg.slogdet(np.eye(7) + WITHIN / 0.02**2)[1])
+    times = len(log.velocity) / LASTING
+    beforehand = math.log(CHANGES / (1.0 - CHANGES))
+    assert odds(60.0, parts) == pytest.approx(30.0 - volume - math.log(9 * times) + beforehand)
+    longer = replace(log, velocity=np.tile(log.velocity, 10))
+    assert odds(60.0, parts, longer) == pytest.approx(odds(60.0, parts) - math.log(10.0))
+
+
+def test_what_a_part_tells_of_a_circuit_counts_as_its_integral_over_the_region() -> None:
+    """In one coordinate, with the others known to nothing: the integral by quadrature."""
+    parts = fits((0, 300.0), (3, 300.0))
+    width, told, off = float(WITHIN[0, 0]), 400.0, 0.2
+    first = np.zeros((7, 7))
+    first[0, 0] = 2 * LASTING * told  # of two outputs that count as one
+    at = parts[0].best.coordinates + np.array([off, *np.zeros(6)])
+    parts[0] = replace(parts[0], information=first, best=replace(parts[0].best, coordinates=at))
+    normal = math.sqrt(2.0 * math.pi * width)
+    integral, _ = quad(lambda x: math.exp(-0.5 * told * (x - off) ** 2 - 0.5 * x**2 / width) / normal, -3.0, 3.0)
+    nothing = replace(parts[0], information=np.zeros((7, 7)))
+    assert odds(30.0, parts) - odds(30.0, [nothing, parts[1]]) == pytest.approx(math.log(integral), abs=1e-6)
+
+
+def test_two_circuits_in_one_condition_are_no_change_of_it() -> None:
+    near, far = fits((0, 2.0), (3, 300.0)), fits((0, 20.0), (3, 300.0))
+    assert odds(200.0, near) == pytest.approx(2.0)
+    assert odds(200.0, far) == pytest.approx(20.0)
+
+
+def test_a_change_is_believed_from_ten_to_one_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    parts = [part_of(blocks(), 0, 75), part_of(blocks(), 75, 150)]
+    for least, told in ((math.log(LIKELIER) + 0.01, True), (math.log(LIKELIER) - 0.01, False)):
+        monkeypatch.setattr(change_odds, "odds_of_change", lambda *_, least=least: least)
+        assert believed(blocks(), parts, fits((0, 9.0), (3, 9.0)), whole(), ACTUATOR) is told
+
+
+def test_one_circuit_for_all_is_asked_again_where_its_search_ended_short_of_the_best(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    log = blocks(after="major_leakage")
+    two = parted(log, fit_classes(log, ACTUATOR), ACTUATOR)
+    assert two is not None
+    assert find_onset(log, two, ACTUATOR) is not None
+    with monkeypatch.context() as doubting:
+        doubting.setattr(onset, "believed", lambda *_: False)
+        assert find_onset(log, two, ACTUATOR) is None
+    steady = blocks()
+    halves = [part_of(steady, 0, 75), part_of(steady, 75, len(steady.velocity))]
+    ends = [fit_classes(one, ACTUATOR) for one in halves]
+    lost = replace(whole(), best=replace(whole().best, fitted=0.9 * whole().best.fitted))
+    assert gain_of(lost, halves, ends) > gain_of(whole(), halves, ends) + 10.0
+    apart = [replace(ends[0], scores=np.array([0.0, *np.full(8, -300.0)])), ends[1]]
+    assert odds_of_change(gain_of(lost, halves, apart), apart, lost, steady, ACTUATOR) > math.log(LIKELIER)
+    assert not believed(steady, halves, apart, lost, ACTUATOR)

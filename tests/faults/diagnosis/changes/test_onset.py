@@ -1,0 +1,235 @@
+"""A change of condition within a log: when it came, and that the verdict is on what followed."""
+
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from scipy.special import chdtri
+
+from benchmarks.population import TEST, draw_logs
+from benchmarks.watching import CircuitStream
+from estimation.log_checks.clean import clean_log
+from experiments.open_benchmark.kinds import make
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.changes import onset
+from faults.diagnosis.changes.onset import (
+    MOST_ALARMS,
+    SOFTENED,
+    LastPart,
+    find_onset,
+    last_part,
+    part_of,
+    parted,
+    softened,
+)
+from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.circuits.actuator import Actuator, actuator_of
+from faults.diagnosis.circuits.blocks import Blocks, blocks_of
+from faults.diagnosis.circuits.class_regions import fit_classes
+from faults.diagnosis.circuits.out_of_model import unexplained
+from faults.diagnosis.diagnose import diagnose_clean
+from faults.eha.inject import abrupt
+from faults.notes import AgainstCode
+from faults.watch.events import Alarm, Event, Ready
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.parameter_path import ParameterPath
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import RIG
+
+HEALTHY = EhaParameters()
+ACTUATOR = actuator_of(HEALTHY)
+AT = 3.2
+
+
+def diagnosed(record: Record) -> Diagnosis:
+    return diagnose_clean(clean_log(record, HEALTHY), ACTUATOR)
+
+
+def changed(condition: str, drive: str, *, pressure: bool, start: float = 0.0) -> Diagnosis:
+    rng = np.random.default_rng(11)
+    speed = make_drive(drive, 6.0, 1e-3, EhaParameters(), rng)
+    path = abrupt(ACTUATOR.circuit, circuit_of(parameters_for(CONDITIONS[condition])), AT)
+    log = replace(simulate(CIRCUIT, speed, 1e-3, path, sensors=RIG, rng=rng), start_time=start)
+    return diagnosed(log if pressure else log.replace(differential_pressure_pa=None))
+
+
+def short_log(condition: str | None, start: float = 0.0) -> Record:
+    """Return four seconds at 2 ms, in which a fault comes after 2.2 s or none does."""
+    rng = np.random.default_rng(11)
+    speed = make_drive("prbs", 4.0, 2e-3, HEALTHY, rng)
+    after = ACTUATOR.circuit if condition is None else circuit_of(parameters_for(CONDITIONS[condition]))
+    path = abrupt(ACTUATOR.circuit, after, 2.2)
+    return replace(simulate(CIRCUIT, speed, 2e-3, path, sensors=RIG, rng=rng), start_time=start)
+
+
+@pytest.mark.parametrize("pressure", [True, False], ids=["with pressure", "without"])
+@pytest.mark.parametrize("condition", ["major_leakage", "major_friction"])
+def test_a_log_is_judged_from_where_its_condition_changed(condition: str, *, pressure: bool) -> None:
+    record = short_log(condition, start=100.0)
+    found = last_part(record if pressure else record.replace(differential_pressure_pa=None), ACTUATOR)
+    assert found.onset is not None
+    assert found.onset.before == "normal"
+    assert found.onset.since == pytest.approx(102.2, abs=0.02)
+    assert found.onset.ci95[0] < found.onset.since < found.onset.ci95[1]
+    assert found.onset.ci95[1] - found.onset.ci95[0] < 0.1
+    assert found.record.start_time == pytest.approx(found.onset.since)
+    assert len(found.record) == pytest.approx(900, abs=10)
+    assert found.blocks.earlier is not None
+    assert found.blocks.earlier[0] * 2e-3 == pytest.approx(2.2, abs=0.02)
+    assert np.flatnonzero(np.isfinite(found.blocks.velocity))[0] == pytest.approx(220, abs=2)
+    assert list(CONDITIONS)[int(np.argmax(found.fits.scores))] == condition
+
+
+def test_without_pressure_oil_that_softens_within_a_log_is_in_no_condition() -> None:
+    blocks = blocks_of(foreign("air_midway", 703).replace(differential_pressure_pa=None))
+    two = parted(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
+    assert two is not None
+    (note,) = softened(two)
+    assert note.code == AgainstCode.OIL_SOFTENS
+    assert note.data["share"] < 0.8
+    assert 8.0 < note.data["at_s"] < 12.0
+    assert not softened(two._replace(fits=two.fits[::-1])), "oil that stiffens"
+    assert not softened(two._replace(gain=0.99 * SOFTENED))
+    assert not softened(two._replace(parts=[replace(one, pressure=one.velocity) for one in two.parts]))
+    assert find_onset(blocks, two, ACTUATOR) is None
+
+
+def test_a_log_in_one_condition_is_judged_whole() -> None:
+    record = short_log(None)
+    found = last_part(record, ACTUATOR)
+    assert found.onset is None
+    assert found.record is record
+    assert found.blocks.earlier is None
+    assert np.all(np.isfinite(found.blocks.velocity))
+
+
+def foreign(kind: str, index: int) -> Record:
+    """Return a log of the open benchmark, whose physics no circuit here shares."""
+    log = make(kind, "training", index).log
+    channels = {str(name): log[name].to_numpy() for name in log if name != "time_s"}
+    return clean_log(Record(1e-3, channels), HEALTHY).record
+
+
+@pytest.mark.parametrize("index", [7, 17])
+def test_a_piston_that_creeps_at_first_was_in_no_other_condition_then(index: int) -> None:
+    assert last_part(foreign("plain", index), ACTUATOR).onset is None
+
+
+def test_two_circuits_that_explain_a_log_better_by_chance_are_no_change() -> None:
+    assert last_part(foreign("plain", 2489), ACTUATOR).onset is None  # they gain 12.1
+
+
+@pytest.mark.slow
+def test_a_seal_that_gives_way_is_dated_on_another_actuator() -> None:
+    found = last_part(foreign("leakage_sets_in", 2), ACTUATOR)
+    assert found.onset is not None
+    assert found.onset.before == "normal"
+    assert found.onset.ci95[0] <= 4.684 <= found.onset.ci95[1]
+
+
+def with_bursts(*begins: float) -> Record:
+    """Return six seconds at 2 ms of a healthy actuator whose Coulomb friction is fivefold for bursts of 0.3 s."""
+    rng = np.random.default_rng(11)
+    speed = make_drive("multisine", 6.0, 2e-3, HEALTHY, rng)
+    rough = replace(ACTUATOR.circuit, friction_coulomb=5.0 * ACTUATOR.circuit.friction_coulomb)
+    times = (0.0, *(time for begin in begins for time in (begin, begin + 0.3)))
+    path = ParameterPath(times, (ACTUATOR.circuit, *[rough, ACTUATOR.circuit] * len(begins)))
+    return simulate(CIRCUIT, speed, 2e-3, path, sensors=RIG, rng=rng)
+
+
+def test_a_quiet_end_is_no_last_condition_where_no_circuit_follows_what_came_before() -> None:
+    record = with_bursts(0.6, 1.2, 1.9)
+    found = last_part(record, ACTUATOR)
+    assert found.onset is None
+    assert found.record is record
+    assert unexplained(found.blocks, found.fits, ACTUATOR)
+
+
+def alarm(since: float) -> Alarm:
+    return Alarm(since + 1.0, "flow", since, (since, since), 9.0, 5.0)
+
+
+def test_of_a_long_log_the_stretches_about_the_last_alarms_are_looked_at_until_one_holds_a_change(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    alarms: list[Event] = [Ready(60.0, (5.0, 5.0)), *map(alarm, (503.0, 520.0, 540.0, 570.0, 594.0))]
+    looked: list[tuple[float, float]] = []
+
+    def last_of(window: Record, _: Actuator) -> LastPart:
+        looked.append((window.start_time, window.duration))
+        change = object() if window.start_time == changed else None
+        nothing: Any = None
+        return LastPart(window, window, nothing, nothing, cast("Any", change))
+
+    monkeypatch.setattr(onset, "watch_record", lambda *_, **__: alarms)
+    monkeypatch.setattr(onset, "_last_of", last_of)
+    long = Record(0.02, {"motor_speed_rad_s": np.zeros(5001)}, start_time=500.0)  # of 100 s
+    changed = 525.0
+    assert last_part(long, ACTUATOR).window.start_time == 525.0
+    assert looked == [(579.0, pytest.approx(21.0)), (555.0, 30.0), (525.0, 30.0)]
+    changed = -1.0
+    looked.clear()
+    assert last_part(long, ACTUATOR).record is long
+    assert len(looked) == MOST_ALARMS + 1
+    looked.clear()
+    for short in (long.slice(0, 4500), replace(long, sample_time=0.06)):  # of 90 s, and too slow to be watched
+        assert last_part(short, ACTUATOR).window is short
+    assert len(looked) == 2
+    alarms[1:] = [alarm(503.0)]
+    last_part(long, ACTUATOR)
+    assert looked[2] == (500.0, 30.0)  # no stretch begins before the log
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pressure", [True, False], ids=["with pressure", "without"])
+@pytest.mark.parametrize(("condition", "drive"), [("minor_leakage", "steps"), ("major_friction", "prbs")])
+def test_a_fault_that_comes_within_a_log_is_named_with_its_time(condition: str, drive: str, *, pressure: bool) -> None:
+    found = changed(condition, drive, pressure=pressure)
+    onset = found.scoreboard.onset
+    assert found.condition == condition
+    assert onset is not None
+    assert onset.before == "normal"
+    assert onset.ci95[0] <= AT <= onset.ci95[1]
+    assert onset.ci95[1] - onset.ci95[0] < 0.5
+
+
+@pytest.mark.slow
+def test_the_time_is_that_of_the_logs_own_clock() -> None:
+    onset = changed("major_leakage", "prbs", pressure=True, start=100.0).scoreboard.onset
+    assert onset is not None
+    assert onset.since == pytest.approx(100.0 + AT, abs=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("like", [True, False], ids=["the circuit that is fitted", "another circuit"])
+def test_a_fault_that_was_there_before_the_log_began_has_no_time(*, like: bool) -> None:
+    for log in draw_logs([TEST + 40], like=like):
+        assert diagnosed(log.record).scoreboard.onset is None
+
+
+@pytest.mark.slow
+def test_a_fault_late_in_a_long_log_is_found_by_the_watch_and_told() -> None:
+    stream = CircuitStream(3)
+    before = [stream.run(60.0), stream.run(30.0)]
+    stream.condition = "major_leakage"
+    samples = np.vstack([*before, stream.run(20.0)])
+    names = ("motor_speed_rad_s", "position_m", "differential_pressure_pa")
+    found = diagnosed(Record(1e-3, dict(zip(names, samples.T.copy(), strict=True))))
+    assert found.condition == "major_leakage"
+    assert found.scoreboard.onset is not None
+    assert found.scoreboard.onset.since == pytest.approx(90.0, abs=0.3)
+
+
+def test_a_part_keeps_the_drive_and_misses_the_rest() -> None:
+    blocks = Blocks(np.zeros(201), 1e-3, 10, np.arange(20.0), None, np.array([1.0]))
+    part = part_of(blocks, 5, 12)
+    assert np.flatnonzero(np.isfinite(part.velocity)).tolist() == list(range(5, 12))
+    assert part.speed is blocks.speed
+
+
+def test_the_interval_of_the_time_is_that_of_95_percent() -> None:
+    assert pytest.approx(0.5 * float(chdtri(1, 0.05)), abs=1e-3) == onset.LIKELY

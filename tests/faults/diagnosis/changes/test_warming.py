@@ -1,0 +1,141 @@
+"""Without pressure, a log whose oil warms: its drift of leakage is found, and no other log has one."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from estimation.eha.explained import LEAKAGE_COURSE
+from estimation.log_checks.clean import CleanLog, clean_log
+from estimation.notes import RigCode
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.beyond_nine.drift import over_drift
+from faults.diagnosis.beyond_nine.load import Loaded
+from faults.diagnosis.changes import warming
+from faults.diagnosis.changes.onset import last_part
+from faults.diagnosis.changes.warming import LEAST, Drift, course_of, drift_of, drifting, with_course
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.blocks import LONGEST, Blocks, blocks_of
+from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
+from faults.diagnosis.diagnose import diagnose_clean
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.parameter_path import ParameterPath
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+from tests.thinned import thinned
+
+HEALTHY = EhaParameters()
+ACTUATOR = actuator_of(HEALTHY)
+SECONDS = 4.0
+
+
+@cache
+def log(condition: str, factor: float) -> CleanLog:
+    """Return a log without pressure over which leakage grows by a factor, and viscous friction falls by it."""
+    p, rng = circuit_of(parameters_for(CONDITIONS[condition])), np.random.default_rng(5)
+    times = np.linspace(0.0, SECONDS, 9)
+    warm = [
+        replace(p, leakage_coefficient=rise * p.leakage_coefficient, friction_linear=p.friction_linear / rise)
+        for rise in factor ** (times / SECONDS)
+    ]
+    path = ParameterPath((1e-6, *times[1:]), tuple(warm), "linear")
+    drive = make_drive("prbs", SECONDS, 1e-3, HEALTHY, rng)
+    made = simulate(CIRCUIT, drive, 1e-3, path, sensors=BENCH, rng=rng)
+    return clean_log(made.replace(differential_pressure_pa=None), HEALTHY)
+
+
+@cache
+def fitted(condition: str, factor: float) -> tuple[Blocks, ClassFits]:
+    blocks = blocks_of(log(condition, factor).record)
+    return blocks, fit_classes(blocks, ACTUATOR)
+
+
+def diagnosed(one: CleanLog) -> Loaded:
+    return Loaded(diagnose_clean(one, ACTUATOR), HEALTHY)
+
+
+@pytest.mark.parametrize(
+    ("condition", "factor"), [("minor_leakage", 2.0), ("major_leakage", 2.0), ("minor_leakage", 0.5)]
+)
+def test_how_far_leakage_drifts_comes_back(condition: str, factor: float) -> None:
+    blocks, fits = fitted(condition, factor)
+    found = drift_of(blocks, fits, ACTUATOR)
+    assert found is not None
+    assert np.exp(found.logarithm) == pytest.approx(factor, rel=0.1)
+    assert found.gain > 5.0
+
+
+@pytest.mark.parametrize("condition", ["normal", "minor_leakage", "major_leakage_major_friction"])
+def test_leakage_that_stays_does_not_drift(condition: str) -> None:
+    assert drift_of(*fitted(condition, 1.0), ACTUATOR) is None
+
+
+def test_slopes_of_a_circuit_that_is_far_off_are_not_all_that_is_asked() -> None:
+    blocks, fits = fitted("minor_leakage", 2.0)
+    lost = replace(fits.best, slopes=np.zeros_like(fits.best.slopes), scales=0.2 * blocks.sizes)
+    found = drift_of(replace(blocks, noise=0.0 * blocks.noise), replace(fits, best=lost), ACTUATOR)
+    assert found is not None
+    assert np.exp(found.logarithm) == pytest.approx(2.0, rel=0.1)
+
+
+def test_a_drift_with_which_no_circuit_follows_the_log_explains_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    blocks, fits = fitted("minor_leakage", 2.0)
+    found = drift_of(blocks, fits, ACTUATOR)
+    assert found is not None
+    left = float(found.fit.scales[0] / blocks.sizes[0])
+    for share, is_one in ((1.1, True), (0.9, False)):
+        monkeypatch.setattr(warming, "UNEXPLAINED", (share * left, 1.0))
+        assert (drift_of(blocks, fits, ACTUATOR) is not None) == is_one
+
+
+def test_no_drift_is_asked_for_with_pressure_beside_one_that_was_found_or_in_part_of_a_log() -> None:
+    blocks, fits = fitted("minor_leakage", 2.0)
+    long = round(LONGEST / blocks.sample_time) + 2
+    for other in (
+        replace(blocks, pressure=np.zeros(len(blocks.velocity))),
+        drifting(blocks, 0.3),
+        replace(blocks, velocity=1e-6 * blocks.velocity),
+        replace(blocks, speed=np.zeros(long)),
+    ):
+        assert drift_of(other, fits, ACTUATOR) is None
+
+
+def test_a_drift_is_shown_where_it_is_ten_times_likelier_and_large_enough_to_matter() -> None:
+    _, fits = fitted("minor_leakage", 2.0)
+    for logarithm, gain, shown in ((0.7, 2.6, True), (-0.7, 2.6, True), (0.7, 2.5, False), (0.9 * LEAST, 99.0, False)):
+        assert Drift(logarithm, fits.best, gain).shown == shown
+
+
+def test_a_log_that_warms_is_not_parted() -> None:
+    part = last_part(log("minor_leakage", 2.0).record, ACTUATOR)
+    assert part.onset is None
+    assert part.drift is not None
+    assert last_part(log("minor_leakage", 1.0).record, ACTUATOR).drift is None
+
+
+@pytest.mark.parametrize("condition", thinned(["minor_leakage", "major_leakage"], ["minor_leakage"]))
+def test_a_condition_of_cold_oil_keeps_its_name_without_pressure(condition: str) -> None:
+    found = over_drift(diagnosed, log(condition, 2.0), ())
+    assert (found.diagnosis.condition, found.diagnosis.unknown) == (condition, False)
+    assert [note.code for note in found.notes] == [RigCode.LEAKAGE_DRIFTS]
+    assert float(found.notes[0].data["factor"]) == pytest.approx(2.0, rel=0.1)
+    assert found.diagnosis.scoreboard.blocks.course is not None
+
+
+def test_what_grows_by_more_than_warm_oil_does_speaks_against_all_nine() -> None:
+    found = over_drift(diagnosed, log("minor_leakage", 6.0), ())
+    assert [note.code for note in found.notes] == [RigCode.LEAKAGE_GROWS]
+    assert found.diagnosis.against[0] == found.notes[0]
+
+
+def test_a_log_with_its_drift_has_a_course_that_ends_at_one() -> None:
+    _, fits = fitted("minor_leakage", 2.0)
+    one = CleanLog(Record(0.1, {"motor_speed_rad_s": np.zeros(5)}), {}, (), ())
+    other, note = with_course(one, Drift(float(np.log(2.0)), fits.best, 9.0))
+    assert other.record[LEAKAGE_COURSE] == pytest.approx([0.5, 2.0**-0.75, 2.0**-0.5, 2.0**-0.25, 1.0])
+    assert float(note.data["last"]) == pytest.approx(2.0 * float(note.data["first"]))
+    assert course_of(0.0, 4).tolist() == [1.0] * 4

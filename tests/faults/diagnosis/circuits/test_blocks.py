@@ -1,0 +1,86 @@
+"""Without pressure, what a piston began with is waited for until it is forgotten."""
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.blocks import FORGOTTEN, SETTLING, blocks_of, root_mean_square
+from faults.diagnosis.circuits.circuit_runs import coordinates_of, parameter_rows, predicted
+from faults.diagnosis.circuits.class_regions import fit_classes
+from faults.diagnosis.circuits.rivals import creeps
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import RIG
+
+HEALTHY, PRESSURE = EhaParameters(), "differential_pressure_pa"
+
+
+def running(seconds: float, first: float) -> Record:
+    """Return a log cut out of a test of major friction, which begins with a motor speed [rad/s]."""
+    rng = np.random.default_rng(3)
+    speed = np.concatenate([[0.0], make_drive("steps", 12.0, 2e-3, HEALTHY, rng)])
+    log = simulate(CIRCUIT, speed, 2e-3, parameters_for(CONDITIONS["major_friction"]), sensors=RIG, rng=rng)
+    place = int(np.argmin(np.abs(log["motor_speed_rad_s"][1000:2000] - first))) + 1000 if first else 0
+    return log.slice(place, place + round(seconds / 2e-3))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "first", "pressure", "settling"),
+    [
+        (6.0, 60.0, False, FORGOTTEN),
+        (3.0, 60.0, False, 0.6),
+        (6.0, 0.0, False, SETTLING),
+        (6.0, 60.0, True, SETTLING),
+    ],
+)
+def test_a_beginning_in_motion_does_not_count_where_no_pressure_says_with_what(
+    seconds: float, first: float, pressure: bool, settling: float
+) -> None:
+    log = running(seconds, first)
+    blocks = blocks_of(log if pressure else log.replace(**{PRESSURE: None}))
+    assert blocks.settling == pytest.approx(settling, rel=2e-3)
+    assert blocks.first == round(blocks.settling / 0.01)
+    assert len(blocks.seen) == len(blocks.velocity) - blocks.first
+
+
+def test_a_circuit_from_rest_follows_a_running_test_once_its_beginning_is_forgotten() -> None:
+    actuator, blocks = actuator_of(HEALTHY), blocks_of(running(6.0, 60.0).replace(**{PRESSURE: None}))
+    fits = fit_classes(blocks, actuator)
+    assert list(CONDITIONS)[int(np.argmax(fits.scores))] == "major_friction"
+    assert not creeps(blocks, fits.best)
+    begun = blocks.velocity - fits.best.fitted[:, 0]
+    assert np.sqrt(np.mean(begun[: blocks.first] ** 2)) > 3.0 * fits.best.scales[0]
+
+
+def test_blocks_in_a_long_gap_of_speed_and_shortly_behind_it_do_not_count() -> None:
+    record = running(8.0, 0.0)
+    speed, position = record["motor_speed_rad_s"].copy(), record["position_m"].copy()
+    speed[2000:2300], position[3000:3300] = np.nan, np.nan
+    blocks = blocks_of(record.replace(motor_speed_rad_s=speed, position_m=position))
+    rows = round(0.01 / record.sample_time)
+    blind = np.flatnonzero(np.isnan(blocks.velocity)) * rows
+    behind = 2300 + round(SETTLING / record.sample_time)
+    assert blind.tolist() == [*range(2000, behind, rows), *range(3000, 3300, rows)]
+    assert blocks.pressure is not None
+    assert np.flatnonzero(np.isnan(blocks.pressure)).tolist() == list(range(2000 // rows, behind // rows))
+
+
+def test_a_circuit_follows_a_fast_log_of_itself_through_the_edges_of_a_binary_signal() -> None:
+    actuator, true = actuator_of(HEALTHY), parameters_for(CONDITIONS["minor_leakage"])
+    drive = make_drive("prbs", 3.0, 1e-4, HEALTHY, np.random.default_rng(0))
+    blocks = blocks_of(simulate(CIRCUIT, drive, 1e-4, circuit_of(true)))
+    rows = parameter_rows(coordinates_of(true, actuator.rated)[None], actuator.circuit, actuator.rated)
+    left = (blocks.velocity - predicted(blocks, rows)[0, :, 0])[blocks.first :]
+    assert root_mean_square(left) < 7e-4 * blocks.sizes[0]  # 4.7e-4; averaged over 1 ms 1.2e-3
+
+
+@pytest.mark.parametrize(("sample_time", "pooled"), [(1e-4, 5), (2e-4, 2), (5e-4, 1), (1e-3, 1), (2e-3, 1)])
+def test_fast_logs_alone_are_averaged_before_they_are_followed(sample_time: float, pooled: int) -> None:
+    rng = np.random.default_rng(0)
+    channels = {name: rng.standard_normal(4000) for name in ("motor_speed_rad_s", "position_m", PRESSURE)}
+    blocks = blocks_of(Record(sample_time, channels))
+    assert blocks.sample_time == pytest.approx(pooled * sample_time)

@@ -1,0 +1,118 @@
+"""A circuit is fitted to a log by steps down the slope of its log-posterior."""
+
+import warnings
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS
+from faults.diagnosis.circuits import class_fit
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.circuit_runs import parameter_rows, predicted
+from faults.diagnosis.circuits.class_fit import FARTHEST, LASTING, WEAK, _most_gained, fit_freely, misfit
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+
+ACTUATOR = actuator_of(EhaParameters())
+PULL = np.asarray(LASTING * np.linalg.inv(WEAK))
+CENTRE = ACTUATOR.conditions[0]
+APART = np.array([0.05, -0.05, 0.08, 0.04, 0.03, 0.05, 0.02])
+
+
+@cache
+def log() -> Blocks:
+    """Return the log of a circuit beside the healthy one, without noise."""
+    speed = np.repeat([60.0, 120.0, -120.0, -70.0], 500)
+    empty = np.zeros(len(speed) // 10)
+    blank = Blocks(np.append(speed, speed[-1]), 1e-3, 10, empty, empty, np.array([1e-4, 2e3]))
+    (found,) = predicted(blank, parameter_rows((CENTRE + APART)[None], ACTUATOR.circuit, ACTUATOR.rated))
+    return replace(blank, velocity=found[:, 0], pressure=found[:, 1])
+
+
+def cost(point: Array) -> float:
+    return class_fit._at(log(), ACTUATOR, CENTRE, point, PULL).cost
+
+
+def test_a_step_is_down_the_slope_of_the_log_posterior() -> None:
+    start = CENTRE + 0.4 * APART
+    here = class_fit._at(log(), ACTUATOR, CENTRE, start, PULL)
+    step = class_fit._step(log(), here, CENTRE, PULL)
+    sides = 1e-3 * np.eye(7)
+    downward = np.array([cost(start - side) - cost(start + side) for side in sides]) / 2e-3
+    assert (here.information + PULL) @ step == pytest.approx(downward, rel=0.0, abs=0.015 * np.abs(downward).max())
+
+
+def test_no_step_is_longer_than_the_longest_and_short_ones_are_whole() -> None:
+    here = class_fit._at(log(), ACTUATOR, CENTRE, CENTRE, PULL)
+    left = (log().outputs - here.fitted)[log().first :] / here.scales**2
+    whole = np.linalg.solve(here.information + PULL, np.einsum("ink,nk->i", here.slopes[:, log().first :], left))
+    far = replace(here, slopes=here.slopes / 100.0, information=here.information / 1e4)
+    assert class_fit._step(log(), here, CENTRE, PULL) == pytest.approx(whole)
+    assert np.abs(class_fit._step(log(), far, CENTRE, 1e-9 * PULL)).max() == pytest.approx(FARTHEST)
+
+
+@pytest.mark.parametrize("bend", [0.5, 3.0, 40.0])
+@pytest.mark.parametrize("reach", [1.0, 0.3, 0.09])
+def test_what_a_shorter_step_gains_is_read_off_the_parabola_through_the_one_that_was_tried(
+    bend: float, reach: float
+) -> None:
+    promised = 1.5
+
+    def gained(share: float) -> float:
+        return 2.0 * promised * share - bend * share**2  # its slope where the step begins is twice what it promises
+
+    best = max(gained(share) for share in np.linspace(0.0, 4.0, 40_001))
+    assert _most_gained(promised, reach, gained(reach)) == pytest.approx(best, rel=1e-6)
+
+
+@pytest.mark.parametrize("pulled", [1.0, 1e3])
+def test_a_whole_step_promises_half_of_what_its_slope_would_give(pulled: float) -> None:
+    pull = pulled * PULL
+    here = class_fit._at(log(), ACTUATOR, CENTRE, CENTRE + 0.4 * APART, pull)
+    information = here.information + pull
+    step = np.linalg.solve(information, class_fit._uphill(log(), here, CENTRE, pull))
+    promised = class_fit._promised(log(), here, CENTRE, pull, step)
+    assert promised == pytest.approx(0.5 * step @ information @ step)
+    for share in (0.5, 1.5):  # less is gained before it and beyond it
+        other = class_fit._promised(log(), here, CENTRE, pull, share * step)
+        assert other == pytest.approx((2.0 * share - share**2) * promised)
+
+
+def test_the_circuit_that_left_a_log_is_found() -> None:
+    found = fit_freely(log(), ACTUATOR, next(iter(CONDITIONS)), gained=1e-3)
+    off = found.coordinates - CENTRE - APART
+    assert found.cost <= cost(CENTRE + APART) < cost(CENTRE)  # the weak prior pulls leakage and bias along each other
+    assert float(off @ found.information @ off) < class_fit.LASTING  # within one deviation
+    assert off[2:5] == pytest.approx(0.0, abs=0.02)
+
+
+def test_a_model_that_ran_away_is_infinitely_far_off_and_another_as_far_as_its_residuals_are_large() -> None:
+    off = log().outputs + np.array([1e-3, 1e5])
+    assert misfit(log(), np.where(np.arange(len(off))[:, None] == 70, np.inf, off)) == np.inf
+    count = len(off) - log().first
+    twice = misfit(log(), log().outputs + np.array([2e-3, 3e5])) - misfit(log(), off)
+    assert twice == pytest.approx(count * (np.log(2.0) + np.log(3.0)))
+
+
+def test_a_log_that_gives_no_slope_ends_the_search_where_it_began() -> None:
+    nothing = replace(log(), pressure=np.full(len(log().velocity), np.nan))
+    with warnings.catch_warnings(action="ignore", category=RuntimeWarning):
+        found = fit_freely(nothing, ACTUATOR, next(iter(CONDITIONS)))
+    np.testing.assert_array_equal(found.coordinates, CENTRE)
+
+
+@pytest.mark.parametrize(("below", "ends"), [(1e6, True), (-20.0 * LASTING, False)])
+def test_a_search_that_cannot_come_to_what_is_wanted_ends_after_a_step_or_two(below: float, ends: bool) -> None:
+    at = list(CONDITIONS).index("minor_leakage")
+    start = ACTUATOR.conditions[at] + 0.2
+    whole = fit_freely(log(), ACTUATOR, "minor_leakage", start)
+    runs: list[int] = []
+    with pytest.MonkeyPatch.context() as patch:
+        real = class_fit.predicted
+        patch.setattr(class_fit, "predicted", lambda *args: runs.append(1) or real(*args))
+        there = fit_freely(log(), ACTUATOR, "minor_leakage", start, wanted=whole.cost - below)
+    assert (len(runs) <= 2) == ends
+    assert (there.cost == whole.cost) == (not ends)

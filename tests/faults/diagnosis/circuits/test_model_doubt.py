@@ -1,0 +1,219 @@
+"""The doubt of a fitted circuit: sensors' noise, a wrong model's error counted once, and what is seldom known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.circuit_runs import COLUMN, COORDINATES, parameter_rows, predicted
+from faults.diagnosis.circuits.class_fit import WEAK, PointFit
+from faults.diagnosis.circuits.model_doubt import (
+    LOOKS,
+    NOISE_ALONE,
+    RIGHT,
+    SELDOM_KNOWN,
+    doubt_of,
+    model_error,
+    near_by,
+    seldom_known_slopes,
+    spreads_of,
+)
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+
+ACTUATOR = actuator_of(EhaParameters())
+CENTRE, SURE, ALL = ACTUATOR.conditions[:1], np.zeros(1), np.ones(7)
+SPREADS = spreads_of(ACTUATOR)
+NOISE = np.array([1e-4, 1e3])
+
+
+def log(blocks: int) -> Blocks:
+    still = np.full(blocks, 0.1)
+    return Blocks(np.zeros(10 * blocks + 1), 1e-3, 10, still, 1e6 * still, NOISE)
+
+
+def told(blocks: int, share: float = 0.0) -> tuple[PointFit, Blocks]:
+    """Return a fit that leaves of each output a share that no sensor makes; each coordinate moves its own blocks."""
+    one = log(blocks)
+    scales = NOISE / np.sqrt(1.0 - share)
+    slopes = np.zeros((7, blocks, 2))
+    for i in range(7):
+        slopes[i, i::7] = NOISE
+    return PointFit(CENTRE[0], 0.0, np.eye(7), scales, one.outputs, slopes), one
+
+
+def nothing_seldom(blocks: int) -> np.ndarray:
+    return np.zeros((len(SELDOM_KNOWN), blocks, 2))
+
+
+def variances(blocks: int, share: float = 0.0) -> np.ndarray:
+    fit, one = told(blocks, share)
+    return np.diag(doubt_of(fit, nothing_seldom(blocks), one, CENTRE, SURE, ALL, SPREADS))
+
+
+def test_noise_alone_averages_away_and_the_error_of_a_wrong_model_does_not() -> None:
+    assert variances(14_010)[0] == pytest.approx(2.0 * variances(28_010)[0], rel=0.02)
+    assert variances(14_010, 0.5)[0] == pytest.approx(variances(28_010, 0.5)[0], rel=0.02)
+
+
+def test_a_wrong_model_is_counted_once() -> None:
+    blocks, share = 14_010, 0.5
+    seen = blocks - log(blocks).first
+    beyond = 1.0 - NOISE_ALONE**2 * (1.0 - share)
+    variance = 7.0 / (2.0 * seen) * (1.0 + beyond * seen / LOOKS) / (1.0 - share)
+    assert variances(blocks, share)[0] == pytest.approx(1.0 / (1.0 / variance + np.linalg.inv(WEAK)[0, 0]), rel=0.01)
+
+
+def test_what_the_noise_is_not_known_to_is_no_wrong_model() -> None:
+    as_known = variances(14_010, 1.0 - 1.0 / NOISE_ALONE**2)[0]
+    assert as_known == pytest.approx(NOISE_ALONE**2 * variances(14_010)[0], rel=1e-3)
+    assert variances(14_010, 1.0 - 0.9 / NOISE_ALONE**2)[0] > 20.0 * as_known
+
+
+def test_an_error_that_lasts_is_seen_where_noise_hides_it_in_a_block() -> None:
+    fit, one = told(14_010)
+    noise = NOISE * np.random.default_rng(0).normal(size=fit.fitted.shape)
+    noise -= np.mean(noise[one.first :], axis=0)
+    hidden = np.where(np.arange(14_010) // 100 % 2, 0.4, -0.4)[:, None] * NOISE
+    alone, lasting = (replace(fit, fitted=one.outputs - left) for left in (noise, noise + hidden))
+    assert np.array_equal(model_error(alone, one), np.zeros(2))
+    assert model_error(lasting, one) == pytest.approx((0.4 * NOISE) ** 2, rel=0.2)
+    wide, narrow = (
+        doubt_of(each, nothing_seldom(14_010), one, CENTRE, SURE, ALL, SPREADS) for each in (lasting, alone)
+    )
+    assert wide[0, 0] > 20.0 * narrow[0, 0]
+
+
+def test_a_wrong_model_errs_where_it_errs() -> None:
+    left = np.zeros((1_000, 1))
+    left[100:200] = 2.0
+    seen = np.ones((1_000, 1), dtype=bool)
+    assert near_by(left, seen)[150] == pytest.approx(10.0)
+    assert near_by(left, seen)[300] == 0.0
+    assert np.all(near_by(0.0 * left, seen) == 1.0)
+    seen[150:160] = False
+    assert near_by(np.where(seen, left, 0.0), seen)[155] == pytest.approx(990 / 90)
+    blocks = 14_010
+    fit, one = told(blocks, 0.5)
+    slopes = np.zeros_like(fit.slopes)
+    slopes[0, : blocks // 2] = slopes[1, blocks // 2 :] = 30.0 * NOISE
+    here = np.where(np.arange(blocks) < blocks // 2, 2.0, 0.0)[:, None] * NOISE * (-1.0) ** np.arange(blocks)[:, None]
+    errs = replace(fit, slopes=slopes, fitted=one.outputs - here)
+    found = np.diag(doubt_of(errs, nothing_seldom(blocks), one, CENTRE, SURE, ALL, SPREADS))
+    assert found[0] > 50.0 * found[1]
+
+
+def test_each_output_answers_for_its_own_error() -> None:
+    fit, one = told(1_410)
+    velocity_off = replace(fit, scales=NOISE * [10.0, 1.0])
+    both_off = replace(fit, scales=NOISE * 10.0)
+    sure, less, least = (
+        doubt_of(one_fit, nothing_seldom(1_410), one, CENTRE, SURE, ALL, SPREADS)[0, 0]
+        for one_fit in (fit, velocity_off, both_off)
+    )
+    assert less == pytest.approx(2.0 * sure, rel=0.1)  # pressure still tells all that it told
+    assert least > 10.0 * less
+
+
+def test_what_is_seldom_known_widens_what_answers_like_it_as_far_as_the_log_leaves_it_open() -> None:
+    blocks = 1_410
+    fit, one = told(blocks)
+    alike, apart = nothing_seldom(blocks), nothing_seldom(blocks)
+    alike[1] = fit.slopes[0]
+    apart[1] = fit.slopes[0] * np.where(np.arange(blocks) % 2, 3.0, -1.0)[:, None]
+    sure, open_, seen = (
+        np.sqrt(doubt_of(fit, seldom, one, CENTRE, SURE, ALL, SPREADS)[0, 0])
+        for seldom in (nothing_seldom(blocks), alike, apart)
+    )
+    weak, valve = WEAK[0, 0], SELDOM_KNOWN["makeup_opening"] ** 2
+    odds = RIGHT / (1.0 - RIGHT) * np.sqrt((weak + valve) / weak)  # the log is as the rig's valve has it
+    assert open_**2 == pytest.approx(weak * valve / (weak + valve) / (1.0 + odds), rel=0.03)
+    assert sure < seen < 2.0 * sure
+
+
+def test_what_the_log_says_of_what_is_seldom_known_counts_as_far_as_the_fit_went_without_it() -> None:
+    blocks, by = 14_010, 0.2
+    fit, one = told(blocks)
+    seldom = nothing_seldom(blocks)
+    seldom[1] = fit.slopes[0] + fit.slopes[1] * 0.5
+    rest = seldom[1] - fit.slopes[0]  # what is left once the first coordinate has given way, and the second may not
+    given_way = replace(fit, slopes=fit.slopes * np.array([1, 0, 1, 1, 1, 1, 1])[:, None, None])
+    without = doubt_of(given_way, seldom, one, CENTRE, SURE, ALL, SPREADS)[0, 0]
+    strayed = doubt_of(replace(given_way, fitted=one.outputs - by * rest), seldom, one, CENTRE, SURE, ALL, SPREADS)[
+        0, 0
+    ]
+    assert np.sqrt(strayed - without) == pytest.approx(by, rel=0.05)
+
+
+def test_a_force_that_the_log_had_to_tell_is_open_whether_the_rig_file_is_right_or_not() -> None:
+    blocks = 1_410
+    fit, one = told(blocks)
+    force = np.concatenate([nothing_seldom(blocks), fit.slopes[:1]])
+    open_ = doubt_of(fit, force, one, CENTRE, SURE, ALL, np.append(SPREADS, 0.1))[0, 0]
+    sure = doubt_of(fit, nothing_seldom(blocks), one, CENTRE, SURE, ALL, SPREADS)[0, 0]
+    assert open_ - sure == pytest.approx(0.1**2 * WEAK[0, 0] / (0.1**2 + WEAK[0, 0]), rel=0.05)
+
+
+def test_friction_of_a_piston_that_sticks_is_open_to_each_condition_that_is_as_likely() -> None:
+    blocks = 1_410
+    fit, one = told(blocks)
+    rated = COORDINATES.index("friction_rated")
+    hidden = np.array([0.0 if name.startswith("friction") else 1.0 for name in COORDINATES])
+    two = ACTUATOR.conditions[[0, 4]]
+    apart = two[1, rated] - two[0, rated]
+    alone, even, unlikely = (
+        doubt_of(fit, nothing_seldom(blocks), one, two, odds, hidden, SPREADS)
+        for odds in (np.array([0.0, -1e3]), np.zeros(2), np.array([0.0, -20.0]))
+    )
+    assert alone[rated, rated] == pytest.approx(WEAK[rated, rated], rel=1e-6)
+    assert even[rated, rated] == pytest.approx(WEAK[rated, rated] + 0.5 * apart**2, rel=1e-6)
+    assert unlikely[rated, rated] == pytest.approx(alone[rated, rated], rel=1e-3)
+    assert even[0, 0] < 0.01 * even[rated, rated]
+
+
+def fitted(at: int) -> tuple[PointFit, Blocks, np.ndarray]:
+    """Return a fit at a condition, its log without what was measured, and its row of parameters."""
+    speed = make_drive("prbs", 4.0, 1e-3, EhaParameters(), np.random.default_rng(0))[:4_001]
+    count = (len(speed) - 1) // 10
+    one = Blocks(speed, 1e-3, 10, np.zeros(count), np.zeros(count), NOISE)
+    centre = ACTUATOR.conditions[at]
+    (row,) = parameter_rows(centre[None], ACTUATOR.circuit, ACTUATOR.rated)
+    (run,) = predicted(one, row[None])
+    return PointFit(centre, 0.0, np.eye(7), NOISE, run, np.zeros((7, count, 2))), one, row
+
+
+def nudged(fit: PointFit, one: Blocks, row: np.ndarray, name: str, by: float) -> np.ndarray:
+    """Return by what the outputs change if a parameter does."""
+    other = row.copy()
+    other[COLUMN[name]] += by
+    return predicted(one, other[None])[0] - fit.fitted
+
+
+def same(slope: np.ndarray, expected: np.ndarray) -> bool:
+    return bool(np.all(np.std(slope - expected, axis=0) < 0.05 * np.std(expected, axis=0)))
+
+
+def test_slopes_are_those_of_the_circuit_that_was_fitted() -> None:
+    fit, one, row = fitted(0)
+    slopes = dict(zip(SELDOM_KNOWN, seldom_known_slopes(fit, one, ACTUATOR), strict=True))
+    for name in ("moving_mass", "makeup_opening"):
+        by = np.expm1(0.05) * row[COLUMN[name]]
+        assert same(slopes[name], nudged(fit, one, row, name, by) / 0.05), name
+    name, by = "pump_crossport_leakage", -0.05 * row[COLUMN["leakage_coefficient"]]
+    assert same(slopes[name], nudged(fit, one, row, name, by) / -0.05)
+
+
+def test_what_leaks_to_the_case_acts_otherwise_where_it_grows_than_where_it_falls() -> None:
+    fit, one, row = fitted(list(CONDITIONS).index("major_leakage"))
+    name = "pump_case_leakage"
+    slope = seldom_known_slopes(fit, one, ACTUATOR)[list(SELDOM_KNOWN).index(name)]
+    whole, case = row[COLUMN["leakage_coefficient"]], row[COLUMN[name]]
+    up = nudged(fit, one, row, name, SELDOM_KNOWN[name] * whole) / SELDOM_KNOWN[name]
+    down = nudged(fit, one, row, name, -case) / (-case / whole)
+    assert not same(up, down)
+    assert same(slope, 0.5 * (up + down))
+    tight = replace(ACTUATOR, circuit=replace(ACTUATOR.circuit, pump_case_leakage=0.0))
+    assert np.all(np.isfinite(seldom_known_slopes(fit, one, tight)))

@@ -1,0 +1,343 @@
+"""A log that no condition explains is "unknown", and each reason has its own limit: above it, not below."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS, severity
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.blocks import Blocks, blocks_of
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
+from faults.diagnosis.circuits.class_fit import PointFit, scales_of
+from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes, region_scores
+from faults.diagnosis.circuits.out_of_model import (
+    EARLIER,
+    LEAST_BIAS,
+    SOFT,
+    STICKS,
+    UNEXPLAINED,
+    YIELDING,
+    reasons_against,
+    sensors_disagree,
+)
+from faults.notes import AgainstCode
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from plant.notes import Note
+
+RIG = EhaParameters()
+ACTUATOR = actuator_of(RIG)
+INFORMATION = 1e4 * np.eye(len(COORDINATES))
+LEVELS = [60.0, 120.0, 90.0, 120.0, -120.0, -70.0, -120.0, -100.0]
+NOISE = np.array([1e-4, 2e3])
+
+
+@cache
+def run_of(place: tuple[float, ...], dwell: int = 1000, pump: float = 1.0) -> Blocks:
+    """Return the log that a circuit leaves of eight speeds, each held for so many milliseconds, without noise.
+
+    Its pump moves ``pump`` times what the rig's does.
+    """
+    speed = np.repeat(LEVELS, dwell)
+    empty = np.zeros(len(speed) // 10)
+    blank = Blocks(np.append(speed, speed[-1]), 1e-3, 10, empty, empty, NOISE)
+    circuit = replace(ACTUATOR.circuit, pump_displacement=pump * ACTUATOR.circuit.pump_displacement)
+    (found,) = predicted(blank, parameter_rows(np.array([place]), circuit, ACTUATOR.rated))
+    return replace(blank, velocity=found[:, 0], pressure=found[:, 1])
+
+
+@cache
+def slopes_of(place: tuple[float, ...]) -> np.ndarray:
+    """Return derivatives of what a circuit does with respect to its coordinates."""
+    point = np.array(place)
+    rows = parameter_rows(np.vstack([point, point + 0.02 * np.eye(len(point))]), ACTUATOR.circuit, ACTUATOR.rated)
+    runs = predicted(run_of(place), rows)
+    return (runs[1:] - runs[0]) / 0.02
+
+
+def fitted(blocks: Blocks, place: np.ndarray) -> ClassFits:
+    """Return fits whose best circuit is at a place."""
+    key = tuple(place.tolist())
+    scales, slopes = scales_of(blocks, run_of(key).outputs), slopes_of(key)
+    weighted = (slopes[:, blocks.first :] / scales).reshape(len(place), -1)
+    best = PointFit(place, 0.0, weighted @ weighted.T, scales, run_of(key).outputs, slopes)
+    nine = np.zeros(len(CONDITIONS))
+    return ClassFits(best, INFORMATION, nine, np.zeros((len(CONDITIONS), 2)), nine, np.linalg.inv(INFORMATION), 1.0)
+
+
+def reasons(blocks: Blocks, place: np.ndarray | None = None) -> Mapping[AgainstCode, Note]:
+    """Return what speaks against a log, by code, where its best circuit is at a place, or is looked for."""
+    fits = fit_classes(blocks, ACTUATOR) if place is None else fitted(blocks, place)
+    region = float(np.max(region_scores(fits.best, fits.information, ACTUATOR)))
+    return {AgainstCode(note.code): note for note in reasons_against(blocks, fits, region, ACTUATOR)}
+
+
+def shifted(**by: float) -> np.ndarray:
+    """Return the healthy circuit's coordinates, some of them moved by a logarithm."""
+    return ACTUATOR.conditions[0] + np.array([by.get(name, 0.0) for name in COORDINATES])
+
+
+def at(leakage: float, friction: float) -> np.ndarray:
+    """Return the coordinates of a circuit with these severities."""
+    return coordinates_of(severity(leakage, friction, ACTUATOR.circuit), ACTUATOR.rated)
+
+
+def healthy() -> Blocks:
+    return run_of(tuple(ACTUATOR.conditions[0].tolist()))
+
+
+@pytest.mark.parametrize("place", range(len(CONDITIONS)), ids=list(CONDITIONS))
+def test_nothing_speaks_against_the_log_of_a_nominal_circuit(place: int) -> None:
+    point = ACTUATOR.conditions[place]
+    assert not reasons(run_of(tuple(point.tolist())), point)
+
+
+@pytest.mark.parametrize(("channel", "name"), [(0, "velocity"), (1, "differential pressure")])
+def test_a_log_is_unexplained_once_its_circuit_leaves_more_than_the_stated_share(channel: int, name: str) -> None:
+    log = healthy()
+    alternating = np.where(np.arange(len(log.velocity)) % 100 < 50, 1.0, -1.0)
+    size = float(np.sqrt(np.mean(log.outputs[log.first :, channel] ** 2)))
+
+    def with_left(share: float) -> Blocks:
+        changed = log.outputs + share * size * np.outer(alternating, np.eye(2)[channel])
+        return replace(log, velocity=changed[:, 0], pressure=changed[:, 1])
+
+    place, limit = ACTUATOR.conditions[0], UNEXPLAINED[channel]
+    assert AgainstCode.UNEXPLAINED not in reasons(with_left(0.9 * limit), place)
+    said = reasons(with_left(1.2 * limit), place)[AgainstCode.UNEXPLAINED]
+    assert said.data["channel"] == name
+    assert said.data["percent"] == pytest.approx(120.0 * limit, rel=0.02)
+    assert 0.02 < limit < 0.25
+
+
+def test_what_the_sensors_own_noise_leaves_speaks_against_nothing() -> None:
+    log = replace(healthy(), noise=np.array([1.0, 1e9]))
+    noisy = replace(log, velocity=log.velocity * np.where(np.arange(len(log.velocity)) % 2, 1.3, 0.7))
+    assert AgainstCode.UNEXPLAINED not in reasons(noisy, ACTUATOR.conditions[0])
+
+
+@pytest.mark.parametrize(("share", "code"), [(0.4, AgainstCode.OIL_SOFT), (2.5, AgainstCode.OIL_STIFF)])
+def test_an_oil_less_than_half_or_more_than_twice_as_stiff_is_another_oil(share: float, code: AgainstCode) -> None:
+    point = shifted(bulk_modulus=float(np.log(share)))
+    said = reasons(run_of(tuple(point.tolist())), point)
+    assert list(said) == [code]
+    assert said[code].data["share"] == pytest.approx(share)
+    near = shifted(bulk_modulus=float(np.log(0.75 if share < 1.0 else 1.3)))
+    assert not {AgainstCode.OIL_SOFT, AgainstCode.OIL_STIFF} & set(reasons(run_of(tuple(near.tolist())), near))
+    assert 0.4 < SOFT < 0.75
+
+
+@pytest.mark.parametrize(("known", "said"), [(0.01, True), (0.3, False)])
+def test_an_oil_is_another_only_where_the_log_knows_how_stiff_it_is(known: float, *, said: bool) -> None:
+    point = shifted(bulk_modulus=float(np.log(0.45)))
+    log = run_of(tuple(point.tolist()))
+    fits = replace(fitted(log, point), information=np.diag([1e4, 1e4, 1e4, 1e4, 1e4, known**-2, 1e4]))
+    found = reasons_against(log, fits, 0.0, ACTUATOR)
+    assert (AgainstCode.OIL_SOFT in [note.code for note in found]) == said
+
+
+def test_a_piston_that_only_yields_on_its_seals_need_not_be_followed_to_the_last_digit() -> None:
+    place = ACTUATOR.conditions[0]
+    log, pump = healthy(), ACTUATOR.circuit.pump_displacement / ACTUATOR.circuit.piston_area
+    whole = pump * float(np.sqrt(np.mean(log.speed**2)))
+    alternating = np.where(np.arange(len(log.velocity)) % 100 < 50, 1.0, -1.0)
+    for share, said in ((0.7 * YIELDING, False), (1.5 * YIELDING, True)):
+        creeping = replace(log, velocity=1e-6 + share * whole * alternating)
+        fits = replace(fitted(log, place).best, fitted=np.column_stack([0.0 * log.velocity, log.pressure]))
+        fits = replace(fits, scales=scales_of(creeping, fits.fitted))
+        found = reasons_against(creeping, replace(fitted(log, place), best=fits), 0.0, ACTUATOR)
+        assert (AgainstCode.UNEXPLAINED in [note.code for note in found]) == said
+
+
+def slipping(late: int, far: float = 1.0, *, pressure: bool = True) -> bool:
+    """Return whether velocity accuses a circuit whose piston slips blocks earlier than the log's, and another way."""
+    log, place = healthy(), ACTUATOR.conditions[0]
+    slips = 0.02 * (np.arange(len(log.velocity)) % 40 < 3)
+    seen = replace(log, velocity=np.roll(slips, late), pressure=log.pressure if pressure else None)
+    seen = seen if pressure else replace(seen, noise=NOISE[:1])
+    whole = fitted(log, place)
+    run = np.nan_to_num(log.outputs)[:, : len(seen.noise)]
+    run[:, 0] = far * slips
+    best = replace(
+        whole.best, fitted=run, slopes=whole.best.slopes[..., : len(seen.noise)], scales=scales_of(seen, run)
+    )
+    found = reasons_against(seen, replace(whole, best=best), 0.0, ACTUATOR)
+    return any(note.code is AgainstCode.UNEXPLAINED and note.data["channel"] == "velocity" for note in found)
+
+
+def test_a_piston_may_break_loose_some_blocks_sooner_if_it_goes_as_far_and_pressure_is_followed() -> None:
+    assert not slipping(2)
+    assert slipping(2, pressure=False)
+    assert slipping(2, far=1.5)
+    assert slipping(20)
+
+
+def jumping(jump: float, *, pressure_left: float = 0.0, drift: float = 0.0, pressure: bool = True) -> bool:
+    """Return whether velocity accuses a circuit whose piston creeps where the log's jumps so far [m] every 40 ms."""
+    log, whole = healthy(), fitted(healthy(), ACTUATOR.conditions[0])
+    velocity = jump / 0.01 * (np.arange(len(log.velocity)) % 4 == 1)
+    seen = replace(log, velocity=velocity, pressure=log.pressure if pressure else None)
+    seen = seen if pressure else replace(seen, noise=NOISE[:1])
+    run = np.nan_to_num(seen.outputs).copy()
+    run[:, 0] = jump / 0.04 + drift
+    run[:, 1:] *= 1.0 + pressure_left
+    slopes = whole.best.slopes[..., : len(seen.noise)]
+    best = replace(whole.best, fitted=run, slopes=slopes, scales=scales_of(seen, run))
+    found = reasons_against(seen, replace(whole, best=best), 0.0, ACTUATOR)
+    return any(note.code is AgainstCode.UNEXPLAINED and note.data["channel"] == "velocity" for note in found)
+
+
+def test_a_piston_may_stick_and_slip_at_other_times_if_it_goes_as_far_and_pressure_is_followed() -> None:
+    yielded = STICKS * ACTUATOR.circuit.presliding_displacement
+    assert yielded == pytest.approx(54e-6, rel=0.01)
+    assert not jumping(1e-4)
+    assert jumping(3e-4)
+    assert jumping(1e-4, pressure_left=1.2 * UNEXPLAINED[1])
+    assert jumping(1e-4, drift=1.1 * yielded / EARLIER)
+    assert jumping(1e-4, pressure=False)
+
+
+def test_without_pressure_a_misfit_of_velocity_counts_however_small_and_so_does_one_that_lasts() -> None:
+    place = ACTUATOR.conditions[0]
+    log, pump = healthy(), ACTUATOR.circuit.pump_displacement / ACTUATOR.circuit.piston_area
+    left = 0.5 * YIELDING * pump * float(np.sqrt(np.mean(log.speed**2)))
+    velocity = left * np.where(np.arange(len(log.velocity)) % 20 < 10, 1.0, -1.0)
+    alone = replace(log, velocity=velocity, pressure=None, noise=NOISE[:1])
+    whole = fitted(log, place)
+    best = replace(whole.best, fitted=np.zeros((len(velocity), 1)), slopes=whole.best.slopes[..., :1])
+    best = replace(best, scales=scales_of(alone, best.fitted))
+    found = reasons_against(alone, replace(whole, best=best), 0.0, ACTUATOR)
+    assert AgainstCode.UNEXPLAINED in [note.code for note in found]
+    assert fit_classes(alone, ACTUATOR).lasting == 1.0
+    assert fit_classes(replace(log, velocity=log.velocity + velocity), ACTUATOR).lasting > 2.0
+
+
+def test_halfway_between_two_levels_of_leakage_lies_in_no_region_and_the_severity_is_told() -> None:
+    point = at(0.5, 0.0)
+    said = reasons(run_of(tuple(point.tolist())), point)
+    assert list(said) == [AgainstCode.BETWEEN_CONDITIONS]
+    assert said[AgainstCode.BETWEEN_CONDITIONS].data == {"leakage": 0.5, "friction": 0.0}
+
+
+def test_far_beyond_every_condition_lies_outside_of_all() -> None:
+    point = shifted(leakage=5.0, friction_rated=2.0)
+    found = reasons(run_of(tuple(point.tolist())), point)
+    assert AgainstCode.OUTSIDE_CONDITIONS in found
+    assert AgainstCode.BETWEEN_CONDITIONS not in found
+
+
+def test_an_actuator_that_differs_as_its_kind_does_stays_in_its_condition() -> None:
+    point = shifted(leakage=0.15, friction_rest=-0.1, bulk_modulus=0.1)
+    assert not reasons(run_of(tuple(point.tolist())), point)
+
+
+@pytest.mark.parametrize("share", [1.5, 3.0, -3.0])
+def test_a_pressure_sensor_that_is_biased_beyond_its_limit_is_named_with_its_bias(share: float) -> None:
+    log = healthy()
+    assert log.pressure is not None
+    limit = LEAST_BIAS["differential_pressure_pa"] * float(np.sqrt(np.mean(log.pressure**2)))
+    found = reasons(replace(log, pressure=log.pressure + share * limit))
+    assert found[AgainstCode.PRESSURE_BIAS].data["bias_pa"] == pytest.approx(share * limit, rel=0.02)
+    assert not reasons(replace(log, pressure=log.pressure + np.sign(share) * 0.5 * limit))
+
+
+def test_a_bias_is_not_believed_within_two_of_its_standard_errors() -> None:
+    short, long = (run_of(tuple(ACTUATOR.conditions[0].tolist()), dwell) for dwell in (100, 1000))
+    for log, said in ((short, False), (long, True)):
+        assert log.pressure is not None
+        limit = LEAST_BIAS["differential_pressure_pa"] * float(np.sqrt(np.mean(log.pressure**2)))
+        found = reasons(replace(log, pressure=log.pressure + 1.5 * limit))
+        assert (AgainstCode.PRESSURE_BIAS in found) == said
+
+
+@pytest.mark.parametrize("share", [1.5, 2.5, -2.5])
+def test_a_speed_sensor_that_is_biased_beyond_its_limit_is_named_with_its_bias(share: float) -> None:
+    log = healthy()
+    limit = LEAST_BIAS["motor_speed_rad_s"] * float(np.sqrt(np.mean(log.speed**2)))
+    found = reasons(replace(log, speed=log.speed + share * limit))
+    assert found[AgainstCode.SPEED_BIAS].data["bias_rad_s"] == pytest.approx(share * limit, rel=0.1)
+    assert not reasons(replace(log, speed=log.speed + np.sign(share) * 0.5 * limit))
+
+
+def test_a_pump_that_moves_more_than_the_rig_file_says_is_named() -> None:
+    """One that moves less looks like leakage to a circuit: the balance of flows judges it (decisions 220 and 238)."""
+    place = tuple(ACTUATOR.conditions[0].tolist())
+    found = reasons(run_of(place, pump=1.2))
+    assert found[AgainstCode.PUMP_OFF].data["percent"] == pytest.approx(20.0, rel=0.35)
+    for near in (0.97, 1.03):
+        assert AgainstCode.PUMP_OFF not in reasons(run_of(place, pump=near))
+
+
+def test_without_pressure_a_pump_that_moves_less_is_left_to_the_search_for_faults_outside() -> None:
+    place = tuple(ACTUATOR.conditions[0].tolist())
+    for gain, said in ((1.2, True), (0.8, False)):
+        log = replace(run_of(place, pump=gain), pressure=None, noise=NOISE[:1])
+        assert (AgainstCode.PUMP_OFF in reasons(log)) == said
+
+
+def test_a_motor_that_never_turned_biases_nothing() -> None:
+    log = replace(healthy(), speed=np.zeros_like(healthy().speed))
+    assert not {AgainstCode.SPEED_BIAS, AgainstCode.PUMP_OFF} & set(reasons(log, ACTUATOR.conditions[0]))
+
+
+def with_two_sensors(gain: float, noise: float) -> Record:
+    """Return a log whose velocity sensor reads more than the encoder's slope says."""
+    time = 1e-3 * np.arange(3001)
+    rng = np.random.default_rng(3)
+    velocity = 0.05 * np.sin(2.0 * np.pi * time)
+    position = 0.05 / (2.0 * np.pi) * (1.0 - np.cos(2.0 * np.pi * time))
+    channels = {
+        "motor_speed_rad_s": 100.0 * np.sin(2.0 * np.pi * time),
+        "position_m": position,
+        "velocity_m_s": gain * velocity + rng.normal(0.0, noise, len(time)),
+    }
+    return Record(1e-3, channels)
+
+
+@pytest.mark.parametrize(("gain", "differs"), [(1.0, False), (1.03, False), (1.08, True), (0.9, True), (-1.0, True)])
+def test_velocity_and_the_encoders_slope_may_differ_by_five_percent(gain: float, differs: bool) -> None:
+    record = with_two_sensors(gain, 1e-6)
+    assert bool(sensors_disagree(record, blocks_of(record))) == differs
+
+
+@pytest.mark.parametrize(("gain", "noise", "differs"), [(1.0, 0.05, False), (1.2, 1e-3, True)])
+def test_noise_of_a_velocity_sensor_excuses_what_it_can_make_and_no_more(
+    gain: float, noise: float, differs: bool
+) -> None:
+    record = with_two_sensors(gain, noise)
+    assert bool(sensors_disagree(record, blocks_of(record))) == differs
+
+
+def test_one_sensor_alone_contradicts_none() -> None:
+    record = with_two_sensors(2.0, 1e-6).replace(position_m=None)
+    assert not sensors_disagree(record, blocks_of(record))
+
+
+def test_sensors_that_never_spoke_at_once_do_not_disagree() -> None:
+    record = with_two_sensors(2.0, 1e-6)
+    early = np.where(np.arange(len(record)) < 60, record["velocity_m_s"], np.nan)
+    apart = record.replace(velocity_m_s=early)
+    assert not sensors_disagree(apart, blocks_of(apart))
+
+
+def test_a_velocity_that_is_slower_than_the_rows_is_excused_by_its_noise_too() -> None:
+    record = with_two_sensors(1.0, 0.05)
+    slow = record.replace(velocity_m_s=np.where(np.arange(len(record)) % 2, np.nan, record["velocity_m_s"]))
+    assert not sensors_disagree(slow, blocks_of(slow))
+
+
+@pytest.mark.parametrize("rows", [1, 20])
+def test_a_coarse_log_of_fast_motion_accuses_no_sensor(rows: int) -> None:
+    """Velocity that changes between two samples is not seen there, but moves the piston."""
+    rng, time = np.random.default_rng(2), 1e-3 * np.arange(12_001)
+    steps = 0.04 * np.repeat(rng.choice([-1.0, 1.0], 1 + len(time) // 150), 150)[: len(time)]
+    velocity = np.convolve(steps, 0.1 * np.exp(-0.1 * np.arange(100)))[: len(time)]  # 10 ms late
+    position = np.concatenate(([0.0], np.cumsum(velocity[:-1]) * 1e-3))
+    channels = {"motor_speed_rad_s": 2e3 * velocity, "position_m": position, "velocity_m_s": velocity}
+    record = Record(rows * 1e-3, {name: values[::rows] for name, values in channels.items()})
+    assert not sensors_disagree(record, blocks_of(record))
+    wrong = record.replace(velocity_m_s=-record["velocity_m_s"])
+    assert sensors_disagree(wrong, blocks_of(wrong))
