@@ -52,7 +52,7 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     data = {"columns": COLUMNS, "rows": cells, "links": [links.get(row.name) for row in rows]}
     facts = {
         "source": source,
-        "title": _title(counts, len(rows)),
+        "title": _title(counts, len(rows) - counts["failed"]),
         "sickest": [row.name for row in rows if row.state in SICK][:5],
         "counts": [(words, counts[name], name) for name, words in STATES.items() if counts[name]],
         "logs": sum(len(row.logs) for row in rows),
@@ -70,7 +70,10 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
 
 
 def _title(counts: Mapping[str, int], total: int) -> str:
+    """Return how many of those actuators are sick whose logs could be read."""
     sick = sum(counts[name] for name in SICK)
+    if not total:
+        return "No log could be read."
     if total == 1:
         return f"The actuator is past {'a' if sick else 'no'} limit."
     if not sick:

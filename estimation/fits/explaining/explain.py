@@ -49,8 +49,8 @@ UNFINISHED = 10.0
 model steps [dimensionless]; what explains a log comes to 1.2."""
 
 FINISHED, REACHED = 0.7, 1.5
-"""What a round of a search with short steps must bring the cost down to, of what does not explain the log yet, by what
-its steps gain or promise: six of them make an eighth. None is asked below the second, over noise [fractions]."""
+"""A search with short model steps goes on while its steps promise to bring the cost to the first share of itself (six
+rounds of it make an eighth), but is never asked for less than the second times what noise alone makes [fractions]."""
 
 CLOSE = 60.0
 """Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""

@@ -84,7 +84,7 @@ class PolynomialDynamics:
         """Return the best run that refinements of first outputs lead to, and its squared error; infinite if none."""
         known, k = runs.used, self.coefficients.size
         best, cost = np.full(y.size, np.nan), np.inf
-        for _ in range(steps):
+        for step in range(steps):
             ran = runs.run(np.concatenate([self.coefficients, start, self.friction]))
             if ran is None:
                 break
@@ -93,7 +93,7 @@ class PolynomialDynamics:
             if not now < cost * (1.0 - 1e-6):
                 break
             best, cost = ran[0], now
-            if steps == 1:
+            if step + 1 == steps:  # nothing follows that slopes would lead
                 break
             moved = runs.sensitivities(*ran, self.terms, starts=True)[known][:, k : k + start.size]
             if not np.isfinite(moved).all():

@@ -3,7 +3,7 @@
 
 (() => {
   const narrow = matchMedia("(max-width: 62rem)"); // there a row is a card of three lines
-  const rowHeight = () => (narrow.matches ? 96 : 36); // [px], as in the style
+  const rowHeight = () => (narrow.matches ? 114 : 36); // [px], as in the style
   const SPARE = 12; // rows above and below those in sight
 
   function element(tag, attributes = {}, ...children) {
@@ -24,7 +24,8 @@
     if (column.kind === "name") {
       return element("th", { scope: "row", role: "rowheader", title: value }, link ? element("a", { href: link }, value) : value);
     }
-    return element("td", { title: value, role: "cell", "data-head": column.label }, value);
+    const lines = value ? [element("span", { class: "two-lines" }, value)] : [];
+    return element("td", { title: value, role: "cell", "data-head": column.label }, ...lines);
   }
 
   function start(holder) {
@@ -75,12 +76,22 @@
       return gap;
     }
 
+    function cells(values, link) { // a reason takes the place of the empty cell after it too
+      const empty = (place) => columns[place]?.kind === "text" && values[place] === "";
+      const wide = (place) => columns[place]?.kind === "text" && values[place] && empty(place + 1);
+      return columns.flatMap((column, place) => {
+        if (empty(place) && wide(place - 1)) return [];
+        const made = cell(column, values[place], link);
+        if (wide(place)) made.setAttribute("colspan", "2");
+        return [made];
+      });
+    }
+
     function draw() {
       const first = Math.max(0, Math.floor(view.scrollTop / rowHeight()) - SPARE);
       const last = Math.min(order.length, first + Math.ceil(view.clientHeight / rowHeight()) + 2 * SPARE);
       const shown = order.slice(first, last).map((row, i) => {
-        const cells = columns.map((column, place) => cell(column, rows[row][place], links[row]));
-        return element("tr", { role: "row", "aria-rowindex": String(first + i + 2) }, ...cells);
+        return element("tr", { role: "row", "aria-rowindex": String(first + i + 2) }, ...cells(rows[row], links[row]));
       });
       body.replaceChildren(...(first > 0 ? [spacer(first)] : []), ...shown, ...(last < order.length ? [spacer(order.length - last)] : []));
     }

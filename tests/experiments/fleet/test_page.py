@@ -30,6 +30,16 @@ def test_the_page_says_how_many_are_sick_and_with_which_to_begin() -> None:
     assert "Start with P-5, P-1." in page
 
 
+def test_what_cannot_be_read_is_no_actuator_within_limits() -> None:
+    def title(*outcomes: str) -> str:
+        rows = [store_row(f"{i}.csv", 1.0, outcome=one) for i, one in enumerate(outcomes)]
+        return fleet_page(actuator_rows(log_rows(rows, {}, {})), {}, "hall").split("<h1>")[1].split("</h1>")[0]
+
+    assert title("ok", "failed", "ok") == "None of 2 actuators is past a limit."
+    assert title("ok", "failed") == "The actuator is past no limit."
+    assert title("failed", "failed") == "No log could be read."
+
+
 def test_pages_of_a_store_wait_for_no_plotting_library() -> None:
     code = (
         "import sys\nimport experiments.fleet.log_pages\nimport experiments.fleet.page\n"
@@ -145,6 +155,26 @@ def test_axe_finds_nothing_serious_and_the_page_fits_a_phone(page: Any) -> None:
     found = axe.Axe().run(page).response["violations"]
     assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [390, 768, 1280])
+def test_a_long_condition_and_a_reason_are_read_whole(browser: Any, tmp_path: Path, width: int) -> None:
+    reason = "differential_pressure_pa is missing in 900 of 1000 samples"
+    rows = [
+        store_row("a.csv", 4.0, found_condition="minor_leakage_minor_friction"),
+        store_row("b.csv", 1.0, outcome="failed", quantities=None, found_condition=None, reason=reason),
+    ]
+    path = tmp_path / "index.html"
+    path.write_text(fleet_page(actuator_rows(log_rows(rows, {}, {})), {}, "hall"), encoding="utf-8")
+    page = browser.new_page(viewport={"width": width, "height": 800})
+    page.goto(path.as_uri())
+    page.wait_for_selector("html.table-drawn", state="attached")
+    lines = page.locator('td[data-head="found"] .two-lines')
+    assert lines.all_inner_texts() == ["minor leakage + minor friction", reason]
+    whole = lines.evaluate_all("all => all.map(one => one.scrollHeight <= one.clientHeight + 1)")
+    assert whole == [True, True]
+    page.close()
 
 
 def in_sight(page: Any, heading: str) -> bool:
