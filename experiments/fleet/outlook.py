@@ -63,6 +63,8 @@ class Outlook:
         """The forecast in one clause."""
         if len(self.logs) - self.trend.begin < FEWEST:
             return "too few logs"
+        if self.left is None and self.alarm:  # the last log alone may lie within it
+            return "trend past the limit"
         if self.left is None:
             return "growing" if self.trend.certain else "no certain growth"
         low, middle, high = self.left

@@ -60,6 +60,14 @@ def test_what_is_past_its_limit_says_so() -> None:
     assert outlook.words == "past the limit"
 
 
+def test_an_alarm_without_certain_growth_says_that_the_trend_is_past_the_limit() -> None:
+    row = actuator([3.4, 3.2] * 14 + [2.8])
+    assert (row.last.state, row.state) == ("open", "alarm")
+    assert row.outlook is not None
+    assert not row.outlook.trend.certain
+    assert row.outlook.words == "trend past the limit"
+
+
 def test_logs_without_a_verdict_play_no_part() -> None:
     assert outlook_of(actuator(GROWING, outcome="mismatch").logs, "leakage_flow") is None
 
