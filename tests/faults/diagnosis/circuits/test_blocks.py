@@ -78,9 +78,20 @@ def test_a_circuit_follows_a_fast_log_of_itself_through_the_edges_of_a_binary_si
     assert root_mean_square(left) < 7e-4 * blocks.sizes[0]  # 4.7e-4; averaged over 1 ms 1.2e-3
 
 
-@pytest.mark.parametrize(("sample_time", "pooled"), [(1e-4, 5), (2e-4, 2), (5e-4, 1), (1e-3, 1), (2e-3, 1)])
-def test_fast_logs_alone_are_averaged_before_they_are_followed(sample_time: float, pooled: int) -> None:
-    rng = np.random.default_rng(0)
-    channels = {name: rng.standard_normal(4000) for name in ("motor_speed_rad_s", "position_m", PRESSURE)}
-    blocks = blocks_of(Record(sample_time, channels))
-    assert blocks.sample_time == pytest.approx(pooled * sample_time)
+@pytest.mark.parametrize(
+    ("sample_time", "smooth", "rough"), [(1e-4, 10, 5), (2e-4, 5, 2), (5e-4, 2, 1), (1e-3, 1, 1), (2e-3, 1, 1)]
+)
+def test_fast_logs_alone_are_averaged_and_less_where_that_blurs_their_speed(
+    sample_time: float, smooth: int, rough: int
+) -> None:
+    rng, time = np.random.default_rng(0), sample_time * np.arange(8000)
+    others = {name: rng.standard_normal(8000) for name in ("position_m", PRESSURE)}
+    for speed, pooled in ((np.sin(10.0 * time), smooth), (rng.standard_normal(8000), rough)):
+        blocks = blocks_of(Record(sample_time, {"motor_speed_rad_s": speed, **others}))
+        assert blocks.sample_time == pytest.approx(pooled * sample_time)
+
+
+@pytest.mark.parametrize(("drive", "pooled"), [("multisine", 10), ("steps", 10), ("prbs", 5)])
+def test_a_binary_signal_is_averaged_less_than_steps_and_sines(drive: str, pooled: int) -> None:
+    speed = make_drive(drive, 3.0, 1e-4, HEALTHY, np.random.default_rng(1))
+    assert blocks_of(simulate(CIRCUIT, speed, 1e-4, circuit_of(HEALTHY))).sample_time == pytest.approx(pooled * 1e-4)
