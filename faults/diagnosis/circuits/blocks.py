@@ -43,8 +43,8 @@ RATE = 1e-3
 """Sample time to which faster logs are averaged [s]; half of it where that blurs the speed."""
 
 MOST_BLURRED = 0.01
-"""Share of the speed, root mean square, that averaging may lose at edges [fraction]. Behind a motor that lags sines lose
-0.2 %, steps up to 0.6 %, and binary signals 1.3 %, with which leakage came out 0.3 to 1.3 % low."""
+"""Share of the speed, root mean square, that averaging may lose at edges [fraction]. Behind a motor that lags sines
+lose 0.2 %, steps up to 0.6 %, and binary signals 1.3 %, with which leakage came out 0.3 to 1.3 % low."""
 
 LEAST_BEGUN = 0.1
 """Share of a log's pressure, root mean square, from which what it begins with is more than noise [fraction]."""
