@@ -37,7 +37,7 @@ def verdict_lines(result: Mapping[str, Any]) -> list[str]:
         What it is, the same for a mechanic, how bad in leakage, in friction and oil, whether it is reliable, what to
         do next, and what the library of transfer functions says where it says anything.
     """
-    from experiments.eha.plain_verdict import verdict
+    from experiments.eha.plain_verdict import verdict  # here, since an estimate needs nothing of it
 
     library = library_sentence(result)
     return [

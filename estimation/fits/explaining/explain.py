@@ -152,15 +152,14 @@ def _paired(log: GreyBoxLog, first: Tried, plain: Mapping[str, float], accepted:
     likely, others = promising(late, first.together, first.values, [one for one in HYPOTHESES if one.name not in taken])
     begun = [_begun_again(log, first), {**plain, **own_starts(log, first.together[-1])[0]}]
     left = left_by(log, first.cost)
-    every = skipping(log, left)
-    spared = Spared(every, left, begun)
+    spared = Spared(skipping(log, left), left, begun)
     tried = [*likely, *(one for one in others if one.far)]
-    nearer = (screened(late, (*first.together, one), begun, every=every) for one in tried)
+    nearer = (screened(late, (*first.together, one), begun, every=spared.every) for one in tried)
     useful = first.cost - WORTH
     pairs = _likeliest(late, nearer, first.cost, spared, useful)
     if not pairs or not _explained(pairs[0], accepted):
         known = NEARLY_AS_GOOD * min(one.cost for one in (first, *pairs[:1]))
-        rest = [screened(late, (*first.together, one), begun, known, every) for one in others if not one.far]
+        rest = [screened(late, (*first.together, one), begun, known, spared.every) for one in others if not one.far]
         pairs = _ranked([*pairs, *_likeliest(late, rest, spared=spared, useful=useful)])
     better = (one for one in pairs if one.cost < first.cost - WORTH)
     return [replace(one, delays={**first.delays, **one.delays}) for one in better]

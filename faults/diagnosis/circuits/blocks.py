@@ -225,7 +225,7 @@ def _samples_in_one(record: Record) -> int:
     if pooled == 1 or len(record) < 2 * pooled:
         return pooled
     speed = bridged(record["motor_speed_rad_s"])
-    means = _mean(speed, pooled, 0)
+    means = _pooled(speed, pooled)
     middles = 0.5 * (pooled - 1) + pooled * np.arange(len(means))
     lost = speed[: pooled * len(means)] - np.interp(np.arange(pooled * len(means)), middles, means)
     blurred = root_mean_square(lost) > MOST_BLURRED * root_mean_square(speed)
