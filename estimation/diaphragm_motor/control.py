@@ -162,15 +162,15 @@ def controlled_run(
     between = 1.0 / (frequency * a_cycle)
     period, count = CYCLES / frequency, round(duration * frequency / CYCLES)
     sine = 0.5 * np.sin(2.0 * pi * np.arange(CYCLES * a_cycle + 1) / a_cycle)
-    seen, held = 0.0, 0.0
+    before, seen, held = 0.0, 0.0, 0.0
     state = at_rest(schedule[0][1])
-    rows = np.empty((count, 6))
+    rows = np.empty((count, 5))
     for k in range(count):
         begin = k * period
         goal = wanted(begin)
         way = 1.0 if goal >= 0.0 else -1.0
         motor = replace([p for time, p in schedule if time <= begin + 1e-9][-1], spool=way)
-        swing, held = control.act(abs(goal) - seen, seen - rows[k - 1, 5] if k else 0.0, held, period)
+        swing, held = control.act(abs(goal) - seen, seen - before, held, period)
         states = run_motor(motor, swing * sine, between, start=state)
         state = states[-1].copy()
         if sensing == "encoder":
@@ -181,11 +181,11 @@ def controlled_run(
             noisy = read + sensors.electrode_v * rng.standard_normal(len(read))
             flow, pressure = maps.sensed(frequency, swing, float(abs(tone(noisy, between, frequency))))
             measured = (flow - maps.motor.crossport_leakage * pressure) / maps.motor.piston_area
-        rows[k] = begin + period, goal, way * measured, state[POSITION] - states[0, POSITION], swing, measured
+        rows[k] = begin + period, goal, way * measured, state[POSITION] - states[0, POSITION], swing
         rows[k, 3] /= period
-        seen = measured
+        before, seen = seen, measured
     position = np.cumsum(rows[:, 3]) * period
-    time, aim, saw, velocity, swings = rows[:, :5].T
+    time, aim, saw, velocity, swings = rows.T
     return ControlledRun(time, aim, saw, velocity, swings, position)
 
 

@@ -92,3 +92,24 @@ def test_self_sensing_does_not_see_what_leaks_past_the_piston_and_an_encoder_doe
     assert last["encoder"][0] == pytest.approx(3e-3, rel=0.02)
     assert last["self"][1] == pytest.approx(3e-3, rel=0.02)
     assert last["self"][0] < 0.95 * 3e-3
+
+
+def test_a_motor_that_is_stopped_does_not_turn_back(maps: MotorMaps) -> None:
+    run = controlled_run(
+        [(0.0, HEALTHY)], lambda time: 3e-3 if time < 0.3 else 0.0, 0.4, PEAK, maps, np.random.default_rng(1)
+    )
+    stopping = run.time > 0.31
+    assert run.swing[stopping][0] > 0.0  # the integral lets go in some periods
+    assert run.velocity[stopping].min() > -1e-4
+
+
+def test_the_derivative_gain_acts_on_what_the_measured_speed_gained(maps: MotorMaps) -> None:
+    control, period = VelocityController(derivative=2.0), 4.0 / PEAK
+    run = controlled_run(
+        [(0.0, HEALTHY)], lambda _: 3e-3, 5 * period, PEAK, maps, np.random.default_rng(1), controller=control
+    )
+    seen, held = np.array([0.0, 0.0, *run.measured]), 0.0
+    assert np.ptp(seen) > 1e-4
+    for before, last, swing in zip(seen, seen[1:], run.swing, strict=False):
+        wanted, held = control.act(3e-3 - last, last - before, held, period)
+        assert swing == pytest.approx(wanted)
