@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from estimation.equations import search
 from estimation.equations.definition import Equations, Parameter
 from estimation.equations.problem import Problem, part_of
-from estimation.equations.search import _guesses
+from estimation.equations.search import _guesses, _moved
 from plant.log.record import Record
 
 RECORD = Record(0.05, {"push": np.sin(np.arange(100.0)), "way": np.cos(np.arange(100.0))})
@@ -44,3 +45,23 @@ def test_other_starts_are_drawn_within_bounds_and_near_the_first_where_there_are
     again = _guesses(problem, 2, seed=2)
     assert np.array_equal(again[1], others[0])
     assert not np.array_equal(_guesses(problem, 2, seed=3)[1], others[0])
+
+
+@pytest.mark.parametrize("substeps", [1, 2])
+def test_a_solution_whose_steps_run_away_has_moved_without_limit(
+    substeps: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    equations = Equations(
+        lag,
+        states={"way": "m"},
+        inputs={"push": "N"},
+        outputs={"way": "m"},
+        parameters={"gain": Parameter(3.0), "rate": Parameter(0.5), "load": Parameter(-1.0)},
+        initial={"way": Parameter(0.3)},
+    )
+    problem = Problem(equations, (part_of(equations, RECORD),), "rk4", 1, np.array([0.01]))
+    point = problem.at(problem.coordinates(np.array([3.0, 0.5, -1.0, 0.3])))
+    assert 0.0 < _moved(problem, point) < 0.05
+    whole = search._whole
+    monkeypatch.setattr(search, "_whole", lambda one, at: None if one.substeps == substeps else whole(one, at))
+    assert _moved(problem, point) == np.inf

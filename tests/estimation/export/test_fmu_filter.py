@@ -40,6 +40,8 @@ def test_it_passes_validation_and_believes_what_the_native_filter_believes(
     path = tmp_path / "filter.fmu"
     path.write_bytes(filter_fmu(problem, method, fmi, name="believed"))
     assert validate_fmu(str(path)) == []
+    inputs = [one for one in fmpy.read_model_description(str(path)).modelVariables if one.causality == "input"]
+    assert [float(one.start) for one in inputs] == [0.0] * (len(problem.model.drives) + len(problem.channels))
     names = [*problem.model.drives, *(f"measured_{one}" for one in problem.channels)]
     time = SAMPLE_TIME * np.arange(len(problem.measured))
     rows = np.column_stack([time, problem.drives, problem.measured])

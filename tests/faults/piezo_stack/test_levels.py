@@ -1,5 +1,6 @@
 """A quantity of the piezo stack says a fault where it is large and sure, and nothing where either is missing."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -49,3 +50,11 @@ def test_a_level_is_the_nearest_and_none_where_deviations_span_half_a_step() -> 
     for value, level in ((10.9, "none"), (11.1, "minor"), (13.9, "minor"), (14.1, "major")):
         assert _level(found("q", value, 0.49), "q", 10.0, levels) == level
     assert _level(found("q", 12.0, 0.51), "q", 10.0, levels) is None
+
+
+def test_a_gap_below_a_reed_is_a_fault_by_what_it_opened_since_the_actuator_was_healthy() -> None:
+    healthy = replace(HEALTHY, inlet_reed_gap=3e-6)
+    assert _fault("inlet_reed_gap", found("inlet_reed_gap", 7e-6, 1e-8), healthy) is None
+    note = _fault("inlet_reed_gap", found("inlet_reed_gap", 9e-6, 1e-8), healthy)
+    assert note is not None
+    assert dict(note.data) == {"reed": "inlet", "gap_um": pytest.approx(9.0)}

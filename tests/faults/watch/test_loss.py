@@ -202,3 +202,16 @@ def test_a_span_is_scored_by_its_distance_from_what_warm_oil_explains_over_its_d
     assert loss[RISEN] == pytest.approx(0.5 + score - ALLOWED)
     assert levels[20 % 4].tolist() == [0.2, 33.0]
     assert (loss[LAST], loss[SEEN], loss[KNOWN]) == (0.2, 21.0, known + 1.0)
+
+
+def test_a_span_at_rest_leaves_what_the_last_one_told() -> None:
+    told = np.array([0.1, 0.2, 0.3, 1.0, 0.4, 0.5])
+    measure_lag(np.zeros((DELAYS + 2, DELAYS + 2)), np.zeros(DELAYS + 2), told)
+    assert told.tolist() == [0.1, 0.2, 0.3, 0.0, 0.4, 0.5]
+
+
+def test_a_drive_of_hardly_any_power_tells_lost_speed_as_well() -> None:
+    reversals = 0.01 * np.repeat(np.random.default_rng(5).choice((-1.0, 1.0), 200), 10)
+    told = lagging(reversals, 0.05)
+    assert told[3] == 1.0
+    assert told[0] == pytest.approx(0.05, abs=1e-3)

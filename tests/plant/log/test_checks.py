@@ -307,3 +307,11 @@ def test_a_channel_that_is_logged_every_second_row_is_slower_too() -> None:
     assert [(note.code, dict(note.data)) for note in checked.notes] == [
         (LogCode.CHANNEL_SLOWER, {"channel": "differential_pressure_pa", "rows": 2})
     ]
+
+
+@pytest.mark.parametrize(("lost", "kept"), [(4, True), (5, False)])
+def test_a_slow_channel_needs_nineteen_of_twenty_of_its_own_samples_between_its_ends(lost: int, kept: bool) -> None:
+    rows = np.arange(9, N - 10, 10)  # 99 samples: the log begins before the first, and ends after the last
+    slow = np.full(N, np.nan)
+    slow[np.delete(rows, np.arange(10, 10 + 2 * lost, 2))] = 1e5
+    assert ("differential_pressure_pa" in check(differential_pressure_pa=slow).channels) is kept

@@ -66,3 +66,9 @@ def test_slopes_of_the_widest_make_up_valve_are_those_of_the_model_and_no_chatte
 
     # a valve that opens within 100 Pa has a corner narrower than a nudge of 1e-3; chatter would grow tenfold here
     assert effects(1e-6) == pytest.approx(effects(1e-5), rel=0.1, abs=1.0)
+
+
+def test_an_offset_at_rest_is_first_taken_to_be_none_where_no_pressure_was_read() -> None:
+    log = wide()
+    blind = replace(log, measured=np.full_like(log.measured, np.nan))
+    assert list(own_starts(blind, OFFSET_AT_REST)) == [{"pressure_offset": 0.0}]

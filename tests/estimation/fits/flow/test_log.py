@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 from estimation.eha.explained import lateness
 from estimation.fits.flow.fit import fit_flow
-from estimation.fits.flow.log import _swept_share, carried, flow_log, without_strays
+from estimation.fits.flow.log import _swept_share, carried, flow_log, speed_gaps, without_strays
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.problem import Problem
 from estimation.log_checks.measurement_noise import struck_variance
@@ -173,3 +173,14 @@ def test_noise_of_speed_stays_where_oil_is_stiff_and_hardly_leaks() -> None:
     assert stiffer.walk == pytest.approx(4.0 * stiff.walk)
     assert replace(stiff, walk=0.0) == seen.noise[0]
     assert carried(seen, HEALTHY, {**found, "leakage_coefficient": 1e4 * HEALTHY.leakage_coefficient}) is seen
+
+
+def test_speeds_missing_at_an_end_of_a_log_are_open_by_the_half_slope_of_the_end_that_is_known() -> None:
+    n, at = 30, 1e-3
+    speed = 10.0 * np.arange(n, dtype=float)
+    speed[:3] = speed[-3:] = np.nan
+    gaps = speed_gaps(Record(at, {"motor_speed_rad_s": speed}), HEALTHY, 0.0)
+    # the missing end is held, so half the slope of 10 rad/s a sample is what four intervals leave open
+    volume = 0.5 * (0.5 * 10.0 * 4) * 3 * at * HEALTHY.pump_displacement
+    variance = (HEALTHY.bulk_modulus / HEALTHY.chamber_volume * volume) ** 2 / 4
+    assert gaps.tolist() == [[0.0, 3.0, pytest.approx(variance)], [n - 3.0, n - 1.0, pytest.approx(variance)]]

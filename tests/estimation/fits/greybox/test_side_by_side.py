@@ -188,3 +188,22 @@ def test_the_loop_run_as_python_gives_what_its_kernel_gives(
     residuals_side_by_side(plain, rows, drives, *given, found)
     compile_side_by_side(FLOW_FORM, LANES)(rows, drives, *given, wanted)
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9)
+
+
+def test_other_drives_of_a_log_with_gaps_or_of_a_long_one_are_run_one_by_one(
+    problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (theta,) = points(problem, 1)
+    drives = [problem.log.drives, 1.001 * problem.log.drives]
+    together = list(problem.disturbed(theta, drives))
+    monkeypatch.setattr(problem, "disturbed_together", lambda *_: pytest.fail("these drives were run together"))
+    monkeypatch.setattr(freed_problem, "MOST_SIDE_BY_SIDE", len(problem.log.drives) - 1)
+    np.testing.assert_allclose(list(problem.disturbed(theta, drives)), together, rtol=1e-7, atol=1e-7)
+    monkeypatch.setattr(freed_problem, "MOST_SIDE_BY_SIDE", len(problem.log.drives))
+    with pytest.raises(pytest.fail.Exception, match="run together"):
+        list(problem.disturbed(theta, drives))
+    open_gap = freed(replace(problem.log, gaps=np.array([[300.0, 340.0, 1e12]])), HYPOTHESES)
+    found = list(open_gap.disturbed(theta, drives))
+    for errors, one in zip(found, drives, strict=True):
+        np.testing.assert_allclose(errors, open_gap.residuals(theta, drives=one), rtol=1e-7, atol=1e-7)
+    assert np.max(np.abs(found[0] - together[0])) > 1.0

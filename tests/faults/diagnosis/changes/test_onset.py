@@ -233,3 +233,23 @@ def test_a_part_keeps_the_drive_and_misses_the_rest() -> None:
 
 def test_the_interval_of_the_time_is_that_of_95_percent() -> None:
     assert pytest.approx(0.5 * float(chdtri(1, 0.05)), abs=1e-3) == onset.LIKELY
+
+
+@pytest.mark.parametrize(("lasting", "wide"), [(0.3, 4), (1.0, 4), (3.0, 13)])
+def test_the_interval_of_the_time_is_wider_by_what_the_circuits_leave_unexplained(
+    lasting: float, wide: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place, best = 120, 100
+    blocks = Blocks(np.zeros(2001), 1e-3, 10, np.zeros(200), None, np.array([1.0]))
+
+    def run(changing: Blocks, rows: np.ndarray) -> list[np.ndarray]:
+        assert changing.earlier is not None
+        assert len(rows) == len(np.atleast_1d(changing.earlier[0]))
+        costs = 0.1 * (np.atleast_1d(changing.earlier[0]) / 10 - best) ** 2  # 1.92 is passed beyond 4.4 blocks
+        return [np.full((200, 1), np.sqrt(2.0 * cost / (200 - blocks.first))) for cost in costs]
+
+    monkeypatch.setattr(onset, "predicted", run)
+    monkeypatch.setattr(onset, "least_scales", lambda _: 1.0)
+    monkeypatch.setattr(onset, "lasting_misfit", lambda *_: lasting)
+    circuits = np.zeros((2, len(onset.COORDINATES)))
+    assert onset._when(blocks, *circuits, place, ACTUATOR) == (best - wide - 1, best, best + wide + 1)

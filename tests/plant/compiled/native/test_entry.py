@@ -153,3 +153,18 @@ def total(values):
         result += value
     return result
 """
+
+
+@pytest.mark.parametrize(("moved", "turns"), [("c = b", 2), ("c = d\n        d = b", 3)])
+def test_an_array_that_a_loop_writes_by_a_name_it_got_in_turns_before_is_known_to_change(
+    moved: str, turns: int
+) -> None:
+    turn = f"        c[0] = 1.0 + k\n        {moved}\n"
+    text = f"def fill(a, b, n):\n    c = a\n    d = a\n    for k in range(n):\n{turn}"
+    fill = load_native("fill_by_turns", text, {"fill": signature("a, b : ndarray, shape (k,)\nn : int")}).fill
+    a, b = np.zeros(1), np.zeros(1)
+    fill(a, b, turns)
+    assert (a[0], b[0]) == (turns - 1.0, turns)
+    b.flags.writeable = False
+    with pytest.raises(TypeError, match=r"b must be .* changed, got .* read-only"):
+        fill(a, b, turns)

@@ -1,0 +1,49 @@
+"""Outputs get one model of all or one each: by what is left on blocks held back, and by how many values it takes."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from estimation.identification.free_run.choose_linear import CLEARLY
+from estimation.identification.free_run.identify import Identified
+from estimation.identification.state_space import identify
+from estimation.identification.state_space.identify import identify_outputs
+
+LEFT = 0.1
+"""What a model an output leaves of each output's deviation [fraction]."""
+
+
+def found(name: str, left: float, n_values: int, *, sound: bool = True) -> Identified:
+    model: Any = SimpleNamespace(structure=name, n_values=n_values)
+    quality: Any = SimpleNamespace(fit_percent=90.0)
+    return Identified(model, quality, 100.0 * (1.0 - left), ({"structure": name},), (), sound)
+
+
+@pytest.mark.parametrize(
+    ("left", "n_values", "shared"),
+    [
+        (0.999 * LEFT, 19, True),  # fewer values than both models of their own have together
+        (1.001 * LEFT, 19, False),
+        ((1.0 - 0.9 * CLEARLY) * LEFT, 20, False),  # as many: by a hundredth, or not at all
+        ((1.0 - 1.1 * CLEARLY) * LEFT, 20, True),
+    ],
+)
+def test_more_values_must_do_better_by_a_hundredth_and_fewer_by_anything(
+    left: float, n_values: int, shared: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data: Any = ["y", "z"]
+    monkeypatch.setattr(identify, "identify_channels", lambda *_, **__: found("own", LEFT, 10))
+    together = [found("shared", left, n_values) for _ in data]
+    monkeypatch.setattr(identify, "identify_state_space", lambda *_, **__: together)
+    chosen = identify_outputs(data, structure="auto")
+    assert [one.model.structure for one in chosen] == ["shared" if shared else "own"] * 2
+    assert [[row["structure"] for row in one.candidates] for one in chosen] == [["own", "shared"]] * 2
+
+
+def test_one_unsound_output_of_a_shared_model_keeps_all_on_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    data: Any = ["y", "z"]
+    together = [found("shared", 0.5 * LEFT, 5, sound=sound) for sound in (True, False)]
+    monkeypatch.setattr(identify, "identify_channels", lambda *_, **__: found("own", LEFT, 10))
+    monkeypatch.setattr(identify, "identify_state_space", lambda *_, **__: together)
+    assert {one.model.structure for one in identify_outputs(data, structure="auto")} == {"own"}
