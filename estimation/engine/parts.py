@@ -4,7 +4,7 @@
 of its own that calls these. In the loop's file they are keyword-only parameters (`plant.compiled.paste`).
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -71,6 +71,24 @@ def function_source(
     lines = lines_source(f"{name}_lines", wanted)
     operation = f"_{name} = function_of({name}_lines, {len(wanted)})"
     return "\n\n\n".join([lines, operation, begin + f"    {targets} _{name}({given})"])
+
+
+def places(array: str, names: Iterable[str]) -> dict[str, str]:
+    """Return where each number stands in an array.
+
+    Parameters
+    ----------
+    array : str
+        Name of the array.
+    names : iterable of str
+        Names of its numbers, from the first on.
+
+    Examples
+    --------
+    >>> places("theta", ["a", "b"])
+    {'a': 'theta[0]', 'b': 'theta[1]'}
+    """
+    return {name: f"{array}[{i}]" for i, name in enumerate(names)}
 
 
 def data_places(model: ProcessModel, channels: tuple[str, ...]) -> dict[str, str]:

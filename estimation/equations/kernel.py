@@ -1,11 +1,11 @@
 """Compiles a user's equations with their exact sensitivities."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any, TypeAlias
 
 from estimation.arrays import Array
-from estimation.engine.parts import function_source
+from estimation.engine.parts import function_source, places
 from estimation.equations.definition import Equations
 from estimation.equations.loops import run
 from estimation.equations.trace import Named, grouped, traced
@@ -74,7 +74,7 @@ class _Symbols:
         unknown = [f"v{j}" for j in range(len(model.parameters) + len(model.free))]
         begun = [name for name in model.states if name not in model.free]
         held = [f"k{j}" for j in range(len(model.known) + len(begun))]
-        self.places = _places("values", unknown) | _places("known", held)
+        self.places = places("values", unknown) | places("known", held)
         self.unknowns, known = [symbol(one) for one in unknown], [symbol(one) for one in held]
         fitted, given = len(model.parameters), len(model.known)
         self.parameters = Named(
@@ -91,7 +91,7 @@ def _source(model: Equations, scheme: str) -> str:
     """Write the kernel."""
     own = _Symbols(model)
     columns = range(len(own.unknowns))
-    point = _places("point", [f"{s}{i}" for i in range(len(own.states)) for s in ("x", *(f"s{j}_" for j in columns))])
+    point = places("point", [f"{s}{i}" for i in range(len(own.states)) for s in ("x", *(f"s{j}_" for j in columns))])
     data = {f"{when}{i}": f"{when}[{i}]" for when in ("before", "after") for i in range(len(model.inputs))}
     moved = _rows(_moved(model, scheme, own), own.states, own.unknowns)
     shown = _rows(_observed(model, own), own.states, own.unknowns)
@@ -99,7 +99,7 @@ def _source(model: Equations, scheme: str) -> str:
     seen = {f"shown[{k // width}, {k % width}]": value for k, value in enumerate(shown)}
     every = dict(zip(point, moved, strict=True)) | seen
     settled, rest = hoisted(every, {*point, *data, "start", "end", "h"}, "c")
-    reads = point | data | _places("fixed", settled)
+    reads = point | data | places("fixed", settled)
     begin = dict(zip(point, _rows(own.first, [], own.unknowns), strict=True))
     return kernel_text(
         "a user's equations, with their sensitivities",
@@ -139,10 +139,6 @@ def _observed(model: Equations, own: _Symbols) -> list[Expression]:
     inputs = grouped("Inputs", tuple(model.inputs), [symbol(f"after{i}") for i in range(len(model.inputs))])
     state = grouped("State", tuple(model.states), own.states)
     return traced("observe", model.observe, tuple(model.outputs), state, inputs, own.parameters)
-
-
-def _places(array: str, names: Iterable[str]) -> dict[str, str]:
-    return {name: f"{array}[{i}]" for i, name in enumerate(names)}
 
 
 def _rows(

@@ -144,6 +144,46 @@ def end_block(setting: WatchSetting, sizes: WatchSizes, memory: Memory, factor: 
         return NOTHING
     clock[USABLE] += 1.0
     since = clock[USABLE] - clock[LEARNT_FROM]
+    news = score_balances(setting, sizes, memory, factor, moved, since, excited, place)
+    if since > sizes.resume:
+        clock[SCORED] += 1.0
+    if clock[USABLE] >= sizes.learning and (int(clock[USABLE]) % REFRESHED == 0 or clock[USABLE] == sizes.learning):
+        renew_thresholds(setting, memory)
+        if clock[USABLE] == sizes.learning:
+            score[:, SUM : PEAK + 1] = 0.0
+            known[WANTED] = max(known[SPANS], LEAST_LEARNT)
+            return READY
+    if news >= 0:
+        peaks[news, peaks.shape[1] - 1] += 1.0
+        return news
+    known[BLOCKS] += 1.0
+    return LOSS if known[BLOCKS] >= SPAN and end_span(memory) else NOTHING
+
+
+def score_balances(
+    setting: WatchSetting,
+    sizes: WatchSizes,
+    memory: Memory,
+    factor: Array,
+    moved: float,
+    since: float,
+    excited: int,
+    place: int,
+) -> int:
+    """Score a block by each balance; return the one that passes its threshold by most, or that none does.
+
+    Parameters
+    ----------
+    factor : ndarray, shape (features, features)
+        Room for a factor of the information.
+    moved : float
+        Intervals of the block in which the actuator moved [count].
+    since : float
+        Usable blocks since the balances were last learnt anew [count].
+    excited, place : int
+        How the drive excited the block, and where its score is kept.
+    """
+    clock, score, peaks = memory.clock, memory.score, memory.peaks
     news = NOTHING
     for c in range(score.shape[0]):
         value = math.log(score[c, SQUARES] / moved + 1e-30)
@@ -162,21 +202,15 @@ def end_block(setting: WatchSetting, sizes: WatchSizes, memory: Memory, factor: 
             and (news < 0 or score[c, SUM] / score[c, THRESHOLD] > score[news, SUM] / score[news, THRESHOLD])
         ):
             news = c
-    if since > sizes.resume:
-        clock[SCORED] += 1.0
-    if clock[USABLE] >= sizes.learning and (int(clock[USABLE]) % REFRESHED == 0 or clock[USABLE] == sizes.learning):
-        for c in range(score.shape[0]):
-            expected = setting.false_alarms * clock[SCORED] / score.shape[0]
-            score[c, THRESHOLD] = threshold(peaks[c, :-1], peaks[c, peaks.shape[1] - 1], LEVEL, expected)
-        if clock[USABLE] == sizes.learning:
-            score[:, SUM : PEAK + 1] = 0.0
-            known[WANTED] = max(known[SPANS], LEAST_LEARNT)
-            return READY
-    if news >= 0:
-        peaks[news, peaks.shape[1] - 1] += 1.0
-        return news
-    known[BLOCKS] += 1.0
-    return LOSS if known[BLOCKS] >= SPAN and end_span(memory) else NOTHING
+    return news
+
+
+def renew_thresholds(setting: WatchSetting, memory: Memory) -> None:
+    """Set each balance's threshold by the peaks so far, so that all together raise the false alarms allowed."""
+    score, peaks = memory.score, memory.peaks
+    for c in range(score.shape[0]):
+        expected = setting.false_alarms * memory.clock[SCORED] / score.shape[0]
+        score[c, THRESHOLD] = threshold(peaks[c, :-1], peaks[c, peaks.shape[1] - 1], LEVEL, expected)
 
 
 def end_span(memory: Memory) -> bool:
@@ -224,7 +258,8 @@ def watch_kernel() -> NativeKernel:
     constants |= {"ALLOWANCE": ALLOWANCE, "LEVEL": LEVEL, "MOVING": MOVING}
     of_balances = (regress, shift, learn, count_gains, solve, accumulate, excitation_octave, standardise)
     of_loss = (count_work, count_lag, measure_work, measure_lag, learn_loss_again, drive_is_alike, judge_loss)
-    small = pasted(*of_balances, *of_loss, drop_span, end_span, end_block, constants=constants, inlined=True)
+    of_blocks = (drop_span, end_span, renew_thresholds, score_balances, end_block)
+    small = pasted(*of_balances, *of_loss, *of_blocks, constants=constants, inlined=True)
     entries = threshold, advance, begin_again
     large = pasted(*entries)
     text = kernel_text("the watch over flow and force balances", small, large)

@@ -11,10 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.fits.greybox.chance import largest_chi_square
-from estimation.fits.greybox.course import opened, vanished
-from estimation.fits.greybox.covariance import automatic_lags, least_squares_covariance
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.drive_noise import drive_variance
+from estimation.fits.greybox.deviations import information, variances
 from estimation.fits.greybox.lateness import changes_beside, lateness, left_by
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, shown_play
@@ -22,7 +20,6 @@ from estimation.fits.greybox.problem import Problem, search_bounds
 from estimation.fits.greybox.rig_response import rig_slopes
 from estimation.fits.greybox.small_teeth import NOT_MOVED, small_teeth
 from estimation.fits.greybox.teeth import NO_OFFSET, ShownOffset, ShownTeeth, shown_teeth
-from estimation.fits.greybox.within_bounds import bounded
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.spare_processors import each
@@ -38,10 +35,6 @@ LENGTHENED = 8
 
 NEAR_ENOUGH = 0.01
 """Half the sum of squares that a further step must promise while model steps are long [dimensionless]."""
-
-NOISE_DOUBT = 0.2
-"""Standard deviation of the share of a driving channel's noise that is counted with the slopes: its size is known to
-some percent, and it is white in theory alone [fraction]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,42 +273,26 @@ def concluded(
     play, teeth, offset = NO_PLAY, dict[int, ShownTeeth](), NO_OFFSET
     used, names = int(np.count_nonzero(errors)), [model.unknowns[place] for place in felt]
     if len(felt) and used > len(theta):
-        slopes = all_slopes if len(felt) == len(theta) else all_slopes[:, felt]
-        left_over, prior, lags = errors.ravel(), problem.prior[felt], automatic_lags(errors.ravel())
-        bread, spread = least_squares_covariance(slopes, left_over, used, lags, prior, warned=warned)
-        # doubts are asked beside what was fitted; deviations also hold what the fit has put to nothing
-        fitted_slopes, fitted_bread = slopes, bread
-        if problem.log.course is not None and (gone := vanished(problem, theta, errors, felt)):
-            slopes, prior = np.column_stack([slopes, *gone]), np.append(prior, np.zeros(len(gone)))
-            bread, spread = least_squares_covariance(slopes, left_over, used, lags, prior, warned=warned)
-
-        def response(shift: Array) -> Array:
-            return bread @ (slopes.T @ shift.ravel())
-
+        known_of = information(problem, theta, errors, all_slopes, felt, warned=warned)
+        left_over, slopes, bread = known_of.left_over, known_of.fitted_slopes, known_of.fitted_bread
         told = disturbed and asked
-        known, moved = changes_beside(problem, theta) if told else (None, [])
-        tilt = bread[:, : len(felt)] @ problem.untilted(theta, errors)[felt]
-        kept = spread if least is None else bounded(problem, point, least, felt, fitted_bread, spread)
-        variance = np.diag(kept) + (NOISE_DOUBT * tilt) ** 2
-        variance = variance + (drive_variance(problem, theta, bread, slopes, known) if disturbed else 0.0)
-        if problem.log.course is not None and disturbed:  # a window's estimate of few turns is poor
-            variance = variance + np.maximum(np.diag(bread - spread), 0.0)
-            variance = variance + opened(problem, theta, errors, bread, slopes)
-        # the window's estimate need not be positive: then nothing is known
-        variance = np.where(np.diag(spread) > 0.0, variance, np.inf)[: len(felt)]
+        here, moved = changes_beside(problem, theta) if told else (None, [])
+        variance = variances(problem, point, known_of, least=least, disturbed=disturbed, undisturbed=here)
         held, shifted = [one.count for one in problem.log.teeth], problem.log.speed_offset != 0.0
         counts = problem.log.counts if asked else held
         if (disturbed and counts) or shifted:
-            teeth, offset = shown_teeth(problem, theta, left_over, fitted_bread, fitted_slopes, counts)
+            teeth, offset = shown_teeth(problem, theta, left_over, bread, slopes, counts)
             variance = variance + sum(teeth[count].opened for count in held if count in teeth)
             variance = variance + (offset.opened if shifted and not held else 0.0)
         noise[felt] = np.sqrt(variance)
         noise[effects <= LEAST_EFFECT**2] = np.inf  # what is known of it is not from this log
         if told:
-            rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in rig_slopes(problem, theta, response)}
-            timed, left = problem.log.timed, left_by(fitted_slopes, fitted_bread, effects[felt] > LEAST_EFFECT**2)
+            by_rig = rig_slopes(problem, theta, known_of.response)
+            rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in by_rig}
+            timed, left = problem.log.timed, left_by(slopes, bread, effects[felt] > LEAST_EFFECT**2)
             late = dict(lateness(timed, moved, left_over, left))
-            play = shown_play(moved[len(timed) :], left_over, left, lambda one: zip(names, response(one), strict=False))
+            at_play = moved[len(timed) :]
+            play = shown_play(at_play, left_over, left, lambda one: zip(names, known_of.response(one), strict=False))
     # teeth that are taken up are not small, and the course of a slow log's motor looks like some
     asked_of_teeth = {} if problem.log.teeth or problem.log.course is not None else teeth
     sizes, values = dict(model.linear), model.values(theta)

@@ -3,14 +3,14 @@
 The model's step is traced once, and its derivatives by state and unknown parameters are written beside it.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import chain
 from types import SimpleNamespace
 from typing import Any, TypeAlias
 
 from estimation.arrays import Array
-from estimation.engine.parts import function_source
+from estimation.engine.parts import function_source, places
 from estimation.fits.greybox.loops import RUNAWAY, SETTLED, STRAIGHT, absorb, carry, correct, run
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.expression import ONE, ZERO, Expression, as_expression, jacobian, symbol, unary
@@ -51,7 +51,7 @@ def _source(model: GreyBoxModel) -> str:
     states = range(len(begun))
     state = [symbol(f"x{i}") for i in states]
     names = [(f"x{i}", *(f"s{i}_{j}" for j in unknowns), *(f"f{i}_{m}" for m in jumps)) for i in states]
-    point = _places("point", chain.from_iterable(names))
+    point = places("point", chain.from_iterable(names))
     data = {f"{when}{i}": f"{when}[{i}]" for when in ("before", "after") for i in range(len(model.drives))}
     moved = _rows(
         model_step(model, state, p, [_between(i) for i in range(len(model.drives))]), state, theta, len(jumps)
@@ -61,8 +61,8 @@ def _source(model: GreyBoxModel) -> str:
     shown = _rows([as_expression(value) for value in model.observe(tuple(state))], state, theta, len(jumps))
     columns = len(names[0])
     seen = {f"shown[{k // columns}, {k % columns}]": value for k, value in enumerate(shown)}
-    rows = _places("parameters", parameter_names(model.parameters)) | _places("theta", [f"theta{j}" for j in unknowns])
-    reads = point | data | _places("fixed", settled) | {"share": "0.0"}
+    rows = places("parameters", parameter_names(model.parameters)) | places("theta", [f"theta{j}" for j in unknowns])
+    reads = point | data | places("fixed", settled) | {"share": "0.0"}
     begin = dict(zip(point, _rows(begun, [], theta, len(jumps)), strict=True))
     counts = {"WIDTH": len(states), "UNKNOWNS": len(unknowns), "OUTPUTS": len(model.outputs), "JUMPS": len(jumps)}
     settings = {"JUMP": model.jump, "RUNAWAY": RUNAWAY, "SETTLED": SETTLED, "STRAIGHT": STRAIGHT}
@@ -97,11 +97,6 @@ def model_step(
         return tuple(as_expression(rate) for rate in model.rates(now, (*drives, h), parameters, share))
 
     return [as_expression(value) for value in ros2_step(rates)(tuple(state), (symbol("share"), ONE), p, h)]
-
-
-def _places(array: str, names: Iterable[str]) -> dict[str, str]:
-    """Return where each number stands in an array."""
-    return {name: f"{array}[{i}]" for i, name in enumerate(names)}
 
 
 def _between(drive: int) -> tuple[Expression, Expression]:

@@ -56,7 +56,7 @@ def test_a_motor_that_seems_to_lag_widens_no_interval(monkeypatch: pytest.Monkey
     speed = record[SPEED]
     early = record.replace(**{SPEED: 0.94 * speed + 0.06 * np.append(speed[1:], speed[-1:])})
     value, std = fit_flow(early, PAPER, 2e8).parameters["bulk_modulus"]
-    monkeypatch.setattr("estimation.fits.greybox.fit.bounded", lambda *given: given[-1])
+    monkeypatch.setattr("estimation.fits.greybox.deviations.bounded", lambda *given: given[-1])
     same, wider = fit_flow(early, PAPER, 2e8).parameters["bulk_modulus"]
     assert same == pytest.approx(value, rel=1e-3)
     assert std < 0.93 * wider

@@ -1,0 +1,143 @@
+"""How surely a solution is known: what its slopes tell of the unknowns that are felt, and the variance of each."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.fits.greybox.course import opened, vanished
+from estimation.fits.greybox.covariance import automatic_lags, least_squares_covariance
+from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.drive_noise import drive_variance
+from estimation.fits.greybox.problem import Problem
+from estimation.fits.greybox.within_bounds import bounded
+from plant.arrays import Array
+
+NOISE_DOUBT = 0.2
+"""Standard deviation of the share of a driving channel's noise that is counted with the slopes: its size is known to
+some percent, and it is white in theory alone [fraction]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """What the slopes at a solution tell of the unknowns that are felt.
+
+    Behind these stand, in the last three, the turns of a slow log's motor that the fit has put to nothing.
+
+    Parameters
+    ----------
+    felt : ndarray of int, shape (felt,)
+        Places of the unknowns that are felt.
+    errors : ndarray, shape (outputs, blocks)
+        Normalised residuals [dimensionless].
+    fitted_slopes : ndarray, shape (outputs * blocks, felt)
+        Their derivatives by what is felt [dimensionless].
+    fitted_bread : ndarray, shape (felt, felt)
+        Inverse of the normal equations of that [dimensionless].
+    slopes : ndarray, shape (outputs * blocks, felt or more)
+        The derivatives, with those of the turns [dimensionless].
+    bread, spread : ndarray, shape (felt or more, felt or more)
+        Inverse of the normal equations with the turns, and the covariance by the residuals [dimensionless].
+    """
+
+    felt: NDArray[np.intp]
+    errors: Array
+    fitted_slopes: Array
+    fitted_bread: Array
+    slopes: Array
+    bread: Array
+    spread: Array
+
+    @property
+    def left_over(self) -> Array:
+        """All residuals in a row, shape (outputs * blocks,) [dimensionless]."""
+        return self.errors.ravel()
+
+    def response(self, shift: Array) -> Array:
+        """Return by how much the unknowns move if the residuals change, to first order.
+
+        Parameters
+        ----------
+        shift : ndarray, shape (outputs, blocks)
+            Change of the normalised residuals [dimensionless].
+
+        Returns
+        -------
+        ndarray, shape (felt or more,)
+            [dimensionless]
+        """
+        return self.bread @ (self.slopes.T @ shift.ravel())
+
+
+def information(
+    problem: Problem, theta: Array, errors: Array, slopes: Array, felt: NDArray[np.intp], *, warned: bool
+) -> Information:
+    """Return what the slopes at a solution tell of the unknowns that are felt.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    theta : ndarray, shape (unknowns,)
+        Its solution [dimensionless].
+    errors : ndarray, shape (outputs, blocks)
+        Normalised residuals there [dimensionless].
+    slopes : ndarray, shape (outputs * blocks, unknowns)
+        Their derivatives [dimensionless].
+    felt : ndarray of int, shape (felt,)
+        Places of the unknowns that are felt.
+    warned : bool
+        Whether the caller is warned where unknowns are not separately determined.
+    """
+    fitted = slopes if len(felt) == len(theta) else slopes[:, felt]
+    left_over, prior, used = errors.ravel(), problem.prior[felt], int(np.count_nonzero(errors))
+    lags = automatic_lags(left_over)
+    fitted_bread, spread = least_squares_covariance(fitted, left_over, used, lags, prior, warned=warned)
+    beside, bread = fitted, fitted_bread
+    if problem.log.course is not None and (gone := vanished(problem, theta, errors, felt)):
+        beside, prior = np.column_stack([fitted, *gone]), np.append(prior, np.zeros(len(gone)))
+        bread, spread = least_squares_covariance(beside, left_over, used, lags, prior, warned=warned)
+    return Information(felt, errors, fitted, fitted_bread, beside, bread, spread)
+
+
+def variances(
+    problem: Problem,
+    point: Point,
+    told: Information,
+    *,
+    least: Array | None,
+    disturbed: bool,
+    undisturbed: Array | None,
+) -> Array:
+    """Return the variance of each unknown that is felt: by noise of the outputs, and of the drives if wanted.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    point : Point
+        Its solution.
+    told : Information
+        What the slopes tell there.
+    least : ndarray, shape (unknowns,), or None
+        Lowest coordinates of its search, see `estimation.fits.greybox.within_bounds` [dimensionless].
+    disturbed : bool
+        Whether the drives' noise counts.
+    undisturbed : ndarray, shape (outputs, blocks), or None
+        Normalised residuals with one model step a sample, where they are known [dimensionless].
+
+    Returns
+    -------
+    ndarray, shape (felt,)
+        The variances [dimensionless]; infinite where nothing is known.
+    """
+    theta, felt, slopes, bread, spread = point.theta, told.felt, told.slopes, told.bread, told.spread
+    tilt = bread[:, : len(felt)] @ problem.untilted(theta, told.errors)[felt]
+    kept = spread if least is None else bounded(problem, point, least, felt, told.fitted_bread, spread)
+    variance = np.diag(kept) + (NOISE_DOUBT * tilt) ** 2
+    variance = variance + (drive_variance(problem, theta, bread, slopes, undisturbed) if disturbed else 0.0)
+    if problem.log.course is not None and disturbed:  # a window's estimate of few turns is poor
+        variance = variance + np.maximum(np.diag(bread - spread), 0.0)
+        variance = variance + opened(problem, theta, told.errors, bread, slopes)
+    # the window's estimate need not be positive: then nothing is known
+    return np.where(np.diag(spread) > 0.0, variance, np.inf)[: len(felt)]
