@@ -23,6 +23,27 @@ COMMON = frozenset({"logs", "plant", "rig", "columns", "report", "out", "seed", 
 """Options of every kind of actuator."""
 
 
+class _Pages:
+    """Pages of logs: where each goes, which are written, and why others are not."""
+
+    def __init__(self, places: Mapping[Path, Path]) -> None:
+        self.places = places
+        self.written: list[Path] = []
+        self.unwritten: list[str] = []
+
+    def write(self, log: Path, page: str) -> None:
+        """Write a log's page; what cannot be written is told in the end, for the answer is shown all the same."""
+        try:
+            write_whole(self.places[log], page, "--report")
+            self.written.append(self.places[log])
+        except HydrostateError as error:
+            self.unwritten.append(str(error))
+
+    def told(self) -> list[str]:
+        """Return what to tell of them: where they are, then each that is missing."""
+        return [*([pages_sentence(self.written)] if self.written else []), *self.unwritten]
+
+
 def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[str, Any]) -> NoReturn:
     """Find what logs say, print it, and leave with the exit code.
 
@@ -61,9 +82,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
         options["healthy"] = read(options["healthy"])
     rig, prepared = chosen.prepare(bench, {**options, "seed": asked["seed"]})
     prepare_output(asked["out"])
-    unwritten: list[str] = []
-    written: list[Path] = []
-    figures, pages = own_paths(options.get("figure"), logs), own_paths(report, logs)
+    figures, pages = own_paths(options.get("figure"), logs), _Pages(own_paths(report, logs))
     about = {"plant": kind.name, "rig": bench.name, "seed": asked["seed"], "expected": expected}
     about |= {"condition": options["condition"]} if "condition" in options else {}
 
@@ -75,23 +94,16 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
         result["message"] = clauses([result["message"], *_agreement(result, found)])
         if log in figures and chosen.figure is not None:
             chosen.figure(found, log.name, figures[log])
-        if log in pages:
-            page = page_of(chosen, with_remarks({"file": str(log), **result}, said), found, record)
-            try:
-                write_whole(pages[log], page, "--report")
-                written.append(pages[log])
-            except HydrostateError as error:  # what was found is shown all the same
-                unwritten.append(str(error))
+        if log in pages.places:
+            pages.write(log, page_of(chosen, with_remarks({"file": str(log), **result}, said), found, record))
         return result
 
     batch = run_logs(logs, work, {**chosen.blank, **about}, doing)
     for remark in chosen.remarks(batch.results):
         note(remark)
-    if written:
-        note(pages_sentence(written))
-    for sentence in unwritten:
+    for sentence in pages.told():
         note(sentence)
-    form: dict[str, Any] = {"as_json": asked["as_json"], "out": asked["out"], "lost": bool(unwritten)}
+    form: dict[str, Any] = {"as_json": asked["as_json"], "out": asked["out"], "lost": bool(pages.unwritten)}
     finish(batch, lambda results: chosen.screen(results, options), **form)
 
 
