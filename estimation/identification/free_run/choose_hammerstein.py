@@ -11,6 +11,7 @@ from estimation.identification.free_run.choose_linear import (
     CLEARLY,
     Candidate,
     block_error,
+    criteria,
     pooled,
     surely_better,
 )
@@ -145,8 +146,7 @@ def _bases(linear: Sequence[Candidate]) -> list[Candidate]:
 
 
 def _bic(fit: HammersteinFit, data: Channels) -> float:
-    n, p = data.n_samples, fit.theta.size
-    return n * float(np.log(max(fit.cost, 1e-300) / n)) + p * float(np.log(n))
+    return criteria(fit.cost, fit.theta.size, data.n_samples)[0]
 
 
 def _doubt(fit: HammersteinFit, data: Channels) -> str:

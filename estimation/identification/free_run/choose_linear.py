@@ -210,11 +210,28 @@ def halves_error(fit: LinearFit, data: Channels) -> float:
 def candidate(fit: LinearFit, data: Channels) -> Candidate:
     """Return a fit with its held-back error, criteria, and what is doubtful in it."""
     # a dead time that was searched is one more value
-    n, p = data.n_samples, fit.theta.size + sum(delay > 1 for delay in fit.form.delays)
-    deviance = n * float(np.log(max(fit.cost, 1e-300) / n))
+    values = fit.theta.size + sum(delay > 1 for delay in fit.form.delays)
     errors = held_back_blocks(fit, data)
-    criteria = (deviance + p * float(np.log(n)), deviance + 2.0 * p)
-    return Candidate(fit, pooled(errors), errors, *criteria, doubt_of(fit, data))
+    return Candidate(fit, pooled(errors), errors, *criteria(fit.cost, values, data.n_samples), doubt_of(fit, data))
+
+
+def criteria(cost: float, values: int, samples: int) -> tuple[float, float]:
+    """Return the information criteria BIC and AIC of a free run with white Gaussian errors of unknown variance.
+
+    Parameters
+    ----------
+    cost : float
+        Sum of squared errors [squared unit of the output].
+    values, samples : int
+        How many values were fitted, to how many samples [count].
+
+    Returns
+    -------
+    tuple of float
+        Both [dimensionless]; less is better.
+    """
+    deviance = samples * float(np.log(max(cost, 1e-300) / samples))
+    return deviance + values * float(np.log(samples)), deviance + 2.0 * values
 
 
 def doubt_of(fit: LinearFit, data: Channels) -> str:

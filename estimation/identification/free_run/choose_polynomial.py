@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from estimation.identification.free_run.choose_linear import BLOCKS, Candidate, block_error, pooled
+from estimation.identification.free_run.choose_linear import BLOCKS, Candidate, block_error, criteria, pooled
 from estimation.identification.free_run.data import Channels, blocks
 from estimation.identification.free_run.dense_polynomial import Asked, Judged, Recipe, forms_tried, judged_recipes
 from estimation.identification.free_run.linear_fit import LinearFit, fit_linear
@@ -174,8 +174,7 @@ def _candidate(
 
 
 def _bic(fit: PolynomialFit, data: Channels) -> float:
-    n, p = data.n_samples, fit.theta.size
-    return n * float(np.log(max(fit.cost, 1e-300) / n)) + p * float(np.log(n))
+    return criteria(fit.cost, fit.theta.size, data.n_samples)[0]
 
 
 def _bases(linear: Sequence[Candidate]) -> list[Candidate]:
