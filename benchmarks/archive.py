@@ -66,6 +66,48 @@ def _timed(read: Callable[[Path], object], paths: list[Path]) -> tuple[float, fl
     return time.perf_counter() - wall, time.process_time() - cpu
 
 
+def diagnosed(folder: Path, workers: int) -> tuple[int, int]:
+    """Diagnose the archive in one command, and print how that went; return how many logs are done and how many fail."""
+    (folder / "study.toml").write_text(
+        'name = "archive"\n[[logs]]\nglob = "archive/**/*.csv"\nmethods = [{ verb = "diagnose" }]\n', encoding="utf-8"
+    )
+    command = [sys.executable, "-m", "experiments.cli", "batch", str(folder / "study.toml"), "--out"]
+    begin = time.perf_counter()
+    done = subprocess.run(  # noqa: S603 -- our own command
+        [*command, str(folder / "store"), "--workers", str(workers), "--json"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    seconds = time.perf_counter() - begin
+    (found,) = json.loads(done.stdout)
+    right = pd.read_csv(folder / "store" / "tables" / "diagnosis.csv")
+    correct, classes = int(right["right"].sum()), int(right["cases"].sum())
+    print(f"{found['done']} logs in one command: {seconds:.1f} s with {workers} workers")
+    print(f"{found['failed']} failed, {len(BAD)} are bad; {correct} of {classes} classes right")
+    print("\n".join(f"  {line}" for line in done.stderr.splitlines() if ".csv" in line))
+    return found["done"], found["failed"]
+
+
+def read_beside_pandas(folder: Path) -> float:
+    """Print how fast logs are read, short ones and a long one; return the least speed over pandas' by wall time."""
+    logs = sorted((folder / "archive").glob("actuator*/*.csv"))[:200]
+    long = folder / "long.csv"
+    rows = pd.concat([pd.read_csv(logs[0])] * 50, ignore_index=True)
+    rows.assign(time_s=SAMPLE_TIME * rows.index).to_csv(long, index=False, float_format="%.9g")
+    ratios: list[float] = []
+    for words, paths in (("archive's logs", logs), ("one long log", [long] * 5)):
+        ours, theirs, our_cpu, their_cpu = reading(paths)
+        ratios.append(ours / theirs)
+        size = statistics.mean(path.stat().st_size for path in paths) / 1e6
+        print(
+            f"reading {words} ({size:.2f} MB each): {ours:.0f} MB/s, pandas {theirs:.0f} MB/s, "
+            f"{ours / theirs:.1f} times "
+            f"by wall time, {our_cpu / their_cpu:.1f} times by CPU time (wanted: {WANTED_SPEED:g})"
+        )
+    return min(ratios)
+
+
 def main(arguments: list[str]) -> int:
     """Print how the archive went and how fast logs are read; return how many targets are missed."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -79,42 +121,6 @@ def main(arguments: list[str]) -> int:
         for number in range(options.logs // 50 + 1):
             (folder / "archive" / f"actuator{number:02d}").mkdir()
         make_archive(folder / "archive", options.logs, options.duration)
-        (folder / "study.toml").write_text(
-            'name = "archive"\n[[logs]]\nglob = "archive/**/*.csv"\nmethods = [{ verb = "diagnose" }]\n',
-            encoding="utf-8",
-        )
-        command = [
-            sys.executable,
-            "-m",
-            "experiments.cli",
-            "batch",
-            str(folder / "study.toml"),
-            "--out",
-            str(folder / "store"),
-        ]
-        begin = time.perf_counter()
-        done = subprocess.run(  # noqa: S603 -- our own command
-            [*command, "--workers", str(options.workers), "--json"], capture_output=True, text=True, check=False
-        )
-        seconds = time.perf_counter() - begin
-        (found,) = json.loads(done.stdout)
-        right = pd.read_csv(folder / "store" / "tables" / "diagnosis.csv")
-        correct, classes = int(right["right"].sum()), int(right["cases"].sum())
-        print(f"{found['done']} logs in one command: {seconds:.1f} s with {options.workers} workers")
-        print(f"{found['failed']} failed, {len(BAD)} are bad; {correct} of {classes} classes right")
-        print("\n".join(f"  {line}" for line in done.stderr.splitlines() if ".csv" in line))
-        logs = sorted((folder / "archive").glob("actuator*/*.csv"))[:200]
-        long = folder / "long.csv"
-        pd.concat([pd.read_csv(logs[0])] * 50).to_csv(long, index=False)
-        ratios: list[float] = []
-        for words, paths in (("archive's logs", logs), ("one long log", [long] * 5)):
-            ours, theirs, our_cpu, their_cpu = reading(paths)
-            ratios.append(ours / theirs)
-            size = statistics.mean(path.stat().st_size for path in paths) / 1e6
-            print(
-                f"reading {words} ({size:.2f} MB each): {ours:.0f} MB/s, pandas {theirs:.0f} MB/s, "
-                f"{ours / theirs:.1f} times "
-                f"by wall time, {our_cpu / their_cpu:.1f} times by CPU time (wanted: {WANTED_SPEED:g})"
-            )
-    missed = found["failed"] != len(BAD) or found["done"] != options.logs
-    return int(missed) + int(min(ratios) < WANTED_SPEED)
+        done, failed = diagnosed(folder, options.workers)
+        speed = read_beside_pandas(folder)
+    return int(failed != len(BAD) or done != options.logs) + int(speed < WANTED_SPEED)
