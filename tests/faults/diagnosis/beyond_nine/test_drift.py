@@ -12,6 +12,7 @@ from estimation.eha.explained import LEAKAGE_COURSE
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.beyond_nine import drift
 from faults.diagnosis.beyond_nine.drift import over_drift, weighed
 from faults.diagnosis.beyond_nine.load import Loaded
 from faults.diagnosis.calibration import shipped_calibration
@@ -130,3 +131,27 @@ def test_places_count_by_their_evidence_and_alike_where_they_compare_other_stret
     cut = replace(one.scoreboard.blocks, velocity=one.scoreboard.blocks.velocity * np.nan)
     elsewhere = replace(two[1], scoreboard=replace(worse, blocks=cut))
     assert weighed((two[0], elsewhere), calibration)["normal"] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("pressure", [True, False])
+def test_a_circuit_fitted_on_from_another_place_begins_at_its_leakage_and_has_the_widths_of_the_log(
+    pressure: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = weighed_over_drift("minor_leakage", 1.0)
+    blocks = one.scoreboard.blocks if pressure else replace(one.scoreboard.blocks, pressure=None)
+    here = replace(one, scoreboard=replace(one.scoreboard, blocks=blocks))
+    misfits, starts = iter((100.0, 0.0)), list[np.ndarray]()
+
+    def fitted(*_: Any, start: np.ndarray) -> Any:
+        starts.append(start)
+        return one.scoreboard.fits
+
+    calibration: Any = SimpleNamespace(widths=lambda asked: asked)
+    monkeypatch.setattr(drift, "misfit", lambda *_: next(misfits))
+    monkeypatch.setattr(drift, "fit_classes", fitted)
+    monkeypatch.setattr(drift, "severities", lambda _, __, widths: {"widths": widths})
+    assert drift._followed([here, here], [1.0, 2.0], ACTUATOR, calibration).severity == {"widths": pressure}
+    moved = starts[0] - one.scoreboard.fits.best.coordinates
+    wanted = np.zeros(len(drift.COORDINATES))
+    wanted[drift.COORDINATES.index("leakage")] = -np.log(2.0)  # what leaks at the end, by what leaked there
+    assert moved == pytest.approx(wanted)
