@@ -103,3 +103,28 @@ def test_a_product_of_variances_goes_into_its_own_lane_and_channel_once_it_is_la
         wanted[place] = np.log(product)
     assert logs == pytest.approx(wanted)
     assert work.tolist() == [1.0] * 7 + [0.5 * lanes.LARGE] + [1.0] * 3
+
+
+@pytest.mark.parametrize("large", [(True, False), (True, True)])
+def test_products_that_have_become_large_go_into_the_logarithms_if_all_are_large_too(large: tuple[bool, bool]) -> None:
+    kernel: Any = SimpleNamespace(PRODUCT=1, LANES=2, CHANNELS=1)
+    products = [2.0 * lanes.LARGE if one else 3.0 for one in large]
+    work, logs = np.array([7.0, *products, 8.0]), np.full((1, 2), 0.5)
+    lanes.flush(kernel, work, logs)
+    assert work.tolist() == [7.0, *(1.0 if one else 3.0 for one in large), 8.0]
+    assert logs[0] == pytest.approx([0.5 + (math.log(2.0 * lanes.LARGE) if one else 0.0) for one in large])
+
+
+def test_the_score_is_the_log_density_of_the_innovations(linear: ProcessModel) -> None:
+    rng = np.random.default_rng(4)
+    names = ("position_m", "velocity_m_s")
+    seen = {name: np.where(rng.random(20) < 0.2, np.nan, rng.normal(size=20)) for name in names}
+    record = Record(1e-3, {"motor_speed_rad_s": rng.normal(size=20), **seen})
+    prior = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1.0, 1e-3, 1.0]))
+    problem = filter_problem(
+        linear, prior, record, EhaParameters(), variances={"position_m": 1e-2, "velocity_m_s": 0.1}
+    )
+    found = ekf(replace(problem, keep_innovations=True))
+    density = -0.5 * (found.residuals**2 / found.residual_variances + np.log(2.0 * np.pi * found.residual_variances))
+    assert np.count_nonzero(np.isnan(density)) == np.count_nonzero(np.isnan([*seen.values()]))
+    assert found.log_likelihood == pytest.approx(float(np.nansum(density)))

@@ -11,7 +11,7 @@ from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, PLANTS, REDUCED, Plant, simulate
 from plant.errors import HydrostateError
 from plant.export.c_plant import substeps_of
-from plant.export.fmu import plant_fmu
+from plant.export.fmu import _unit, plant_fmu
 from plant.solvers.steps import parameter_row
 from plant.solvers.trajectory import compile_trajectory
 from tests.c_compiler import compiler
@@ -132,3 +132,18 @@ def test_sources_are_inside_so_that_other_platforms_can_build(fmi: str) -> None:
 def test_a_version_that_is_none_is_refused() -> None:
     with pytest.raises(HydrostateError, match=r"version of FMI must be one of 2\.0, 3\.0, got '1\.0'"):
         plant_fmu(LUMPED, RIG, STEP, "1.0", name="bench")
+
+
+def test_a_state_begins_in_the_unit_of_its_channel_its_own_or_of_oil() -> None:
+    units = {state: _unit(state) for plant in PLANTS.values() for state in plant.states}
+    assert units == {
+        "position_m": "m",
+        "velocity_m_s": "m/s",
+        "acceleration_m_s2": "m/s^2",
+        "differential_pressure_pa": "Pa",
+        "motor_speed_rad_s": "rad/s",
+        "presliding": "1",
+        "oil_a_m3": "m^3",
+        "oil_b_m3": "m^3",
+        "oil_accumulator_m3": "m^3",
+    }
