@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -115,43 +116,30 @@ def estimate_by_filter(
     names = options.names
     wide = augmented(model, names, dict.fromkeys(names, WALK**2))
     channels = available_channels(model, record)
-    variances = {**log.variances, **named.variances}
-    noise = {**({PRESSURE: PRESSURE_NOISE_LOGGED} if PRESSURE in channels else {}), **named.noise}
+    known: dict[str, Any] = {
+        "channels": channels,
+        "variances": {**log.variances, **named.variances},
+        "noise": {**({PRESSURE: PRESSURE_NOISE_LOGGED} if PRESSURE in channels else {}), **named.noise},
+    }
     found: Tuning | None = None
     if options.tuned:
-        found = tune(
-            log.record,
-            model,
-            first_belief(model, record, guess, start_std),
-            parameters,
-            channels=channels,
-            variances=variances,
-            noise=noise,
-            told=record,
-        )
-        variances, noise = found.tuned.variances, found.tuned.noise
+        prior = first_belief(model, record, guess, start_std)
+        found = tune(log.record, model, prior, parameters, **known, told=record)
+        known |= {"variances": found.tuned.variances, "noise": found.tuned.noise}
         guess = float(found.prior.mean[model.index(BULK_MODULUS)])
 
     def filtered(first_guess: float) -> Estimate:
         prior = augmented_prior(wide, first_belief(model, record, first_guess, start_std), parameters)
+        robust = options.robust
         return run_filter(
-            METHODS[method],
-            wide,
-            prior,
-            record,
-            parameters,
-            channels=channels,
-            variances=variances,
-            noise=noise,
-            robust=options.robust,
-            keep_innovations=True,
+            METHODS[method], wide, prior, record, parameters, **known, robust=robust, keep_innovations=True
         )
 
     def bound_at(bulk_modulus: float) -> float:
         prior = first_belief(model, record, bulk_modulus, start_std)
-        actuator = at_bulk_modulus(parameters, bulk_modulus)
-        std = bulk_modulus_bound(model, prior, record, actuator, channels=channels, variances=variances, noise=noise)
-        return std / bulk_modulus
+        return (
+            bulk_modulus_bound(model, prior, record, at_bulk_modulus(parameters, bulk_modulus), **known) / bulk_modulus
+        )
 
     estimate, first = _settled(filtered, guess)
     value, _ = estimate.settled(BULK_MODULUS)
