@@ -128,3 +128,21 @@ def test_the_score_is_the_log_density_of_the_innovations(linear: ProcessModel) -
     density = -0.5 * (found.residuals**2 / found.residual_variances + np.log(2.0 * np.pi * found.residual_variances))
     assert np.count_nonzero(np.isnan(density)) == np.count_nonzero(np.isnan([*seen.values()]))
     assert found.log_likelihood == pytest.approx(float(np.nansum(density)))
+
+
+def test_steps_between_samples_are_those_of_a_faster_log_that_measures_nothing_in_between(linear: ProcessModel) -> None:
+    rng = np.random.default_rng(7)
+    model = replace(linear, longest_step=5e-4)
+    speed, seen = rng.normal(size=12), rng.normal(size=12)
+    slow = Record(1e-3, {"motor_speed_rad_s": speed, "position_m": seen})
+    halved, between = np.full(23, np.nan), np.empty(23)
+    halved[::2] = seen
+    between[::2], between[1::2] = speed, 0.5 * (speed[1:] + speed[:-1])
+    fast = Record(5e-4, {"motor_speed_rad_s": between, "position_m": halved})
+    prior = Gaussian(np.array([0.1, -0.2, 0.5]), np.diag([1.0, 1e-3, 1.0]))
+    found, wanted = (
+        ekf(filter_problem(model, prior, one, EhaParameters(), variances={"position_m": 1e-2})) for one in (slow, fast)
+    )
+    assert found.mean == pytest.approx(wanted.mean, rel=1e-9)
+    assert found.covariance == pytest.approx(wanted.covariance, rel=1e-9)
+    assert found.log_likelihood == pytest.approx(wanted.log_likelihood)
