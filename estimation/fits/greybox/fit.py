@@ -4,7 +4,7 @@ The variance of an estimate has three parts, told apart: noise of the outputs, n
 well the rig's own parameters are known. The last two are read off the fit's linear response to them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.deviations import information, variances
+from estimation.fits.greybox.deviations import Information, information, variances
 from estimation.fits.greybox.lateness import changes_beside, lateness, left_by
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, shown_play
@@ -287,20 +287,14 @@ def concluded(
         noise[felt] = np.sqrt(variance)
         noise[effects <= LEAST_EFFECT**2] = np.inf  # what is known of it is not from this log
         if told:
-            by_rig = rig_slopes(problem, theta, known_of.response)
-            rig = {name: _spread_out(slope, felt, len(theta)) for name, slope in by_rig}
-            timed, left = problem.log.timed, left_by(slopes, bread, effects[felt] > LEAST_EFFECT**2)
-            late = dict(lateness(timed, moved, left_over, left))
-            at_play = moved[len(timed) :]
-            play = shown_play(at_play, left_over, left, lambda one: zip(names, known_of.response(one), strict=False))
+            rig = dict(_by_rig(problem, theta, known_of))
+            late, play = _late_and_play(problem, known_of, moved, effects[felt] > LEAST_EFFECT**2)
     # teeth that are taken up are not small, and the course of a slow log's motor looks like some
     asked_of_teeth = {} if problem.log.teeth or problem.log.course is not None else teeth
     sizes, values = dict(model.linear), model.values(theta)
     unit = np.array([sizes.get(name, values[name]) for name in model.unknowns])
-    squares = np.einsum("ij,ij->i", errors, errors)
     slopes_si = {name: dict(zip(model.unknowns, map(float, unit * one), strict=True)) for name, one in rig.items()}
-    neighbours = np.einsum("ij,ij->i", errors[:, 1:], errors[:, :-1])
-    seen = np.maximum(np.count_nonzero(errors, axis=1), 1)
+    chi_square, autocorrelation, seen = _statistics(errors)
     return GreyBoxFit(
         model=model,
         theta=theta,
@@ -314,14 +308,36 @@ def concluded(
         speed_offset=offset,
         small_teeth=small_teeth(asked_of_teeth, names),
         cost=point.cost,
-        chi_square=tuple(map(float, squares / seen)),
-        autocorrelation=tuple(map(float, neighbours / np.maximum(squares, np.finfo(float).tiny))),
-        seen=float(seen[0]),
+        chi_square=chi_square,
+        autocorrelation=autocorrelation,
+        seen=seen,
     )
 
 
-def _spread_out(values: Array, places: NDArray[np.intp], length: int) -> Array:
-    """Return values at their places, zero elsewhere."""
-    whole = np.zeros(length)
-    whole[places] = values[: len(places)]
-    return whole
+def _by_rig(problem: Problem, theta: Array, known_of: Information) -> Iterator[tuple[str, Array]]:
+    """Yield how each unknown would differ per relative change of an uncertain parameter of the rig."""
+    for name, slope in rig_slopes(problem, theta, known_of.response):
+        whole = np.zeros(len(theta))
+        whole[known_of.felt] = slope[: len(known_of.felt)]
+        yield name, whole
+
+
+def _late_and_play(
+    problem: Problem, known_of: Information, moved: Sequence[Array], told: NDArray[np.bool_]
+) -> tuple[dict[str, tuple[float, float]], ShownPlay]:
+    """Return which drives seem to come late, and what the residuals say of a play of the encoder."""
+    timed, left_over = problem.log.timed, known_of.left_over
+    left = left_by(known_of.fitted_slopes, known_of.fitted_bread, told)
+    names = [problem.model.unknowns[place] for place in known_of.felt]
+    late = dict(lateness(timed, moved, left_over, left))
+    at_play = moved[len(timed) :]
+    return late, shown_play(at_play, left_over, left, lambda one: zip(names, known_of.response(one), strict=False))
+
+
+def _statistics(errors: Array) -> tuple[tuple[float, ...], tuple[float, ...], float]:
+    """Return mean square and autocorrelation of each output's residuals, and how many of the first one count."""
+    squares = np.einsum("ij,ij->i", errors, errors)
+    neighbours = np.einsum("ij,ij->i", errors[:, 1:], errors[:, :-1])
+    seen = np.maximum(np.count_nonzero(errors, axis=1), 1)
+    autocorrelation = neighbours / np.maximum(squares, np.finfo(float).tiny)
+    return tuple(map(float, squares / seen)), tuple(map(float, autocorrelation)), float(seen[0])
