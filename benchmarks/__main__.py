@@ -7,67 +7,68 @@ from benchmarks.history import record
 from benchmarks.targets import kept
 
 NAMES = (
-    "bulk_modulus",
-    "classification",
-    "foreign_logs",
-    "filter_speed",
-    "start_up",
-    "export_c",
-    "fmu",
-    "restored",
-    "many_filters",
-    "robustness",
-    "efficiency",
-    "coverage",
-    "convergence",
-    "chamber_filter",
-    "identification",
-    "identification_tests",
-    "identification_sets",
-    "own_equations",
-    "bent_inputs",
-    "state_space",
-    "frequency_response",
-    "circuit",
-    "detection",
-    "slow_growth",
-    "forecast",
-    "real_rig",
-    "piezo_stack",
-    "diaphragm_motor",
-    "diaphragm_faults",
-    "diagnosis",
-    "noisy_sensors",
-    "open_benchmark",
-    "batch_scale",
-    "archive",
-    "fleet",
-    "server",
+    "filters.bulk_modulus",
+    "diagnosis.classification",
+    "diagnosis.foreign_logs",
+    "filters.filter_speed",
+    "many_logs.start_up",
+    "filters.export_c",
+    "filters.fmu",
+    "filters.restored",
+    "filters.many_filters",
+    "filters.robustness",
+    "filters.efficiency",
+    "diagnosis.coverage",
+    "filters.convergence",
+    "filters.chamber_filter",
+    "identification.identification",
+    "identification.identification_tests",
+    "identification.identification_sets",
+    "identification.own_equations",
+    "identification.bent_inputs",
+    "identification.state_space",
+    "identification.frequency_response",
+    "plants.circuit",
+    "watching.detection",
+    "watching.slow_growth",
+    "watching.forecast",
+    "diagnosis.real_rig",
+    "plants.piezo_stack",
+    "plants.diaphragm_motor",
+    "plants.diaphragm_faults",
+    "diagnosis.diagnosis",
+    "diagnosis.noisy_sensors",
+    "diagnosis.open_benchmark",
+    "many_logs.batch_scale",
+    "many_logs.archive",
+    "many_logs.fleet",
+    "server.server",
 )
 """Every benchmark that needs nothing but the project, in the order of `make benchmark`."""
 
-FITS = ("fit_diagnosis",)
+FITS = ("diagnosis.fit_diagnosis",)
 """Those that write numbers which ship with the package."""
 
-WITH_PEERS = ("identification_peers", "streaming")
+WITH_PEERS = ("identification.identification_peers", "watching.streaming")
 """Those that need environments of other tools, which `make peers` sets up."""
 
-OF_COMMITS = ("same_numbers",)
+OF_COMMITS = ("same_numbers.same_numbers",)
 """Those that compare commits, named behind the script's name."""
 
-OF_TESTS = ("mutants",)
+OF_TESTS = ("mutants.mutants",)
 """Those that ask the tests themselves, and take minutes to hours."""
 
 OF_RUNS = ("history",)
 """Those that compare earlier runs of the others."""
 
-ALL = (*NAMES, *FITS, *WITH_PEERS, *OF_COMMITS, *OF_TESTS, *OF_RUNS)
+ALL = {module.rpartition(".")[2]: module for module in (*NAMES, *FITS, *WITH_PEERS, *OF_COMMITS, *OF_TESTS, *OF_RUNS)}
+"""The module of each, by the name that the command takes."""
 
 
 def run(name: str, arguments: list[str], *, recorded: bool) -> int:
     """Run one benchmark; return how many of its targets it missed."""
     kept.clear()
-    missed = importlib.import_module(f"benchmarks.{name}").main(arguments)
+    missed = importlib.import_module(f"benchmarks.{ALL[name]}").main(arguments)
     if recorded and kept:
         print(f"{record(' '.join([name, *arguments]), kept)} figures added to the history")
     return missed
@@ -83,7 +84,7 @@ def main(words: list[str]) -> int:
     if name:
         return int(run(name, arguments, recorded=recorded) > 0)
     misses = 0
-    for one in NAMES:
+    for one in (module.rpartition(".")[2] for module in NAMES):
         print(f"\n== {one}")
         misses += run(one, [], recorded=recorded)
     return int(misses > 0)

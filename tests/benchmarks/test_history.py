@@ -90,7 +90,7 @@ def test_machines_and_arguments_are_not_compared_with_each_other(
 
 
 def test_recording_is_asked_for_before_the_name(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import benchmarks.start_up as benchmark
+    import benchmarks.many_logs.start_up as benchmark
 
     def measured(arguments: list[str]) -> int:
         say(f"took {arguments}", 2.0, 1.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.chamber_filter import on_circuit
+from benchmarks.filters.chamber_filter import on_circuit
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.eha.by_flow_filter import BIASES, LEAKAGES, MODULI, drive_noise, filter_flow
 from estimation.log_checks.measurement_noise import measurement_variances

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.export_c import task
+from benchmarks.filters.export_c import task
 from benchmarks.peers.c_filter import built
 from estimation.engine.contract import FilterProblem
 from estimation.export.c_filter import EXPORTED, filter_in_c

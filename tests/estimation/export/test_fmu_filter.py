@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.export_c import SAMPLE_TIME, task
+from benchmarks.filters.export_c import SAMPLE_TIME, task
 from estimation.export.fmu_filter import filter_fmu
 from estimation.filters.run import METHODS
 from tests.c_compiler import compiler

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.efficiency import Case, run_case
+from benchmarks.filters.efficiency import Case, run_case
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.eha.by_filter import chosen_method
 from estimation.engine.contract import FilterProblem

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.export_c import task
+from benchmarks.filters.export_c import task
 from estimation.filters.online import RULES, OnlineFilter
 from estimation.filters.run import METHODS
 from plant.errors import HydrostateError

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.coverage import Case, logged
+from benchmarks.diagnosis.coverage import Case, logged
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.log_checks.told_once import REST, middles, told_once
 from plant.log.record import Record

@@ -7,7 +7,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.bouc_wen_oscillator import OscillatorParameters, fit_oscillator, linear_start, simulate_oscillator
+from benchmarks.plants.bouc_wen_oscillator import (
+    OscillatorParameters,
+    fit_oscillator,
+    linear_start,
+    simulate_oscillator,
+)
 from estimation.piezo_stack.bouc_wen import LOOP, SHAPE, _checked_loop, fit_stack_loop, loop_bounds
 from estimation.piezo_stack.bouc_wen_printed import REGIONS, printed_fit
 from estimation.tuning.step_sensitivity import sensitivity_step

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.population import OUT_OF_MODEL, TEST, draw_logs
+from benchmarks.diagnosis.population import OUT_OF_MODEL, TEST, draw_logs
 from estimation.notes import SensorCode
 from experiments.batch.diagnosis import class_row, diagnosed
 from faults.conditions import CONDITIONS, parameters_for

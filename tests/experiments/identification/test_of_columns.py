@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import hydrostate as hs
-from benchmarks.bent_inputs import PLANTED, logged
+from benchmarks.identification.bent_inputs import PLANTED, logged
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
 from experiments.cli import app

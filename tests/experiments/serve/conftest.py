@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from benchmarks.server_trials import bench_log
+from benchmarks.server.server_trials import bench_log
 from experiments.serve.app import make_app
 from experiments.serve.settings import Settings
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.server_trials import feeding
+from benchmarks.server.server_trials import feeding
 from experiments.serve import gauges as module
 from experiments.serve import live
 from experiments.serve.events import event_stream

@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from benchmarks.hostile_client import MIX, server_errors
-from benchmarks.server_process import Server
-from benchmarks.server_trials import attack, feeding, kill, settled, stream
+from benchmarks.server.hostile_client import MIX, server_errors
+from benchmarks.server.server_process import Server
+from benchmarks.server.server_trials import attack, feeding, kill, settled, stream
 
 pytestmark = pytest.mark.slow
 

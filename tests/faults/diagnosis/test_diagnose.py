@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.population import OUT_OF_MODEL, TEST, Drawn, draw_logs
-from benchmarks.scores import calibration_error, share_interval
+from benchmarks.diagnosis.population import OUT_OF_MODEL, TEST, Drawn, draw_logs
+from benchmarks.diagnosis.scores import calibration_error, share_interval
 from estimation.log_checks.clean import clean_log
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for

@@ -132,7 +132,7 @@ def test_a_healthy_run_under_another_drive_is_refused() -> None:
 
 @pytest.mark.slow
 def test_over_seeds_faults_are_named_on_motors_within_tolerance() -> None:
-    from benchmarks.diaphragm_faults import isolate
+    from benchmarks.plants.diaphragm_faults import isolate
 
     share, unknown, *_ = isolate(4, 1.0, calibrated=False)
     assert share >= 0.95

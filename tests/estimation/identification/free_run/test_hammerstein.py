@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.bent_inputs import PLANTED, Planted, logged
+from benchmarks.identification.bent_inputs import PLANTED, Planted, logged
 from estimation.identification.free_run import choose_hammerstein
 from estimation.identification.free_run.choose_hammerstein import (
     ORDERS,

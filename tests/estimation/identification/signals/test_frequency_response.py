@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.frequency_response import DAMPED, NUMERATOR, PERIOD, PERIODS, bent, multisine, odd_lines
+from benchmarks.identification.frequency_response import DAMPED, NUMERATOR, PERIOD, PERIODS, bent, multisine, odd_lines
 from estimation.identification.model.recursion import filtered
 from estimation.identification.signals.distortion import best_linear_approximation, find_period
 from estimation.identification.signals.local_polynomial import local_polynomial_response

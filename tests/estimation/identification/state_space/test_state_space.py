@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.state_space import A, bound, identified, logged, plant, told
+from benchmarks.identification.state_space import A, bound, identified, logged, plant, told
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.saved import load_models, save_models
 from estimation.identification.model.recursion import filtered

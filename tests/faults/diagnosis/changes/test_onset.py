@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.special import chdtri
 
-from benchmarks.population import TEST, draw_logs
-from benchmarks.watching import CircuitStream
+from benchmarks.diagnosis.population import TEST, draw_logs
+from benchmarks.watching.watching import CircuitStream
 from estimation.log_checks.clean import clean_log
 from experiments.open_benchmark.kinds import make
 from faults.conditions import CONDITIONS, parameters_for

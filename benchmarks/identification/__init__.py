@@ -1,0 +1,1 @@
+"""Identification: statistics, public sets, peers, bent inputs, state space, frequency response, own equations."""

@@ -1,0 +1,202 @@
+"""Which tests can notice a fault at a line: read from what `make coverage` has recorded.
+
+A line of a function is executed by the tests that coverage.py names. What is executed once for all (constants,
+defaults, what a cache keeps) and what runs compiled (loops whose text is pasted into kernels) is not seen there; so the
+mirrored folder's kept numbers, the tests that execute the functions which use the name, the rest of the file, and the
+mirrored folder's tests come after them.
+"""
+
+import ast
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+
+from coverage import CoverageData
+
+from benchmarks.mutants.mutation import mirrored
+
+PACKAGES = ("plant", "estimation", "faults", "experiments")
+FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+class Executed:
+    """Tests by the lines that they execute.
+
+    Parameters
+    ----------
+    root : Path
+        The project.
+    data : Path
+        What coverage.py wrote, with a context a test.
+    """
+
+    def __init__(self, root: Path, data: Path) -> None:
+        self.root = root
+        self.measured = data.stat().st_mtime
+        self._data = CoverageData(basename=str(data))
+        self._data.read()
+        self._files = {_from_package(file): file for file in self._data.measured_files()}
+        self._by_line: dict[str, Mapping[int, set[str]]] = {}
+        self._cost: dict[str, int] = defaultdict(int)
+        for path in list(self._files):
+            if not (root / path).is_file():
+                del self._files[path]
+                continue
+            for tests in self.of_file(path).values():
+                for test in tests:
+                    self._cost[test] += 1
+
+    def of_file(self, path: str) -> Mapping[int, set[str]]:
+        """Return tests by line: none of a file that was edited since, whose lines stand elsewhere now."""
+        if path not in self._by_line:
+            stands = path in self._files and (self.root / path).stat().st_mtime <= self.measured
+            found = self._data.contexts_by_lineno(self._files[path]) if stands else {}
+            self._by_line[path] = {line: {_test(one) for one in tests if one} for line, tests in found.items()}
+        return self._by_line[path]
+
+    @cached_property
+    def all_tests(self) -> Mapping[str, list[str]]:
+        """Tests by their file."""
+        found: dict[str, list[str]] = defaultdict(list)
+        for test in self._cost:
+            found[test.partition("::")[0]].append(test)
+        return found
+
+    @cached_property
+    def trees(self) -> Mapping[str, ast.Module]:
+        """The packages' files, parsed."""
+        files = [file for package in PACKAGES for file in (self.root / package).rglob("*.py")]
+        return {str(file.relative_to(self.root)): ast.parse(file.read_text(encoding="utf-8")) for file in files}
+
+    @cached_property
+    def _uses(self) -> Mapping[str, list[tuple[str, ast.stmt]]]:
+        """Where a name is read: functions, or statements of a module or class."""
+        found: dict[str, list[tuple[str, ast.stmt]]] = defaultdict(list)
+        for path, tree in self.trees.items():
+            for place in _places(tree):
+                for name in _names(place):
+                    found[name].append((path, place))
+        return found
+
+    def tests(self, path: str, line: int) -> list[str]:
+        """Return the tests that can notice a fault at a line, the most likely and the quickest first.
+
+        Parameters
+        ----------
+        path : str
+            File, from the project's folder.
+        line : int
+            Where the fault is.
+
+        Returns
+        -------
+        list of str
+            Names of tests. Within a group those that execute the fewest lines come first.
+        """
+        near = mirrored(self.root, path)
+        groups = [self._at(path, line), self._kept_numbers(near), *self._later(path, line)]
+        groups.append({test for file, tests in self.all_tests.items() if file.startswith(near[-1]) for test in tests})
+        ordered: dict[str, None] = {}
+        for group in groups:
+            ordered |= dict.fromkeys(sorted(group, key=lambda test: (_far(test, near), self._cost[test], test)))
+        return [test for test in ordered if (self.root / test.partition("::")[0]).is_file()]
+
+    def _kept_numbers(self, near: Sequence[str]) -> set[str]:
+        """Return the kept numbers of the mirrored folder, which take seconds and see constants."""
+        return {test for file in near if "test_numbers" in file for test in self.all_tests.get(file, ())}
+
+    def _at(self, path: str, line: int) -> set[str]:
+        statement = _innermost(self.trees[path], line)
+        end = min([one.lineno - 1 for one in _body(statement)], default=statement.end_lineno or line)
+        at = self.of_file(path)
+        return set().union(*(at.get(one, set()) for one in range(statement.lineno, max(end, line) + 1)))
+
+    def _later(self, path: str, line: int) -> Iterator[set[str]]:
+        """Yield tests of what uses the name that the line defines, and of the rest of the file."""
+        place = next((one for one in _places(self.trees[path]) if _spans(one, line)), None)
+        names = _defined(place) if place is not None else set()
+        seen = set(names)
+        users = self._within(path, place) if isinstance(place, FUNCTIONS) else set[str]()
+        while names:
+            more: set[str] = set()
+            for name in names:
+                for file, use in self._uses.get(name, ()):
+                    if isinstance(use, FUNCTIONS):
+                        users |= self._within(file, use)
+                    else:
+                        more |= _defined(use)
+            names = more - seen
+            seen |= names
+        yield users
+        yield set().union(*(self._within(path, one) for one in _places(self.trees[path]) if isinstance(one, FUNCTIONS)))
+
+    def _within(self, path: str, function: ast.stmt) -> set[str]:
+        first = min((one.lineno for one in _body(function)), default=function.lineno)
+        at = self.of_file(path)
+        return set().union(*(at.get(one, set()) for one in range(first, (function.end_lineno or first) + 1)))
+
+
+def _from_package(file: str) -> str:
+    parts = Path(file).parts
+    first = next((i for i, part in enumerate(parts) if part in PACKAGES), 0)
+    return "/".join(parts[first:])
+
+
+def _test(context: str) -> str:
+    return context.rpartition("|")[0] or context
+
+
+def _far(test: str, near: Sequence[str]) -> int:
+    """Return how far a test is from a file: its own and its folder's kept numbers, its folder's, all others.
+
+    The first alike: among them a quick test comes before kept numbers of a whole search.
+    """
+    place = next((i for i, place in enumerate(near) if test.startswith(place)), len(near))
+    return max(place - (len(near) - 2), 0)
+
+
+def _body(statement: ast.stmt) -> list[ast.stmt]:
+    handlers = [one for handler in getattr(statement, "handlers", []) for one in handler.body]
+    cases = [one for case in getattr(statement, "cases", []) for one in case.body]
+    return [*getattr(statement, "body", []), *handlers, *cases]
+
+
+def _spans(statement: ast.stmt, line: int) -> bool:
+    decorators = getattr(statement, "decorator_list", [])
+    first = min([statement.lineno, *(one.lineno for one in decorators)])
+    return first <= line <= (statement.end_lineno or first)
+
+
+def _innermost(tree: ast.Module, line: int) -> ast.stmt:
+    found = [one for one in ast.walk(tree) if isinstance(one, ast.stmt) and _spans(one, line)]
+    return min(found, key=lambda one: (one.end_lineno or one.lineno) - one.lineno)
+
+
+def _places(tree: ast.Module | ast.ClassDef) -> Iterator[ast.stmt]:
+    """Yield functions, methods, and statements of modules and classes."""
+    for one in tree.body:
+        if isinstance(one, ast.ClassDef):
+            yield from _places(one)
+        else:
+            yield one
+
+
+def _defined(place: ast.stmt) -> set[str]:
+    if isinstance(place, FUNCTIONS):
+        return {place.name}
+    targets: Iterable[ast.AST] = (
+        place.targets if isinstance(place, ast.Assign) else [place.target] if isinstance(place, ast.AnnAssign) else []
+    )
+    return {one.id for target in targets for one in ast.walk(target) if isinstance(one, ast.Name)}
+
+
+def _names(place: ast.stmt) -> set[str]:
+    found: set[str] = set()
+    for node in ast.walk(place):
+        match node:
+            case ast.Name(id=name, ctx=ast.Load()) | ast.Attribute(attr=name) | ast.keyword(arg=str(name)):
+                found.add(name)
+            case _:
+                pass
+    return found

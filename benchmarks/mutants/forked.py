@@ -1,0 +1,153 @@
+"""Runs tests in forks of a process that has imported what does not belong to the tree, which saves seconds a run.
+
+`python -m benchmarks.mutants.forked` reads one task a line from standard input and answers each in one line, both JSON.
+It imports nothing of the packages itself, so that each fork reads their files as they are at that moment.
+"""
+
+import importlib
+import json
+import os
+import resource
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PATIENCE = 60
+"""A run hangs that takes so much more processor time than it is allowed [s]."""
+
+SLEPT = 900
+"""A run hangs that lasts so long, however little it does [s]."""
+
+OPTIONS = ("-q", "-m", "not slow", "-p", "no:cacheprovider", "-p", "no:terminalreporter", "-p", "no:xdist")
+QUIET = ("-W", "ignore::pytest.PytestAssertRewriteWarning")
+"""What is imported before pytest sees it keeps its assertions as they are written."""
+
+
+class Chosen:
+    """Keeps the chosen tests, in the order in which they are named, and stops when time is up.
+
+    Parameters
+    ----------
+    tests : sequence of str
+        Their names; empty for all of the files.
+    allowed : float
+        Processor time [s].
+    """
+
+    def __init__(self, tests: Sequence[str], allowed: float) -> None:
+        self.place = {name: i for i, name in enumerate(tests)}
+        self.allowed = allowed
+        self.failed: list[str] = []
+        self.tried = 0
+        self.cut_short = False
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """Leave out what was not chosen."""
+        if self.place:
+            items[:] = sorted(
+                (item for item in items if item.nodeid in self.place), key=lambda item: self.place[item.nodeid]
+            )
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Remember what failed."""
+        self.tried += report.when == "call"
+        if report.failed:
+            self.failed.append(report.nodeid)
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        """Remember what could not be imported."""
+        if report.failed:
+            self.failed.append(report.nodeid)
+
+    @pytest.hookimpl(hookwrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Any:
+        """Stop when time is up."""
+        yield
+        if time.process_time() > self.allowed:
+            self.cut_short = True
+            item.session.shouldstop = "time is up"
+
+
+def ran(task: Mapping[str, Any]) -> dict[str, Any]:
+    """Run tests in a fork and return what came of it.
+
+    Parameters
+    ----------
+    task : Mapping[str, Any]
+        ``tests``: names, the first file's first; ``files``; ``seconds`` of processor time; ``all``: do not stop at the
+        first failure; ``collect``: run none, but say which modules were imported.
+
+    Returns
+    -------
+    dict
+        ``code`` of pytest, or None where it hung; ``failed`` tests; ``tried`` [count]; ``cut_short``; ``modules``.
+    """
+    begin = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="forked-") as folder:
+        answer = Path(folder) / "answer.json"
+        child = os.fork()
+        if not child:
+            _in_the_fork(task, answer)
+        signal.signal(signal.SIGALRM, lambda *_: _end(child))
+        signal.alarm(SLEPT)
+        os.waitpid(child, 0)
+        signal.alarm(0)
+        _end(child)  # and what it started
+        hung = {"code": None, "failed": [], "tried": 0, "cut_short": False}
+        told = json.loads(answer.read_text()) if answer.exists() else hung
+    return {**told, "seconds": time.monotonic() - begin}
+
+
+def _end(child: int) -> None:
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(child, signal.SIGKILL)
+
+
+def _in_the_fork(task: Mapping[str, Any], answer: Path) -> None:
+    os.setsid()
+    # A fault of the same size within a second of the last one would be taken for it, from the bytecode left behind.
+    sys.dont_write_bytecode = True
+    os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+    limit = int(task["seconds"] + time.process_time()) + PATIENCE
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for stream in range(3):
+        os.dup2(nothing, stream)
+    plugin = Chosen(task["tests"], task["seconds"] + time.process_time())
+    how = ["--collect-only"] if task.get("collect") else [] if task.get("all") else ["-x"]
+    code = int(pytest.main([*OPTIONS, *QUIET, *how, *task["files"]], plugins=[plugin]))
+    told: dict[str, Any] = {"code": code, "failed": plugin.failed, "tried": plugin.tried}
+    if task.get("collect"):
+        told["modules"] = _not_of_the_tree()
+    answer.write_text(json.dumps({**told, "cut_short": plugin.cut_short}))
+    os._exit(0)
+
+
+def _not_of_the_tree() -> list[str]:
+    here = str(Path.cwd())
+    files = {name: getattr(module, "__file__", None) for name, module in list(sys.modules.items())}
+    return [name for name, file in files.items() if file and not (file.startswith(here) and ".venv" not in file)]
+
+
+def main() -> int:
+    """Answer tasks until there are none."""
+    for line in sys.stdin:
+        task = json.loads(line)
+        answer = ran(task)
+        for name in answer.pop("modules", []):
+            with suppress(Exception):
+                importlib.import_module(name)
+        print(json.dumps(answer), flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Plants: the circuit and its solvers, the piezo stack, the diaphragm motor."""

@@ -1,0 +1,1 @@
+"""The server under hostile clients, kills and streams."""

@@ -1,0 +1,1 @@
+"""Streams and trends: alarms of a watch, slow growth, forecasts, rows through a broker."""

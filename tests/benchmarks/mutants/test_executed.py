@@ -1,0 +1,83 @@
+"""The record of a run names the tests that a fault at a line can make fail."""
+
+import os
+from pathlib import Path
+
+import pytest
+from coverage import CoverageData
+
+from benchmarks.mutants.executed import Executed
+
+SOURCE = """
+LIMIT = 3
+
+
+def held(x):
+    if x > LIMIT:
+        return LIMIT
+    return x
+
+
+def doubled(x, by=2):
+    return by * x
+"""
+
+RAN = {
+    "tests/plant/test_a.py::test_high|run": [6, 7],
+    "tests/plant/test_b.py::test_low|run": [6, 8],
+    "tests/plant/test_b.py::test_doubled|setup": [12],
+    "": [2, 5, 11],
+}
+"""What a run would record: the file's lines by test."""
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A project of one file with two files of tests, and a record of their run."""
+    (tmp_path / "plant").mkdir()
+    (tmp_path / "plant" / "a.py").write_text(SOURCE)
+    for name in ("test_a.py", "test_b.py"):
+        (tmp_path / "tests" / "plant" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "tests" / "plant" / name).touch()
+    data = CoverageData(basename=str(tmp_path / "data"))
+    for test, lines in RAN.items():
+        data.set_context(test)
+        data.add_lines({"plant/a.py": lines})
+    data.write()
+    return tmp_path
+
+
+def first(project: Path, line: int, count: int) -> set[str]:
+    """The first tests that are tried."""
+    named = Executed(project, project / "data").tests("plant/a.py", line)[:count]
+    return {test.partition("::")[2] for test in named}
+
+
+def test_a_fault_goes_first_to_the_tests_that_execute_its_line(project: Path) -> None:
+    assert first(project, 7, 1) == {"test_high"}
+    assert first(project, 8, 1) == {"test_low"}
+    assert first(project, 6, 2) == {"test_high", "test_low"}
+
+
+def test_a_constant_goes_to_the_tests_of_the_functions_that_read_it(project: Path) -> None:
+    assert first(project, 2, 2) == {"test_high", "test_low"}
+
+
+def test_a_default_goes_to_the_tests_of_its_function(project: Path) -> None:
+    assert first(project, 11, 1) == {"test_doubled"}
+
+
+def test_no_test_of_the_folder_is_left_out(project: Path) -> None:
+    for line in (2, 6, 7, 8, 11, 12):
+        assert first(project, line, 9) == {"test_high", "test_low", "test_doubled"}
+
+
+def test_the_files_own_test_comes_first_and_quick_ones_before_others(project: Path) -> None:
+    named = Executed(project, project / "data").tests("plant/a.py", 6)
+    assert named[0] == "tests/plant/test_a.py::test_high"
+
+
+def test_lines_of_a_file_that_was_edited_since_say_nothing(project: Path) -> None:
+    later = (project / "data").stat().st_mtime + 10
+    os.utime(project / "plant" / "a.py", (later, later))
+    assert Executed(project, project / "data").of_file("plant/a.py") == {}

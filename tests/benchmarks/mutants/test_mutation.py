@@ -1,0 +1,95 @@
+"""Planted faults change one thing each, leave what is no formula alone, and are tried on the tests of their folder."""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.mutants.mutants import draw
+from benchmarks.mutants.mutation import count_mutants, mirrored, mutants_of
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def faults(text: str) -> set[str]:
+    """Return the one line of a file, as each fault makes it."""
+    return {mutant.source for mutant in mutants_of("plant/x.py", text, range(count_mutants(text)))}
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("y = a + b", {"y = a - b"}),
+        ("y = a - b", {"y = a + b"}),
+        ("y = a * b / c", {"y = a * b * c", "y = a / b / c"}),
+        ("y = a ** b", {"y = a * b"}),
+        ("y = -a", {"y = a"}),
+        ("y = f(-a)", {"y = f(a)"}),
+        ("y = 0.5", {"y = 1.0", "y = 50.0"}),
+        ("y = 0", {"y = 1"}),
+        ("y = a < b <= c", {"y = a >= b <= c", "y = a < b > c"}),
+        ("y = a is None", {"y = a is not None"}),
+        ("y = a and b", {"y = a or b"}),
+        ("y = not a", {"y = a"}),
+        ("y = a.reshape(-1, 3)", {"y = a.reshape(1, 3)", "y = a.reshape(-1, 6)", "y = a.reshape(-1, 300)"}),
+        ("y = reshape(-1)", {"y = reshape(1)", "y = reshape(-2)", "y = reshape(-100)"}),
+        ("@f\ndef g(x):\n    return x + a", {"@f\ndef g(x):\n    return x - a"}),
+        ("def g(x=2):\n    return x", {"def g(x=4):\n    return x", "def g(x=200):\n    return x"}),
+    ],
+)
+def test_each_fault_changes_one_thing(text: str, wanted: set[str]) -> None:
+    assert faults(text) == wanted
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "y: Array[2] = x",
+        "raise E(f'at most {a + 1}')",
+        "s = 'a' + b",
+        "s = f'{a + b}'",
+        "y = x[0]",
+        "y = True",
+        "import a",
+        '"""1 + 1"""',
+    ],
+)
+def test_what_is_no_formula_is_left_alone(text: str) -> None:
+    assert count_mutants(text) == 0
+
+
+@pytest.mark.parametrize("length", [-1, -2, -100])
+def test_any_negative_length_is_what_is_left(length: int) -> None:
+    """So a fault in its size would be no fault."""
+    values = np.arange(12.0)
+    np.testing.assert_array_equal(values.reshape(length, 3), values.reshape(4, 3))
+    assert values[:0].reshape(3, length).shape == (3, 0)
+
+
+def test_every_file_of_the_packages_can_be_mutated_and_still_be_read() -> None:
+    for mutant in draw(ROOT, ["plant/eha", "faults/diagnosis"], 30, 3):
+        tree = ast.parse(mutant.source)
+        assert ast.dump(tree) != ast.dump(ast.parse((ROOT / mutant.path).read_text(encoding="utf-8")))
+        assert "  ->  " in mutant.change
+
+
+def test_a_seed_draws_the_same_faults_and_another_others() -> None:
+    once, again, other = ([m.change for m in draw(ROOT, ["plant/eha"], 20, seed)] for seed in (1, 1, 2))
+    assert once == again != other
+
+
+def test_a_file_is_tried_on_kept_numbers_on_its_own_test_and_on_its_folder() -> None:
+    assert mirrored(ROOT, "plant/eha/circuit.py") == [
+        "tests/plant/eha/test_numbers.py",
+        "tests/plant/eha/test_circuit.py",
+        "plant/eha/circuit.py",
+        "tests/plant/eha",
+    ]
+    assert mirrored(ROOT, "faults/diagnosis/calibration.py") == [
+        "tests/faults/diagnosis/test_numbers.py",
+        "tests/faults/diagnosis/test_numbers_steps.py",
+        "tests/faults/diagnosis/test_numbers_verdict.py",
+        "faults/diagnosis/calibration.py",
+        "tests/faults/diagnosis",
+    ]
