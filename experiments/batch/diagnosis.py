@@ -10,6 +10,7 @@ from estimation.finding import Finding, Outcome
 from estimation.log_checks.clean import CleanLog
 from estimation.notes import ChannelCode, SensorCode
 from experiments.log_pages.entries import quantity_entry
+from experiments.page.condition_names import in_words
 from faults.diagnosis.diagnose import diagnose_log
 from faults.notes import ClassCode
 from plant.eha.rig import Rig
@@ -67,8 +68,9 @@ def class_row(found: Finding) -> dict[str, Any]:
     (best, first), (second, other) = sorted(found.probabilities.items(), key=lambda item: -item[1])[:2]
     margin, severities = first / max(other, 1e-300), {"quantities": json.dumps(_severities(found))}
     if found.unknown:
-        said = f"{'; '.join(map(str, found.against))}; in none of the nine conditions, the nearest is {best}"
-        return {"outcome": "mismatch", "reason": said, "trusted": False, **severities}
+        said = f"{'; '.join(map(str, found.against))}; in none of the nine conditions, the nearest is {in_words(best)}"
+        against = json.dumps([{"code": str(one.code), "data": dict(one.data)} for one in found.against])
+        return {"outcome": "mismatch", "reason": said, "trusted": False, "against": against, **severities}
     if margin < TOLD_APART:
         said = f"no class: under this drive {best} and {second} move alike; drive the actuator, at best with steps"
         return {"outcome": "not_observable", "reason": said, "margin": margin}

@@ -46,12 +46,13 @@ SCHEMA = pa.schema(
         "trusted": pa.bool_(),
         **dict.fromkeys(("found_condition", "runner_up"), TEXT),
         **dict.fromkeys(("margin", *NIS.values(), "log_likelihood"), NUMBER),
-        "quantities": TEXT,
+        **dict.fromkeys(("quantities", "against"), TEXT),
     }
 )
 """Columns of the store. ``outcome`` is ok, not_observable, mismatch, diverged or failed, and ``reason`` says why;
 ``plant`` is ``log`` for a log, whose ``condition`` is known only if whoever made the log wrote it down; of a kind of
-actuator that is not the gear-pump one it is the kind, and ``quantities`` holds what was found, as JSON."""
+actuator that is not the gear-pump one it is the kind, and ``quantities`` holds what was found, as JSON; ``against``,
+as JSON too, is a list of what speaks against every class, each a note's code and data."""
 
 Row: TypeAlias = dict[str, Any]
 

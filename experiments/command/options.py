@@ -41,7 +41,8 @@ Logs: TypeAlias = Annotated[
     ),
 ]
 Json: TypeAlias = Annotated[
-    bool, flag("--json", "Print one JSON document, a list with one object per log; notes go to stderr.")
+    bool,
+    flag("--json", "Print the results as one JSON list, for logs with one object per log; notes go to standard error."),
 ]
 Out: TypeAlias = Annotated[
     Path | None,

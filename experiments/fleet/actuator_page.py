@@ -1,5 +1,7 @@
 """The page of one actuator: how every severity develops over its logs, and when a limit is reached."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 
@@ -13,8 +15,9 @@ from experiments.page.names_shown import SHOWN
 from experiments.page.numbers import MISSING, decimals_of, fixed, number, shop_unit
 from experiments.page.panels import Curve, Mark, Panel
 from experiments.page.render import render_page
-from experiments.page.tables import Column
+from experiments.page.tables import Cell, Column
 from faults.trend.kalman import moments, predict, settings
+from faults.trend.trend import FEWEST
 from plant.arrays import Array
 
 AHEAD = 30
@@ -26,18 +29,27 @@ NORMAL_90 = 1.645
 ROUNDING = 0.05
 """Growth below this share of its standard deviation is shown as none [fraction]."""
 
+ROOM = 0.25
+"""Room above and below the logs, the healthy value and the limit in a chart, as a share of their range [fraction]."""
+
 MOST_LOGS = 30
 """Last logs that are listed [count]."""
 
 FORECASTS = (
     "severity",
     Column("level", "level now, 95 % interval"),
+    "limit",
     Column("growth", "growth per log"),
     Column("half", "50 % interval to the limit", "logs"),
     Column("most", "90 % interval to the limit", "logs"),
     Column("outlook", "outlook"),
 )
-LOGS = ("log", "date", "state", "found")
+LOGS = (
+    "log",
+    Column("date", words=lambda date: Cell(date, "name")),
+    Column("state", words=lambda state: Cell(STATES[state], f"fleet-{state} name")),
+    "found",
+)
 
 
 def actuator_page(row: ActuatorRow, log: str | None) -> str:
@@ -51,26 +63,56 @@ def actuator_page(row: ActuatorRow, log: str | None) -> str:
     worst = row.outlook
     every = (worst if worst and worst.name == name else outlook_of(row.logs, name, row.maintained) for name in SHOWN)
     outlooks = [one for one in every if one is not None]
+    counted = max((len(one.logs) for one in outlooks), default=0)
     last = [*row.logs][-MOST_LOGS:][::-1]
     facts = {
         "name": row.name,
         "title": f"{row.name}: {STATES[row.state]}.",
-        "outlook": "" if worst is None else f"{SHOWN.get(worst.name, worst.name)}: {worst.words}".capitalize(),
+        "outlook": "" if worst is None else f"{SHOWN.get(worst.name, worst.name)}: {_in_full(worst)}".capitalize(),
         "log": log,
         "forecasts": pd.DataFrame([_forecast(one) for one in outlooks]),
         "logs": pd.DataFrame(
-            [(one.file.rsplit("/", 1)[-1], one.named.date, STATES[one.state], found_in(one)) for one in last],
-            columns=list(LOGS),
+            [(one.file.rsplit("/", 1)[-1], one.named.date, one.state, found_in(one)) for one in last],
+            columns=["log", "date", "state", "found"],
         ),
         "charts": {one.name: _chart(one, row.name) for one in outlooks},
         "names": [(one.name, SHOWN[one.name]) for one in outlooks],
-        "began": [_changed(one) for one in outlooks if one.trend.begin > 0],
+        "began": _restarts(outlooks, row.maintained),
+        "counted": counted,
+        "left_out": len(row.logs) - counted,
     }
     return render_page("fleet/actuator.html", facts, {"forecasts": FORECASTS, "logs": LOGS}, {})
 
 
-def _changed(one: Outlook) -> str:
-    return f"{SHOWN[one.name].capitalize()} starts again with the log of {one.logs[one.trend.begin].named.date}."
+def _restarts(outlooks: Sequence[Outlook], maintained: Sequence[float]) -> list[str]:
+    """Return from which logs on trends are followed, a sentence for all that start with one."""
+    together: dict[str, list[Outlook]] = {}
+    for one in outlooks:
+        if one.trend.begin > 0:
+            together.setdefault(one.logs[one.trend.begin].file, []).append(one)
+    said: list[str] = []
+    for which in together.values():
+        begin = which[0].trend.begin
+        log, before = which[0].logs[begin].named, which[0].logs[begin - 1].named
+        repaired = any((before.place or 0.0) < one <= (log.place or 0.0) for one in maintained)
+        why = "after a repair" if repaired else "after a lasting jump"
+        names = [SHOWN[one.name] for one in which]
+        subject = "Every severity" if len(names) == len(outlooks) else ", ".join(names).capitalize()
+        verb = "is" if len(names) in (1, len(outlooks)) else "are"
+        said.append(f"{subject} {verb} followed from the log of {log.date or begin + 1} on, {why}.")
+    return said
+
+
+def _reached(low: float, high: float) -> str:
+    return "reached" if high <= 0.0 else span_of(low, high)
+
+
+def _in_full(one: Outlook) -> str:
+    count = len(one.logs) - one.trend.begin
+    if count >= FEWEST:
+        return one.words
+    there = f"there {'is' if count == 1 else 'are'} {count}{' since the trend restarted' if one.trend.begin else ''}"
+    return f"no forecast yet, since it needs {FEWEST} logs, and {there}"
 
 
 def _forecast(one: Outlook) -> dict[str, str]:
@@ -85,9 +127,10 @@ def _forecast(one: Outlook) -> dict[str, str]:
     return {
         "severity": SHOWN[one.name],
         "level": f"{shown} {unit} ({low} to {high})",
+        "limit": f"{number(scale * one.series.limit, 3)} {unit}",
         "growth": f"{number(scale * growth, 2)} ± {number(scale * growth_std, 2)} {unit}",
-        "half": MISSING if reached is None else span_of(reached[1], reached[3]),
-        "most": MISSING if reached is None else span_of(reached[0], reached[4]),
+        "half": MISSING if reached is None else _reached(reached[1], reached[3]),
+        "most": MISSING if reached is None else _reached(reached[0], reached[4]),
         "outlook": one.words,
     }
 
@@ -107,7 +150,11 @@ def _chart(one: Outlook, name: str) -> Charts:
         Curve("90 % lower", scale * (level - NORMAL_90 * std), "blue", "edge"),
     )
     marks = (Mark("y", scale * one.series.limit, "limit"), Mark("x", float(count), "last log"))
-    return Charts(x, "log", [Panel(SHOWN[one.name], unit, curves, marks, [(2, 3)])], f"{name}-{one.name}", "logs")
+    ends = scale * np.array([*one.series.values, one.series.healthy, one.series.limit])
+    room = ROOM * float(np.ptp(ends))  # a forecast that leaves it would leave no height for the logs
+    told = (float(ends.min()) - room, float(ends.max()) + room)
+    panel = Panel(SHOWN[one.name], unit, curves, marks, [(2, 3)], told)
+    return Charts(x, "log", [panel], f"{name}-{one.name}", "logs")
 
 
 def _course(one: Outlook) -> tuple[Array, Array]:

@@ -44,8 +44,8 @@ class ActuatorRow:
     @cached_property
     def state(self) -> str:
         """That of the last log, or an alarm where it is within its limits and will not stay so."""
-        growing = self.outlook is not None and self.outlook.alarm
-        return "alarm" if growing and self.last.state in ("open", "within") else self.last.state
+        growing = self.last.told and self.outlook is not None and self.outlook.alarm
+        return "alarm" if growing and self.last.state in ("open", "within", "unknown") else self.last.state
 
     @property
     def order(self) -> tuple[int, float]:

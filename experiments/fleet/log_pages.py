@@ -59,7 +59,7 @@ def write_pages(
         written = row.last.state != "failed" and write(row.last.file, out / place)
         if written:
             links[row.name] = place.as_posix()
-        if row.outlook is not None:
+        if len(row.logs) > 1:
             course = Path("actuators") / file_name(row.name)
             page = actuator_page(row, f"../{place.as_posix()}" if written else None)
             write_whole(out / course, page, "--out", parents=True)

@@ -25,11 +25,14 @@ class Named:
         As it was given; empty where it is not known.
     place : float or None
         The date as a number [day, or the unit of numbers that were given]; None where it is not known.
+    problem : str
+        Why the log cannot be placed among those of its actuator; empty where it can.
     """
 
     actuator: str
     date: str
     place: float | None
+    problem: str = ""
 
 
 UNNAMED = Named("", "", None)
@@ -86,12 +89,13 @@ def by_pattern(files: Iterable[str], pattern: str) -> dict[str, Named]:
     Returns
     -------
     dict[str, Named]
-        By file; those that do not match are `UNNAMED`.
+        By file; those that do not match are `UNNAMED`, and those whose date cannot be read have a ``problem`` instead
+        of an actuator.
 
     Raises
     ------
     HydrostateError
-        If the pattern names no actuator, or something else, or a date cannot be read.
+        If the pattern names no actuator, or something else, or no date that it finds can be read.
 
     Examples
     --------
@@ -113,8 +117,24 @@ def by_pattern(files: Iterable[str], pattern: str) -> dict[str, Named]:
             found[file] = UNNAMED
             continue
         date = match.groupdict().get("date") or ""
-        found[file] = Named(match["actuator"].split("/")[-1], date, place_of(date, file) if date else None)
+        found[file] = _named(match["actuator"].split("/")[-1], date, "its name")
+    return _require_a_date(found)
+
+
+def _require_a_date(found: dict[str, Named]) -> dict[str, Named]:
+    """Refuse names of which none has a date that can be read: the pattern or the form of dates is wrong, no log is."""
+    wrong = [file for file, one in found.items() if one.problem]
+    if wrong and not any(one.actuator for one in found.values()):
+        raise HydrostateError(f"{wrong[0]}: {found[wrong[0]].problem}")
     return found
+
+
+def _named(actuator: str, date: str, source: str) -> Named:
+    """Return what is known of a log; one bad date must not cost the fleet its page."""
+    try:
+        return Named(actuator, date, place_of(date, source) if date else None)
+    except HydrostateError as error:
+        return Named("", "", None, str(error))
 
 
 def by_table(files: Iterable[str], table: Path) -> dict[str, Named]:
@@ -130,20 +150,17 @@ def by_table(files: Iterable[str], table: Path) -> dict[str, Named]:
     Returns
     -------
     dict[str, Named]
-        By file; those that are not in the table are `UNNAMED`.
+        By file; those that are not in the table are `UNNAMED`, and those whose date cannot be read have a ``problem``
+        instead of an actuator.
 
     Raises
     ------
     HydrostateError
-        If the table cannot be read or lacks a column.
+        If the table cannot be read or lacks a column, or no date in it can be read.
     """
     rows = table_rows(table, ("file", "actuator"))
-    said = {
-        row["file"]: Named(
-            row["actuator"], row.get("date") or "", place_of(row["date"], f"{table}") if row.get("date") else None
-        )
-        for row in rows
-    }
+    said = {row["file"]: _named(row["actuator"], row.get("date") or "", table.name) for row in rows}
+    _require_a_date(said)
     return {file: said.get(file) or said.get(Path(file).name) or UNNAMED for file in files}
 
 

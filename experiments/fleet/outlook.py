@@ -106,7 +106,7 @@ def outlook_of(logs: Sequence[LogRow], name: str, maintained: Sequence[float] = 
     Outlook or None
         None where no log tells the severity with a verdict.
     """
-    told = tuple(one for one in logs if name in one.amounts and one.state not in ("unknown", "failed"))
+    told = tuple(one for one in logs if name in one.amounts and one.told)
     if not told:
         return None
     amounts = [one.amounts[name] for one in told]

@@ -9,14 +9,20 @@ import pandas as pd
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.rows import STATES, LogRow
 from experiments.page.names_shown import SHOWN
-from experiments.page.numbers import number, shop_unit
+from experiments.page.numbers import fixed, number, shop_unit
 from experiments.page.render import render_page
 from experiments.page.scripting import data_block
-from experiments.page.tables import Cell, Column
+from experiments.page.tables import Cell, Column, right
 from experiments.page.words import in_words
 
 MOST_STILL = 100
 """Rows of the table that stands where scripts do not run, and on paper [count]."""
+
+UNREAD = ("log", "actuator", "why")
+"""Columns of the table of logs that an actuator's row passes over."""
+
+LEVELS = ("none", "minor", "major")
+"""Levels of leakage and friction, by size."""
 
 SICK = ("over", "likely")
 """States of actuators that need work."""
@@ -49,6 +55,7 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     """
     counts = Counter(row.state for row in rows)
     cells = [row_cells(row) for row in rows]
+    unread = [(one.file.rsplit("/", 1)[-1], row.name, found_in(one)) for row in rows for one in _unread_in(row)]
     data = {"columns": COLUMNS, "rows": cells, "links": [links.get(row.name) for row in rows]}
     facts = {
         "source": source,
@@ -58,15 +65,24 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
         "logs": sum(len(row.logs) for row in rows),
         "data": data_block(data),
         "most": MOST_STILL,
+        "pages": len(links),
+        "rows": len(rows),
+        "unread_count": len(unread),
+        "unread": pd.DataFrame(unread[:MOST_STILL], columns=list(UNREAD)),
         "still": pd.DataFrame(cells[:MOST_STILL], columns=[column["label"] for column in COLUMNS]),
     }
     columns = [
         Column("state", words=lambda name: Cell(STATES[name], f"fleet-{name}")),
-        Column("of the limit", unit="%", digits=3),
+        Column("of the limit", unit="%", words=lambda share: right(fixed(share, 1))),
         Column("logs left", digits=3),
     ]
     shown = [next((one for one in columns if one.source == each["label"]), each["label"]) for each in COLUMNS]
-    return render_page("fleet/fleet.html", facts, {"still": shown}, {})
+    return render_page("fleet/fleet.html", facts, {"still": shown, "unread": UNREAD}, {})
+
+
+def _unread_in(row: ActuatorRow) -> list[LogRow]:
+    """Return the logs that could not be read and stand behind one that could; else the row itself says why."""
+    return [] if row.last.state == "failed" else [one for one in row.logs if one.state == "failed"]
 
 
 def _title(counts: Mapping[str, int], total: int) -> str:
@@ -90,7 +106,7 @@ def row_cells(row: ActuatorRow) -> list[Any]:
         Text, numbers, or None where nothing is known.
     """
     last = row.last
-    told = last.state != "unknown"  # the amounts of a model that does not fit are none of the actuator's
+    told = last.told  # the amounts of a model that does not fit are none of the actuator's
     share = round(100.0 * last.worst.share, 1) if last.worst is not None and told else None
     outlook = row.outlook
     left = None if outlook is None or outlook.left is None else round(outlook.left[1], 1)
@@ -110,7 +126,29 @@ def row_cells(row: ActuatorRow) -> list[Any]:
 
 def found_in(log: LogRow) -> str:
     """Return what was found in a log, or why nothing was, without the folder that the log was in."""
+    levels = [level_in_words(name, size) for name, size in log.between.items() if size > 0.0]
+    if levels:
+        return "; ".join(levels)
     return in_words(log.condition) if log.condition else log.reason.split(f"{log.file}: ", 1)[-1]
+
+
+def level_in_words(name: str, size: float) -> str:
+    """Return between which levels a fault lies.
+
+    Parameters
+    ----------
+    size : float
+        Where 1 is minor and 2 is major [dimensionless].
+
+    Examples
+    --------
+    >>> level_in_words("leakage", 0.5), level_in_words("friction", 1.0), level_in_words("friction", 2.25)
+    ('leakage none to minor', 'minor friction', 'friction above major')
+    """
+    below = int(size)
+    if below == size and below < len(LEVELS):
+        return f"{LEVELS[below]} {name}"
+    return f"{name} {LEVELS[below]} to {LEVELS[below + 1]}" if below + 1 < len(LEVELS) else f"{name} above major"
 
 
 def worst_in(log: LogRow) -> str:

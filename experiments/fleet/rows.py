@@ -3,11 +3,12 @@
 import json
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from estimation.finding import NORMAL_95
 from experiments.fleet.naming import UNNAMED, Named
+from faults.notes import AgainstCode
 
 STATES: Mapping[str, str] = {
     "over": "past a limit",
@@ -19,6 +20,8 @@ STATES: Mapping[str, str] = {
     "failed": "not readable",
 }
 """States of a log or an actuator, the most urgent first, and what a reader is told."""
+
+BETWEEN = str(AgainstCode.BETWEEN_CONDITIONS)
 
 RANKS: Mapping[str, int] = {name: place for place, name in enumerate(STATES)}
 
@@ -78,6 +81,9 @@ class LogRow:
         That was found; empty where none was.
     reason : str
         Why there is none.
+    between : Mapping[str, float]
+        Where one circuit explains the log, but its leakage and friction lie between those of two conditions: both to
+        the nearest quarter, where 1 is minor and 2 is major [dimensionless]; else empty.
     """
 
     file: str
@@ -86,6 +92,12 @@ class LogRow:
     condition: str
     reason: str
     amounts: Mapping[str, Amount]
+    between: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    @property
+    def told(self) -> bool:
+        """Whether the severities are the actuator's: a model explains the log, of one of the nine conditions or not."""
+        return self.state not in ("unknown", "failed") or bool(self.between)
 
     @property
     def worst(self) -> Amount | None:
@@ -109,6 +121,7 @@ def log_rows(
         Of a batch store, with ``file``, ``verb``, ``outcome``, ``found_condition``, ``reason`` and ``quantities``.
     names : Mapping[str, Named]
         By file.
+        ``against`` too, where it is known.
     limits : Mapping[str, float]
         That replace those of the store, by severity [its unit].
 
@@ -123,8 +136,20 @@ def log_rows(
 
 
 def _row(row: Mapping[str, Any], named: Named, limits: Mapping[str, float]) -> LogRow:
+    if named.problem:
+        return LogRow(row["file"], named, "failed", "", named.problem, {})
     amounts = _amounts(row["quantities"], limits)
-    return LogRow(row["file"], named, _state(row, amounts), row["found_condition"] or "", row["reason"] or "", amounts)
+    between = _between(row.get("against"))
+    state = _state(row, amounts)
+    if state == "unknown" and between and any(one.share > 1.0 for one in amounts.values()):
+        state = "likely"  # a sensor with a wrong gain would look alike
+    return LogRow(row["file"], named, state, row["found_condition"] or "", row["reason"] or "", amounts, between)
+
+
+def _between(text: str | None) -> dict[str, float]:
+    """Return leakage and friction of a log against which nothing speaks but that they lie between two conditions."""
+    against = json.loads(text or "[]")
+    return against[0]["data"] if [one["code"] for one in against] == [BETWEEN] else {}
 
 
 def _amounts(text: str | None, limits: Mapping[str, float]) -> dict[str, Amount]:

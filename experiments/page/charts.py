@@ -69,6 +69,7 @@ class Charts:
                     "unit": panel.unit,
                     "marks": [vars(mark) for mark in panel.marks],
                     "bands": [list(band) for band in panel.bands],
+                    **({"ends": list(panel.ends)} if panel.ends else {}),
                     "curves": [
                         {"name": one.name, "colour": one.colour, "look": one.look, **_carried(one.values)}
                         for one in panel.curves

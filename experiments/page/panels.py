@@ -63,6 +63,8 @@ class Panel:
     ----------
     bands : sequence of tuple
         Places of two curves, the upper and the lower, between which it is shaded.
+    ends : tuple of float, optional
+        Ends of the y axis [its unit]; by default those of all that is drawn.
     """
 
     label: str
@@ -70,3 +72,4 @@ class Panel:
     curves: Sequence[Curve]
     marks: Sequence[Mark] = ()
     bands: Sequence[tuple[int, int]] = ()
+    ends: tuple[float, float] | None = None

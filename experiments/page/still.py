@@ -48,6 +48,7 @@ ROOM = 0.05
 STYLE = (
     "text{font:8.5px 'DejaVu Sans',Verdana,sans-serif;fill:#000}.grid{stroke:#e3e3e3;stroke-width:.6}"
     ".frame{stroke:#000;stroke-width:.8;fill:none}.mark{stroke:#d55e00;stroke-width:1.1;stroke-dasharray:4 2}"
+    ".told{fill:#b04a00}"
     ".line{fill:none;stroke-linejoin:round}.dots{fill:none;stroke-linecap:round;stroke-width:3.4}"
 )
 
@@ -88,7 +89,7 @@ def still_picture(x: Array, label: str, panels: Sequence[Panel]) -> bytes:
 
 def _panel(x: Array, panel: Panel, size: tuple[float, float], name: str, label: str) -> Iterator[str]:
     wide, high = size
-    across, up = _range(x, 0.0), _range(_every(panel), ROOM)
+    across, up = _range(x, 0.0), panel.ends or _range(_every(panel), ROOM)
     places = (x - across[0]) * (wide / (across[1] - across[0]))
     scale = high / (up[1] - up[0])
 
@@ -118,6 +119,11 @@ def _panel(x: Array, panel: Panel, size: tuple[float, float], name: str, label: 
         along = (mark.at - across[0]) * wide / (across[1] - across[0])
         line = f"M{along:.1f} 0V{high:g}" if mark.axis == "x" else f"M0 {high - (mark.at - up[0]) * scale:.1f}H{wide:g}"
         yield f'<path class="mark" d="{line}"/>'
+    for mark in panel.marks:
+        along = (mark.at - across[0]) * wide / (across[1] - across[0])
+        left, top = (along + 3.0, 7.0) if mark.axis == "x" else (wide - 2.0, high - (mark.at - up[0]) * scale - 3.0)
+        anchor = "start" if mark.axis == "x" else "end"
+        yield f'<text class="told" x="{left:.1f}" y="{top:.1f}" text-anchor="{anchor}">{escape(mark.words)}</text>'
     yield f'</g><path class="frame" d="M0 0V{high:g}H{wide:g}"/>'
     for words, shift in ((panel.label, 48.0), (f"[{panel.unit}]", 38.0)):
         turned = f'transform="translate({-shift:g} {high / 2:g}) rotate(-90)"'
@@ -160,6 +166,9 @@ def _every(panel: Panel) -> Array:
     return np.concatenate([np.asarray(lines, dtype=np.float64), *(curve.values for curve in panel.curves)])
 
 
+PLAIN_TO = 1e5
+"""Size below which a number on an axis has no power of ten [any unit]."""
+
 LEAST = 1e-290
 """Size below which a channel that does not change is drawn as zero [any unit]."""
 
@@ -187,7 +196,9 @@ def _ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
         if last > first:
             break
     within = [place * step for place in range(first, last + 1)]
-    digits = min(max(math.ceil(math.log10(max(map(abs, within), default=1.0) / step + 1e-300)) + 2, 3), 12)
+    largest = max(map(abs, within), default=1.0)
+    whole = len(f"{largest:.0f}") if largest < PLAIN_TO else 0
+    digits = min(max(math.ceil(math.log10(largest / step + 1e-300)) + 2, 3, whole), 12)
     return [(one, f"{one:.{digits}g}".replace("-", "\N{MINUS SIGN}")) for one in within]
 
 

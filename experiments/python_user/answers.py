@@ -156,7 +156,7 @@ class Answer(Shown):
         Parameters
         ----------
         path : str or Path
-            Where to; ``.html`` is added to a name without an ending.
+            Where to; ``.html`` is added to a name without an ending, and folders that are missing are made.
         title : str
             What the page calls the log.
 
@@ -180,7 +180,7 @@ class Answer(Shown):
         if file.suffix.lower() not in PAGES:
             raise HydrostateError(f"a page's name must end in .html, got {file.name!r}")
         file = file.with_suffix(".html") if file.name and not file.suffix else file
-        write_whole(file, self._page(title))
+        write_whole(file, self._page(title), parents=True)
         return file
 
     def plot(self) -> "list[Axes]":

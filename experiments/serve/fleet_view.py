@@ -34,7 +34,7 @@ def fleet_view(
             names[files[identity]] = by_pattern([name], pattern or "")[name]
         except HydrostateError:  # a date that is none
             names[files[identity]] = UNNAMED
-    blank = dict.fromkeys(("outcome", "found_condition", "reason", "quantities"))
+    blank = dict.fromkeys(("outcome", "found_condition", "reason", "quantities", "against"))
     table = [{**blank, **entries, "verb": "diagnose", "file": files[identity]} for identity, _, entries in rows]
     found = actuator_rows(log_rows(table, names, limits))
     by_file = {file: identity for identity, file in files.items()}

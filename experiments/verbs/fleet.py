@@ -14,6 +14,7 @@ from plant.errors import HydrostateError, require_known
 
 if TYPE_CHECKING:
     from experiments.batch.part_store import PartStore
+    from experiments.fleet.actuators import ActuatorRow
     from experiments.fleet.naming import Named
 
 PAGE = "index.html"
@@ -72,7 +73,7 @@ def fleet(
         logs = _logs_in(Path(place), out)
         _names([one.relative_to(place).as_posix() for one in logs], pattern, names)
         store = _diagnosed(Path(place), logs, out, plant, rig, load_columns(columns), workers or os.cpu_count() or 1)
-    table = store.rows(["file", "verb", "outcome", "found_condition", "reason", "quantities"]).to_pylist()
+    table = store.rows(["file", "verb", "outcome", "found_condition", "reason", "quantities", "against"]).to_pylist()
     files = [row["file"] for row in table if row["file"]]
     rows = actuator_rows(log_rows(table, _names(files, pattern, names), limits), repairs)
     if not rows:
@@ -80,6 +81,7 @@ def fleet(
     base = Path(place) if from_logs else Path()
     links = write_pages(rows, out, pages, _page_writer(base, plant, rig, columns))
     write_whole(out / PAGE, fleet_page(rows, links, Path(place).name), "--out", parents=True)
+    _warn(rows, repairs, pattern, names)
     failed = sum(one.state == "failed" for row in rows for one in row.logs)
     total = sum(len(row.logs) for row in rows)
     if failed:
@@ -87,6 +89,23 @@ def fleet(
     emit(f"{out / PAGE}")
     if failed:
         raise typer.Exit(USAGE if failed == total else SOME_FAILED)
+
+
+def _warn(
+    rows: "Sequence[ActuatorRow]", repairs: Mapping[str, Sequence[float]], pattern: str | None, names: Path | None
+) -> None:
+    """Say which files stand alone, and which repairs restart nothing."""
+    every = [one for row in rows for one in row.logs]
+    alone = [one.file for one in every if not (one.named.actuator or one.named.problem)]
+    if alone and (pattern or names):
+        told = f"do not match --pattern {pattern}" if pattern else f"are not in {names}"
+        note(f"warning: {len(alone)} of {len(every)} files {told}, so each has its own row, such as {alone[0]}")
+    known = {row.name: row for row in rows}
+    for name in repairs:
+        if name not in known:
+            note(f"warning: --maintenance has a repair of {name!r}, but no log is of that actuator")
+        elif not all(one.named.place is not None for one in known[name].logs):
+            note(f"warning: --maintenance has a repair of {name!r}, but its logs have no dates, so its trend goes on")
 
 
 def limits_of_options(texts: Sequence[str]) -> dict[str, float]:

@@ -92,7 +92,7 @@
       legend: { show: false },
       padding: [10, 24, last ? 0 : 8, 0], // room for half of the lowest number where no axis is below it
       cursor: { sync: { key: figure.group }, drag: { x: true, y: false } },
-      scales: { x: { time: false } },
+      scales: { x: { time: false }, y: panel.ends ? { range: () => panel.ends } : {} },
       axes: [
         { ...axis, label: last ? figure.x.label : undefined, show: last, size: 34, labelSize: 20 },
         { ...axis, size: 62 },

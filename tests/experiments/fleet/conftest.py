@@ -4,6 +4,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from faults.notes import AgainstCode
+
 
 def store_row(file: str, leakage: float, spread: float = 0.2, **more: Any) -> Mapping[str, Any]:
     """Return the row of a log that leaks so much: healthy is 1, the limit 3."""
@@ -12,3 +14,10 @@ def store_row(file: str, leakage: float, spread: float = 0.2, **more: Any) -> Ma
     stiff = {"value": 2.0e8, "unit": "Pa", "ci95": [1.9e8, 2.1e8], "healthy": 2.07e8, "limit": 1.656e8}
     row = {"file": file, "verb": "diagnose", "outcome": "ok", "found_condition": "normal", "reason": None}
     return {**row, "quantities": json.dumps({"leakage_flow": amount, "bulk_modulus": stiff}), **more}
+
+
+def between(leakage: float, friction: float) -> str:
+    """Return what speaks against a log whose leakage and friction lie between those of two conditions, for a row."""
+    return json.dumps(
+        [{"code": str(AgainstCode.BETWEEN_CONDITIONS), "data": {"leakage": leakage, "friction": friction}}]
+    )

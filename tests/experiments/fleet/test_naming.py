@@ -41,9 +41,20 @@ def test_a_later_date_is_a_larger_number_whatever_its_form() -> None:
     assert place_of("2026-11-23", "log") - place_of("20261122", "log") == 1.0
 
 
-def test_a_date_that_is_none_is_refused_with_the_file() -> None:
-    with pytest.raises(HydrostateError, match=r"P_2026-13-45.csv: date must be ISO 8601"):
-        by_pattern(["P_2026-13-45.csv"], "{actuator}_{date}.csv")
+def test_one_bad_date_costs_its_own_log_a_name_and_no_other() -> None:
+    found = by_pattern(["P_2026-13-45.csv", "P_2026-11-22.csv"], "{actuator}_{date}.csv")
+    assert found["P_2026-11-22.csv"].actuator == "P"
+    assert found["P_2026-13-45.csv"].actuator == ""
+    assert found["P_2026-13-45.csv"].problem.startswith("its name: date must be ISO 8601")
+
+
+def test_names_of_which_no_date_can_be_read_are_refused_with_the_file(tmp_path: Path) -> None:
+    with pytest.raises(HydrostateError, match=r"P_22.11.2026.csv: its name: date must be ISO 8601"):
+        by_pattern(["P_22.11.2026.csv", "notes.txt"], "{actuator}_{date}.csv")
+    table = tmp_path / "names.csv"
+    table.write_text("file,actuator,date\na.csv,P-1,22 Nov\n", encoding="utf-8")
+    with pytest.raises(HydrostateError, match=r"a.csv: names.csv: date must be ISO 8601"):
+        by_table([], table)
 
 
 def test_a_table_names_files_by_path_or_by_name(tmp_path: Path) -> None:

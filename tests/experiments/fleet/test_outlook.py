@@ -1,6 +1,8 @@
 """How an actuator develops: its outlook, its alarm and its page."""
 
+import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from experiments.fleet.naming import by_pattern
 from experiments.fleet.outlook import outlook_of, read_maintenance
 from experiments.fleet.rows import log_rows
 from plant.errors import HydrostateError
-from tests.experiments.fleet.conftest import store_row
+from tests.experiments.fleet.conftest import between, store_row
 
 
 def actuator(leakages: Any, maintained: tuple[float, ...] = (), **more: Any) -> ActuatorRow:
@@ -72,6 +74,34 @@ def test_logs_without_a_verdict_play_no_part() -> None:
     assert outlook_of(actuator(GROWING, outcome="mismatch").logs, "leakage_flow") is None
 
 
+def test_logs_between_two_conditions_are_part_of_the_trend_and_may_raise_the_alarm() -> None:
+    row = actuator(GROWING, outcome="mismatch", found_condition=None, against=between(0.5, 0.0))
+    assert row.outlook is not None
+    assert len(row.outlook.logs) == 30
+    assert (row.last.state, row.state) == ("unknown", "alarm")
+
+
+def test_a_page_tells_logs_that_have_no_place_in_the_trend() -> None:
+    logs = actuator(GROWING).logs
+    lost = replace(logs[3], state="unknown")
+    page = actuator_page(ActuatorRow("P-1", (*logs[:3], lost, *logs[4:])), None)
+    assert "1 of 30 logs has no severity that can be relied on" in page
+    assert "relied on" not in actuator_page(actuator(GROWING), None)
+
+
+def test_an_actuator_without_any_severity_has_a_page_that_says_why() -> None:
+    page = actuator_page(actuator(GROWING[:5], outcome="failed", found_condition=None, reason="no time"), None)
+    assert page.count("no time") == 5
+    assert "When a limit is reached" not in page
+
+
+def test_a_chart_shows_the_limit_and_no_forecast_that_would_flatten_the_logs() -> None:
+    page = actuator_page(actuator(1.0 + 0.1 * np.arange(10)), None)
+    low, high = json.loads(re.findall(r'"ends": ?(\[[^]]*\])', page)[0])
+    assert low < 1.0
+    assert 3.0 < high < 5.0
+
+
 def test_the_page_of_an_actuator_shows_every_severity_with_its_forecast() -> None:
     page = actuator_page(actuator(GROWING), "../pages/last.html").replace("\N{NO-BREAK SPACE}", " ")
     assert "<h1>P-1: nearing a limit.</h1>" in page
@@ -82,7 +112,15 @@ def test_the_page_of_an_actuator_shows_every_severity_with_its_forecast() -> Non
 
 
 def test_a_repair_is_named_on_the_page() -> None:
-    assert "Leakage starts again with the log of 10." in actuator_page(actuator(GROWING, maintained=(9.5,)), None)
+    page = actuator_page(actuator(GROWING, maintained=(9.5,)), None)
+    assert "Every severity is followed from the log of 10 on, after a repair." in page
+    few = actuator_page(actuator(GROWING, maintained=(27.0,)), None).replace("\N{NO-BREAK SPACE}", " ")
+    assert re.search("no forecast yet, since it needs 4 logs, and there are [23] since the trend restarted", few)
+
+
+def test_a_lasting_jump_is_no_repair() -> None:
+    page = actuator_page(actuator([1.0] * 15 + [2.0] * 15), None)
+    assert "Leakage is followed from the log of 15 on, after a lasting jump." in page
 
 
 def test_repairs_are_read_from_a_table(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from experiments.fleet.log_pages import file_name, write_pages
 from experiments.fleet.naming import by_pattern
 from experiments.fleet.page import fleet_page, row_cells
 from experiments.fleet.rows import log_rows
-from tests.experiments.fleet.conftest import store_row
+from tests.experiments.fleet.conftest import between, store_row
 
 ROWS = 10_000
 
@@ -72,6 +72,35 @@ def test_amounts_of_a_model_that_does_not_fit_are_not_shown() -> None:
     (found,) = actuator_rows(log_rows([row], {}, {}))
     _, state, said, worst, share, *_ = row_cells(found)
     assert (state, said, worst, share) == ("unknown", "the pump is worn; in none of the nine", "", None)
+
+
+def test_a_log_between_two_conditions_is_shown_by_its_levels_and_amounts() -> None:
+    row = store_row("a.csv", 1.8, outcome="mismatch", found_condition=None, against=between(0.5, 1.0))
+    (found,) = actuator_rows(log_rows([row], {}, {}))
+    _, state, said, worst, share, *_ = row_cells(found)
+    assert (state, said, worst, share) == (
+        "unknown",
+        "leakage none to minor; minor friction",
+        "leakage 1.80 L/min",
+        40.0,
+    )
+
+
+def test_logs_that_a_row_passes_over_are_listed_with_the_reason() -> None:
+    rows = [
+        store_row("A_1.csv", 1.0),
+        store_row("A_2.csv", 1.0, outcome="failed", found_condition=None, reason="A_2.csv: no time"),
+    ]
+    named = by_pattern(["A_1.csv", "A_2.csv"], "{actuator}_{date}.csv")
+    page = fleet_page(actuator_rows(log_rows(rows, named, {})), {}, "hall")
+    assert "<td>A_2.csv</td>" in page.replace(' data-head="log"', "")
+    assert "no time" in page
+    assert "The rows above pass over this log" in page
+    assert "pass over" not in fleet_page(actuator_rows(log_rows(rows[:1], named, {})), {}, "hall")
+
+
+def test_the_page_says_how_many_rows_have_a_page() -> None:
+    assert "1 of 9 rows have a page" in page_of(9, links=True).replace("\n", " ")
 
 
 def test_the_page_explains_each_state_by_the_word_that_it_shows() -> None:

@@ -1,11 +1,14 @@
 """A log's state follows from its severities and their limits."""
 
+import json
+from typing import Any
+
 import pytest
 
 from experiments.fleet.actuators import actuator_rows
 from experiments.fleet.naming import by_pattern
 from experiments.fleet.rows import STATES, log_rows
-from tests.experiments.fleet.conftest import store_row
+from tests.experiments.fleet.conftest import between, store_row
 
 
 @pytest.mark.parametrize(
@@ -36,6 +39,30 @@ def test_what_has_no_verdict_is_not_called_sound() -> None:
         {},
     )
     assert (unknown.state, failed.state) == ("unknown", "failed")
+
+
+def test_a_log_between_two_conditions_has_severities_and_is_never_surely_past_a_limit() -> None:
+    doubt: dict[str, Any] = {"outcome": "mismatch", "found_condition": None, "reason": "none of the nine"}
+    rows = [
+        store_row("a.csv", 1.8, against=between(0.5, 0.0), **doubt),
+        store_row("b.csv", 9.0, against=between(1.5, 0.0), **doubt),
+        store_row("c.csv", 9.0, **doubt),
+    ]
+    found = log_rows(rows, {}, {})
+    assert [(one.state, one.told) for one in found] == [("unknown", True), ("likely", True), ("unknown", False)]
+
+
+def test_a_log_against_which_more_speaks_than_its_size_has_no_severities() -> None:
+    against = json.dumps([*json.loads(between(0.5, 0.0)), {"code": "oil_soft", "data": {}}])
+    (row,) = log_rows([store_row("a.csv", 9.0, outcome="mismatch", against=against)], {}, {})
+    assert (row.state, row.told) == ("unknown", False)
+
+
+def test_a_log_whose_date_cannot_be_read_is_not_readable_and_says_why() -> None:
+    files = ["A_2026-99-01.csv", "A_2026-11-22.csv"]
+    logs = log_rows([store_row(file, 4.0) for file in files], by_pattern(files, "{actuator}_{date}.csv"), {})
+    assert [(one.name, one.state) for one in actuator_rows(logs)] == [("A", "over"), (files[0], "failed")]
+    assert "must be ISO 8601 such as 2026-11-22, or a number, got '2026-99-01'" in logs[0].reason
 
 
 def test_of_another_kind_of_actuator_the_condition_decides() -> None:

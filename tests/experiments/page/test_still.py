@@ -67,6 +67,14 @@ def test_ticks_are_round_and_told_apart(values: list[float], words: list[str]) -
     assert len(heights) >= 3
 
 
+def test_a_line_across_is_named_and_an_axis_may_be_given() -> None:
+    picture = drawn([0.0, 1.0], Mark("y", 3.0, "limit"), Mark("x", 1.0, "last log"))
+    assert {"limit", "last log"} <= set(words_of(picture))
+    panel = Panel("force", "N", [Curve("a", np.array([0.0, 1.0]))], ends=(0.0, 1000.0))
+    words = words_of(ET.fromstring(still_picture(np.arange(2.0), "log", [panel])))  # noqa: S314 -- our own picture
+    assert {"0", "500", "1000"} <= set(words)
+
+
 def test_names_are_escaped_and_a_long_log_keeps_its_peak_with_few_points() -> None:
     values = np.zeros(100_000)
     values[77_777] = 1.0

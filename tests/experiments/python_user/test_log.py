@@ -89,8 +89,9 @@ def test_an_answer_writes_its_page_whole_or_says_why_not(log: hs.Log, tmp_path: 
     text = page.read_text(encoding="utf-8")
     assert text.startswith("<!DOCTYPE html>")
     assert "bench 7, Monday" in text
+    assert answer.report(tmp_path / "new" / "folder" / "page.html").exists()
     with pytest.raises(hs.HydrostateError, match="cannot be written"):
-        answer.report(tmp_path / "no such folder" / "page.html")
+        answer.report(page / "page.html")
 
 
 def test_a_diagnosis_writes_the_page_of_its_actuator(log: hs.Log, tmp_path: Path) -> None:

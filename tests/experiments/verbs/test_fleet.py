@@ -48,7 +48,9 @@ def test_a_folder_of_logs_becomes_a_page_with_the_sick_one_first(tmp_path: Path)
     assert "Start with B." in page
     assert str(tmp_path) not in page
     (own,) = (tmp_path / "fleet" / "pages").iterdir()
-    assert f"pages/{own.name}" in page
+    (course,) = (tmp_path / "fleet" / "actuators").iterdir()
+    assert f"actuators/{course.name}" in page
+    assert f"../pages/{own.name}" in course.read_text("utf-8")
     assert "(minor leakage)" in own.read_text("utf-8")
     code, _, _ = invoke("fleet", tmp_path / "fleet" / "store", *named, "--out", tmp_path / "again")
     assert code == 1
@@ -115,6 +117,23 @@ def test_a_date_that_is_none_is_refused_before_any_log_is_diagnosed(
     code, _, said = invoke("fleet", tmp_path, "--pattern", "{actuator}_{date}.csv", "--out", tmp_path / "fleet")
     assert (code, ran) == (2, [])
     assert "date must be ISO 8601 such as 2026-11-22, or a number, got '2026-99'" in said
+
+
+def test_names_that_do_not_match_and_repairs_that_restart_nothing_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stored = Stored([{**ROW, "file": "P-1_2026-01-02.csv"}, {**ROW, "file": "run.csv"}, {**ROW, "file": "P-2_x.csv"}])
+    monkeypatch.setattr("experiments.batch.part_store.open_store", lambda _: stored)
+    repairs = tmp_path / "repairs.csv"
+    repairs.write_text("actuator,date\nP-1,2026-01-01\nP1,2026-01-01\n")
+    options = ("--pattern", "{actuator}_{date}.csv", "--maintenance", repairs, "--out", tmp_path / "fleet")
+    code, _, said = invoke("fleet", tmp_path, *options)
+    assert code == 0
+    assert "2 of 3 files do not match --pattern {actuator}_{date}.csv, so each has its own row" in said
+    assert "a repair of 'P1', but no log is of that actuator" in said
+    assert "'P-1'" not in said
+    code, _, said = invoke("fleet", tmp_path, "--pattern", "{actuator}_*.csv", *options[2:])
+    assert "a repair of 'P-1', but its logs have no dates" in said
 
 
 def test_a_file_is_no_fleet(tmp_path: Path) -> None:
