@@ -52,13 +52,15 @@ LOGS = (
 )
 
 
-def actuator_page(row: ActuatorRow, log: str | None) -> str:
+def actuator_page(row: ActuatorRow, log: str | None, fleet: str = "../index.html") -> str:
     """Return the page of an actuator.
 
     Parameters
     ----------
     log : str or None
         Path of the page of its last log from this one, where there is one.
+    fleet : str
+        Path of the page of all actuators.
     """
     worst = row.outlook
     every = (worst if worst and worst.name == name else outlook_of(row.logs, name, row.maintained) for name in SHOWN)
@@ -70,6 +72,7 @@ def actuator_page(row: ActuatorRow, log: str | None) -> str:
         "title": f"{row.name}: {STATES[row.state]}.",
         "outlook": "" if worst is None else f"{SHOWN.get(worst.name, worst.name)}: {_in_full(worst)}".capitalize(),
         "log": log,
+        "fleet": fleet,
         "forecasts": pd.DataFrame([_forecast(one) for one in outlooks]),
         "logs": pd.DataFrame(
             [(one.file.rsplit("/", 1)[-1], one.named.date, one.state, found_in(one)) for one in last],

@@ -41,7 +41,7 @@ COLUMNS: Sequence[Mapping[str, Any]] = (
 """Columns of the table, their widths in sizes of the page's type [rem]; 76 in all fit a screen of 1280 px."""
 
 
-def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: str) -> str:
+def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: str, home: str = "") -> str:
     """Return the page of a fleet.
 
     Parameters
@@ -52,6 +52,8 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
         Relative path of an actuator's own page, by its name.
     source : str
         What the page is of.
+    home : str
+        Path of the page of all logs, where a server has one.
     """
     counts = Counter(row.state for row in rows)
     cells = [row_cells(row) for row in rows]
@@ -59,6 +61,7 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     data = {"columns": COLUMNS, "rows": cells, "links": [links.get(row.name) for row in rows]}
     facts = {
         "source": source,
+        "home": home,
         "title": _title(counts, len(rows) - counts["failed"]),
         "sickest": [row.name for row in rows if row.state in SICK][:5],
         "counts": [(words, counts[name], name) for name, words in STATES.items() if counts[name]],

@@ -22,7 +22,16 @@ from experiments.command.terminal import note, unexpected
 from experiments.serve.answers import Comparison, Health, Log, Logs, Said, StreamHistory, StreamState, Verb, log_of
 from experiments.serve.comparison import compared
 from experiments.serve.events import MOST_LOOKING, event_stream
-from experiments.serve.limits import HEADERS, MOST_UPLOADS, Guard, RefusedError, receive_file, require_size
+from experiments.serve.limits import (
+    HEADERS,
+    MOST_UPLOADS,
+    Guard,
+    RefusedError,
+    receive_file,
+    refusal_page,
+    require_size,
+    wants_page,
+)
 from experiments.serve.metrics import PROMETHEUS_TEXT, exposition
 from experiments.serve.pages import home_page, live_page, policy_of, policy_of_file
 from experiments.serve.service import Service
@@ -54,9 +63,10 @@ _CONTROLS = re.compile(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff\u202a-\u202e\u2066-\u2
 
 
 def why(*more: int, page: bool = False) -> dict[int | str, dict[str, Any]]:
-    """Return how a request may be refused, for OpenAPI; that of a page is refused as JSON too."""
+    """Return how a request may be refused, for OpenAPI; that of a page is refused as JSON too, but to a browser."""
     schema = {"$ref": "#/components/schemas/Said"}
-    said: dict[str, Any] = {"content": {"application/json": {"schema": schema}}} if page else {"model": Said}
+    kinds = {"application/json": {"schema": schema}, "text/html": {"schema": {"type": "string"}}}
+    said: dict[str, Any] = {"content": kinds} if page else {"model": Said}
     return {one: {"description": WHY[one], **said} for one in sorted((400, 401, 403, 405, 408, 421, 429, *more))}
 
 
@@ -137,18 +147,23 @@ def methods_at(app: FastAPI, scope: Scope) -> list[str]:
 
 
 def _answer_errors(app: FastAPI) -> None:
-    async def refused(_: Request, error: Exception) -> Response:
+    def answered(request: Request, status: int, detail: str, headers: Mapping[str, str] | None = None) -> Response:
+        if wants_page(request.method, request.url.path, request.headers.get("accept", "")):
+            return HTMLResponse(refusal_page(detail), status, headers)
+        return JSONResponse({"detail": detail}, status, headers)
+
+    async def refused(request: Request, error: Exception) -> Response:
         said = error if isinstance(error, RefusedError) else RefusedError(400, str(error))
-        return JSONResponse({"detail": said.detail}, said.status, said.headers)
+        return answered(request, said.status, said.detail, said.headers)
 
     async def http(request: Request, error: Exception) -> Response:
         status = error.status_code if isinstance(error, HTTPException) else 400
         headers = {"Allow": ", ".join(methods_at(app, request.scope))} if status == 405 else None
-        return JSONResponse({"detail": WHY.get(status, str(error))}, status, headers)
+        return answered(request, status, WHY.get(status, str(error)), headers)
 
-    async def invalid(_: Request, error: Exception) -> Response:
+    async def invalid(request: Request, error: Exception) -> Response:
         found: Any = error.errors()[0] if isinstance(error, RequestValidationError) else {"loc": (), "msg": str(error)}
-        return JSONResponse({"detail": f"{' '.join(map(str, found['loc']))}: {found['msg']}"}, 422)
+        return answered(request, 422, f"{' '.join(map(str, found['loc']))}: {found['msg']}")
 
     async def strange(_: Request, error: Exception) -> Response:
         said = unexpected(error)
@@ -294,6 +309,11 @@ def _offer_pages(app: FastAPI, service: Service) -> None:
     async def fleet() -> HTMLResponse:
         """Return the page of the fleet: one row per actuator, the worst on top."""
         return shown(await service.fleet())
+
+    @app.get("/actuator", response_class=HTMLResponse, responses=why(404, 422, page=True), tags=["pages"])
+    async def actuator(name: Annotated[str, Query(min_length=1, max_length=400)]) -> HTMLResponse:
+        """Return the page of an actuator with several logs: its trends and its last logs."""
+        return shown(await service.actuator(name))
 
     @app.get("/compare", response_class=HTMLResponse, responses=why(404, 409, 422, page=True), tags=["pages"])
     async def comparison(first: Asked, second: Asked) -> HTMLResponse:

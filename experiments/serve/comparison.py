@@ -32,22 +32,33 @@ MOST_NAMED = 6
 """Quantities that a title names, at most [count]."""
 
 
-def compare_view(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
+def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities: tuple[str, str] | None = None) -> str:
     """Return the page of two logs side by side.
 
     Parameters
     ----------
     first, second : Mapping
         Their entries of the JSON contract.
+    identities : tuple of str, optional
+        By which the server has them; without, nothing is linked.
     """
     from experiments.page.render import render_page
     from experiments.page.tables import Column
 
     rows = compared(first, second)
-    logs = [{"file": one["file"], "message": sentence(one.get("message") or "")} for one in (first, second)]
+    logs = [
+        {
+            "file": one["file"],
+            "message": plain_words(one) or sentence(one.get("message") or ""),
+            "unknown": one.get("unknown"),
+        }
+        for one in (first, second)
+    ]
     facts = {
         "logs": logs,
-        "title": _title([row["quantity"] for row in rows if row["changed"]]),
+        "links": None if identities is None else [f"logs/{one}" for one in identities],
+        "turned": identities and f"compare?first={identities[1]}&second={identities[0]}",
+        "title": _title([row for row in rows if row["changed"]]),
         "quantities": _quantities_shown(rows),
         "probabilities": _probabilities_shown(first.get("probabilities") or {}, second.get("probabilities") or {}),
     }
@@ -199,10 +210,36 @@ def alike_in_digits(value: float | None, interval: Sequence[float] | None, unit:
     return [number(value), number(low, 3), number(high, 3)]
 
 
-def _title(changed: Sequence[str]) -> str:
+def plain_words(result: Mapping[str, Any]) -> str:
+    """Return the verdict of a diagnosis as its page has it, empty for any other result.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of the JSON contract.
+    """
+    from experiments.eha.plain_verdict import verdict
+    from faults.conditions import CONDITIONS
+
+    if result.get("condition") not in CONDITIONS or not result.get("probabilities"):
+        return ""
+    said = verdict(result)
+    return said if result["unknown"] else f"{said} Probability {percent_text(max(result['probabilities'].values()))} %."
+
+
+def _title(changed: Sequence[Mapping[str, Any]]) -> str:
+    """Return which quantities the second log has more of, and less."""
     if not changed:
         return "No certain difference between the two logs."
-    named = [SHOWN.get(one, one.replace("_", " ")) for one in changed[:MOST_NAMED]]
-    named += ["other quantities"] if len(changed) > MOST_NAMED else []
-    said = named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
-    return f"{said[:1].upper()}{said[1:]} {'differs' if len(named) == 1 else 'differ'} between the two logs."
+    found: list[str] = []
+    for words, sign in (("higher", 1.0), ("lower", -1.0)):
+        named = [
+            SHOWN.get(one["quantity"], one["quantity"].replace("_", " "))
+            for one in changed[:MOST_NAMED]
+            if sign * one["difference"] > 0.0
+        ]
+        if named:
+            before = f"{', '.join(named[:-1])} and " if len(named) > 1 else ""
+            found.append(f"{words} {before}{named[-1]}")
+    more = ", and other differences" if len(changed) > MOST_NAMED else ""
+    return f"The second log has {'; '.join(found)}{more}."

@@ -1,29 +1,65 @@
-"""The page of the fleet of all logs that a server has, made in a process that can be killed."""
+"""The pages of the fleet of all logs that a server has, and of an actuator, made in a process that can be killed."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
+from urllib.parse import quote
 
 from plant.errors import HydrostateError
 
+if TYPE_CHECKING:
+    from experiments.fleet.actuators import ActuatorRow
 
-def fleet_view(
-    rows: Sequence[tuple[str, str, Mapping[str, Any]]], pattern: str | None, limits: Mapping[str, float], source: str
-) -> str:
+Diagnosed: TypeAlias = Sequence[tuple[str, str, Mapping[str, Any]]]
+"""Identity, name and entries of a row of each log that was diagnosed."""
+
+
+def fleet_view(rows: Diagnosed, pattern: str | None, limits: Mapping[str, float], source: str) -> str:
     """Return the page of the fleet.
 
     Parameters
     ----------
     rows : sequence of tuple
-        Identity, name and entries of a row of each log that was diagnosed.
+        As `Diagnosed` says.
     pattern : str or None
         How logs are named.
     limits : Mapping[str, float]
         Limits of severities [their units].
     """
+    from experiments.fleet.page import fleet_page
+
+    found, pages = _actuators(rows, pattern, limits)
+    links = {
+        row.name: f"actuator?name={quote(row.name, safe='')}" if len(row.logs) > 1 else pages[row.last.file]
+        for row in found
+        if len(row.logs) > 1 or row.last.state != "failed"
+    }
+    return fleet_page(found, links, source, home=".")
+
+
+def actuator_view(rows: Diagnosed, pattern: str | None, limits: Mapping[str, float], name: str) -> str:
+    """Return the page of an actuator, empty if there is none of that name.
+
+    Parameters
+    ----------
+    rows, pattern, limits
+        As for `fleet_view`.
+    """
+    from experiments.fleet.actuator_page import actuator_page
+
+    found, pages = _actuators(rows, pattern, limits)
+    row = next((one for one in found if one.name == name), None)
+    if row is None:
+        return ""
+    return actuator_page(row, None if row.last.state == "failed" else pages[row.last.file], "fleet")
+
+
+def _actuators(
+    rows: Diagnosed, pattern: str | None, limits: Mapping[str, float]
+) -> "tuple[list[ActuatorRow], dict[str, str]]":
+    """Return the actuators, and the page of each log by its file."""
     from experiments.fleet.actuators import actuator_rows
     from experiments.fleet.naming import UNNAMED, Named, by_pattern
-    from experiments.fleet.page import fleet_page
     from experiments.fleet.rows import log_rows
 
     counts = Counter(name for _, name, _ in rows)
@@ -36,7 +72,5 @@ def fleet_view(
             names[files[identity]] = UNNAMED
     blank = dict.fromkeys(("outcome", "found_condition", "reason", "quantities", "against"))
     table = [{**blank, **entries, "verb": "diagnose", "file": files[identity]} for identity, _, entries in rows]
-    found = actuator_rows(log_rows(table, names, limits))
-    by_file = {file: identity for identity, file in files.items()}
-    links = {row.name: f"logs/{by_file[row.last.file]}" for row in found if row.last.state != "failed"}
-    return fleet_page(found, links, source)
+    pages = {file: f"logs/{identity}" for identity, file in files.items()}
+    return actuator_rows(log_rows(table, names, limits)), pages

@@ -167,7 +167,7 @@ class Jobs:
             worked = self._lost(unexpected(error), log)
         try:
             state = FAILED if worked.result["outcome"] == "failed" else DONE
-            self._store.finish(log.id, state, worked.result, worked.entries)
+            self._store.finish(log.id, state, worked.result, worked.entries, worked.said)
             if self._store.get(log.id) is None:
                 self._forget(log.id)
         except HydrostateError as error:

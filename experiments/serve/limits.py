@@ -2,6 +2,7 @@
 
 import asyncio
 import hmac
+import html
 import json
 import os
 import shutil
@@ -101,7 +102,9 @@ class Guard:
                 return
             await self._app(scope, exchange.receive, exchange.send)
         except RefusedError as refused:
-            await exchange.answer(refused.status, refused.detail, [RETRY] if refused.status == 429 else [])
+            again = [RETRY] if refused.status == 429 else []
+            page = wants_page(scope["method"], scope["path"], headers.get(b"accept", b"").decode("latin-1"))
+            await exchange.answer(refused.status, refused.detail, again, page)
         finally:
             self._busy -= 1
 
@@ -129,6 +132,28 @@ class Guard:
                 401, "a token is needed: open the address that the server printed, or send a Bearer token"
             )
         return None
+
+
+def wants_page(method: str, path: str, accept: str) -> bool:
+    """Return whether a refusal is read by a person: a browser asks for a page, a program says what it accepts.
+
+    Examples
+    --------
+    >>> wants_page("GET", "/fleet", "text/html,*/*;q=0.8"), wants_page("GET", "/fleet", "*/*")
+    (True, False)
+    """
+    return method == "GET" and "text/html" in accept and not path.startswith("/api/")
+
+
+def refusal_page(detail: str) -> str:
+    """Return the page that says why there is no other."""
+    said = html.escape(f"{detail[:1].upper()}{detail[1:].rstrip('.')}.")
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>Hydrostate: not shown</title>'
+        '<meta name="viewport" content="width=device-width"><meta name="color-scheme" content="light dark"></head>'
+        f'<body><main><h1>This page cannot be shown.</h1><p>{said}</p><p><a href="/">All logs</a></p></main></body>'
+        "</html>\n"
+    )
 
 
 def _same(given: str, token: str) -> bool:
@@ -182,11 +207,12 @@ class _Exchange:
             message = {"type": "http.response.body", "body": b"", "more_body": False}
         await self._send(message)
 
-    async def answer(self, status: int, detail: str, headers: list[tuple[bytes, bytes]]) -> None:
+    async def answer(self, status: int, detail: str, headers: list[tuple[bytes, bytes]], page: bool = False) -> None:
         if self._status:  # an answer is under way, and can no longer be another one
             return
-        body = json.dumps({"detail": detail}).encode()
-        about = [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode())]
+        body = (refusal_page(detail) if page else json.dumps({"detail": detail})).encode()
+        kind = b"text/html; charset=utf-8" if page else b"application/json"
+        about = [(b"content-type", kind), (b"content-length", str(len(body)).encode())]
         await self.send({"type": "http.response.start", "status": status, "headers": [*about, *headers]})
         await self.send({"type": "http.response.body", "body": body})
 

@@ -2,7 +2,7 @@
 
 import html
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,13 @@ from typing import Any
 from experiments.serve.settings import MB, VERBS, Settings
 
 _POLICY = re.compile(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">')
+
+WORDS: Mapping[str, str] = {
+    "diagnose": "what is wrong",
+    "estimate": "bulk modulus of the oil",
+    "inspect": "what the file contains",
+}
+"""What each verb answers."""
 
 HEAD = 4096
 """Letters of a page among which its policy stands [count]."""
@@ -39,7 +46,7 @@ def home_page(settings: Settings) -> str:
     return _rendered(
         "serve/home.html",
         (
-            ("verbs", VERBS),
+            ("verbs", tuple((verb, WORDS[verb]) for verb in VERBS)),
             ("largest", settings.largest // MB),
             ("seconds", f"{settings.seconds:g}"),
             ("streams", tuple(settings.streams)),

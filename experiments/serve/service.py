@@ -11,7 +11,7 @@ from pebble import ProcessExpired
 
 from experiments.running.refusal import refused
 from experiments.serve.comparison import compare_view
-from experiments.serve.fleet_view import fleet_view
+from experiments.serve.fleet_view import actuator_view, fleet_view
 from experiments.serve.jobs import BusyError, Jobs, log_file, page_file, phase_file
 from experiments.serve.limits import RefusedError, Room
 from experiments.serve.live import Stream, Streams
@@ -232,7 +232,26 @@ class Service:
             If one is not there or not done, or too much is asked at once.
         """
         pair = [await asyncio.to_thread(self.result, one) for one in (first, second)]
-        return await self._view(compare_view, *pair)
+        return await self._view(compare_view, *pair, (first, second))
+
+    async def actuator(self, name: str) -> str:
+        """Return the page of an actuator.
+
+        Parameters
+        ----------
+        name : str
+            As the page of the fleet has it.
+
+        Raises
+        ------
+        RefusedError
+            If no log is of that actuator, or too much is asked at once.
+        """
+        rows = await asyncio.to_thread(lambda: list(self.store.diagnosed()))
+        page = await self._view(actuator_view, rows, self.settings.pattern, dict(self.settings.limits), name)
+        if not page:
+            raise RefusedError(404, f"no log is of an actuator {name!r}")
+        return page
 
     async def _view(self, make: Any, *args: Any) -> str:
         try:

@@ -166,7 +166,12 @@ class Store:
             connection.execute("UPDATE logs SET tries = tries + 1 WHERE id = ?", (identity,))
 
     def finish(
-        self, identity: str, state: str, result: Mapping[str, Any], entries: Mapping[str, Any] | None = None
+        self,
+        identity: str,
+        state: str,
+        result: Mapping[str, Any],
+        entries: Mapping[str, Any] | None = None,
+        said: str = "",
     ) -> None:
         """Keep what came of a log; a log that was deleted meanwhile stays so.
 
@@ -178,13 +183,15 @@ class Store:
             Entries of the JSON contract, ``outcome`` and ``message`` among them.
         entries : Mapping, optional
             Those of a row of a batch, for the fleet.
+        said : str
+            The result in one sentence, if another than its ``message``.
         """
         text = json.dumps(result, allow_nan=False)
         told = None if entries is None else json.dumps(entries, allow_nan=False)
         with self._writing() as connection:
             connection.execute(
                 "UPDATE logs SET state = ?, ended = ?, outcome = ?, message = ?, result = ?, entries = ? WHERE id = ?",
-                (state, time.time(), result["outcome"], result["message"], text, told, identity),
+                (state, time.time(), result["outcome"], said or result["message"], text, told, identity),
             )
 
     def result(self, identity: str) -> dict[str, Any] | None:

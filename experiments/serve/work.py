@@ -13,6 +13,7 @@ from experiments.command.log_verb import page_of
 from experiments.command.logs import caught, overheard, read_log, with_remarks
 from experiments.command.options import load_actuator
 from experiments.command.terminal import clauses, unexpected
+from experiments.serve.comparison import plain_words
 from experiments.serve.process import bind_to_server
 from plant.atomic import replacing
 from plant.errors import HydrostateError
@@ -66,10 +67,13 @@ class Worked:
         Entries of the JSON contract.
     entries : Mapping or None
         Those of a row of a batch, where the log was diagnosed.
+    said : str
+        The result in one sentence, if another than its ``message``.
     """
 
     result: Mapping[str, Any]
     entries: Mapping[str, Any] | None
+    said: str = ""
 
 
 def begin_worker(server: int, memory: int) -> None:
@@ -113,7 +117,7 @@ def work_on(task: Task) -> Worked:
         except Exception as error:  # whatever a log brings up is told to whoever sent it
             worked = _failed(task, blank, unexpected(error))
     result = plain({"file": task.name, **with_remarks(worked.result, said)})
-    return Worked(_without_path(result, task), plain(worked.entries))
+    return Worked(_without_path(result, task), plain(worked.entries), plain_words(result))
 
 
 def _found(task: Task) -> Worked:

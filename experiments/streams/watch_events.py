@@ -19,6 +19,14 @@ STATES: Mapping[str, str] = {"start": "learning", "ready": "watching", "end": "e
 """What a watch does from an event on."""
 
 
+BALANCES: Mapping[str, str] = {
+    "flow": "the piston gets another share of the pump's flow",
+    "force": "moving the piston takes another pressure",
+    "motion": "the piston follows the pump in another way",
+}
+"""What a balance compares, as what it means that it changed."""
+
+
 class WatchEvents:
     """What is told of a watch, one entry after the other, and what has been so far, for the last one.
 
@@ -159,7 +167,7 @@ def _changed(event: "Alarm") -> str:
 
     if event.balance == SLOW:
         return f"lost flow has grown more than warm oil explains, since about {event.since:.0f} s"
-    return f"the {event.balance} balance changed at {event.since:.2f} s"
+    return f"the {event.balance} balance changed at {event.since:.2f} s: {BALANCES[event.balance]}"
 
 
 def _reading(event: "Change") -> str:

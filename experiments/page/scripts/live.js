@@ -4,7 +4,7 @@
 (() => {
   const KEPT = 2400; // gauges that are kept, as the server does
   const DRAWN = 500; // time between two drawings [ms]
-  const HEIGHT = 130; // of a chart [px]
+  const HEIGHT = 140; // of a chart [px]
   const UNITS = {
     _rad_s: ["rpm", 30 / Math.PI],
     _m_s: ["mm/s", 1e3],
@@ -43,7 +43,13 @@
 
   function showState(one) {
     const said = one.message.startsWith(one.state) ? one.message : [one.state, one.message].filter(Boolean).join(": ");
-    state.textContent = `${said[0].toUpperCase()}${said.slice(1)}.`;
+    const raised = one.events.filter((event) => event.event === "alarm");
+    const last = raised.at(-1);
+    const count = raised.length === 1 ? "1 alarm" : `${raised.length} alarms`;
+    const before = last ? `${count}, the last at ${new Date(1000 * last.received).toLocaleString()}: ${last.message}. ` : "";
+    const now = last && one.state === "watching" ? "Watching" : said;
+    state.textContent = `${before}${now[0].toUpperCase()}${now.slice(1)}.`;
+    state.classList.toggle("alarmed", raised.length > 0);
     const rows = one.events.toReversed().map((event) =>
       element(
         "tr",
@@ -81,7 +87,7 @@
     const figure = element("figure", {}, element("figcaption", {}, unit ? `${label} [${unit}]` : label));
     histories.append(figure);
     const line = { stroke: css("blue"), width: 1, points: { show: false } };
-    const axis = { stroke: css("soft"), grid: { stroke: css("line"), width: 1 }, space: 28 };
+    const axis = { stroke: css("soft"), grid: { stroke: css("line"), width: 1 }, space: 20 };
     const share = { range: (_, least, most) => [0, Math.max(100, most ?? 0)] }; // up to an alarm, at the least
     const made = new uPlot(
       {

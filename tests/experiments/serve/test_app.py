@@ -204,7 +204,7 @@ def test_two_logs_are_compared_and_the_fleet_has_both(served: Served, monkeypatc
     assert (row["difference"], row["changed"]) == (2.0, True)
     assert row["interval"] == pytest.approx(interval_95(2.0, 0.1 * 2**0.5))
     page = client.get("/compare", params={"first": pair[0], "second": pair[1]}).text
-    assert "Leakage differs between the two logs." in page
+    assert "The second log has higher leakage." in page
     assert "<b>_2" not in page
     fleet = client.get("/fleet")
     assert "1 of 2 actuators is past a limit." in fleet.text
@@ -250,3 +250,39 @@ def test_a_folder_that_cannot_be_had_ends_the_server_with_its_reason(tmp_path: P
         with pytest.raises(HydrostateError, match="the server's folder cannot be made"), TestClient(app):
             pass
         assert told is None or len(told) == 1
+
+
+@pytest.mark.parametrize(("path", "status"), [("/fleet", 404), ("/nowhere", 404), ("/compare?first=x&second=y", 422)])
+def test_a_refusal_is_a_page_for_a_browser_and_data_for_a_program(served: Served, path: str, status: int) -> None:
+    client = served()
+    page = client.get(path, headers={"Accept": "text/html,application/xhtml+xml,*/*;q=0.8"})
+    assert (page.status_code, page.headers["content-type"]) == (status, "text/html; charset=utf-8")
+    assert "<h1>This page cannot be shown.</h1>" in page.text
+    assert '<a href="/">All logs</a>' in page.text
+    assert set(client.get(path).json()) == {"detail"}
+
+
+def test_a_browser_without_the_token_reads_what_to_do(served: Served) -> None:
+    client = served(token=16 * "a")
+    page = client.get("/", params={"token": "<b>"}, headers={"Accept": "text/html"})
+    assert (page.status_code, "<b>" in page.text) == (401, False)
+    assert "A token is needed: open the address that the server printed" in page.text
+    program = client.get("/api/logs", headers={"Accept": "text/html"})
+    assert (program.status_code, set(program.json())) == (401, {"detail"})
+
+
+def test_the_page_of_an_actuator_is_served(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    from experiments.serve.work import Worked
+
+    row = {"outcome": "ok", "found_condition": "normal"}
+    said = "the verdict of its page"
+    monkeypatch.setattr(
+        "experiments.serve.jobs.work_on",
+        lambda task: Worked({"file": task.name, "outcome": "ok", "message": "it is so"}, row, said),
+    )
+    client = served(pattern="{actuator}_{date}.csv")
+    logs = [dropped(client, f"A_{day}.csv", b"a", "diagnose") for day in (1, 2)]
+    assert [client.get(f"/api/logs/{one['id']}").json()["message"] for one in logs] == [said, said]
+    page = client.get("/actuator", params={"name": "A"})
+    assert (page.status_code, page.text.count("<td>A_")) == (200, 2)
+    assert client.get("/actuator", params={"name": "B"}).status_code == 404

@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from experiments.serve.comparison import compare_view, compared, quantities_of
-from experiments.serve.fleet_view import fleet_view
+from experiments.serve.comparison import compare_view, compared, plain_words, quantities_of
+from experiments.serve.fleet_view import actuator_view, fleet_view
 
 
 def result(value: float | None, half: float | None, **more: Any) -> dict[str, Any]:
@@ -46,7 +46,7 @@ def test_the_page_of_two_logs_shows_readers_units_and_no_tag_of_a_name() -> None
     bulk = {"value": 2.0e8, "std": 1e6, "ci95": [1.98e8, 2.02e8]}
     first = {"file": "<img src=x>.csv", "message": "one", "bulk_modulus_pa": bulk, "probabilities": {"normal": 0.9}}
     page = compare_view(first, {**first, "file": "b.csv", "bulk_modulus_pa": {**bulk, "value": 1.5e8}})
-    assert "Bulk modulus differs between the two logs." in page
+    assert "The second log has lower bulk modulus." in page
     assert "200.0 (198.0 to 202.0)" in page
     assert "MPa" in page
     assert "<img src=x>" not in page
@@ -62,6 +62,56 @@ def test_logs_of_one_name_are_told_apart_and_a_date_that_is_none_leaves_a_log_wi
     assert "P_2026-99-99.csv" in page
     assert f"logs/{'3' * 16}" in page
     assert "None of 4 actuators" in page
+
+
+def test_the_title_says_what_the_second_log_has_more_of_and_less() -> None:
+    first = {"file": "a", "message": "so", "quantities": {n: {"value": 1.0, "std": 0.01, "unit": ""} for n in "abc"}}
+    values = {"a": 2.0, "b": 0.5, "c": 0.2}
+    second = {**first, "quantities": {name: {"value": one, "std": 0.01, "unit": ""} for name, one in values.items()}}
+    assert "<h1>The second log has higher a; lower b and c.</h1>" in compare_view(first, second)
+
+
+def test_a_comparison_leads_to_both_logs_back_and_the_other_way_round() -> None:
+    one = {"file": "a.csv", "message": "so"}
+    page = compare_view(one, {**one, "file": "b.csv"}, ("0" * 16, "1" * 16))
+    for link in (f"logs/{'0' * 16}", f"logs/{'1' * 16}", ".", f"compare?first={'1' * 16}&amp;second={'0' * 16}"):
+        assert f'href="{link}"' in page
+    assert "href" not in compare_view(one, one).split("<nav")[0].split("<header")[1]
+
+
+def test_a_diagnosis_is_told_in_the_words_of_its_page_and_an_unknown_one_with_a_warning() -> None:
+    leaks = {
+        "file": "a.csv",
+        "message": "so",
+        "condition": "minor_leakage",
+        "unknown": False,
+        "notes": [],
+        "reasons": [],
+    }
+    shares = {"minor_leakage": 0.97, "normal": 0.03}
+    said = "The actuator leaks inside more than it should (minor leakage); friction is normal. Probability 97.0 %."
+    assert plain_words({**leaks, "probabilities": shares}) == said
+    assert plain_words({"condition": None, "message": "no"}) == plain_words({"message": "2 GPa"}) == ""
+    doubtful = {**leaks, "unknown": True, "probabilities": shares}
+    assert "Probability" not in plain_words(doubtful)
+    page = compare_view(leaks, doubtful)
+    assert page.count("Do not rely on its numbers") == 1
+
+
+def test_an_actuator_of_several_logs_has_a_page_with_its_last_logs() -> None:
+    row = {"outcome": "ok", "found_condition": "normal"}
+    rows = [(f"{day}" * 16, f"P 1_2026-01-0{day}.csv", row) for day in (1, 2)]
+    named = ("{actuator}_{date}.csv", dict[str, float]())
+    fleet = fleet_view([*rows, ("3" * 16, "Q_2026-01-03.csv", row)], *named, "here")
+    assert "actuator?name=P%201" in fleet
+    assert f"logs/{'3' * 16}" in fleet
+    assert '<a href=".">All logs</a>' in fleet
+    assert "--pages" not in fleet
+    page = actuator_view(rows, *named, "P 1")
+    assert page.count("P 1_2026-01-0") == 2
+    assert f'href="logs/{"2" * 16}"' in page
+    assert 'href="fleet"' in page
+    assert actuator_view(rows, *named, "none") == ""
 
 
 def test_what_has_no_value_is_shown_as_missing_and_what_is_no_quantity_is_left_out() -> None:

@@ -3,6 +3,7 @@
 `python -m benchmarks server` measures the same at full length.
 """
 
+import json
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -184,6 +185,25 @@ def test_an_answer_that_comes_late_does_not_undo_a_newer_one(opened: Any, tmp_pa
         route.fulfill(response=old)
     page.wait_for_timeout(100)
     assert "failed" in row.inner_text(timeout=PATIENCE)
+
+
+@pytest.mark.parametrize(("raised", "begin"), [(0, "Watching: learning is over."), (2, "2 alarms, the last at ")])
+def test_an_alarm_stays_in_the_heading_of_the_live_view(opened: Any, raised: int, begin: str) -> None:
+    alarm = {"event": "alarm", "time_s": 9.0, "received": 1.7e9, "message": "the flow balance changed"}
+    ready = {"event": "ready", "time_s": 5.0, "received": 1.7e9, "message": "learning is over"}
+    told = {"name": "bench", "state": "watching", "message": "learning is over", "gauges": None, "history": []}
+    body = f"event: history\ndata: {json.dumps({**told, 'events': [ready, *[alarm] * raised]})}\n\n"
+    page = opened("live")
+    page.route("**/events", lambda route: route.fulfill(content_type="text/event-stream", body=body))
+    page.add_init_script(  # the answer ends at once, which is no matter here
+        "addEventListener('DOMContentLoaded', () => new MutationObserver((all) => all.forEach((one) => {"
+        "window.said ??= one.target.textContent }))"
+        ".observe(document.querySelector('.live-state'), { childList: true }))"
+    )
+    page.reload()
+    page.wait_for_function("window.said !== undefined")
+    assert page.evaluate("window.said").startswith(begin)
+    assert page.locator(".live-state").evaluate("one => one.classList.contains('alarmed')") is (raised > 0)
 
 
 def test_the_live_view_shows_gauges_and_what_the_watch_tells(opened: Any) -> None:
