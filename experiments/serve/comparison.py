@@ -66,12 +66,11 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
     headed = {
         "quantities": (
             "quantity",
+            Column("says", "verdict"),
             Column("first", names[0]),
             Column("second", names[1]),
             "difference",
             Column("interval", "95 % interval of the difference"),
-            "unit",
-            Column("says", "verdict"),
         ),
         "probabilities": ("condition", Column("first", names[0], "%"), Column("second", names[1], "%")),
     }
@@ -83,7 +82,6 @@ def _quantities_shown(rows: Sequence[Mapping[str, Any]]) -> "pd.DataFrame":
 
     shown = [
         {
-            "quantity": SHOWN.get(row["quantity"], row["quantity"].replace("_", " ")),
             **_in_a_readers_unit(row),
             "says": "changed" if row["changed"] else "no certain change" if row["interval"] else "not in both logs",
         }
@@ -166,6 +164,7 @@ def std_of(one: Mapping[str, Any]) -> float | None:
 
 def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:
     scale, unit = shop_unit(row["unit"])
+    named = SHOWN.get(row["quantity"], row["quantity"].replace("_", " "))
 
     def amount(one: Mapping[str, Any] | None) -> str:
         if one is None or one.get("value") is None:
@@ -183,7 +182,7 @@ def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:
         "second": amount(row["second"]),
         "difference": shown,
         "interval": " to ".join(ends) or MISSING,
-        "unit": pretty_unit(unit),
+        "quantity": f"{named} [{pretty_unit(unit)}]" if unit else named,
     }
 
 

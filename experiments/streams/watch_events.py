@@ -132,11 +132,12 @@ class WatchEvents:
         outcome : str
             ``ok``, ``failed`` or ``interrupted``.
         message : str
-            Why; the count of alarms where it is empty.
+            Why; the count of alarms where it is empty, and beside it after an interruption.
         """
         if self.watch is not None:
             seconds = self.watch.last - self.began
-            message = message or f"{self.alarms} alarms in {seconds:.1f} s"
+            counted = f"{self.alarms} {'alarm' if self.alarms == 1 else 'alarms'} in {seconds:.1f} s"
+            message = f"{message}; {counted}" if outcome == "interrupted" else message or counted
             if outcome == "ok" and not self._armed:
                 message += "; the stream ended before learning was over, so no alarm was possible"
         time = None if self.watch is None else self.watch.last

@@ -1,5 +1,6 @@
 """A watch on a terminal: how far each balance is from an alarm, what the channels read, the last events."""
 
+import math
 import sys
 import time
 from collections.abc import Generator, Mapping
@@ -23,6 +24,15 @@ CALM, NEAR = 0.5, 0.8
 
 BAR = 30
 """Length of a bar [characters]."""
+
+
+UNITS: Mapping[str, tuple[str, float]] = {
+    "_rad_s": ("rpm", 30.0 / math.pi),
+    "_m_s": ("mm/s", 1e3),
+    "_m": ("mm", 1e3),
+    "_pa": ("bar", 1e-5),
+}
+"""Endings of channels: the unit that a reader gets, and the factor from SI."""
 
 
 @contextmanager
@@ -68,13 +78,27 @@ def drawn(told: Watched) -> "Group":
         balances = Table("balance", "towards an alarm", "[%]", box=None)
         for name, score in gauges["scores"].items():
             balances.add_row(name, *_bar(score, gauges["thresholds"][name]))
-        channels = Table("channel", "now", box=None)
+        channels = Table("channel", "now", "unit", box=None)
         for name, value in gauges["values"].items():
-            channels.add_row(name, "-" if value is None else f"{value:.5g}")
+            channels.add_row(*_reading(name, value))
         lines += [balances, channels]
     events = [one for one in list(told.last_events) if one["event"] != "alive"][-EVENTS:]
-    lines += [Text(f"{one['clock'][11:19]} UTC  {one['event']}: {visible(str(one['message']))}") for one in events]
+    lines += [
+        Text(
+            f"{one['clock'][11:19]} UTC  {one['event']}: {visible(str(one['message']))}",
+            style="bold red" if one["event"] == "alarm" else "",
+        )
+        for one in events
+    ]
     return Group(*lines)
+
+
+def _reading(channel: str, value: float | None) -> tuple[str, str, str]:
+    """Return what a channel is called, what it reads and in which unit, as the server's live view has them."""
+    ending = next((one for one in UNITS if channel.endswith(one)), "")
+    unit, factor = UNITS.get(ending, ("", 1.0))
+    words = channel.removesuffix(ending).replace("_", " ")
+    return words, "-" if value is None else f"{factor * value:.4g}", unit
 
 
 def _standing(state: Mapping[str, Any], alarms: int) -> str:

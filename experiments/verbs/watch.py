@@ -37,7 +37,8 @@ def watch(
         str,
         argument(
             "LOG",
-            "A log, tcp://HOST:PORT, mqtt://HOST/TOPIC, ring:PATH, or - for CSV on standard input: a header, then "
+            "A log (it is read to its end; a file that still grows is followed as in the example), tcp://HOST:PORT, "
+            "mqtt://HOST/TOPIC, ring:PATH, or - for CSV on standard input: a header, then "
             "rows of time_s, motor_speed_rad_s, and position_m or velocity_m_s; differential_pressure_pa is optional.",
         ),
     ],

@@ -71,7 +71,7 @@
       {},
       named,
       element("td", { "data-head": "state", class: log.state === "failed" ? "bad" : "" }, `${stateWords(log)} (${log.verb})`),
-      element("td", { "data-head": "verdict" }, log.message ?? "", ...advice(log)),
+      element("td", { "data-head": "verdict" }, (log.message ?? "").replaceAll(" %", "\u00a0%"), ...advice(log)),
       element("td", { "data-head": "compare" }, tick),
       element("td", { "data-head": "delete" }, remove),
     );

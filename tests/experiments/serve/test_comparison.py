@@ -48,7 +48,7 @@ def test_the_page_of_two_logs_shows_readers_units_and_no_tag_of_a_name() -> None
     page = compare_view(first, {**first, "file": "b.csv", "bulk_modulus_pa": {**bulk, "value": 1.5e8}})
     assert "The second log has lower bulk modulus." in page
     assert "200.0 (198.0 to 202.0)" in page
-    assert "MPa" in page
+    assert "bulk modulus [MPa]" in page
     assert "<img src=x>" not in page
     assert "No certain difference" in compare_view(first, first)
 

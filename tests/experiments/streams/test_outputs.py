@@ -142,8 +142,8 @@ def test_the_view_shows_gauges_values_and_events_and_no_control_character() -> N
     assert "watching, 5.0 s of the stream, 2 rows, 1 alarm" in shown
     assert re.search(r"flow +#{8}\.{22} +25", shown)
     assert re.search(r"motion +still learning", shown)
-    assert re.search(r"position_m +0\.25", shown)
-    assert re.search(r"velocity_m_s +-", shown)
+    assert re.search(r"position +250 +mm", shown)
+    assert re.search(r"velocity +- +mm/s", shown)
     assert "ready: learning is over, alarms are possible from now on" in shown
     assert "\x1b" not in shown
 

@@ -1,5 +1,6 @@
 """Events of a watch as entries: what an alarm says of its cause, and what is not known."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -36,3 +37,21 @@ def test_what_a_change_did_to_lost_flow_and_pressure_is_in_percent_or_is_not_kno
     assert blind["lost_flow_percent"] == {"before": None, "after": None}
     assert blind["pressure_change_percent"] is None
     assert "the cause of the change is not known" in blind["message"]
+
+
+@pytest.mark.parametrize(
+    ("outcome", "why", "words"),
+    [
+        ("ok", "", "1 alarm in 12.0 s"),
+        ("interrupted", "interrupted", "interrupted; 1 alarm in 12.0 s"),
+        ("failed", "no", "no"),
+    ],
+)
+def test_the_end_counts_the_alarms_whoever_ended_it(outcome: str, why: str, words: str) -> None:
+    lines: list[dict[str, Any]] = []
+    events = WatchEvents(lines.append)
+    watch: Any = SimpleNamespace(last=12.0, thresholds=(1.0,), balances=("flow",))
+    events.watch = watch
+    events.events([alarm("flow")])
+    events.end(outcome, why)
+    assert lines[-1]["message"] == words
