@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from functools import partial
+from posixpath import commonpath
 from typing import Any
 
 import pandas as pd
@@ -11,7 +12,8 @@ from experiments.batch.compare import in_sentences
 from experiments.batch.figures import way_in_words
 from experiments.batch.summary import MOST_LISTED, NEAR_PERCENT
 from experiments.page.frames import Tables
-from experiments.page.numbers import MISSING, number, pretty_unit
+from experiments.page.names_shown import SHOWN
+from experiments.page.numbers import MISSING, decimals_of, fixed, number, pretty_unit, shop_unit
 from experiments.page.render import render_page
 from experiments.page.tables import Cell, Column, decimals
 from experiments.page.words import in_words
@@ -22,15 +24,20 @@ def _or_dash(value: Any) -> str:
 
 
 def _quantities(text: Any) -> str:
-    """Return what was found of an actuator that is not the gear-pump one: every quantity with its interval."""
+    """Return what was found: severities of a log without their intervals, which the CSV file has, others with them."""
     if pd.isna(text):
         return MISSING
     told = {name: one for name, one in json.loads(text).items() if one["value"] is not None}
-    return "; ".join(
-        f"{name.replace('_', ' ')} {number(one['value'])} {pretty_unit(one['unit']).removeprefix('1')}"
-        + (f" ({number(one['ci95'][0])} to {number(one['ci95'][1])})" if one["ci95"] else "")
-        for name, one in told.items()
-    )
+    return "; ".join(f"{SHOWN.get(name, name.replace('_', ' '))} {_amount(one)}" for name, one in told.items())
+
+
+def _amount(one: Mapping[str, Any]) -> str:
+    scale, unit = shop_unit(one["unit"])
+    ends = [scale * end for end in one["ci95"] or () if end is not None]
+    if "healthy" in one and len(ends) == 2:
+        return f"{fixed(scale * one['value'], decimals_of(*ends))} {pretty_unit(unit)}"
+    told = f"{number(scale * one['value'])} {pretty_unit(unit).removeprefix('1')}"
+    return f"{told} ({number(ends[0])} to {number(ends[1])})" if len(ends) == 2 else told
 
 
 _text = partial(Column, words=_or_dash)
@@ -120,7 +127,24 @@ def render_batch_report(manifest: Mapping[str, Any], tables: Tables, files: Mapp
 def _shown(table: pd.DataFrame) -> pd.DataFrame:
     """Return the rows that the page lists, each with its method in words."""
     head = table.head(MOST_LISTED)
+    if "file" in head:
+        head = head.assign(file=below_one_folder(head["file"].tolist()))
     return head.assign(way=[way_in_words(row) for row in head.to_dict("records")]) if "pressure" in head else head
+
+
+def below_one_folder(files: Sequence[Any]) -> list[Any]:
+    """Return paths without the folder that they share, which is of one machine; what is no path stays.
+
+    Examples
+    --------
+    >>> below_one_folder(["/home/ann/logs/a/1.csv", "/home/ann/logs/b/2.csv", None])
+    ['a/1.csv', 'b/2.csv', None]
+    """
+    folders = [file.rpartition("/")[0] for file in files if isinstance(file, str)]
+    shared = (
+        f"{commonpath(folders)}/" if folders and all(folders) and len({one[:1] == "/" for one in folders}) == 1 else ""
+    )
+    return [file.removeprefix(shared) if isinstance(file, str) else file for file in files]
 
 
 def render_comparison(table: pd.DataFrame, names: Sequence[str]) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from experiments.eha.plain_verdict import sureness, verdict, what_to_do
+from experiments.eha.plain_verdict import of_another_size, sureness, verdict, what_to_do
 from experiments.eha.verdict_words import SHOWN, amount, library_sentence
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.page.charts import Charts
@@ -45,6 +45,7 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "title": verdict(result),
         "to_do": what_to_do(result),
         "sureness": sureness(result),
+        "another_size": of_another_size(result),
         "library": library_sentence(result),
         "not_told": [sentence(said) for said in result["not_told"]],
         "warnings": [

@@ -13,6 +13,9 @@ from faults.notes import AdviceCode, AgainstCode
 SURE, LIKELY = 0.99, 0.8
 """Probabilities from which a verdict is called certain, and probable [probability]."""
 
+MAJOR = 2.0
+"""Size of a fault from which it is treated as major, where 1 is minor [dimensionless]."""
+
 TOLD = 0.5
 """Probability of other levels from which one of leakage, or of friction, is not told [probability]."""
 
@@ -107,13 +110,28 @@ def _outside(result: Mapping[str, Any]) -> list[str]:
 def _named(result: Mapping[str, Any]) -> list[str]:
     """Return what is wrong though it is none of the nine conditions: faults by name, else a size between theirs."""
     found = _outside(result)
-    for one in result["notes"] if not found else ():
-        if one["code"] == str(AgainstCode.BETWEEN_CONDITIONS):
-            words = {"leakage": "leaks more inside", "friction": "has more friction"}
-            raised = [said for name, said in words.items() if one["data"][name] > 0.0]
-            if raised:
-                found.append(f"The actuator {' and '.join(raised)} than a healthy one, or a sensor has a wrong gain.")
+    words = {"leakage": "leaks more inside", "friction": "has more friction"}
+    raised = [words[name] for name in _raised(result)] if not found else []
+    if raised:
+        found.append(f"The actuator {' and '.join(raised)} than a healthy one, or a sensor has a wrong gain.")
     return found
+
+
+def _raised(result: Mapping[str, Any]) -> dict[str, float]:
+    """Return what is raised to another size than minor or major: 1 is minor, 2 is major [dimensionless]."""
+    sizes = [one["data"] for one in result["notes"] if one["code"] == str(AgainstCode.BETWEEN_CONDITIONS)]
+    return {name: size for data in sizes for name, size in data.items() if size > 0.0}
+
+
+def of_another_size(result: Mapping[str, Any]) -> bool:
+    """Return whether a circuit fits the log, and nothing but the size of its faults is in none of the nine conditions.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of a diagnosis with probabilities.
+    """
+    return result["unknown"] and len(result["reasons"]) == 1 and not _outside(result) and bool(_raised(result))
 
 
 def sureness(result: Mapping[str, Any]) -> str:
@@ -131,6 +149,12 @@ def sureness(result: Mapping[str, Any]) -> str:
     """
     if result["unknown"]:
         reasons = "; ".join(result["reasons"])
+        if of_another_size(result):
+            sizes = " and ".join(f"{name} {size:g}" for name, size in _raised(result).items())
+            return (
+                "The size is none of those of the nine conditions: to the nearest quarter, it is "
+                f"{sizes}, where 1 is minor and 2 is major."
+            )
         if _named(result):
             return f"This is none of the nine conditions, so do not rely on the numbers below: {reasons}."
         return f"Do not rely on anything on this page: {reasons}."
@@ -198,6 +222,10 @@ def work_on(result: Mapping[str, Any]) -> list[str]:
     list[str]
         Empty where the verdict is unknown or leaves leakage or friction open, and where only the oil is soft.
     """
+    if of_another_size(result):
+        works = {"leakage": WORK_ON_LEAKAGE, "friction": WORK_ON_FRICTION}
+        work = [works[name]["minor" if size < MAJOR else "major"] for name, size in _raised(result).items()]
+        return ["Check the gains of the sensors against the rig file. If they are right:", *work]
     if result["unknown"]:
         return []
     levels = _levels(result)

@@ -3,8 +3,11 @@
 import json
 
 import numpy as np
+import pyarrow as pa
 
-from experiments.batch.pages import _or_dash, _quantities
+from experiments.batch.pages import _or_dash, _quantities, render_batch_report
+from experiments.batch.rows import SCHEMA
+from experiments.batch.summary import frame_of, summary_tables
 from experiments.page.numbers import MISSING
 
 
@@ -24,3 +27,21 @@ def test_quantities_are_told_with_their_intervals_and_those_without_a_value_are_
 def test_what_is_not_there_is_a_dash() -> None:
     assert _quantities(None) == _quantities(np.nan) == MISSING
     assert [_or_dash(one) for one in (None, np.nan, "", "normal")] == [MISSING] * 3 + ["normal"]
+
+
+def test_what_was_found_in_a_log_is_short_and_its_path_names_no_machine() -> None:
+    noise = {"value": 1.1e-15, "unit": "%", "ci95": [-0.025, 0.027], "healthy": 0.0}
+    found = {
+        "velocity_lost": noise,
+        "bulk_modulus": {**noise, "value": 2.0673e8, "unit": "Pa", "ci95": [2.061e8, 2.073e8]},
+    }
+    rows = [
+        {"plant": "log", "file": f"/home/ann/logs/{name}.csv", "verb": "diagnose", "outcome": "ok"} for name in "ab"
+    ]
+    rows[0]["quantities"] = json.dumps(found)
+    table = frame_of(pa.Table.from_pylist(rows, schema=SCHEMA))
+    manifest = dict.fromkeys(("study", "question", "source", "config_hash", "rig", "python", "machine", "commit"), "x")
+    page = render_batch_report({**manifest, "cases": 2, "versions": {}}, summary_tables(table), {}, 2)
+    assert "velocity lost 0.000 %; bulk modulus 206.7 MPa" in page.replace("\N{NO-BREAK SPACE}", " ")
+    assert "/home/ann" not in page
+    assert '<td data-head="log">a.csv</td>' in page

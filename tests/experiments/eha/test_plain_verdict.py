@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from estimation.notes import RigCode
-from experiments.eha.plain_verdict import sureness, verdict, what_to_do
+from experiments.eha.plain_verdict import sureness, verdict, what_to_do, work_on
 from faults.conditions import CONDITIONS
 from faults.notes import AdviceCode, AgainstCode
 
@@ -49,8 +49,22 @@ def test_a_fault_of_another_size_is_in_the_verdict(leakage: float, friction: flo
     note = AgainstCode.BETWEEN_CONDITIONS.note(leakage=leakage, friction=friction)
     result = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=[str(note)])
     assert verdict(result).startswith(said)
-    assert "do not rely on the numbers" in sureness(result) or leakage == friction == 0.0
+    fits = leakage > 0.0 or friction > 0.0
+    assert (
+        sureness(result).startswith("The size is none of those of the nine conditions: to the nearest quarter, it is ")
+        is fits
+    )
+    assert ("Check the gains of the sensors" in work_on(result)[0] if fits else work_on(result) == []) is True
+    assert any("pump and piston seal" in one for one in work_on(result)) is (leakage > 0.0)
+    assert any("guides and alignment" in one for one in work_on(result)) is (friction > 0.0)
     assert "to the nearest quarter" in str(note)
+
+
+def test_a_size_beside_another_reason_is_no_ground_for_work() -> None:
+    note = AgainstCode.BETWEEN_CONDITIONS.note(leakage=0.5, friction=0.0)
+    result = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=[str(note), "the pressure froze"])
+    assert work_on(result) == []
+    assert "do not rely on the numbers" in sureness(result)
 
 
 def test_a_fault_that_has_a_name_comes_before_its_size() -> None:
