@@ -69,7 +69,7 @@ def actuator_page(row: ActuatorRow, log: str | None, fleet: str = "../index.html
     last = [*row.logs][-MOST_LOGS:][::-1]
     facts = {
         "name": row.name,
-        "title": f"{row.name}: {STATES[row.state]}.",
+        "title": f"{row.name}: {STATES[row.state]}{f' ({found_in(row.last)})' if row.last.between else ''}.",
         "outlook": "" if worst is None else f"{SHOWN.get(worst.name, worst.name)}: {_in_full(worst)}".capitalize(),
         "log": log,
         "fleet": fleet,

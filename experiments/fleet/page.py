@@ -24,6 +24,9 @@ UNREAD = ("log", "actuator", "why")
 LEVELS = ("none", "minor", "major")
 """Levels of leakage and friction, by size."""
 
+MOST_NAMED = 5
+"""Actuators that are named above the table [count]."""
+
 SICK = ("over", "likely")
 """States of actuators that need work."""
 
@@ -62,8 +65,8 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     facts = {
         "source": source,
         "home": home,
-        "title": _title(counts, len(rows) - counts["failed"]),
-        "sickest": [row.name for row in rows if row.state in SICK][:5],
+        "title": title_of(rows),
+        "sickest": sickest_of(rows),
         "counts": [(words, counts[name], name) for name, words in STATES.items() if counts[name]],
         "logs": sum(len(row.logs) for row in rows),
         "data": data_block(data),
@@ -88,16 +91,37 @@ def _unread_in(row: ActuatorRow) -> list[LogRow]:
     return [] if row.last.state == "failed" else [one for one in row.logs if one.state == "failed"]
 
 
-def _title(counts: Mapping[str, int], total: int) -> str:
-    """Return how many of those actuators are sick whose logs could be read."""
+def sickest_of(rows: Sequence[ActuatorRow]) -> list[str]:
+    """Return the names with which to begin: those past a limit, else those nearing one, five at most.
+
+    Parameters
+    ----------
+    rows : sequence of ActuatorRow
+        The sickest first.
+    """
+    sick = [row.name for row in rows if row.state in SICK]
+    return (sick or [row.name for row in rows if row.state == "alarm"])[:MOST_NAMED]
+
+
+def title_of(rows: Sequence[ActuatorRow]) -> str:
+    """Return how many of those actuators are sick whose logs could be read.
+
+    Parameters
+    ----------
+    rows : sequence of ActuatorRow
+        In any order.
+    """
+    counts = Counter(row.state for row in rows)
+    total = len(rows) - counts["failed"]
     sick = sum(counts[name] for name in SICK)
+    near = f"; {counts['alarm']} {'nears' if counts['alarm'] == 1 else 'near'} one" if counts["alarm"] else ""
     if not total:
         return "No log could be read."
     if total == 1:
-        return f"The actuator is past {'a' if sick else 'no'} limit."
+        return "The actuator nears a limit." if near else f"The actuator is past {'a' if sick else 'no'} limit."
     if not sick:
-        return f"None of {total} actuators is past a limit."
-    return f"{sick} of {total} actuators {'is' if sick == 1 else 'are'} past a limit."
+        return f"None of {total} actuators is past a limit{near}."
+    return f"{sick} of {total} actuators {'is' if sick == 1 else 'are'} past a limit{near}."
 
 
 def row_cells(row: ActuatorRow) -> list[Any]:

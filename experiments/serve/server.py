@@ -72,6 +72,9 @@ def run_server(settings: Settings, say: Callable[[str], None]) -> None:
             raise refusals[0]
 
 
+ANYWHERE = ("0.0.0.0", "::")  # noqa: S104 - hosts that another machine cannot open under this name
+
+
 class _Speaking(uvicorn.Server):
     """A server that says when it listens."""
 
@@ -103,7 +106,8 @@ def _listening(settings: Settings) -> socket.socket:
 
 def _address(settings: Settings, listener: socket.socket) -> str:
     port = listener.getsockname()[1]
-    host = f"[{settings.host}]" if ":" in settings.host else settings.host
+    name = socket.gethostname() if settings.host in ANYWHERE else settings.host
+    host = f"[{name}]" if ":" in name else name
     token = f"?token={settings.token}" if settings.token else ""
     sys.stdout.flush()
     return f"http://{host}:{port}/{token}"

@@ -60,7 +60,7 @@ def fleet(
     from experiments.fleet.actuators import actuator_rows
     from experiments.fleet.log_pages import write_pages
     from experiments.fleet.outlook import read_maintenance
-    from experiments.fleet.page import fleet_page
+    from experiments.fleet.page import fleet_page, sickest_of, title_of
     from experiments.fleet.rows import log_rows
 
     limits, repairs = limits_of_options(limit or []), read_maintenance(maintenance)
@@ -86,6 +86,8 @@ def fleet(
     total = sum(len(row.logs) for row in rows)
     if failed:
         note(f"{failed} of {total} logs could not be read; the page says why")
+    first = sickest_of(rows)
+    note(title_of(rows) + (f" Start with {', '.join(first)}." if first else ""))
     emit(f"{out / PAGE}")
     if failed:
         raise typer.Exit(USAGE if failed == total else SOME_FAILED)

@@ -18,6 +18,7 @@
   let begun = 0; // looks so far
   let newest = 0; // the latest of them that was shown
   let shown = "";
+  let refused = ""; // what was not done last; it stays in sight until something else is asked
 
   function element(tag, attributes = {}, ...children) {
     const made = document.createElement(tag);
@@ -61,10 +62,10 @@
     const remove = element("button", { type: "button", "aria-label": `Delete ${log.name}` }, "Delete");
     remove.addEventListener("click", async () => {
       if (!window.confirm(`Delete ${log.name} and what came of it?`)) return;
-      const refused = await removed(log.id);
+      const why = await removed(log.id);
+      refused = why ? `${log.name} was not deleted: ${why}` : "";
       ticked.delete(log.id);
       await look();
-      if (refused) status.textContent = `${log.name} was not deleted: ${refused}`;
     });
     return element(
       "tr",
@@ -127,7 +128,8 @@
       older.hidden = logs.length >= total;
       comparing.disabled = ticked.size !== 2;
       if (!coming.size) {
-        status.textContent = total ? `${total} ${total === 1 ? "log" : "logs"}, ${counts.unfinished ?? 0} not finished yet.` : "No log yet.";
+        const counted = total ? `${total} ${total === 1 ? "log" : "logs"}, ${counts.unfinished ?? 0} not finished yet.` : "No log yet.";
+        status.textContent = refused ? `${refused.replace(/\.$/, "")}. ${counted}` : counted;
       }
     } catch (error) {
       status.textContent = `The server does not answer: ${error.message}`;
@@ -164,9 +166,23 @@
     });
   }
 
+  async function isFile(file) { // a folder that is dropped has no content
+    try {
+      await file.slice(0, 1).arrayBuffer();
+      return true;
+    } catch {
+      return false;
+    }
+  }
+
   async function take(files) {
     const refusals = [];
+    refused = "";
     for (const file of files) {
+      if (!(await isFile(file))) {
+        refusals.push(`${file.name}: is a folder, or cannot be read; drop the files themselves`);
+        continue;
+      }
       status.textContent = `Sending ${file.name}.`;
       look();
       let said = await send(file, verb.value);
@@ -178,18 +194,21 @@
       if (said) refusals.push(`${file.name}: ${said}`);
       await look();
     }
-    if (refusals.length) status.textContent = `Not taken: ${refusals.join("; ")}`;
+    if (refusals.length) refused = `Not taken: ${refusals.join("; ")}`;
+    if (refused) await look();
   }
 
   const field = holder.querySelector(".drop-here");
-  for (const kind of ["dragenter", "dragover"]) {
-    field.addEventListener(kind, (event) => {
+  for (const kind of ["dragenter", "dragover"]) { // beside the field too, where a browser would open the file instead
+    window.addEventListener(kind, (event) => {
       event.preventDefault();
       field.classList.add("over");
     });
   }
-  field.addEventListener("dragleave", () => field.classList.remove("over"));
-  field.addEventListener("drop", (event) => {
+  window.addEventListener("dragleave", (event) => {
+    if (!event.relatedTarget) field.classList.remove("over");
+  });
+  window.addEventListener("drop", (event) => {
     event.preventDefault();
     field.classList.remove("over");
     take([...event.dataTransfer.files]);

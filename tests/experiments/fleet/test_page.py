@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from experiments.fleet.actuators import actuator_rows
+from experiments.fleet.actuators import ActuatorRow, actuator_rows
 from experiments.fleet.log_pages import file_name, write_pages
 from experiments.fleet.naming import by_pattern
-from experiments.fleet.page import fleet_page, row_cells
+from experiments.fleet.page import fleet_page, row_cells, sickest_of, title_of
 from experiments.fleet.rows import log_rows
 from tests.experiments.fleet.conftest import between, store_row
 
@@ -28,6 +28,20 @@ def test_the_page_says_how_many_are_sick_and_with_which_to_begin() -> None:
     page = page_of(9)
     assert "<h1>2 of 9 actuators are past a limit.</h1>" in page
     assert "Start with P-5, P-1." in page
+
+
+def test_actuators_that_near_a_limit_are_in_the_title_and_named_where_none_is_past_one() -> None:
+    def row(name: str, state: str) -> ActuatorRow:
+        (log,) = log_rows([store_row(f"{name}.csv", 1.0)], {}, {})
+        made = ActuatorRow(name, (log,))
+        vars(made)["state"] = state
+        return made
+
+    near, sound, sick = row("A", "alarm"), row("B", "within"), row("C", "over")
+    assert (title_of([near]), sickest_of([near])) == ("The actuator nears a limit.", ["A"])
+    assert title_of([near, sound]) == "None of 2 actuators is past a limit; 1 nears one."
+    assert title_of([sick, near, near]) == "1 of 3 actuators is past a limit; 2 near one."
+    assert sickest_of([sick, near]) == ["C"]
 
 
 def test_what_cannot_be_read_is_no_actuator_within_limits() -> None:

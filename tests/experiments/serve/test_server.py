@@ -164,6 +164,24 @@ def test_a_log_that_the_server_does_not_delete_stays_and_the_page_says_why(opene
     row.wait_for(state="detached", timeout=PATIENCE)
 
 
+def test_a_log_may_be_dropped_anywhere_and_a_refusal_stays_in_sight(opened: Any) -> None:
+    page = opened("home")
+    drop = """([name, text]) => {
+        const files = new DataTransfer();
+        files.items.add(new File([text], name));
+        document.body.dispatchEvent(new DragEvent("drop", { dataTransfer: files, bubbles: true, cancelable: true }));
+    }"""
+    page.evaluate(drop, ["empty.csv", ""])
+    page.get_by_text("Not taken: empty.csv: the body must be the file itself, but it is empty.").wait_for(
+        timeout=PATIENCE
+    )
+    page.wait_for_timeout(1500)  # the list is looked at meanwhile
+    assert "Not taken: empty.csv" in page.get_by_role("status").inner_text()
+    page.evaluate(drop, ["dropped beside.csv", "a,b\n1,2\n3,4\n"])
+    page.locator("tr", has_text="dropped beside.csv").locator("td", has_text="failed").wait_for(timeout=PATIENCE)
+    assert "Not taken" not in page.get_by_role("status").inner_text()
+
+
 def test_an_answer_that_comes_late_does_not_undo_a_newer_one(opened: Any, tmp_path: Path) -> None:
     """A log that had failed was shown as waiting again, until the server was next asked."""
     page, asked, held = opened("home"), list[Any](), list[Any]()

@@ -1,6 +1,7 @@
 """Pages over many logs are made once, and anew where that helps; files of logs that are kept stay."""
 
 import asyncio
+import socket
 from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
@@ -11,6 +12,7 @@ from pebble import ProcessExpired
 
 from experiments.serve.jobs import BusyError, log_file, page_file
 from experiments.serve.limits import RefusedError
+from experiments.serve.server import _address  # pyright: ignore[reportPrivateUsage]
 from experiments.serve.service import Service
 from experiments.serve.settings import Settings
 from experiments.serve.store import DONE, FAILED
@@ -176,3 +178,16 @@ def test_a_folder_that_could_not_be_opened_is_free_for_the_next_server(tmp_path:
     again = Service(settings)
     again.open()
     again.close()
+
+
+@pytest.mark.parametrize(
+    ("host", "begin"),
+    [("127.0.0.1", "http://127.0.0.1:"), ("0.0.0.0", f"http://{socket.gethostname()}:"), ("::1", "http://[::1]:")],  # noqa: S104
+)
+def test_the_address_that_is_printed_can_be_opened_where_the_server_can_be_reached(host: str, begin: str) -> None:
+    token = None if host.startswith(("127", "::1")) else 16 * "a"
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        said = _address(Settings(folder=Path("kept"), host=host, token=token), listener)
+    assert said.startswith(begin)
+    assert ("?token=" in said) is (token is not None)

@@ -43,6 +43,7 @@ def test_a_folder_of_logs_becomes_a_page_with_the_sick_one_first(tmp_path: Path)
     code, out, said = invoke("fleet", logs, *named, "--out", tmp_path / "fleet", "--pages", 1, "--workers", 1)
     assert (code, out.strip()) == (1, f"{tmp_path}/fleet/index.html")
     assert "1 of 5 logs could not be read" in said
+    assert "1 of 2 actuators is past a limit. Start with B." in said
     page = (tmp_path / "fleet" / "index.html").read_text("utf-8")
     assert "1 of 2 actuators is past a limit." in page
     assert "Start with B." in page
