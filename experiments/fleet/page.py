@@ -9,7 +9,7 @@ import pandas as pd
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.rows import STATES, LogRow
 from experiments.page.names_shown import SHOWN
-from experiments.page.numbers import fixed, number, shop_unit
+from experiments.page.numbers import MISSING, fixed, number, shop_unit
 from experiments.page.render import render_page
 from experiments.page.scripting import data_block
 from experiments.page.tables import Cell, Column, right
@@ -19,7 +19,7 @@ MOST_STILL = 100
 """Rows of the table that stands where scripts do not run, and on paper [count]."""
 
 UNREAD = ("log", "actuator", "why")
-"""Columns of the table of logs that an actuator's row passes over."""
+"""Columns of the table of logs that could not be read."""
 
 LEVELS = ("none", "minor", "major")
 """Levels of leakage and friction, by size."""
@@ -60,7 +60,8 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     """
     counts = Counter(row.state for row in rows)
     cells = [row_cells(row) for row in rows]
-    unread = [(one.file.rsplit("/", 1)[-1], row.name, found_in(one)) for row in rows for one in _unread_in(row)]
+    failed = [one for row in rows for one in row.logs if one.state == "failed"]
+    unread = [(one.file.rsplit("/", 1)[-1], one.named.actuator or MISSING, found_in(one)) for one in failed]
     data = {"columns": COLUMNS, "rows": cells, "links": [links.get(row.name) for row in rows]}
     facts = {
         "source": source,
@@ -84,11 +85,6 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     ]
     shown = [next((one for one in columns if one.source == each["label"]), each["label"]) for each in COLUMNS]
     return render_page("fleet/fleet.html", facts, {"still": shown, "unread": UNREAD}, {})
-
-
-def _unread_in(row: ActuatorRow) -> list[LogRow]:
-    """Return the logs that could not be read and stand behind one that could; else the row itself says why."""
-    return [] if row.last.state == "failed" else [one for one in row.logs if one.state == "failed"]
 
 
 def sickest_of(rows: Sequence[ActuatorRow]) -> list[str]:

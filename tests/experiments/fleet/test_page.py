@@ -100,7 +100,7 @@ def test_a_log_between_two_conditions_is_shown_by_its_levels_and_amounts() -> No
     )
 
 
-def test_logs_that_a_row_passes_over_are_listed_with_the_reason() -> None:
+def test_logs_that_could_not_be_read_are_listed_with_the_reason() -> None:
     rows = [
         store_row("A_1.csv", 1.0),
         store_row("A_2.csv", 1.0, outcome="failed", found_condition=None, reason="A_2.csv: no time"),
@@ -109,8 +109,8 @@ def test_logs_that_a_row_passes_over_are_listed_with_the_reason() -> None:
     page = fleet_page(actuator_rows(log_rows(rows, named, {})), {}, "hall")
     assert "<td>A_2.csv</td>" in page.replace(' data-head="log"', "")
     assert "no time" in page
-    assert "The rows above pass over this log" in page
-    assert "pass over" not in fleet_page(actuator_rows(log_rows(rows[:1], named, {})), {}, "hall")
+    assert "Logs that could not be read" in page
+    assert "Logs that could not be read" not in fleet_page(actuator_rows(log_rows(rows[:1], named, {})), {}, "hall")
 
 
 def test_the_page_says_how_many_rows_have_a_page() -> None:
