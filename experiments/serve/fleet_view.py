@@ -42,8 +42,10 @@ def actuator_view(rows: Diagnosed, pattern: str | None, limits: Mapping[str, flo
 
     Parameters
     ----------
-    rows, pattern, limits
+    rows, pattern
         As for `fleet_view`.
+    limits : Mapping[str, float]
+        Limits of severities [their units].
     """
     from experiments.fleet.actuator_page import actuator_page
 

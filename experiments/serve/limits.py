@@ -102,7 +102,7 @@ class Guard:
                 return
             await self._app(scope, exchange.receive, exchange.send)
         except RefusedError as refused:
-            again = [RETRY] if refused.status == 429 else []
+            again: list[tuple[bytes, bytes]] = [RETRY] if refused.status == 429 else []
             page = wants_page(scope["method"], scope["path"], headers.get(b"accept", b"").decode("latin-1"))
             await exchange.answer(refused.status, refused.detail, again, page)
         finally:
