@@ -57,6 +57,20 @@ class MissingColumnError(LogError):
         return MissingColumnError, (self.channel, self.column, self.known, self.source, self.hint)
 
 
+class TextColumnError(LogError):
+    """A column of a log holds text where numbers are needed.
+
+    Parameters
+    ----------
+    column : str
+        What the column is called.
+    """
+
+    def __init__(self, message: str, source: str | None = None, column: str = "") -> None:
+        super().__init__(message, source)
+        self.column = column
+
+
 class NoChannelError(LogError):
     """A log lacks the channels of an actuator; as a log of anything it may still be read."""
 

@@ -129,12 +129,12 @@ def resolve_columns(
     ['time_s', 'position_m']
     """
     clean = cleaned(names)
-    stamped = [position for position, heading in enumerate(clean) if heading.stamped]
+    dated = _dated(clean)
     found = {channel: _foreign(clean, channel, spec, source) for channel, spec in (mapping or {}).items()}
     taken = {column.position for column in found.values()}
     strange: list[tuple[str, LogError]] = []
     for position, heading in enumerate(clean):
-        channel = None if position in taken else TIME if stamped == [position] else _channel_of(heading)
+        channel = None if position in taken else TIME if dated == position else _channel_of(heading)
         if channel is None or channel in (mapping or {}):
             continue
         try:
@@ -153,6 +153,14 @@ def resolve_columns(
         if channel not in found:
             raise error
     return tuple(found.values())
+
+
+def _dated(headings: Sequence[Heading]) -> int | None:
+    """Return the one column of dates, where it is the time: no other is, nor is it called another channel."""
+    stamped = [position for position, heading in enumerate(headings) if heading.stamped]
+    if len(stamped) != 1 or _channel_of(headings[stamped[0]]) is not None:
+        return None
+    return None if any(_channel_of(heading) == TIME for heading in headings) else stamped[0]
 
 
 def _channel_of(heading: Heading) -> str | None:

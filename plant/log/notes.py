@@ -30,6 +30,16 @@ class LogCode(Code):
     CHANNEL_SLOWER = "{channel} has one value in {rows} rows"
     CHANNEL_LEFT_OUT = "{channel} is missing in {count} of {total} samples ({percent:.2g} %); the channel is not used"
     LINES_SKIPPED = "lines skipped between rows of data (comments, or the header again): {count}"
+    ROWS_LEFT_OUT = "lines left out because they hold no row of data: {count} (the first is line {line}: {said!r})"
+    CELLS_NO_NUMBERS = (
+        "column {column!r} has cells that are no numbers, which are not used: {count} (the first is {said!r} in "
+        "{where} {place})"
+    )
+    CHANNEL_OF_TEXT = "{channel} is not used, for column {column!r} holds text"
+    TIME_SET = (
+        "{channel} jumps by {hours:+g} h at row {row}, as where a clock is set to summer time or back; the rows were "
+        "taken to go on evenly"
+    )
     END_LEFT_OUT = "lines left out after row {taken}, the last row of data: {count}"
     COLUMNS_ABSENT = "the rig file names columns that the log does not have: {columns}"
     COLUMN_OVERLOOKED = "column {column!r} was not used, but it may be {channel}; if it is, add --columns '{option}'"

@@ -88,13 +88,17 @@ def table_of(
         As `Table` takes them.
     """
     from plant.log.formats.cells import each_read, numbers
+    from plant.log.formats.times import is_time, moments
 
     names = list(named)
 
     def read_one(column: Column) -> Array:
         values = named[names[column.position]]
         got = np.atleast_1d(np.asarray(values() if callable(values) else values))
-        return got.astype("datetime64[ns]") if got.dtype.kind == "M" else numbers(got, column.name, source)
+        return moments(got, column.name, source) if is_time(got) else numbers(got, column.name, source)
 
-    headings = tuple(Heading(name, (units or {}).get(name)) for name in names)
+    headings = tuple(
+        Heading(name, (units or {}).get(name), not callable(values) and is_time(np.asarray(values)))
+        for name, values in named.items()
+    )
     return Table(source, headings, lambda columns: each_read(columns, read_one), **more)

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from plant.arrays import Array
-from plant.errors import LogError, MissingColumnError
+from plant.errors import LogError, MissingColumnError, TextColumnError
 from plant.log.checks import alternatives
 from plant.log.clock.merging import Timed, merged
 from plant.log.columns import TIME, TRUTH, Column, converted, listed, resolve_columns
 from plant.log.guess import hint_of, missing_channels, overlooked
 from plant.log.headings import Heading, cleaned
+from plant.log.notes import LogCode
 from plant.log.table import Table
 from plant.notes import Note
 
@@ -83,11 +84,33 @@ def gathered(
         wanted = [TIME] * timeless + lacking
         raise missing_channels(wanted, headings, source, found)
     with np.errstate(over="ignore", invalid="ignore"):  # what is no finite number is refused or noted later
-        parts = [(table, _read(table, columns)) for table, columns in chosen]
+        notes: list[Note] = []
+        parts = [(table, _without_text(table, columns, found, required, notes)) for table, columns in chosen]
     timed = [_timed(table, values, parts, sample_time, source) for table, values in parts]
     together = merged(timed, source)
     columns, began = _from_start(together.channels)
-    return Gathered(columns, began, (*_overlooked(chosen, tables), *together.notes))
+    return Gathered(columns, began, (*_overlooked(chosen, tables), *notes, *together.notes))
+
+
+def _without_text(
+    table: Table, columns: Sequence[Column], found: list[str], required: Collection[str], notes: list[Note]
+) -> dict[str, Array]:
+    """Return the channels of a table, without those that nobody asked for and that hold text."""
+    try:
+        return _read(table, columns)
+    except TextColumnError as error:
+        text = next((one for one in columns if one.name == error.column and one.channel != TIME), None)
+        if text is None or not found:
+            raise
+        others = [name for name in found if name != text.channel]
+        if not any(name != TIME for name in others) or any(
+            text.channel in alternatives(wanted) and not any(name in others for name in alternatives(wanted))
+            for wanted in required
+        ):
+            raise
+        found.remove(text.channel)
+        notes.append(LogCode.CHANNEL_OF_TEXT.note(channel=text.channel, column=text.name[:80]))
+        return _without_text(table, [one for one in columns if one is not text], found, required, notes)
 
 
 def _overlooked(chosen: Chosen, tables: Sequence[Table]) -> tuple[Note, ...]:

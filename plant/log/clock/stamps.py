@@ -53,7 +53,7 @@ def _shaped(text: str) -> bool:
     return any(one.fullmatch(text) for one in (*_PATTERNS, _MINUTES))
 
 
-def read_stamps(cells: Sequence[str], refuse: Callable[[int, str], Exception]) -> Stamps:
+def read_stamps(cells: Sequence[str], refuse: Callable[[int, str], Exception | None]) -> Stamps:
     """Return stamps as times; those without a zone are taken for universal time.
 
     Parameters
@@ -61,7 +61,8 @@ def read_stamps(cells: Sequence[str], refuse: Callable[[int, str], Exception]) -
     cells : sequence of str
         The stamps, empty where there is none.
     refuse : callable
-        From a row, from 0, and its text to the error that is raised where that is no stamp.
+        From a row, from 0, and its text to the error that is raised where that is no stamp; None where it is taken
+        for missing.
 
     Returns
     -------
@@ -85,7 +86,9 @@ def read_stamps(cells: Sequence[str], refuse: Callable[[int, str], Exception]) -
             continue
         value = _nanoseconds(text, months_first=months_first)
         if value is None:
-            raise refuse(row, cell)
+            if (error := refuse(row, cell)) is not None:
+                raise error
+            value = int(np.iinfo(np.int64).min)
         out[row] = value
     return _over_midnight(out).view("datetime64[ns]")
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from plant.arrays import Array
 from plant.errors import LogError, SparseLogError
 from plant.log.clock.jitter import GAP, grid_of, resampled, rounded_clock, usual_step
+from plant.log.clock.jumps import without_jumps
 from plant.log.columns import TIME
 from plant.log.notes import LogCode
 from plant.notes import Note
@@ -101,12 +102,15 @@ def on_uniform_clock(
     if clock is not None and _agrees(time, clock):
         return Checked(clock.sample_time, clock.start_time, channels)
     _steps_of_a_clock(time, source)
+    time, jumps = without_jumps(time)
+    for row, hours in jumps:
+        notes.append(LogCode.TIME_SET.note(channel=TIME, hours=hours, row=row + 1))
     if _own_times(channels):
         return _merged(time, channels, source, notes)
     ticks = _whole_ticks(time)
     if ticks is None:
         return _mended(time, channels, source, notes)
-    _few_left_out(len(time), float(ticks.sum()) + 1.0, source, most_missing)
+    _few_left_out(len(time), float(ticks.sum()) + 1.0, source, most_missing, time)
     sample_time = float((time[-1] - time[0]) / ticks.sum())
     jitter = float(np.abs(np.diff(time) / sample_time - ticks).max())
     if jitter > max(ROUNDING, _resolution(time, sample_time)):
@@ -164,7 +168,7 @@ def _resampled(time: Array, channels: Channels, source: str, notes: list[Note]) 
     shortest = GAP * usual_step(np.diff(time))
     if not shortest > 0.0:
         raise _not_increasing(time, source)
-    _few_left_out(len(time), (float(time[-1]) - float(time[0])) / shortest, source)
+    _few_left_out(len(time), (float(time[-1]) - float(time[0])) / shortest, source, time=time)
     grid = grid_of(time)
     if not grid.scatter <= MOST_JITTER:
         raise LogError(
@@ -188,7 +192,10 @@ def _resampled(time: Array, channels: Channels, source: str, notes: list[Note]) 
 def _not_increasing(time: Array, source: str) -> LogError:
     row = int(np.argmax(np.diff(time) <= 0.0))
     got = f"{time[row + 1]:.12g} in row {row + 2} after {time[row]:.12g}"
-    return LogError(f"{TIME} must increase, got {got}", source)
+    return LogError(
+        f"{TIME} must increase, got {got}; if the clock was set there, or another test begins, keep one side of it",
+        source,
+    )
 
 
 def _own_times(channels: Channels) -> bool:
@@ -235,11 +242,12 @@ def _whole_ticks(time: Array) -> Array | None:
     return ticks if np.all(ticks >= 1.0) and np.max(off) <= WHOLE + ROUNDING else None
 
 
-def _few_left_out(there: int, total: float, source: str, most: float = MOST_MISSING) -> None:
+def _few_left_out(there: int, total: float, source: str, most: float = MOST_MISSING, time: Array | None = None) -> None:
     if not there >= (1.0 - most) * total:
         said = "{:.0f} of {:.0f}" if total < 1e15 else "{:.3g} of {:.3g}"
         left_out = said.format(total - there, total)
-        raise SparseLogError(f"{TIME} leaves out {left_out} samples, wanted at most {100.0 * most:g} %", source)
+        where = "" if time is None else f"; the longest gap is before row {int(np.argmax(np.diff(time))) + 2}"
+        raise SparseLogError(f"{TIME} leaves out {left_out} samples, wanted at most {100.0 * most:g} %{where}", source)
 
 
 def _agrees(time: Array, clock: Clock) -> bool:

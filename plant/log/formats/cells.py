@@ -1,5 +1,6 @@
 """Cells of a log as numbers: what is one, what says that nothing was measured, and what is refused."""
 
+import warnings
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -7,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.arrays import Array
-from plant.errors import LogError
+from plant.errors import LogError, LogWarning, TextColumnError
 from plant.log.columns import TRUTH, Column
+from plant.log.notes import LogCode
+from plant.notes import Note
 
 MISSING = (
     *("", "NaN", "nan", "NAN", "-NaN", "-nan", "NA", "N/A", "n/a", "NULL", "null", "None"),
@@ -16,6 +19,12 @@ MISSING = (
     *("1.#QNAN", "1.#IND", "-1.#IND", "-nan(ind)"),
 )
 """Cells that say that nothing was measured, as loggers, multimeters, spreadsheets and C write it."""
+
+MOST_STRANGE = 0.01
+"""Cells of a column that may be no numbers, or rows that are no data, of all rows of a log [fraction]."""
+
+SHOWN = 60
+"""Characters that a note shows of what is no number [count]."""
 
 
 def number(text: str) -> float:
@@ -40,7 +49,7 @@ def number(text: str) -> float:
 
 
 def numbers(values: NDArray[Any], name: str, source: str) -> Array:
-    """Return a column as floats, shape (n,), NaN where it says that nothing was measured.
+    """Return a column as floats, shape (n,), NaN where nothing was measured and where a few cells are no numbers.
 
     Parameters
     ----------
@@ -57,7 +66,12 @@ def numbers(values: NDArray[Any], name: str, source: str) -> Array:
     Raises
     ------
     LogError
-        If the column is not one-dimensional, or a value is not a real number; it names the first.
+        If the column is not one-dimensional, or over 1 % of the values are no real numbers; it names the first.
+
+    Warns
+    -----
+    LogWarning
+        If fewer are none.
     """
     if values.ndim != 1:
         raise LogError(f"column {name[:80]!r} must be one-dimensional, got shape {values.shape}", source)
@@ -69,12 +83,35 @@ def numbers(values: NDArray[Any], name: str, source: str) -> Array:
     if values.dtype.kind in "fiub":
         return np.ascontiguousarray(values, dtype=np.float64)
     out = np.empty(len(values))
+    bad: list[int] = []
     for row, value in enumerate(values):
         try:
             out[row] = np.nan if value is None else number(value) if isinstance(value, str) else float(value)
-        except (TypeError, ValueError) as error:
-            raise not_a_number(source, name, row, value) from error
+        except (TypeError, ValueError):
+            out[row] = np.nan
+            bad.append(row)
+    if len(bad) > MOST_STRANGE * len(values):
+        raise not_a_number(source, name, bad[0], values[bad[0]])
+    if bad:
+        note = no_numbers(name, len(bad), "row", bad[0] + 1, str(values[bad[0]]))
+        warnings.warn(LogWarning(note, source), stacklevel=2)
     return out
+
+
+def no_numbers(name: str, count: int, where: str, place: int, said: str) -> Note:
+    """Return the note on a few cells of a column that are no numbers.
+
+    Parameters
+    ----------
+    where : str
+        What the place counts: ``line`` of a file, or ``row``.
+    place : int
+        Where the first one is, from 1.
+    said : str
+        What it holds.
+    """
+    shown = said.strip()[:SHOWN]
+    return LogCode.CELLS_NO_NUMBERS.note(column=name[:80], count=count, where=where, place=place, said=shown)
 
 
 def each_read(columns: Iterable[Column], read: Callable[[Column], Array]) -> dict[Column, Array]:
@@ -121,4 +158,5 @@ def not_a_number(source: str, name: str, row: int, value: object) -> LogError:
     row : int
         The row from 0; the sentence counts from 1, without the header.
     """
-    return LogError(f"column {name[:80]!r} must hold numbers, got {str(value)[:40]!r} in row {row + 1}", source)
+    said = f"column {name[:80]!r} must hold numbers, got {str(value)[:40]!r} in row {row + 1}"
+    return TextColumnError(said, source, name)

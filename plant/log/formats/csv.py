@@ -1,9 +1,8 @@
 """CSV logs: what they hold as numbers; fast through pyarrow, and cell by cell to name what is wrong."""
 
-import csv
 import gzip
 import io
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -13,12 +12,12 @@ import pyarrow as pa
 from pyarrow import csv as arrow_csv
 
 from plant.arrays import Array
-from plant.errors import LogError
+from plant.log.clock.stamps import read_stamps
 from plant.log.columns import Column
 from plant.log.formats.arrow import from_arrow, to_arrow
 from plant.log.formats.cells import MISSING
-from plant.log.formats.csv_cells import read_cells, stamps
-from plant.log.formats.csv_layout import BLANKS, Layout, layout_of
+from plant.log.formats.csv_cells import read_cells
+from plant.log.formats.csv_layout import BLANKS, Layout, cells_of, layout_of
 from plant.log.formats.packed import opened, packing_of
 from plant.log.table import Table
 
@@ -54,7 +53,7 @@ def _read(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, 
     if layout.delimiter != BLANKS:
         try:
             return _read_fast(path, layout, chosen)
-        except (pa.ArrowInvalid, UnicodeError):  # stray bytes of another encoding harm nobody outside their cell
+        except (pa.ArrowInvalid, UnicodeError, _NotFastError):  # stray bytes harm nobody outside their cell
             pass
     return _read_cells(path, layout, chosen)
 
@@ -77,6 +76,10 @@ def write_csv(columns: Mapping[str, Array], file: BinaryIO, *, compressed: bool)
         arrow_csv.write_csv(table, cast(BinaryIO, packed))
 
 
+class _NotFastError(Exception):
+    """A log must be read line by line."""
+
+
 @contextmanager
 def _text(path: Path, layout: Layout, errors: str = "replace") -> Generator[TextIO]:
     encoding = "utf-8-sig" if layout.encoding == "utf-8" else layout.encoding
@@ -84,21 +87,18 @@ def _text(path: Path, layout: Layout, errors: str = "replace") -> Generator[Text
         yield text
 
 
-def _bytes(path: Path, layout: Layout) -> Any:
+def _source(path: Path, layout: Layout) -> Path | bytes:
     """Return what pyarrow reads: the file itself where it can, since it reads that in parallel; else its text in UTF-8.
 
     No thread of pyarrow may call Python back: an error raised there, as of too large a file, ends or hangs the process.
     """
     if layout.encoding.startswith("utf-16"):
         with _text(path, layout, errors="strict") as text:
-            return pa.BufferReader(text.read().encode())
+            return text.read().encode()
     if packing_of(path) is None:
         return path
-    content = bytearray()
     with opened(path) as file:
-        while part := file.read(_BLOCK):
-            content += part
-    return pa.BufferReader(content)
+        return b"".join(iter(lambda: file.read(_BLOCK), b""))
 
 
 def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
@@ -106,8 +106,9 @@ def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Col
     wanted = [labels[column.position] for column in chosen]
     texts = {labels[place] for place in layout.stamped}
     kinds: dict[str, Any] = {one: pa.string() if one in texts else pa.float64() for one in wanted}
+    source = _source(path, layout)
     table = arrow_csv.read_csv(
-        _bytes(path, layout),
+        source if isinstance(source, Path) else pa.BufferReader(source),
         read_options=arrow_csv.ReadOptions(column_names=labels, skip_rows=layout.skipped),
         parse_options=arrow_csv.ParseOptions(delimiter=layout.delimiter),
         convert_options=arrow_csv.ConvertOptions(
@@ -117,27 +118,37 @@ def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Col
             decimal_point=layout.decimal_point,
         ),
     )
+    if (lines := _lines_if_quoted(source, layout)) is not None and lines != table.num_rows:
+        raise _NotFastError  # a quote that is never closed makes one cell of all that follows
     out: dict[Column, Array] = {}
     for column, label in zip(chosen, wanted, strict=True):
         if label in texts:
-            out[column] = stamps(table.column(label).to_pylist(), column, str(path))
+            out[column] = read_stamps([cell or "" for cell in table.column(label).to_pylist()], _refused)
         else:
             out[column] = from_arrow(table.column(label))
         table = table.drop_columns([label])  # hands each column's memory back before the next is copied
     return out
 
 
-def _rows(text: TextIO, layout: Layout) -> Iterator[list[str]]:
-    lines = islice(text, layout.skipped, None)
-    if layout.delimiter == BLANKS:
-        return (line.split() for line in lines)
-    return csv.reader(lines, delimiter=layout.delimiter)
+def _refused(row: int, cell: str) -> Exception:
+    return _NotFastError(f"{cell!r} in row {row}")
+
+
+def _lines_if_quoted(source: Path | bytes, layout: Layout) -> int | None:
+    """Return how many lines with anything in them are below the header; None where no quote is."""
+    with source.open("rb") if isinstance(source, Path) else io.BytesIO(source) as file:
+        for _ in range(layout.skipped):
+            file.readline()
+        begin = file.tell()
+        if not any(b'"' in part for part in iter(lambda: file.read(_BLOCK), b"")) and file.tell() > begin:
+            return None
+        file.seek(begin)
+        return sum(1 for line in file if line.strip(b"\r\n"))
 
 
 def _read_cells(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
-    """Read what pyarrow will not, or say in which row and column it is no number."""
-    try:
-        with _text(path, layout) as text:
-            return read_cells(_rows(text, layout), layout, chosen, str(path))
-    except csv.Error as error:
-        raise LogError(f"cannot be read as CSV: {error}", str(path)) from error
+    """Read what pyarrow will not, line by line, or say in which row and column it is no number."""
+    with _text(path, layout) as text:
+        lines = (line.rstrip("\n") for line in islice(text, layout.skipped, None))
+        rows = (cells_of(line, layout.delimiter) if line else [] for line in lines)
+        return read_cells(rows, layout, chosen, str(path))

@@ -3,22 +3,21 @@
 import re
 import warnings
 from array import array
-from collections.abc import Iterable, Sequence
-from itertools import takewhile
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError, LogWarning
 from plant.log.clock.stamps import is_stamp, read_stamps
-from plant.log.columns import TRUTH, Column
-from plant.log.formats.cells import MISSING, not_a_number, number, wrong_width
-from plant.log.formats.csv_layout import COMMENT, Layout
+from plant.log.columns import TIME, TRUTH, Column
+from plant.log.formats.cells import MISSING, MOST_STRANGE, SHOWN, no_numbers, not_a_number, number, wrong_width
+from plant.log.formats.csv_layout import COMMENT, Layout, is_value
+from plant.log.headings import unit_or_none
 from plant.log.notes import LogCode
-
-MOST_AFTER, SHARE_AFTER = 20, 0.01
-"""Lines below the last row of data that are left out: at most so many [count], and of the rows above [fraction]."""
+from plant.notes import Note
 
 TOGETHER = 1000
 """Rows that are put into columns at once [count]."""
@@ -33,119 +32,243 @@ _THOUSANDS = {
 def read_cells(
     rows: Iterable[Sequence[str]], layout: Layout, chosen: Sequence[Column], source: str
 ) -> dict[Column, Array]:
-    """Return columns of rows; a line of comment, a header that comes again and a few lines at the end are left out.
+    """Return columns of rows; lines that are no rows of data are left out where they are few.
 
-    A logger that is switched off leaves its last line cut, and some write sums below the data.
+    A line of comment and a header that comes again are skipped. Of all rows, 1 % may have too few or too many cells, or
+    a cell that is no number: such a row is left out where its time is unknown or it is one of the last, else only the
+    cell is missing. In a log without a column of time no row within the data is left out, for those below it would come
+    too early.
 
     Parameters
     ----------
     rows : iterable of sequence of str
-        Cells of each line below the header.
+        Cells of each line below the header, none of a blank line.
     chosen : sequence of Column
         Columns that are read; of the truth, those that hold no numbers are left out.
 
     Returns
     -------
     dict[Column, ndarray of shape (n,)]
-        Numbers, NaN in empty cells; stamps as datetime64[ns].
+        Numbers, NaN in cells that are empty or no number; stamps as datetime64[ns].
 
     Raises
     ------
     LogError
-        If a row has another width than the header, or a cell is no number, and rows of data come after it.
+        If more rows are no data, more cells of a column are no numbers, or another header stands among the rows.
 
     Warns
     -----
     LogWarning
-        If lines were left out.
+        If lines were left out, or cells are no numbers.
     """
-    names = [heading.name for heading in layout.headings]
-    kept: dict[Column, Any] = {one: [] if one.position in layout.stamped else array("d") for one in chosen}
-    waiting: list[list[float | str | None]] = []
-    strange: list[LogError] = []
-    between = taken = 0
-    for row, cells in enumerate(cells for cells in rows if cells):
-        first = cells[0].strip()
+    names = [one.name for one in layout.headings]
+    body = _Body(layout, {one: _Cells([] if one.position in layout.stamped else array("d")) for one in chosen}, source)
+    block: list[_Row] = []
+    row = 0
+    for line, cells in enumerate(rows, start=layout.skipped + 1):
+        if not cells or (len(cells) == 1 < len(names) and not cells[0].strip()):
+            continue
+        first = cells[0].strip().removeprefix("\ufeff")
         comment = COMMENT.match(first) and first not in MISSING
-        if comment or (first == names[0] and [cell.strip() for cell in cells] == names):
-            between += 1
-            continue
-        try:
-            values = _values(cells, layout, kept, source, row)
-        except LogError as error:
-            strange.append(error)
-            continue
-        if strange and None not in values:
-            raise strange[0]
-        waiting.append(values)
-        if len(waiting) == TOGETHER:
-            _keep(kept, waiting)
-            taken += TOGETHER
-            waiting.clear()
-    lacking = sum(1 for _ in takewhile(lambda values: None in values, reversed(waiting)))
-    taken += len(waiting) - lacking
-    if len(strange) + lacking > min(MOST_AFTER, SHARE_AFTER * taken):
-        if strange:
-            raise strange[0]
-        lacking = 0
-    _keep(kept, waiting[: len(waiting) - lacking])
-    if between:
-        warnings.warn(LogWarning(LogCode.LINES_SKIPPED.note(count=between), source), stacklevel=2)
-    if lacking or strange:
-        left_out = LogCode.END_LEFT_OUT.note(count=lacking + len(strange), taken=taken)
-        warnings.warn(LogWarning(left_out, source), stacklevel=2)
-    return {
-        one: stamps(values, one, source) if one.position in layout.stamped else _array(values)
-        for one, values in kept.items()
-    }
-
-
-def stamps(cells: Sequence[str | None], column: Column, source: str) -> Any:
-    """Return a column of dates or times of the day.
-
-    Raises
-    ------
-    LogError
-        If a cell is none.
-    """
-    return read_stamps([cell or "" for cell in cells], lambda row, cell: not_a_number(source, column.name, row, cell))
-
-
-def _keep(kept: dict[Column, Any], rows: Sequence[Sequence[float | str | None]]) -> None:
-    """Add rows; a column of the truth that has no number in one of them is read no further."""
-    for place, column in enumerate(list(kept)):
-        cells = [row[place] for row in rows]
-        if None in cells:
-            del kept[column]
+        if comment or (first == names[0] and [first, *(cell.strip() for cell in cells[1:])] == names):
+            body.skipped += 1
+        elif len(cells) == len(names):
+            block.append(_Row(line, row, cells))
+            if len(block) == TOGETHER:
+                body.take(block)
+                block = []
         else:
-            kept[column].extend(cells)
-
-
-def _array(values: "array[float]") -> Array:
-    return np.frombuffer(values, dtype=np.float64) if len(values) else np.empty(0)
-
-
-def _values(
-    cells: Sequence[str], layout: Layout, columns: Iterable[Column], source: str, row: int
-) -> list[float | str | None]:
-    """Return what a row holds; None in a column of the truth whose cell is no number."""
-    if len(cells) != len(layout.headings):
-        raise wrong_width(source, len(layout.headings), len(cells), row)
-    found: list[float | str | None] = []
-    for column in columns:
-        cell = cells[column.position]
-        if column.position in layout.stamped:
-            if cell.strip() not in MISSING and not is_stamp(cell):
-                raise not_a_number(source, column.name, row, cell)
-            found.append(cell)
-            continue
-        try:
-            found.append(_number(cell, layout.decimal_point))
-        except ValueError as error:
-            if not column.channel.startswith(TRUTH):
-                raise not_a_number(source, column.name, row, cell) from error
-            found.append(None)
+            body.note_width(_Row(line, row, cells), len(block))
+        row += 1
+    body.take(block)
+    found, notes = body.judged()
+    for note in notes:
+        warnings.warn(LogWarning(note, source), stacklevel=2)
     return found
+
+
+class _Row(NamedTuple):
+    """A line of the file, and which row it is below the header, from 0."""
+
+    line: int
+    row: int
+    cells: Sequence[str]
+
+    @property
+    def said(self) -> str:
+        """What a note shows of it."""
+        return ", ".join(cell.strip() for cell in self.cells)[:SHOWN]
+
+
+class _Strange(NamedTuple):
+    """A line that is no row of data."""
+
+    line: int
+    said: str
+    error: LogError
+    is_header: bool = False
+
+
+@dataclass
+class _Cells:
+    """A column as it is read: its values, and the cells that are no numbers by their place among the rows."""
+
+    values: Any
+    bad: dict[int, str] = field(default_factory=dict[int, str])
+
+
+@dataclass
+class _Body:
+    """The rows of a log as they are read."""
+
+    layout: Layout
+    columns: dict[Column, _Cells]
+    source: str
+    rows: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+    timeless: dict[int, str] = field(default_factory=dict[int, str])
+    strange: list[_Strange] = field(default_factory=list[_Strange])
+    skipped: int = 0
+
+    def note_width(self, row: _Row, waiting: int) -> None:
+        """Keep a row of another width in mind; most rows of a log are not so."""
+        wanted, got = len(self.layout.headings), len(row.cells)
+        error = wrong_width(self.source, wanted, got, row.row)
+        self.strange.append(_Strange(row.line, row.said, error, got == wanted - 1 and _is_header(row.cells)))
+        if len(self.strange) > TOGETHER + len(self.rows) + waiting:
+            raise self.strange[0].error
+
+    def take(self, block: Sequence[_Row]) -> None:
+        """Add rows to the columns, but for headers and units that stand among them."""
+        odd = {
+            place
+            for column in self.columns
+            for place in self._read(column, [row.cells[column.position] for row in block])[1]
+        }
+        headers = {place for place in odd if _is_header(block[place].cells)}
+        for row in (block[place] for place in sorted(headers)):
+            if self._units_again(row.cells):
+                self.skipped += 1
+                continue
+            error = LogError(
+                f"every row must hold numbers, got another header in row {row.row + 1} ({row.said!r}), counted below "
+                "the first; save what stands below it as a log of its own",
+                self.source,
+            )
+            self.strange.append(_Strange(row.line, row.said, error, is_header=True))
+        kept = [row for place, row in enumerate(block) if place not in headers]
+        for column, cells in self.columns.items():
+            values, bad = self._read(column, [row.cells[column.position] for row in kept])
+            for place in bad:
+                cells.bad[len(self.rows) + place] = kept[place].cells[column.position]
+                if column.channel == TIME:
+                    self.timeless[len(self.rows) + place] = kept[place].said
+            cells.values.extend(values)
+        self.rows.extend((row.line, row.row) for row in kept)
+
+    def _units_again(self, cells: Sequence[str]) -> bool:
+        units = [unit_or_none(cell.strip().strip("[]()")) for cell in cells]
+        return any(one.said for one in self.layout.headings) and all(
+            one.stamped or one.said == unit for one, unit in zip(self.layout.headings, units, strict=True)
+        )
+
+    def _read(self, column: Column, cells: list[str]) -> tuple[list[Any], list[int]]:
+        """Return values of some rows, and the places of cells that are no numbers."""
+        if column.position in self.layout.stamped:
+            bad = [place for place, cell in enumerate(cells) if cell.strip() not in MISSING and not is_stamp(cell)]
+            return [cell if cell.strip() else "" for cell in cells], bad
+        point = self.layout.decimal_point
+        joined = "\n".join(cells)
+        if "_" not in joined and cells:
+            try:
+                values = list(map(float, (joined if point == "." else joined.replace(",", ".")).split("\n")))
+            except ValueError:
+                pass
+            else:
+                return values, []
+        values, bad = [], []
+        for place, cell in enumerate(cells):
+            try:
+                values.append(_number(cell, point))
+            except ValueError:
+                values.append(float("nan"))
+                bad.append(place)
+        return values, bad
+
+    def judged(self) -> tuple[dict[Column, Array], list[Note]]:
+        """Return the columns without what is no data, and what was left out; refuse where that is much."""
+        found = {one: self._values(one, cells) for one, cells in self.columns.items()}
+        allowed = MOST_STRANGE * len(self.rows)
+        for column in [one for one in found if len(self.columns[one].bad) > allowed]:
+            if column.channel.startswith(TRUTH):
+                del found[column]
+        bad = set[int]().union(*(self.columns[one].bad for one in found))
+        taken = len(self.rows)
+        while taken - 1 in bad:
+            taken -= 1
+        last = self.rows[taken - 1][0] if taken else 0
+        within = [one for one in self.strange if one.line < last]
+        self._refuse(found, within, allowed)
+        timeless = {row: said for row, said in self.timeless.items() if row < taken}
+        notes = self._notes(found, taken, within, timeless)
+        if ended := len(self.rows) - taken + len(self.strange) - len(within):
+            notes.append(LogCode.END_LEFT_OUT.note(count=ended, taken=taken))
+        return {one: np.delete(values[:taken], sorted(timeless)) for one, values in found.items()}, notes
+
+    def _may_leave_out(self) -> bool:
+        """Return whether each row has a time of its own, or the rows are only shown."""
+        channels = [one.channel for one in self.columns]
+        return TIME in channels or all(one.startswith(TRUTH) for one in channels)
+
+    def _values(self, column: Column, cells: _Cells) -> Any:
+        if column.position not in self.layout.stamped:
+            return np.frombuffer(cells.values, dtype=np.float64) if len(cells.values) else np.empty(0)
+
+        def refuse(row: int, cell: str) -> None:  # it has the shape of a stamp, but no day has the number 93
+            cells.bad[row] = cell
+            if column.channel == TIME:
+                self.timeless[row] = cell
+
+        return read_stamps(["" if row in cells.bad else one for row, one in enumerate(cells.values)], refuse)
+
+    def _refuse(self, found: Iterable[Column], within: Sequence[_Strange], allowed: float) -> None:
+        """Refuse rows if too many are no data, by the first of them; another header comes before all others."""
+        for one in within:
+            if one.is_header:
+                raise one.error
+        reasons: list[tuple[int, LogError]] = []
+        if (count := len(self.strange) + len(self.timeless)) > allowed:
+            more = f"; {count} rows cannot be read, at most 1 % of {len(self.rows)} may be so"
+            reasons += [(one.line, LogError(f"{one.error.message}{more}", self.source)) for one in self.strange[:1]]
+        for column in found:
+            bad = self.columns[column].bad
+            if len(bad) > allowed:
+                place = min(bad)
+                line, row = self.rows[place]
+                reasons.append((line, not_a_number(self.source, column.name, row, bad[place])))
+        if reasons:
+            raise min(reasons, key=lambda one: one[0])[1]
+        if within and not self._may_leave_out():
+            raise within[0].error
+
+    def _notes(
+        self, found: Iterable[Column], taken: int, within: Sequence[_Strange], timeless: Mapping[int, str]
+    ) -> list[Note]:
+        notes = [LogCode.LINES_SKIPPED.note(count=self.skipped)] if self.skipped else []
+        left = [(one.line, one.said) for one in within]
+        if left := [*left, *((self.rows[row][0], said) for row, said in timeless.items())]:
+            line, said = min(left)
+            notes.append(LogCode.ROWS_LEFT_OUT.note(count=len(left), line=line, said=said))
+        for column in found:
+            bad = self.columns[column].bad
+            if rows := sorted(row for row in bad if row < taken and row not in timeless):
+                notes.append(no_numbers(column.name, len(rows), "line", self.rows[rows[0]][0], bad[rows[0]]))
+        return notes
+
+
+def _is_header(cells: Sequence[str]) -> bool:
+    """Return whether a row holds no number but different texts, as names of columns are."""
+    texts = {cell.strip() for cell in cells} - set(MISSING)
+    return len(texts) > 1 and not any(map(is_value, texts))
 
 
 def _number(cell: str, decimal_point: str) -> float:

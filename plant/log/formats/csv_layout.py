@@ -25,6 +25,10 @@ LINES = 300
 BLANKS = " "
 """The delimiter of a log whose cells are apart by any number of blanks."""
 
+MOST_ZEROS = 0.02
+"""Bytes of zero at the start of a text, as a logger leaves where its power fails; more are of another encoding
+[fraction]."""
+
 DELIMITERS = (",", ";", "\t", "|", BLANKS)
 _NUMBER = re.compile(r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][-+]?\d+)?")
 COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
@@ -107,7 +111,7 @@ def _encoding(start: bytes, source: str) -> str:
     if start[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16"
     zeros = Counter(place % 2 for place, one in enumerate(start[:2000]) if not one)
-    if zeros:
+    if sum(zeros.values()) > MOST_ZEROS * len(start[:2000]):
         half = len(start[:2000]) // 2
         for side, name in ((1, "utf-16-le"), (0, "utf-16-be")):
             if zeros[side] > 0.9 * half > 0 and not zeros[1 - side]:
@@ -206,6 +210,8 @@ class _Block:
             for place, one in enumerate(self.numeric)
             if one and _mostly_stamps([row[place] for _, row in self.rows[:9]])
         )
+        clocks = {place for place in stamped if any(":" in row[place] for _, row in self.rows[:9])}
+        stamped = frozenset(clocks) or stamped  # a column of days beside one of times says nothing that is read
         headings = tuple(
             Heading(name, None if place in stamped else unit, place in stamped)
             for place, (name, unit) in enumerate(zip(names, units, strict=True))
@@ -222,7 +228,8 @@ def _has_number(cells: Sequence[str], width: int) -> bool:
     return len(cells) == width and any(_NUMBER.fullmatch(cell.strip()) or is_stamp(cell) for cell in cells)
 
 
-def _is_value(cell: str) -> bool:
+def is_value(cell: str) -> bool:
+    """Return whether a cell is what rows of data hold: a number, a stamp, or a word for nothing measured."""
     text = cell.strip()
     if not text or len(text) > 60:
         return False
@@ -236,7 +243,7 @@ def _block(lines: Sequence[str], delimiter: str) -> _Block:
         for place, line in enumerate(lines)
         if line.strip()
     ]
-    judged = [(place, row, tuple(map(_is_value, row))) for place, row in split if len(row) <= _WIDEST]
+    judged = [(place, row, tuple(map(is_value, row))) for place, row in split if len(row) <= _WIDEST]
     judged = [one for one in judged if any(one[2])]
     widths = Counter(len(row) for _, row, _ in judged)
     if not widths:

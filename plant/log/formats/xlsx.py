@@ -120,10 +120,13 @@ def _table(path: Path, title: str, rows: Cells) -> Table | None:
     layout = layout_of_lines(lines, "utf-8", str(path))
     if layout.delimiter != "\t" or len(layout.headings) != width:
         return None
-    body = [row for row in rows[layout.skipped :] if any(cell is not None for cell in row)]
 
     def read(chosen: Sequence[Column]) -> dict[Column, Array]:
-        return read_cells(([_said(cell) for cell in _wide(row, width)] for row in body), layout, chosen, str(path))
+        texts = (
+            [_said(cell) for cell in _wide(row, width)] if any(cell is not None for cell in row) else []
+            for row in rows[layout.skipped :]
+        )
+        return read_cells(texts, layout, chosen, str(path))
 
     return Table(str(path), layout.headings, read, label=title)
 

@@ -96,9 +96,36 @@ def test_what_is_no_table_of_columns_is_refused(given: pd.DataFrame, said: str) 
 
 def test_text_in_a_column_is_named() -> None:
     given = pd.DataFrame({"time_s": TIME, **CHANNELS}).astype({"position_m": object})
-    given.loc[3, "position_m"] = "n/a?"
+    given.loc[3:7, "position_m"] = "n/a?"
     with pytest.raises(LogError, match=r"^the table: column 'position_m' must hold numbers, got 'n/a\?' in row 4"):
         read_record(frame_table(given))
+
+
+def test_one_text_in_a_hundred_rows_is_a_missing_sample() -> None:
+    ramp = np.arange(100.0)
+    given = pd.DataFrame({"time_s": 0.01 * ramp, "motor_speed_rad_s": ramp % 7, "position_m": 0.001 * ramp})
+    given = given.astype({"position_m": object})
+    given.loc[3, "position_m"] = "ERR"
+    with pytest.warns(LogWarning) as caught:
+        record = read_record(frame_table(given))
+    assert "'ERR' in row 4" in str(caught[0].message)
+    assert np.flatnonzero(np.isnan(record["position_m"])).tolist() == [3]
+
+
+@pytest.mark.parametrize("how", ["datetime64", "text", "datetime", "zone"])
+def test_a_column_of_dates_is_the_time_however_it_is_kept(how: str) -> None:
+    ramp = np.arange(100.0)
+    dates = pd.Series(pd.Timestamp("2026-03-01 12:00:00") + pd.to_timedelta(0.25 * ramp, unit="s"))
+    kept = {
+        "datetime64": dates,
+        "text": dates.astype(str),
+        "datetime": pd.Series([one.to_pydatetime() for one in dates], dtype=object),
+        "zone": pd.Series([one.tz_localize("Europe/Berlin") for one in dates], dtype=object),
+    }[how]
+    record = read_record(
+        frame_table(pd.DataFrame({"Time": kept, "motor_speed_rad_s": ramp % 7, "position_m": 1e-3 * ramp}))
+    )
+    assert (record.sample_time, len(record)) == (pytest.approx(0.25), 100)
 
 
 def test_only_pandas_has_frames() -> None:

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from plant.errors import LogError
+from plant.errors import LogError, LogWarning
 from plant.log.formats.cells import MISSING, number, numbers
 
 
@@ -31,6 +31,12 @@ def test_a_column_of_texts_and_gaps_becomes_floats() -> None:
 def test_the_first_text_in_a_column_is_named_with_its_row() -> None:
     with pytest.raises(LogError, match=r"a\.csv: column 'speed' must hold numbers, got 'x' in row 2"):
         numbers(np.array([1.0, "x", "y"], dtype=object), "speed", "a.csv")
+
+
+def test_one_text_in_a_hundred_cells_is_missing_with_a_note() -> None:
+    cells = np.array([*map(str, range(99)), "x"], dtype=object)
+    with pytest.warns(LogWarning, match=r"column 'speed' has cells .*: 1 \(the first is 'x' in row 100\)"):
+        assert np.flatnonzero(np.isnan(numbers(cells, "speed", "a.csv"))).tolist() == [99]
 
 
 def test_a_table_is_no_column() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from plant.errors import LogError, LogWarning
 from plant.log.files import read_record
-from plant.log.formats.csv_cells import MOST_AFTER, TOGETHER
+from plant.log.formats.csv_cells import TOGETHER
 from plant.log.formats.detect import open_tables
 from plant.log.notes import LogCode
 from plant.log.record import Record
@@ -63,18 +63,76 @@ def test_sums_below_the_data_are_no_part_of_any_column_that_is_shown(tmp_path: P
 
 
 @pytest.mark.parametrize(
-    ("lines", "said"),
+    ("line", "said"),
     [
-        ([*ROWS[:40], "Mean,1,2,3", *ROWS[40:]], "column 'time_s' must hold numbers, got 'Mean' in row 41"),
-        ([*ROWS[:40], "1,2", *ROWS[40:]], "every row must have 4 cells as the header has, got 2 in row 41"),
-        ([*ROWS, *["end of test"] * 16], f"got 1 in row {len(ROWS) + 1}"),
-        ([*ROWS * 2, *["end of test"] * (MOST_AFTER + 1)], f"got 1 in row {2 * len(ROWS) + 1}"),
-        ([*ROWS[:60], "0.060,x,0.06,text"], "column 'motor_speed_rad_s' must hold numbers, got 'x' in row 61"),
+        ("Mean,1,2,3", "'Mean, 1, 2, 3'"),
+        ("1,2", "'1, 2'"),
+        ("range switched", "'range switched'"),
+        ("ERR,ERR,ERR,ERR", "'ERR, ERR, ERR, ERR'"),
+        ("0.04\0\0,5,0.004,x", "'0.04"),
+        ('0.040,"5,0.004,x', "'0.040, 5,0.004,x'"),
     ],
 )
-def test_other_lines_are_refused_by_their_row(lines: list[str], said: str, tmp_path: Path) -> None:
+def test_a_row_of_garbage_within_a_log_leaves_a_gap_and_is_said(line: str, said: str, tmp_path: Path) -> None:
+    record, notes = read(written(tmp_path, *ROWS[:40], line, *ROWS[41:]))
+    (left_out,) = (note for note in notes if note.code is LogCode.ROWS_LEFT_OUT)
+    assert (left_out.data["count"], left_out.data["line"]) == (1, 42)
+    assert said in str(left_out)
+    assert np.flatnonzero(np.isnan(record["position_m"])).tolist() == [40]
+    np.testing.assert_allclose(np.delete(record["position_m"], 40), np.delete(0.001 * np.arange(len(ROWS)), 40))
+
+
+def test_a_cell_that_is_no_number_is_missing_and_the_rest_of_its_row_is_not(tmp_path: Path) -> None:
+    record, notes = read(written(tmp_path, *ROWS[:40], "0.040,ERR,0.0400,text", *ROWS[41:]))
+    wanted = {"column": "motor_speed_rad_s", "count": 1, "where": "line", "place": 42, "said": "ERR"}
+    assert LogCode.CELLS_NO_NUMBERS.note(**wanted) in notes
+    assert np.flatnonzero(np.isnan(record["motor_speed_rad_s"])).tolist() == [40]
+    assert not np.isnan(record["position_m"]).any()
+
+
+def test_a_quote_that_is_never_closed_swallows_no_rows(tmp_path: Path) -> None:
+    record, _ = read(written(tmp_path, *ROWS[:40], '0.040,5,0.0400,"text', *ROWS[41:]))
+    assert len(record) == len(ROWS)
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ([*ROWS, *["end of test"] * 16], f"got 1 in row {len(ROWS) + 1}.* 16 rows cannot be read, at most 1 %"),
+        ([*ROWS[:40], *["1,2"] * 16, *ROWS[40:]], "got 2 in row 41, .* 16 rows cannot be read, at most 1 % of 1500"),
+        ([*ROWS[:60], "0.060,x,0.06,text"], "column 'motor_speed_rad_s' must hold numbers, got 'x' in row 61"),
+        ([*ROWS[:9], "time_s,position_m,motor_speed_rad_s,said", *ROWS[9:]], "got another header in row 10"),
+    ],
+)
+def test_many_such_rows_or_another_header_are_refused_by_their_row(lines: list[str], said: str, tmp_path: Path) -> None:
     with pytest.raises(LogError, match=said):
         read_record(written(tmp_path, *lines))
+
+
+def test_without_a_time_no_row_is_left_out_within_the_data(tmp_path: Path) -> None:
+    path = written(tmp_path, *ROWS[:40], "1,2", *ROWS[40:])
+    path.write_text(path.read_text().replace("time_s", "count"))
+    with pytest.raises(LogError, match="got 2 in row 41"):
+        read_record(path, sample_time=1e-3)
+
+
+def test_a_stamp_of_no_day_is_a_row_without_time(tmp_path: Path) -> None:
+    rows = [f"2026-03-01 12:00:{0.01 * k:06.3f},{k % 7},{0.001 * k:.4f},text" for k in range(500)]
+    rows[40] = rows[40].replace("-03-", "-93-")
+    record, notes = read(written(tmp_path, *rows))
+    assert LogCode.ROWS_LEFT_OUT in [note.code for note in notes]
+    assert np.flatnonzero(np.isnan(record["position_m"])).tolist() == [40]
+
+
+def test_a_channel_of_text_that_nobody_asked_for_is_left_out(tmp_path: Path) -> None:
+    path = written(tmp_path, *ROWS)
+    path.write_text(path.read_text().replace("said", "differential_pressure_bar", 1))
+    record, notes = read(path)
+    assert "differential_pressure_pa" not in record
+    left_out = {"channel": "differential_pressure_pa", "column": "differential_pressure_bar"}
+    assert notes == [LogCode.CHANNEL_OF_TEXT.note(**left_out)]
+    with pytest.raises(LogError, match="'differential_pressure_bar' must hold numbers, got 'text' in row 1"):
+        read_record(path, required=("differential_pressure_pa",))
 
 
 def test_cells_that_loggers_and_spreadsheets_leave_for_nothing_are_missing(tmp_path: Path) -> None:

@@ -117,7 +117,7 @@ def layouts() -> dict[str, Any]:
         "header alone": told("# t;x;v"),
         "decimal commas in commas": told("t,x,y", "0,5,1", "1,5,2"),
         "numbers": [
-            csv_layout._is_value(cell)
+            csv_layout.is_value(cell)
             for cell in ("1", "-1.5e-3", "1,5", ".5", "1d4", "1e", "--1", "NaN", "INF", "", "12:00", "a")
         ],  # pyright: ignore[reportPrivateUsage]
         "encodings": [

@@ -1,0 +1,57 @@
+"""A clock that is set while it logs."""
+
+import warnings
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from plant.errors import LogError, LogWarning
+from plant.log.clock.jumps import without_jumps
+from plant.log.files import read_record
+from plant.log.frames import frame_table
+from plant.log.notes import LogCode
+from plant.notes import Note
+
+EVEN = 0.01 * np.arange(2000.0)
+
+
+def stamps(seconds: NDArray[np.float64]) -> NDArray[np.datetime64]:
+    return np.datetime64("2026-10-25T02:59:50", "ns") + np.rint(1e9 * seconds).astype("timedelta64[ns]")
+
+
+def read(seconds: NDArray[np.float64]) -> tuple[float, int, list[Note]]:
+    ramp = np.arange(float(len(seconds)))
+    table = frame_table({"time": stamps(seconds), "motor_speed_rad_s": ramp % 7, "position_m": 1e-4 * ramp})
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        record = read_record(table)
+    return record.sample_time, len(record), [one.message.note for one in caught if isinstance(one.message, LogWarning)]
+
+
+@pytest.mark.parametrize("hours", [-1, 1, 2, -24])
+def test_a_clock_that_is_set_by_hours_goes_on_evenly_with_a_note(hours: int) -> None:
+    sample_time, length, notes = read(EVEN + 3600.0 * hours * (EVEN > 9.995))
+    assert sample_time == pytest.approx(0.01)
+    assert length == len(EVEN)
+    assert notes == [LogCode.TIME_SET.note(channel="time_s", hours=hours, row=1001)]
+
+
+def test_stamps_that_are_rounded_are_set_back_first() -> None:
+    sample_time, length, notes = read(np.floor(EVEN - 3600.0 * (EVEN > 9.995)))
+    assert (sample_time, length) == (pytest.approx(0.01), len(EVEN))
+    assert [str(note.code) for note in notes] == ["time_set", "time_rounded"]
+
+
+@pytest.mark.parametrize("by", [-5.0, -3605.0, 3605.0, 5.0])
+def test_a_jump_that_no_change_of_hours_explains_is_refused_by_its_row(by: float) -> None:
+    with pytest.raises(LogError, match=r"in row 1001 after .* keep one side|gap is before row 1001"):
+        read(EVEN + by * (EVEN > 9.995))
+
+
+def test_pauses_of_an_hour_between_slow_samples_or_three_of_them_stand() -> None:
+    slow = 30.0 * np.arange(100.0)
+    for time in (slow + 3600.0 * (slow > 900.0), EVEN + 3600.0 * np.floor(EVEN / 5.0)):
+        kept, jumps = without_jumps(time)
+        assert jumps == []
+        np.testing.assert_array_equal(kept, time)
