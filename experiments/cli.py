@@ -159,6 +159,10 @@ def main() -> None:
     trust_sources()
     for name in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{name}_NUM_THREADS", "1")
+    if ALONE.keys() & set(sys.argv[1:2]):
+        from experiments.command.memory import keep_freed_memory
+
+        keep_freed_memory()
     try:
         app_for(sys.argv[1:])()
     except SystemExit as ended:

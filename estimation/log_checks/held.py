@@ -158,10 +158,12 @@ def held_rows(values: Array) -> int:
     moved = np.flatnonzero(steps > 0.0)  # a step to or from a missing sample is none
     if len(moved) < LEAST_STEPS or np.count_nonzero(np.isnan(values)):
         return 1
-    large = moved[steps[moved] > RESOLVED * np.min(steps[moved])]
+    sizes = steps[moved]
+    is_large = sizes > RESOLVED * np.min(sizes)
+    large = moved[is_large]
     runs_on = np.count_nonzero(steps[large[large > 0] - 1] > 0.0)
     if len(large) < LEAST_STEPS or runs_on > RUN_ON * len(large):
         return 1
-    apart = np.diff(moved)[np.isin(moved[:-1], large)]
+    apart = np.diff(moved)[is_large[:-1]]
     rows = int(np.median(apart))
     return rows if np.mean(np.abs(apart - rows) <= 1) > ON_TIME else 1

@@ -10,7 +10,7 @@ import numpy as np
 from estimation.fits.convolution import smooth_length
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
-from estimation.log_checks.order import median
+from estimation.log_checks.order import medians, stacked
 from estimation.notes import SensorCode
 from plant.arrays import Array
 from plant.log.record import Record
@@ -87,8 +87,8 @@ def _lines(values: Array) -> Array:
     length = smooth_length(len(bends), (2, 3, 5))
     length += length % 2
     power = np.abs(np.fft.rfft(bends * _window(len(bends)), length)) ** 2
-    parts = np.array_split(power, max(1, len(power) // NEARBY))
-    usual = np.concatenate([np.full(len(part), median(part)) for part in parts])
+    parts = stacked(power, max(1, len(power) // NEARBY))
+    usual = np.concatenate([np.repeat(medians(part), part.shape[1]) for part in parts])
     return power / np.maximum(usual, np.finfo(float).tiny)
 
 

@@ -1,13 +1,13 @@
 """Measurement noise read off the log itself, not taken as published (errata E11)."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
+from hashlib import blake2b
 from math import comb
 
 import numpy as np
 
 from estimation.log_checks.channel_names import POSITION, PRESSURE, VELOCITY
-from estimation.log_checks.order import median
+from estimation.log_checks.order import median, stacked
 from plant.arrays import Array
 from plant.log.record import Record
 
@@ -22,8 +22,8 @@ well below any bench sensor, so that a noiseless simulation stays solvable."""
 NORMAL_MAD = 1.482602218505602
 """Standard deviation of a normal variable over its median absolute deviation."""
 
-MOST_REMEMBERED = 50_000
-"""Longest channel whose variance is remembered by its content [samples]: some 6 MB for the last sixteen."""
+MOST_REMEMBERED = 32
+"""Variances that are remembered by what they are of [count]."""
 
 ROUNDING = 1e-12
 """Share of a channel's largest value up to which a step is that of floating-point numbers [fraction]."""
@@ -62,14 +62,17 @@ def measurement_variances(record: Record, channels: Sequence[str]) -> Mapping[st
 
 def _once(variance: Callable[..., float], values: Array, *more: str) -> float:
     """Return a variance of a channel, which checks and fits ask one after another: once for all of them."""
-    if len(values) > MOST_REMEMBERED:
-        return variance(values, *more)
-    return _remembered(variance, np.ascontiguousarray(values, dtype=np.float64).tobytes(), *more)
+    content = np.ascontiguousarray(values, dtype=np.float64)
+    key = (variance.__name__, blake2b(content.data, digest_size=16).digest(), len(content), *more)
+    found = _remembered.get(key)
+    if found is None:
+        if len(_remembered) >= MOST_REMEMBERED:
+            _remembered.clear()
+        found = _remembered[key] = variance(content, *more)
+    return found
 
 
-@lru_cache(maxsize=16)
-def _remembered(variance: Callable[..., float], content: bytes, *more: str) -> float:
-    return variance(np.frombuffer(content), *more)
+_remembered: dict[tuple[object, ...], float] = {}
 
 
 def _variance(values: Array, channel: str) -> float:
@@ -188,6 +191,6 @@ def _position_variance(position: Array) -> float:
     moved = steps[steps > 0.0]
     if not (len(bends) and len(moved)):
         return SMALLEST_VARIANCE[POSITION]
-    parts = np.array_split(bends, max(1, len(bends) // WINDOW))
-    variance = median(np.array([float(np.mean(part**2)) for part in parts])) / comb(2 * SMOOTH, SMOOTH)
+    powers = [np.mean(part**2, axis=1) for part in stacked(bends, max(1, len(bends) // WINDOW))]
+    variance = median(np.concatenate(powers)) / comb(2 * SMOOTH, SMOOTH)
     return float(max(variance, np.min(moved) ** 2 / 12.0))

@@ -1,4 +1,4 @@
-"""`median`, `percentile`: order statistics of samples that are all there, as NumPy gives them, but quicker."""
+"""Order statistics of samples that are all there, as NumPy gives them, but quicker."""
 
 from math import floor
 
@@ -30,6 +30,25 @@ def median(values: Array) -> float:
     return float((ordered[low] + ordered[high]) / 2.0)
 
 
+def medians(rows: Array) -> Array:
+    """Return the median of each row, shape (m,).
+
+    Parameters
+    ----------
+    rows : ndarray, shape (m, n)
+        Any unit; none missing.
+
+    Examples
+    --------
+    >>> medians(np.array([[3.0, 1.0, 2.0, 10.0], [1.0, 1.0, 2.0, 2.0]])).tolist()
+    [2.5, 1.5]
+    """
+    low, high = (rows.shape[1] - 1) // 2, rows.shape[1] // 2
+    ordered = np.partition(rows, (low, high), axis=1) if rows.size else rows
+    middle: Array = (ordered[:, low] + ordered[:, high]) / 2.0
+    return middle
+
+
 def percentile(values: Array, percent: float) -> float:
     """Return a percentile, on the straight line between neighbours.
 
@@ -57,3 +76,28 @@ def percentile(values: Array, percent: float) -> float:
     below, above = ordered[low], ordered[high]
     between = below + share * (above - below) if share < 0.5 else above - (1.0 - share) * (above - below)
     return float(between)
+
+
+def stacked(values: Array, count: int) -> tuple[Array, Array]:
+    """Return parts of a channel as rows, cut as `numpy.array_split` cuts them: some parts hold one sample more.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Any unit.
+    count : int
+        How many parts, at most n.
+
+    Returns
+    -------
+    tuple of ndarray, shapes (n % count, n // count + 1) and (count - n % count, n // count)
+        The longer parts, which come first, and the others; views.
+
+    Examples
+    --------
+    >>> [part.tolist() for part in stacked(np.arange(5.0), 2)]
+    [[[0.0, 1.0, 2.0]], [[3.0, 4.0]]]
+    """
+    each, longer = divmod(len(values), count)
+    end = longer * (each + 1)
+    return values[:end].reshape(longer, each + 1), values[end:].reshape(count - longer, each)

@@ -120,9 +120,12 @@ def _running_ranks(values: Array, window: int, ranks: Sequence[int]) -> Array:
     around, out = np.pad(values, window // 2, mode="edge"), np.empty((len(ranks), len(values)))
     for begin in range(0, len(values), PART):
         part = around[begin : begin + PART + window - 1]
-        rows = [part[k : len(part) - window + 1 + k] for k in range(window)]
+        rows = [part[k : len(part) - window + 1 + k].copy() for k in range(window)]
+        spare = np.empty_like(rows[0])
         for low, high in exchanges(window):
-            rows[low], rows[high] = np.minimum(rows[low], rows[high]), np.maximum(rows[low], rows[high])
+            lower = np.minimum(rows[low], rows[high], out=spare)
+            np.maximum(rows[low], rows[high], out=rows[high])
+            spare, rows[low] = rows[low], lower
         out[:, begin : begin + PART] = [rows[rank] for rank in ranks]
     return out
 

@@ -108,7 +108,7 @@ def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Col
     kinds: dict[str, Any] = {one: pa.string() if one in texts else pa.float64() for one in wanted}
     source = _source(path, layout)
     table = arrow_csv.read_csv(
-        source if isinstance(source, Path) else pa.BufferReader(source),
+        cast("Any", source if isinstance(source, Path) else pa.BufferReader(source)),
         read_options=arrow_csv.ReadOptions(column_names=labels, skip_rows=layout.skipped),
         parse_options=arrow_csv.ParseOptions(delimiter=layout.delimiter),
         convert_options=arrow_csv.ConvertOptions(
@@ -123,7 +123,8 @@ def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Col
     out: dict[Column, Array] = {}
     for column, label in zip(chosen, wanted, strict=True):
         if label in texts:
-            out[column] = read_stamps([cell or "" for cell in table.column(label).to_pylist()], _refused)
+            found: Any = read_stamps([cell or "" for cell in table.column(label).to_pylist()], _refused)
+            out[column] = found
         else:
             out[column] = from_arrow(table.column(label))
         table = table.drop_columns([label])  # hands each column's memory back before the next is copied

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from plant.log.clock.stamps import Stamps, is_stamp, read_stamps
+from plant.log.clock.stamps import is_stamp, read_stamps
 from plant.log.formats.cells import not_a_number
 
 
@@ -30,7 +30,7 @@ def is_time(values: "np.ndarray[Any, Any]") -> bool:
     return isinstance(first, datetime) or (isinstance(first, str) and is_stamp(first))
 
 
-def moments(values: "np.ndarray[Any, Any]", name: str, source: str) -> Stamps:
+def moments(values: "np.ndarray[Any, Any]", name: str, source: str) -> Any:
     """Return a column of dates and times in universal time.
 
     Parameters

@@ -1,5 +1,4 @@
 import os
-import re
 import subprocess
 import sys
 import warnings
@@ -101,8 +100,7 @@ def test_text_late_in_a_long_file_is_named_with_its_line(tmp_path: Path) -> None
     rows[51_234] = "51.234,oops,0"
     with pytest.warns(LogWarning) as caught:
         read_record(log(tmp_path, rows=rows))
-    said = r"column 'motor_speed_rad_s' has cells .*: 1 \(the first is 'oops' in line 51236\)"
-    assert re.search(said, str(caught[0].message))
+    assert "'oops' in line 51236" in str(caught[0].message)
 
 
 @pytest.mark.parametrize("cell", ["inf", "-inf", "Infinity", "1e999"])

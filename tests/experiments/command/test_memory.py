@@ -1,0 +1,29 @@
+"""Freed memory stays with the process of a single log."""
+
+import platform
+import subprocess
+import sys
+
+import pytest
+
+CODE = """
+import resource, sys
+import numpy as np
+from experiments.command.memory import keep_freed_memory
+if sys.argv[1] == "kept":
+    assert keep_freed_memory()
+np.zeros(400_000) + 1.0
+before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+for _ in range(50):
+    np.arange(200_000.0) + 1.0
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only the GNU C library has mallopt")
+def test_arrays_of_200000_rows_take_the_memory_of_those_before_them() -> None:
+    faults = {
+        how: int(subprocess.run([sys.executable, "-c", CODE, how], capture_output=True, check=True, text=True).stdout)
+        for how in ("kept", "as it is")
+    }
+    assert faults["kept"] < 0.2 * faults["as it is"]
