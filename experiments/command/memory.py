@@ -25,5 +25,5 @@ def keep_freed_memory() -> bool:
         mallopt = ctypes.CDLL(None).mallopt
     except (AttributeError, OSError, TypeError):
         return False
-    options = {MMAP: LARGEST_KEPT, TRIM: MOST_KEPT, ARENAS: 1}
-    return all([mallopt(option, value) == 1 for option, value in options.items()])
+    taken = [mallopt(option, value) for option, value in ((MMAP, LARGEST_KEPT), (TRIM, MOST_KEPT), (ARENAS, 1))]
+    return all(one == 1 for one in taken)

@@ -141,7 +141,7 @@ def points_by_name(heading: Heading, channel: str) -> float | None:
 
 
 _SUFFIX = re.compile(
-    r"(?:^|_)(rpm|mm_s|cm_s|m_s|rad_s|deg_s|mm|cm|um|ms|us|sec|bar|mbar|kpa|mpa|psi|(?<=_)pa|volts?|mv|rev_min)$"
+    r"(?:^|_)(rpm|mm_s|cm_s|m_s|rad_s|deg_s|mm|cm|um|ms|us|ns|sec|bar|mbar|kpa|mpa|psi|(?<=_)pa|volts?|mv|rev_min)$"
 )
 
 

@@ -110,9 +110,20 @@ def inspect_table(table: Table) -> TableFacts:
     for place, heading in enumerate(table.headings):
         values = found.get(place)
         dated = values is not None and values.dtype.kind == "M"
-        columns.append(ColumnFacts(Heading(heading.name, heading.said, heading.stamped or dated), values))
+        said = heading.said if heading.unit is not None or dated or values is None else _unit_since_1970(values)
+        columns.append(ColumnFacts(Heading(heading.name, said, heading.stamped or dated), values))
     rows = max((len(values) for values in found.values()), default=0)
     return TableFacts(table, rows, tuple(columns))
+
+
+def _unit_since_1970(values: Array) -> str | None:
+    """Return the unit in which all of a column is a time since 1970, of this half of the century; None for others."""
+    there = values[np.isfinite(values)]
+    if not len(there):
+        return None
+    low, high = float(there.min()), float(there.max())
+    fits = (unit for unit, least in (("ms", 1e12), ("us", 1e15), ("ns", 1e18)) if least < low <= high < 3.0 * least)
+    return next(fits, None)
 
 
 def clock_facts(stamps: Any) -> ClockFacts | None:

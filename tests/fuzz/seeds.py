@@ -6,10 +6,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tests.log_formats import written
+from tests.log_formats import more_written, written
 from tests.log_formats.written import SI
 
-N = 60
+N = 240
+"""Rows of each: of as many, two may be garbage [count]."""
+
 KINDS: Mapping[str, str] = {
     "csv": "plain",
     "semicolons": "decimal_comma",
@@ -27,8 +29,16 @@ KINDS: Mapping[str, str] = {
     "mdf": "mdf4",
     "gzip": "gzipped",
     "zstd": "zstd",
+    "labview": "labview_without_x",
+    "dspace": "dspace",
+    "fortran": "fortran",
+    "day": "day_and_time",
+    "npz": "archive",
+    "npy": "records",
+    "json lines": "json_lines",
+    "json": "json_columns",
 }
-"""What writes each, of `tests.log_formats.written`."""
+"""What writes each, of `tests.log_formats`."""
 
 
 def seeds(folder: Path) -> dict[str, tuple[str, bytes]]:
@@ -38,6 +48,6 @@ def seeds(folder: Path) -> dict[str, tuple[str, bytes]]:
     log = pd.DataFrame(dict(zip(SI, (time, 90.0 * wave, 1e-3 * (1.0 - wave), 0.03 * wave, 3e5 * wave), strict=True)))
     made: dict[str, tuple[str, bytes]] = {}
     for kind, name in KINDS.items():
-        path: Path = getattr(written, name)(log, folder)
+        path: Path = getattr(written, name, getattr(more_written, name, None))(log, folder)
         made[kind] = (path.name, path.read_bytes())
     return made

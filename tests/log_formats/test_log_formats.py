@@ -20,10 +20,13 @@ from plant.errors import LogError, LogWarning
 from plant.log.files import read_record
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
+from tests.log_formats.more_written import MORE
 from tests.log_formats.written import SI, WAYS, T, Way, rounded, with_a_copied_row
 
 READ = {name: way for name, way in WAYS.items() if not way.refused}
 REFUSED = {name: way for name, way in WAYS.items() if way.refused}
+ALSO_READ = {name: way for name, way in MORE.items() if not way.refused}
+ALSO_REFUSED = {name: way for name, way in MORE.items() if way.refused}
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +72,14 @@ def test_a_log_is_one_record_however_it_is_written(name: str, log: pd.DataFrame,
         assert_same(read_record(path, **options_of(READ[name], path)), log)
 
 
+@pytest.mark.parametrize("name", ALSO_READ)
+def test_so_it_is_of_instruments_and_scripts(name: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    path = ALSO_READ[name].write(log, tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        assert_same(read_record(path, **options_of(ALSO_READ[name], path)), log)
+
+
 @pytest.mark.parametrize("name", READ)
 def test_inspect_finds_every_channel_however_the_log_is_written(name: str, log: pd.DataFrame, tmp_path: Path) -> None:
     path = READ[name].write(log, tmp_path)
@@ -79,10 +90,10 @@ def test_inspect_finds_every_channel_however_the_log_is_written(name: str, log: 
     assert found["reads"] or "--sample-time" in found["message"]
 
 
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_cannot_be_read_is_refused_with_the_remedy(name: str, log: pd.DataFrame, tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=REFUSED[name].refused):
-        read_record(REFUSED[name].write(log, tmp_path))
+@pytest.mark.parametrize("way", [*REFUSED.values(), *ALSO_REFUSED.values()], ids=[*REFUSED, *ALSO_REFUSED])
+def test_what_cannot_be_read_is_refused_with_the_remedy(way: Way, log: pd.DataFrame, tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=way.refused):
+        read_record(way.write(log, tmp_path))
 
 
 @pytest.mark.parametrize("write", [rounded, with_a_copied_row])

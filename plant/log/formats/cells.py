@@ -1,5 +1,6 @@
 """Cells of a log as numbers: what is one, what says that nothing was measured, and what is refused."""
 
+import re
 import warnings
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -19,6 +20,9 @@ MISSING = (
     *("1.#QNAN", "1.#IND", "-1.#IND", "-nan(ind)"),
 )
 """Cells that say that nothing was measured, as loggers, multimeters, spreadsheets and C write it."""
+
+_FORTRAN = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)[dD][-+]?\d+")
+"""A number in double precision, as Fortran writes it."""
 
 MOST_STRANGE = 0.01
 """Cells of a column that may be no numbers, or rows that are no data, of all rows of a log [fraction]."""
@@ -45,6 +49,8 @@ def number(text: str) -> float:
         return float("nan")
     if "_" in cell:  # Python reads 1_000, no logger writes it
         raise ValueError(cell)
+    if _FORTRAN.fullmatch(cell):
+        cell = cell.upper().replace("D", "E")
     return float(cell)
 
 

@@ -45,7 +45,7 @@ def open_csv(path: Path, metadata: str | None) -> Table:
     def read(chosen: Sequence[Column]) -> dict[Column, Array]:
         return _read(path, layout, chosen)
 
-    return Table(str(path), layout.headings, read, metadata)
+    return Table(str(path), layout.headings, read, metadata, step=layout.step)
 
 
 def _read(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:

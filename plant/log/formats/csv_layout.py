@@ -5,7 +5,7 @@ import io
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
@@ -34,6 +34,8 @@ _NUMBER = re.compile(r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][-+]?\d+)?")
 COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
 """How a line of comment begins."""
 
+LABVIEW, HEADER_ENDS = "LabVIEW Measurement", "***End_of_Header***"
+
 _WIDEST = 10_000
 
 
@@ -53,6 +55,8 @@ class Layout:
         As Python calls it.
     stamped : frozenset of int
         Columns of dates or times of the day.
+    step : float or None
+        Time between rows [s], where the lines above give it in place of a column.
     """
 
     headings: tuple[Heading, ...]
@@ -61,6 +65,7 @@ class Layout:
     decimal_point: str
     encoding: str = "utf-8"
     stamped: frozenset[int] = frozenset()
+    step: float | None = None
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
@@ -150,6 +155,8 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
     """
     if not any(line.strip() for line in lines):
         raise LogError("a header line is needed, but the file is empty", source)
+    if lines[0].startswith(LABVIEW) and (found := _of_labview(lines, encoding, source)) is not None:
+        return found
     head = "\n".join(lines[:5])
     strange = sum(one == "\ufffd" or (ord(one) < 32 and one not in "\t\n\x0c\x0b") for one in head)
     if strange > 0.1 * len(head) or "\0" in head:
@@ -161,6 +168,25 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
     if not block.score or _header_parts_at_commas(lines, block):
         return _by_header(lines, encoding)
     return block.layout(lines, encoding)
+
+
+def _of_labview(lines: Sequence[str], encoding: str, source: str) -> Layout | None:
+    """Return the layout of a LabVIEW measurement file: two headers above the names, with units and the time step."""
+    ends = [place for place, line in enumerate(lines) if line.startswith(HEADER_ENDS)]
+    if not ends:
+        return None
+    layout = layout_of_lines(lines[ends[-1] + 1 :] or [""], encoding, source)
+    said = {name: cells for name, *cells in (cells_of(line, layout.delimiter) for line in lines[: ends[-1]])}
+    has_x = (said.get("X_Columns") or [""])[0].strip() != "No"
+    units = {**dict(enumerate(said.get("Y_Unit_Label", []), start=1)), 0: "s" if has_x else ""}
+    headings = tuple(
+        Heading(one.name, unit_or_none(units.get(place, "")), one.stamped) for place, one in enumerate(layout.headings)
+    )
+    try:
+        step = float((said.get("Delta_X") or [""])[0].replace(",", ".")) if not has_x else None
+    except ValueError:
+        step = None
+    return replace(layout, headings=headings, skipped=layout.skipped + ends[-1] + 1, step=step)
 
 
 def _header_parts_at_commas(lines: Sequence[str], block: "_Block") -> bool:

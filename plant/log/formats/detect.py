@@ -1,9 +1,12 @@
 """Which format a log file is in, told by its first bytes, and the file opened as tables."""
 
+import re
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from zipfile import BadZipFile, ZipFile
 
 from plant.arrays import Array
 from plant.errors import HydrostateError, LogError, NoMemoryError
@@ -24,6 +27,10 @@ SIGNS: Mapping[bytes, str] = {
     b"\xd0\xcf\x11\xe0": "xls",
     b"\x1f\x8b": "csv",
     b"\x28\xb5\x2f\xfd": "csv",
+    b"\x93NUMPY": "numpy",
+    b"\x80\x03": "pickle",
+    b"\x80\x04": "pickle",
+    b"\x80\x05": "pickle",
 }
 """First bytes of each format; what has none of them is text, or a MAT."""
 
@@ -35,6 +42,9 @@ READERS: Mapping[str, str] = {
     "hdf5": "plant.log.formats.hdf5:open_hdf5",
     "xlsx": "plant.log.formats.xlsx:open_xlsx",
     "mat": "plant.log.formats.mat:open_mat",
+    "numpy": "plant.log.formats.numpy_files:open_npy",
+    "npz": "plant.log.formats.numpy_files:open_npz",
+    "json": "plant.log.formats.json_text:open_json",
 }
 """What opens each; imported when a file of the kind comes."""
 
@@ -47,6 +57,14 @@ SUFFIXES: Mapping[str, str] = {
 """Formats that a damaged file is taken for by its suffix; all others are text."""
 
 OLD_EXCEL = "a workbook of Excel before 2007 (.xls), or one that is encrypted, cannot be read: save it as .xlsx or .csv"
+
+
+REFUSED: Mapping[str, str] = {
+    "xls": OLD_EXCEL,
+    "pickle": "a pickle may run any program when it is read, so it is not read: save the log as .parquet or .csv",
+    "ods": "a sheet of OpenDocument (.ods) cannot be read: save it as .xlsx or .csv",
+}
+"""Formats that are known and not read, and what to do."""
 
 
 def format_of(path: Path) -> str:
@@ -66,7 +84,7 @@ def format_of(path: Path) -> str:
         raise LogError("a header line is needed, but the file is empty", str(path))
     for sign, kind in SIGNS.items():
         if start.startswith(sign):
-            return kind
+            return _in_zip(path) if kind == "xlsx" else kind
     if start[512:].startswith(b"\x89HDF"):
         return "hdf5"
     if start[126:128] in (b"IM", b"MI") and (start.startswith(b"MATLAB") or start[124:125] in (b"\x00", b"\x01")):
@@ -74,9 +92,24 @@ def format_of(path: Path) -> str:
     return _by_suffix(path, start)
 
 
+def _in_zip(path: Path) -> str:
+    """Return what an archive holds: NumPy's arrays, a sheet of OpenDocument, or, for all others, Excel's."""
+    try:
+        with ZipFile(path) as archive:
+            names = archive.namelist()
+            if "mimetype" in names and b"opendocument" in archive.open("mimetype").read(200):
+                return "ods"
+    except (BadZipFile, OSError, NotImplementedError, RuntimeError, ValueError, KeyError, zlib.error, EOFError):
+        return "xlsx"
+    return "npz" if names and all(name.endswith(".npy") for name in names) else "xlsx"
+
+
 def _by_suffix(path: Path, start: bytes) -> str:
     """Return what a file is taken for that no first bytes tell: text where it is text."""
     kind = SUFFIXES.get(path.suffix.lower(), "csv")
+    text = start.removeprefix(b"\xef\xbb\xbf").lstrip()
+    if kind == "csv" and re.match(rb'\{\s*"|\[\s*[\[{]', text):
+        return "json"
     return kind if b"\0" in start or kind in ("mat", "xls") else "csv"
 
 
@@ -101,8 +134,8 @@ def open_tables(path: Path, metadata: str | None = None) -> tuple[Table, ...]:
     kind = "log"
     try:
         kind = format_of(path)
-        if kind == "xls":
-            raise LogError(OLD_EXCEL, str(path))
+        if kind in REFUSED:
+            raise LogError(REFUSED[kind], str(path))
         if kind == "csv":
             return (_guarded(open_csv(path, metadata), kind, path),)
         module, _, name = READERS[kind].partition(":")

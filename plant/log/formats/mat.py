@@ -65,6 +65,9 @@ def tables_of(content: Mapping[str, Value], source: str) -> tuple[Table, ...]:
     plain = {name: value for name, value in content.items() if not isinstance(value, Mapping)}
     structs = {name: value for name, value in content.items() if isinstance(value, Mapping)}
     for name, value in {"": plain, **structs}.items():
+        if recorded := _recorded(value):
+            made += [table_of(source, columns, units=units, label=name) for columns, units in recorded]
+            continue
         columns, units = _columns(value)
         text = value.get(METADATA)
         if columns:
@@ -89,6 +92,37 @@ def _columns(struct: Mapping[str, Value], above: str = "") -> tuple[dict[str, An
         elif isinstance(value, np.ndarray):
             columns |= spread(above + name, value)
     return columns, units
+
+
+def _recorded(struct: Mapping[str, Value]) -> list[tuple[dict[str, Any], dict[str, str | None]]]:
+    """Return the columns of what dSPACE records, a raster each: signals in Y, each with its place in the times of X."""
+    if not {"X", "Y"} <= struct.keys():
+        return []
+    times, signals = ([one for one in _each(struct[name]) if isinstance(one.get("Data"), np.ndarray)] for name in "XY")
+    rasters: dict[int, tuple[dict[str, Any], dict[str, str | None]]] = {}
+    for one in signals:
+        place = one.get("XIndex")
+        raster = int(np.ravel(place)[0]) - 1 if isinstance(place, np.ndarray) and place.size else 0
+        if isinstance(name := one.get("Name"), str) and 0 <= raster < len(times):
+            time = times[raster]
+            columns, units = rasters.setdefault(raster, ({"time": np.ravel(_data(time))}, {"time": _unit(time) or "s"}))
+            columns[name], units[name] = np.ravel(_data(one)), _unit(one)
+    return list(rasters.values())
+
+
+def _each(value: Value) -> list[Mapping[str, Any]]:
+    """Return the structs of an array of them, or the only one."""
+    many: Any = [value] if isinstance(value, Mapping) else value if isinstance(value, Sequence) else []
+    return [one for one in many if isinstance(one, Mapping)]
+
+
+def _data(struct: Mapping[str, Any]) -> Any:
+    return struct["Data"]
+
+
+def _unit(struct: Mapping[str, Any]) -> str | None:
+    said = struct.get("Unit")
+    return said if isinstance(said, str) and said.strip() else None
 
 
 def _simulink(struct: Mapping[str, Value]) -> tuple[dict[str, Any], dict[str, str | None]]:

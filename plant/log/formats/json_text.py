@@ -1,0 +1,80 @@
+"""JSON logs: rows as objects, one a line or in a list, rows as lists below their names, or an object of columns."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from plant.errors import LogError
+from plant.log.formats.packed import opened
+from plant.log.table import Table, table_of
+
+WANTED = (
+    "JSON is read as one object a row (a list of them, or one a line), or as one object with a list a column; "
+    "save the log as .csv or .parquet"
+)
+
+
+def open_json(path: Path) -> Table:
+    """Open a log in JSON.
+
+    Raises
+    ------
+    LogError
+        If it is no table, or no JSON.
+    """
+    with opened(path) as file:
+        text = file.read().decode("utf-8-sig", errors="replace")
+    columns = _columns(_document(text, str(path)))
+    if not columns:
+        raise LogError(WANTED, str(path))
+    return table_of(str(path), {name: _array(values) for name, values in columns.items()})
+
+
+def _document(text: str, source: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        pass
+    rows: list[Any] = []
+    lines = [line for line in text.splitlines() if line.strip()]
+    for place, line in enumerate(lines):
+        try:
+            rows.append(json.loads(line))
+        except json.JSONDecodeError as error:
+            if place == len(lines) - 1 > 0:  # a logger that is switched off leaves its last line cut
+                break
+            raise LogError(f"{WANTED} (line {place + 1} is no JSON: {error.msg})", source) from error
+    return rows
+
+
+def _columns(document: Any) -> dict[str, list[Any]]:
+    if isinstance(document, Mapping):
+        lists = {str(name): values for name, values in document.items() if isinstance(values, list)}
+        lengths = {len(values) for values in lists.values()}
+        if len(lists) == 1 and (inner := _columns(next(iter(lists.values())))):
+            return inner
+        return lists if len(lengths) == 1 else {}
+    if not isinstance(document, Sequence) or isinstance(document, str) or not document:
+        return {}
+    if all(isinstance(row, Mapping) for row in document):
+        names = dict.fromkeys(str(name) for row in document for name in row)
+        return {name: [row.get(name) for row in document] for name in names}
+    first = document[0]
+    if isinstance(first, list) and all(isinstance(row, list) and len(row) == len(first) for row in document):
+        named = all(isinstance(cell, str) for cell in first)
+        names = [str(cell) for cell in first] if named else [f"column {place + 1}" for place in range(len(first))]
+        rows = document[1:] if named else document
+        return {name: [row[place] for row in rows] for place, name in enumerate(names)}
+    return {}
+
+
+def _array(values: list[Any]) -> Any:
+    """Return a column as numbers, NaN for null; as it is where it holds others."""
+    if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
+        return np.array([np.nan if value is None else float(value) for value in values])
+    made = np.empty(len(values), dtype=object)
+    made[:] = values
+    return made
