@@ -48,6 +48,6 @@ def seeds(folder: Path) -> dict[str, tuple[str, bytes]]:
     log = pd.DataFrame(dict(zip(SI, (time, 90.0 * wave, 1e-3 * (1.0 - wave), 0.03 * wave, 3e5 * wave), strict=True)))
     made: dict[str, tuple[str, bytes]] = {}
     for kind, name in KINDS.items():
-        path: Path = getattr(written, name, getattr(more_written, name, None))(log, folder)
+        path: Path = getattr(written if hasattr(written, name) else more_written, name)(log, folder)
         made[kind] = (path.name, path.read_bytes())
     return made

@@ -4,6 +4,7 @@ import json
 import pickle
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 from zipfile import ZipFile
 
 import numpy as np
@@ -15,7 +16,7 @@ BARE = tuple(name.split(" [")[0] for name in ENGLISH)
 UNITS = tuple(name[:-1].split(" [")[1] for name in ENGLISH)
 
 
-def body(log: pd.DataFrame, sep: str, **how: str) -> str:
+def body(log: pd.DataFrame, sep: str, **how: Any) -> str:
     return benched(log).to_csv(index=False, header=False, sep=sep, **how)
 
 

@@ -83,7 +83,7 @@ def cells_of(line: str, delimiter: str) -> list[str]:
     if '"' not in line:
         return line.split(delimiter)
     try:
-        return next(csv.reader([line], delimiter=delimiter))
+        return next(csv.reader([line], delimiter=delimiter, strict=True))  # a quote that is never closed is none
     except (csv.Error, StopIteration):
         return line.split(delimiter)
 

@@ -70,7 +70,7 @@ def test_sums_below_the_data_are_no_part_of_any_column_that_is_shown(tmp_path: P
         ("range switched", "'range switched'"),
         ("ERR,ERR,ERR,ERR", "'ERR, ERR, ERR, ERR'"),
         ("0.04\0\0,5,0.004,x", "'0.04"),
-        ('0.040,"5,0.004,x', "'0.040, 5,0.004,x'"),
+        ('0.040,5,0.5,"x,1,2,text', "0.040, 5, 0.5, "),
     ],
 )
 def test_a_row_of_garbage_within_a_log_leaves_a_gap_and_is_said(line: str, said: str, tmp_path: Path) -> None:
@@ -80,6 +80,38 @@ def test_a_row_of_garbage_within_a_log_leaves_a_gap_and_is_said(line: str, said:
     assert said in str(left_out)
     assert np.flatnonzero(np.isnan(record["position_m"])).tolist() == [40]
     np.testing.assert_allclose(np.delete(record["position_m"], 40), np.delete(0.001 * np.arange(len(ROWS)), 40))
+
+
+GARBAGE = (
+    "x",
+    '"',
+    '",',
+    "1,2",
+    "1,2,3,4,5",
+    "ERR,ERR,ERR,ERR",
+    '0.5,"x,1,2',
+    "#x",
+    "Mean,1,2,3",
+    "\0\0",
+    '"a\nb"',
+    ";;;",
+)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_garbage_moves_no_sample_and_is_never_left_out_in_silence(seed: int, tmp_path: Path) -> None:
+    rng, rows = np.random.default_rng(seed), list(ROWS)
+    for place, line in zip(rng.integers(1, len(rows) - 1, 6), rng.choice(GARBAGE, 6), strict=True):
+        if rng.random() < 0.5:
+            rows.insert(place, str(line))
+        else:
+            rows[place] = ",".join([*rows[place].split(",")[:2], str(line), "text"])
+    record, notes = read(written(tmp_path, *rows))
+    there = np.isfinite(record["position_m"])
+    assert len(record) == len(ROWS)
+    assert np.count_nonzero(~there) <= 12
+    np.testing.assert_allclose(record["position_m"][there], 0.001 * np.arange(len(ROWS))[there])
+    assert notes
 
 
 def test_a_cell_that_is_no_number_is_missing_and_the_rest_of_its_row_is_not(tmp_path: Path) -> None:
