@@ -31,12 +31,17 @@ def median(values: Array) -> float:
 
 
 def medians(rows: Array) -> Array:
-    """Return the median of each row, shape (m,).
+    """Return the median of each row.
 
     Parameters
     ----------
     rows : ndarray, shape (m, n)
         Any unit; none missing.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        In the same unit.
 
     Examples
     --------

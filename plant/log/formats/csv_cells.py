@@ -207,6 +207,7 @@ class _Body:
             taken -= 1
         last = self.rows[taken - 1][0] if taken else 0
         within = [one for one in self.strange if one.line < last]
+        self._note_out_of_order(found)
         self._refuse(found, within, allowed)
         timeless = {row: said for row, said in self.timeless.items() if row < taken}
         notes = self._notes(found, taken, within, timeless)
@@ -229,6 +230,16 @@ class _Body:
                 self.timeless[row] = cell
 
         return read_stamps(["" if row in cells.bad else one for row, one in enumerate(cells.values)], refuse)
+
+    def _note_out_of_order(self, found: Mapping[Column, Any]) -> None:
+        """Count a row that holds a cell of text as garbage where its time does not lie between those beside it."""
+        for time in (values for column, values in found.items() if column.channel == TIME):
+            for bad in (self.columns[column].bad for column in found):
+                for row, cell in bad.items():
+                    here = time[row]
+                    late = row + 1 < len(time) and here >= time[row + 1]
+                    if (late or (row and here <= time[row - 1])) and row not in self.timeless:
+                        self.timeless[row] = cell
 
     def _refuse(self, found: Iterable[Column], within: Sequence[_Strange], allowed: float) -> None:
         """Refuse rows if too many are no data, by the first of them; another header comes before all others."""
