@@ -32,6 +32,26 @@ class SensorCode(Code):
         "all channels repeat their last sample, and then {channel} jumps: the logger missed {rows} rows in {count} "
         "places; the repeated rows were left out"
     )
+    SENT_TWICE = (
+        "the logger wrote {rows} rows twice, in {count} places, with other times, among them those of {channel}; the "
+        "copies were left out"
+    )
+    HELD_ALONE = (
+        "{channel} repeats its last value for {seconds:.3g} s in {count} places, from {begin_s:.3g} s on, while other "
+        "channels go on; the repeated values were left out"
+    )
+    ROWS_LOST = (
+        "{jumped} jump from one row to the next at {where} s, as no piston and no oil does: the logger lost rows "
+        "there, though its times go on; the log was used from {begin_s:.4g} to {end_s:.4g} s"
+    )
+    POSITION_REZEROED = (
+        "{channel} steps by {step:.4g} m at {at_s:.4g} s while everything else goes on as before: its zero was set "
+        "anew, or rows were lost in steady motion; the step was subtracted"
+    )
+    PRESSURE_REZEROED = (
+        "{channel} steps at {where} s (by {step:.3g} Pa), which no flow explains, while position goes on as before: "
+        "its zero was set anew; the log was used from {begin_s:.4g} to {end_s:.4g} s"
+    )
     FILTERED = (
         "{channel} was filtered or averaged before it was logged: its noise is correlated over {rows} rows, so one "
         "sample in {rows} was used"
@@ -59,6 +79,10 @@ class ChannelCode(Code):
     CHANNEL_UNIT = (
         "{channel}: the values are {factor:.3g} times what {against} would give, which looks like {slip}; give the "
         "column's unit (--columns CHANNEL=NAME:UNIT)"
+    )
+    UNIT_CHANGES = (
+        "{channel}: from {begin_s:.3g} s on, noise is about {factor:.3g} times what it was, as when the column's unit "
+        "changes within the log; give both parts as logs of their own"
     )
     NOTHING_CHANGES = (
         "{channel}: no value changes from the first row to the last although the motor turns, so the log shows "

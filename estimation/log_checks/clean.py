@@ -5,13 +5,17 @@ from dataclasses import dataclass
 
 from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED, VELOCITY
 from estimation.log_checks.channel_physics import channel_mistakes
+from estimation.log_checks.discontinuities import without_discontinuities
 from estimation.log_checks.dropout import without_dropouts
 from estimation.log_checks.filtered import independent_variance, without_correlated_noise
 from estimation.log_checks.held import without_held
+from estimation.log_checks.held_alone import without_held_alone
 from estimation.log_checks.hum import without_hum
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
 from estimation.log_checks.outliers import without_gross_outliers
 from estimation.log_checks.sensor_check import sensor_objections, without_saturated
+from estimation.log_checks.sent_twice import without_rows_sent_twice
+from estimation.log_checks.unit_change import unit_changes
 from estimation.log_checks.velocity_offset import without_velocity_offset
 from estimation.notes import SensorCode
 from plant.eha.model import EhaParameters
@@ -29,8 +33,8 @@ class CleanLog:
     Parameters
     ----------
     record : Record
-        The log, without repeated samples, dropouts, gross outliers, clipped pressures, hum, an offset of its velocity
-        sensor, and samples of like noise.
+        The log, without repeated samples and rows, dropouts, gross outliers, clipped pressures, steps of a zero, hum,
+        an offset of its velocity sensor, and samples of like noise; its longest part where rows were lost.
     variances : Mapping[str, float]
         Measurement variance of each of its channels [SI squared].
     left_out : tuple of Note
@@ -89,20 +93,27 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
         The log to fit, and what was found.
     """
     sampled, held = without_held(record)
-    whole, dropouts = without_dropouts(sampled)
-    sound, outliers = without_gross_outliers(whole, CLEANED)
+    sent_once, twice = without_rows_sent_twice(sampled)
+    whole, dropouts = without_dropouts(sent_once)
+    changes = unit_changes(whole)
+    live, alone = without_held_alone(whole)
+    sound, outliers = without_gross_outliers(live, CLEANED)
     clipped: tuple[Note, ...] = ()
     if PRESSURE in sound:
         sound, clipped = without_saturated(sound, parameters)
+    mended, steps = (sound, ()) if changes else without_discontinuities(sound)
+    if steps and not (changes := channel_mistakes(sound, parameters)):  # channels of another meaning may jump
+        sound = mended
     sound, hum = without_hum(sound)
     sound, offset = without_velocity_offset(sound)
     known = [name for name in dict.fromkeys((*CLEANED, *PRESSURES)) if name in sound]
     objections = sensor_objections(sound, parameters)
     dead = any(note.data["channel"] == PRESSURE for note in objections)
-    mistakes = channel_mistakes(sound.replace(**{PRESSURE: None}) if dead else sound, parameters)
-    objections = () if mistakes else objections  # a sensor cannot be judged by channels of another meaning
+    mistakes = changes or channel_mistakes(sound.replace(**{PRESSURE: None}) if dead else sound, parameters)
+    if mistakes:  # a sensor cannot be judged by channels of another meaning
+        objections = steps = ()
     sound, filtered = without_correlated_noise(sound)
-    left_out = (*held, *dropouts, *outliers, *clipped, *hum, *offset, *filtered)
+    left_out = (*held, *twice, *dropouts, *alone, *outliers, *clipped, *steps, *hum, *offset, *filtered)
     variances = {**measurement_variances(sound, known), **_thinned_variances(sound, filtered)}
     return CleanLog(sound, variances, left_out, objections, mistakes)
 

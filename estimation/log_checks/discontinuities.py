@@ -1,0 +1,247 @@
+"""Rows at which a log breaks off: a sensor's zero that was set anew, and rows that were lost without a mark.
+
+Position goes on by what velocity says. Pressure changes by what pump and piston compress, and by what leaks. A row at
+which one of them steps several times farther from that than it ever does elsewhere is no motion. Where it steps alone,
+its zero was set anew: a step of position is subtracted. That of a pressure is not known as well as a fit asks for, and
+where several channels jump at once rows were lost, nobody knows how many: the longest part without a step is kept.
+"""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
+from estimation.notes import SensorCode
+from plant.arrays import Array
+from plant.log.record import Record
+from plant.notes import Note
+
+FEWEST_ROWS, MOST_PLACES = 500, 10
+"""Rows of a log that show what is usual, at least, and places that are looked for, at most [count]."""
+
+SLOWEST, SLOWEST_PRESSURE = 5.5e-3, 2.5e-3
+"""Sample times beyond which pace, and pressure, change within a row by as much as they ever do [s]."""
+
+APART = 10
+"""Rows about a place that are left out of what is usual elsewhere, and over which a step must last [samples]."""
+
+STEP, STEP_ALONE, STEP_OF_PRESSURE = 3.0, 4.0, 2.2
+"""How many times the largest one elsewhere a step must be [dimensionless]: of a position; of one without a velocity
+that says how far the piston went; of a pressure. 640 logs reach 1.9, 2.0 and 1.5 (training, shared), and 9 where
+friction grips."""
+
+NEAR = 4
+"""Rows on either side over whose mean a step is taken [samples]."""
+
+LASTS = 0.5
+"""Share of a step that must be left some rows on; of an outlier nothing is [fraction]."""
+
+BROKEN = 8.0
+"""Deviations of noise by which another channel jumps in the same row if rows were lost [dimensionless]."""
+
+REST = 10
+"""Rows that position repeats before it jumps if it was held by its logger [samples]."""
+
+
+class _Step(NamedTuple):
+    """A step of a channel from a row to the next."""
+
+    channel: str
+    row: int
+    size: float
+
+
+def without_discontinuities(record: Record) -> tuple[Record, tuple[Note, ...]]:
+    """Return a log whose sensors have one zero throughout and whose clock misses no rows.
+
+    Parameters
+    ----------
+    record : Record
+        The log, without outliers; position is needed, and a channel that goes with it.
+
+    Returns
+    -------
+    tuple of (Record, tuple of Note)
+        The log, steps of a zero subtracted, or its longest part; and what was done.
+    """
+    if POSITION not in record or len(record) < FEWEST_ROWS or record.sample_time > SLOWEST:
+        return record, ()
+    moved = _steps_of_position(record)
+    places = [step.row for step in moved]
+    pressed = (
+        step for step in _steps_of_pressure(record) if _beside(step.row, places) or not _driven(record, step.row)
+    )
+    if not (steps := [*moved, *pressed]):
+        return record, ()
+    if any(
+        step.channel == PRESSURE or (not _held_before(record, step) and _also(record, step, steps)) for step in steps
+    ):
+        return _longest(record, steps)
+    notes: list[Note] = []
+    position = record[POSITION].copy()
+    for step in steps:
+        at = record.start_time + record.sample_time * (step.row + 1)
+        if (held := _held_before(record, step)) > 0:
+            position[step.row + 1 - held : step.row + 1] = np.nan
+            seconds = held * record.sample_time
+            said = SensorCode.HELD_ALONE.note(channel=POSITION, seconds=seconds, count=1, begin_s=at - seconds)
+        else:
+            position[step.row + 1 :] -= step.size
+            said = SensorCode.POSITION_REZEROED.note(channel=POSITION, step=step.size, at_s=at)
+        notes.append(said)
+    return record.replace(**{POSITION: position}), tuple(notes)
+
+
+def _by_row(record: Record, steps: list[_Step]) -> dict[int, set[str]]:
+    """Return the channels that jump at each place; steps in neighbouring rows are one place."""
+    out: dict[int, set[str]] = {}
+    for step in sorted(steps, key=lambda one: one.row):
+        row = next((one for one in out if step.row - one <= APART), step.row)
+        out.setdefault(row, set()).update((step.channel, *_also(record, step, steps)))
+    return out
+
+
+def _longest(record: Record, steps: list[_Step]) -> tuple[Record, tuple[Note, ...]]:
+    """Return the longest part of a log between places at which pressure steps or rows were lost."""
+    seams = _by_row(record, steps)
+    ends = [0, *(row + 1 for row in seams), len(record)]
+    first, behind = max(pairwise(ends), key=lambda part: part[1] - part[0])
+    begin, end = (record.start_time + record.sample_time * row for row in (first, behind - 1))
+    where = ", ".join(f"{record.start_time + record.sample_time * (row + 1):.4g}" for row in seams)
+    jumped = [name for name in (POSITION, PRESSURE, VELOCITY, SPEED) if any(name in one for one in seams.values())]
+    clock = {"where": where, "begin_s": begin, "end_s": end}
+    if jumped == [PRESSURE]:
+        said = SensorCode.PRESSURE_REZEROED.note(channel=PRESSURE, step=steps[0].size, **clock)
+    else:
+        channel = SPEED if SPEED in record else POSITION
+        said = SensorCode.ROWS_LOST.note(channel=channel, jumped=" and ".join(jumped), **clock)
+    return record.slice(first, behind), (said,)
+
+
+def _steps_of_position(record: Record) -> list[_Step]:
+    """Return where position steps farther from where velocity takes it than elsewhere, and than it ever goes in a row.
+
+    Seals that grip stop a piston within a row; it strays by less than it goes.
+    """
+    gone, sure = np.diff(record[POSITION]), VELOCITY in record
+    pace = record.sample_time * record[VELOCITY] if sure else np.zeros(len(record))
+    strayed = gone - 0.5 * (pace[1:] + pace[:-1])
+    rows = _places(strayed, STEP if sure else STEP_ALONE)
+    farthest = float(np.nanmax(np.abs(_without(gone, rows))))
+    return [_Step(POSITION, k, _size(strayed, k)) for k in rows if abs(strayed[k]) > farthest]
+
+
+def _steps_of_pressure(record: Record) -> list[_Step]:
+    """Return where pressure steps farther from what compresses the oil than elsewhere."""
+    if PRESSURE not in record or SPEED not in record or record.sample_time > SLOWEST_PRESSURE:
+        return []
+    rows = _places(_pressure_strays(record, noisy=True), STEP_OF_PRESSURE)
+    strayed = _pressure_strays(record) if rows else np.empty(0)
+    return [_Step(PRESSURE, k, _size(strayed, k)) for k in rows]
+
+
+def _beside(row: int, places: list[int]) -> bool:
+    return any(abs(row - place) <= 1 for place in places)
+
+
+def _driven(record: Record, row: int) -> bool:
+    """Return whether the motor jumps about a row, which may move pressure within it."""
+    return any(_jumps(record[SPEED], one) for one in range(row - 2, row + 3))
+
+
+def _without(values: Array, rows: list[int]) -> Array:
+    """Return values with zeros about some rows."""
+    out = np.nan_to_num(values)
+    for k in rows:
+        out[max(0, k - APART) : k + APART + 1] = 0.0
+    return out
+
+
+def _pressure_strays(record: Record, *, noisy: bool = False) -> Array:
+    """Return what is left of the change of pressure from row to row beside what pump, piston and leakage explain [Pa].
+
+    A noisy row is followed by a change the other way, which may be counted among what explains; a step is not.
+
+    Valves and seals bend this line, so rows that stray far from it are left out before it is drawn again.
+    """
+    pressure, speed, T = record[PRESSURE], record[SPEED], record.sample_time
+    rise, swept, turned = np.diff(pressure), np.diff(record[POSITION]), 0.5 * T * (speed[1:] + speed[:-1])
+    shifted = [np.roll(one, k) for one in (swept, turned) for k in (-1, 0, 1)]
+    middle = 0.5 * T * (pressure[1:] + pressure[:-1])
+    before = (np.roll(rise, 1),) if noisy else ()
+    known = np.stack([*shifted, middle, T * np.sign(turned), *before])
+    known[:, [0, -1]] = 0.0
+    there = np.isfinite(rise) & np.all(np.isfinite(known), axis=0)
+    left = rise
+    if np.count_nonzero(there) < FEWEST_ROWS // 2:
+        return left
+    for _ in range(3):
+        rows = known[:, there]
+        sizes = np.linalg.norm(rows, axis=1)
+        sizes[sizes == 0.0] = 1.0
+        rows = rows / sizes[:, None]
+        found = np.linalg.lstsq(rows @ rows.T, rows @ rise[there], rcond=1e-10)[0]
+        left = rise - (found / sizes) @ known
+        usual = np.sort(np.abs(left[there]))
+        there &= np.abs(left) <= 3.0 * usual[int(0.99 * (len(usual) - 1))]
+    return left
+
+
+def _places(strayed: Array, least: float) -> list[int]:
+    """Return rows behind which a channel steps farther than anywhere else, and stays; nothing where none does."""
+    sizes = np.nan_to_num(np.abs(strayed))
+    sizes[:APART] = sizes[-APART:] = 0.0  # a log may begin within a jerk
+    found: list[tuple[int, float]] = []
+    for _ in range(MOST_PLACES + 1):
+        k = int(np.argmax(sizes))
+        found.append((k, float(sizes[k])))
+        sizes[max(0, k - APART) : k + APART + 1] = 0.0
+    alone = [n for n in range(1, len(found)) if found[n - 1][1] > least * found[n][1] > 0.0]
+    rows = [k for k, _ in found[: max(alone, default=0)]]
+    sums = (float(np.nansum(strayed[k - APART : k + APART + 1])) / strayed[k] for k in rows)
+    return rows if all(lasting > LASTS for lasting in sums) else []
+
+
+def _size(strayed: Array, k: int) -> float:
+    """Return how much higher a channel is behind a row than before, by the means of some rows on either side."""
+    course = np.cumsum(np.nan_to_num(strayed[k - NEAR : k + NEAR + 1]))
+    return float(np.mean(course[NEAR:]) - np.mean(course[:NEAR]))
+
+
+def _held_before(record: Record, step: _Step) -> int:
+    """Return how many rows a position repeats before it jumps; 0 where it is none or no rest."""
+    if step.channel != POSITION:
+        return 0
+    before = record[POSITION][: step.row + 1]
+    moved = np.flatnonzero(before != before[-1])
+    count = step.row - int(moved[-1]) if len(moved) else 0
+    if count < REST or VELOCITY not in record:
+        return 0
+    gone = record.sample_time * float(np.nansum(record[VELOCITY][step.row + 1 - count : step.row + 2]))
+    return count - 1 if abs(gone - step.size) < 0.5 * abs(step.size) else 0
+
+
+def _also(record: Record, step: _Step, steps: list[_Step]) -> list[str]:
+    """Return the other channels that jump in the same row."""
+    names = [one.channel for one in steps if one.channel != step.channel and _beside(one.row, [step.row])]
+    for name in (PRESSURE, VELOCITY, SPEED):
+        if name in record and name not in (step.channel, *names) and _jumps(record[name], step.row):
+            names.append(name)
+    return names
+
+
+def _jumps(values: Array, row: int) -> bool:
+    """Return whether a channel leaves the line on which it came and goes on, by far more than its noise."""
+    first = max(0, row - 3 * APART)
+    around = values[first : row + 3 * APART + 2]
+    steps = np.diff(around)
+    k = row - first
+    beside = np.delete(steps, k)
+    beside = beside[np.isfinite(beside)]
+    if len(beside) < APART or not np.isfinite(steps[k]):
+        return False
+    near = steps[[i for i in (k - 2, k - 1, k + 1, k + 2) if 0 <= i < len(steps)]]
+    expected = float(np.nanmedian(near))
+    usual = 1.4826 * float(np.median(np.abs(beside - np.median(beside))))
+    return abs(float(steps[k]) - expected) > BROKEN * usual

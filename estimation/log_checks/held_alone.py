@@ -1,0 +1,106 @@
+"""A channel that stood still by itself: its logger had no new sample of it for a while, and then had.
+
+Where a channel is noisy on either side, it cannot repeat one value for long. That is left out as missing. A sensor that
+never comes back, or stands still for long, is accused instead (`sensor_check`).
+"""
+
+import numpy as np
+
+from estimation.arrays import BoolArray
+from estimation.log_checks.channel_names import PRESSURES, SPEED, VELOCITY
+from estimation.notes import SensorCode
+from estimation.stretches import stretches
+from plant.arrays import Array
+from plant.log.record import Record
+from plant.notes import Note
+
+ASKED = (SPEED, VELOCITY, *PRESSURES)
+"""Channels that are asked. A piston that rests repeats its position too; that shows by a jump (`discontinuities`)."""
+
+FEWEST_ROWS, BESIDE = 20, 50
+"""Rows that a channel repeats, and rows on either side that show its noise, at least [count]."""
+
+REPEATS, LONGER = 0.1, 4.0
+"""Share of those rows that repeat the one before, at most [fraction]; and how many times longer than any other of its
+repetitions a hold is [dimensionless]: rest, a clipped pressure and a coarse sensor come again."""
+
+NOISY, LEAST_NOISE = 1.0, 1e-5
+"""Fourth differences of noise are larger than its third ones, by 1.9 on average, those of a motion far smaller
+[dimensionless]; and the least share of a channel's range that is noise, and no rounding of the file [fraction]."""
+
+MOST = 0.2
+"""Share of a log that a channel may be held [fraction]."""
+
+
+def without_held_alone(record: Record) -> tuple[Record, tuple[Note, ...]]:
+    """Return a log without the samples of a channel that its logger only repeated for a while.
+
+    Parameters
+    ----------
+    record : Record
+        The log; rows that repeat all channels are missing.
+
+    Returns
+    -------
+    tuple of (Record, tuple of Note)
+        The log, and a note for each channel that was held.
+    """
+    changed: dict[str, Array] = {}
+    notes: list[Note] = []
+    for name in (one for one in ASKED if one in record):
+        held = _held(record[name])
+        if not np.any(held):
+            continue
+        first, _ = stretches(held)
+        begin = record.start_time + record.sample_time * float(first[0])
+        seconds = record.sample_time * float(np.count_nonzero(held))
+        notes.append(SensorCode.HELD_ALONE.note(channel=name, seconds=seconds, count=len(first), begin_s=begin))
+        changed[name] = np.where(held, np.nan, record[name])
+    return (record.replace(**changed), tuple(notes)) if notes else (record, ())
+
+
+def _held(values: Array) -> BoolArray:
+    """Return which samples only repeat the one before, where the channel does not by itself."""
+    out = np.zeros(len(values), dtype=np.bool_)
+    first, behind = stretches(np.append(False, np.diff(values) == 0.0))
+    lengths = behind - first
+    long = np.flatnonzero(lengths >= FEWEST_ROWS)
+    if not len(long) or np.sum(lengths[long]) > MOST * len(values):
+        return out
+    rest = np.delete(lengths, long)
+    usual = int(np.max(rest, initial=1))
+    ends = {float(np.nanmax(values)), float(np.nanmin(values))}
+    for k in long.tolist():
+        a, b = int(first[k]), int(behind[k])
+        if lengths[k] < LONGER * usual or float(values[a]) in ends or values[a] == 0.0:
+            return np.zeros_like(out)
+        beside = values[max(0, a - 1 - BESIDE) : max(0, a - 1)], values[b : b + BESIDE]
+        if not all(len(one) == BESIDE and is_noisy(one, LEAST_NOISE * (max(ends) - min(ends))) for one in beside):
+            return np.zeros_like(out)
+        out[a:b] = True
+    return out
+
+
+def is_noisy(values: Array, least: float) -> bool:
+    """Return whether a stretch shows noise of its own in nearly every row.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        The stretch [any unit].
+    least : float
+        Third differences that are more than a file's rounding [unit of the channel].
+
+    Examples
+    --------
+    >>> time = 1e-3 * np.arange(50)
+    >>> is_noisy(np.sin(60.0 * time), 1e-5)
+    False
+    >>> is_noisy(np.sin(60.0 * time) + np.random.default_rng(1).normal(0.0, 1e-3, 50), 1e-5)
+    True
+    """
+    there = values[np.isfinite(values)]
+    if len(there) < 5:
+        return False
+    bends, rough = (np.median(np.abs(np.diff(there, order))) for order in (3, 4))
+    return bool(np.mean(np.diff(there) == 0.0) < REPEATS and bends > least and rough > NOISY * bends)

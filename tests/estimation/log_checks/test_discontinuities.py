@@ -1,0 +1,105 @@
+"""A zero that is set anew is subtracted, rows that were lost end a log's part, and what only moves is neither."""
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.clean import clean_log
+from estimation.log_checks.discontinuities import without_discontinuities
+from estimation.notes import ChannelCode, SensorCode
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH, IDEAL, Sensors
+
+SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
+PRESSURE = "differential_pressure_pa"
+ROW = 1500
+
+
+def log(drive: str, sensors: Sensors = BENCH) -> Record:
+    rng = np.random.default_rng(4)
+    signal = make_drive(drive, 4.0, 1e-3, EhaParameters(), rng)
+    return simulate(CIRCUIT, signal, 1e-3, EhaParameters(), sensors=sensors, rng=rng)
+
+
+def stepped(record: Record, channel: str, size: float) -> Record:
+    return record.replace(**{channel: record[channel] + np.where(np.arange(len(record)) < ROW, 0.0, size)})
+
+
+@pytest.mark.parametrize("sensors", [BENCH, IDEAL])
+@pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "chirp", "sine"])
+def test_a_log_that_goes_on_throughout_is_what_it_was(drive: str, sensors: Sensors) -> None:
+    record = log(drive, sensors)
+    assert without_discontinuities(record) == (record, ())
+    still = record.replace(**{VELOCITY: None})
+    assert without_discontinuities(still) == (still, ())
+
+
+@pytest.mark.parametrize("drive", ["steps", "multisine", "sine"])
+def test_a_zero_of_position_that_is_set_anew_is_named_and_subtracted(drive: str) -> None:
+    record = log(drive)
+    found, (note,) = without_discontinuities(stepped(record, POSITION, 0.004))
+    assert note.code is SensorCode.POSITION_REZEROED
+    assert note.data["step"] == pytest.approx(0.004, abs=1e-5)
+    assert note.data["at_s"] == pytest.approx(record.start_time + ROW * record.sample_time)
+    assert np.allclose(found[POSITION], record[POSITION], rtol=0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("drive", ["steps", "multisine", "sine"])
+def test_behind_a_zero_of_pressure_that_is_set_anew_the_longer_part_is_used(drive: str) -> None:
+    given = stepped(log(drive), PRESSURE, 1e6)
+    found, (note,) = without_discontinuities(given)
+    assert note.code is SensorCode.PRESSURE_REZEROED
+    assert note.data["step"] == pytest.approx(1e6, rel=0.03)
+    assert note.data["begin_s"] == pytest.approx(found.start_time) == pytest.approx(1e-3 * ROW)
+    assert np.array_equal(found[PRESSURE], given[PRESSURE][ROW:])
+
+
+@pytest.mark.parametrize(("drive", "rows"), [("multisine", 120), ("multisine", 400), ("prbs", 400)])
+def test_lost_rows_are_named_and_the_longest_part_is_used(drive: str, rows: int) -> None:
+    record = log(drive)
+    kept = np.delete(np.arange(len(record)), np.arange(ROW, ROW + rows))
+    found, (note,) = without_discontinuities(Record(1e-3, {name: record[name][kept] for name in record}))
+    assert note.code is SensorCode.ROWS_LOST
+    assert POSITION in note.data["jumped"]
+    assert found.start_time == pytest.approx(ROW * 1e-3)
+    assert np.array_equal(found[PRESSURE], record[PRESSURE][ROW + rows :])
+
+
+def test_a_motor_that_steps_within_a_row_sets_no_pressure_anew() -> None:
+    """Of a run without noise nothing else jumps as far; a step of the motor was called lost rows."""
+    record = log("steps", IDEAL)
+    pressure = record[PRESSURE] + np.where(np.arange(len(record)) < ROW, 0.0, 3e6)
+    speed = record[SPEED] + np.where(np.arange(len(record)) < ROW, 0.0, 400.0)
+    given = record.replace(**{PRESSURE: pressure, SPEED: speed})
+    assert without_discontinuities(given) == (given, ())
+
+
+def test_a_position_that_is_held_for_a_while_is_missing_there() -> None:
+    record = log("multisine")
+    held = record[POSITION].copy()
+    held[ROW : ROW + 100] = held[ROW]
+    clean = clean_log(record.replace(**{POSITION: held}), EhaParameters())
+    (note,) = (one for one in clean.left_out if one.code is SensorCode.HELD_ALONE)
+    assert note.data["channel"] == POSITION
+    assert np.flatnonzero(np.isnan(clean.record[POSITION])).tolist() == list(range(ROW + 1, ROW + 100))
+    assert clean.objections == ()
+
+
+def test_a_spike_a_short_log_and_a_slow_one_have_no_steps() -> None:
+    record = log("multisine")
+    spike = record[POSITION].copy()
+    spike[ROW] += 0.01
+    for given in (record.replace(**{POSITION: spike}), stepped(record, POSITION, 0.01).slice(1300, 1700)):
+        assert without_discontinuities(given) == (given, ())
+    slow = stepped(record, PRESSURE, 1e6).slice(0, None, 3)
+    assert without_discontinuities(slow) == (slow, ())
+
+
+def test_a_velocity_under_the_name_of_position_is_named_and_not_mended() -> None:
+    record = log("multisine")
+    jerky = record[VELOCITY] + np.where(np.arange(len(record)) < ROW, 0.0, 0.004)
+    clean = clean_log(record.replace(**{POSITION: jerky, VELOCITY: record[POSITION]}), EhaParameters())
+    assert [note.code for note in clean.mistakes] == [ChannelCode.CHANNELS_SWAPPED]
+    assert clean.left_out == ()

@@ -1,0 +1,47 @@
+"""A channel that stands still by itself for a while is missing there; what rests, clips or is coarse is not."""
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.clean import clean_log
+from estimation.log_checks.held_alone import FEWEST_ROWS, without_held_alone
+from estimation.notes import SensorCode
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from tests.estimation.log_checks.made_logs import LOG, PRESSURE, SPEED, VELOCITY, stands
+
+
+@pytest.mark.parametrize("channel", [SPEED, VELOCITY, PRESSURE])
+@pytest.mark.parametrize("rows", [FEWEST_ROWS + 1, 200])
+def test_a_channel_that_is_held_alone_is_missing_there_and_said(channel: str, rows: int) -> None:
+    given = LOG.replace(**{channel: stands(LOG[channel], 700, rows)})
+    found, (note,) = without_held_alone(given)
+    assert note.code is SensorCode.HELD_ALONE
+    assert note.data["channel"] == channel
+    assert np.flatnonzero(np.isnan(found[channel])).tolist() == list(range(701, 700 + rows))
+    clean = clean_log(given, EhaParameters())
+    assert note in clean.left_out
+    assert clean.objections == ()
+
+
+def unchanged(values: Array) -> bool:
+    record = LOG.replace(**{PRESSURE: values})
+    return without_held_alone(record) == (record, ())
+
+
+def test_a_sensor_that_never_comes_back_is_left_to_its_accusers() -> None:
+    assert unchanged(stands(LOG[PRESSURE], 1200, len(LOG)))
+
+
+def test_what_clips_is_coarse_or_rests_again_is_not_held() -> None:
+    pressure = LOG[PRESSURE]
+    assert unchanged(np.minimum(pressure, 0.3 * np.max(pressure)))
+    assert unchanged(np.round(pressure, -6))
+    assert unchanged(stands(stands(pressure, 300, 60), 900, 18))
+
+
+def test_a_drive_without_noise_that_rests_is_not_held() -> None:
+    ramp = np.interp(np.arange(3000), [0, 1000, 1400, 3000], [0.0, 50.0, 50.0, 80.0])
+    record = Record(1e-3, {SPEED: np.round(ramp, 7), PRESSURE: 1e4 * ramp})
+    assert without_held_alone(record) == (record, ())

@@ -1,0 +1,67 @@
+"""Rows that a logger wrote twice are left out; rest, drives that repeat and coarse channels are no copies."""
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.clean import clean_log
+from estimation.log_checks.sent_twice import FEWEST_ROWS, without_rows_sent_twice
+from estimation.notes import SensorCode
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH, IDEAL, Sensors
+
+SPEED, POSITION, PRESSURE = "motor_speed_rad_s", "position_m", "differential_pressure_pa"
+
+
+def log(drive: str, sensors: Sensors = BENCH) -> Record:
+    rng = np.random.default_rng(4)
+    signal = make_drive(drive, 4.0, 1e-3, EhaParameters(), rng)
+    return simulate(CIRCUIT, signal, 1e-3, EhaParameters(), sensors=sensors, rng=rng)
+
+
+def at(record: Record, rows: np.ndarray) -> Record:
+    return Record(record.sample_time, {name: record[name][rows] for name in record})
+
+
+@pytest.mark.parametrize("sensors", [BENCH, IDEAL])
+@pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "sine"])
+def test_a_log_that_is_written_once_has_no_copies(drive: str, sensors: Sensors) -> None:
+    record = log(drive, sensors)
+    assert without_rows_sent_twice(record) == (record, ())
+
+
+@pytest.mark.parametrize("rows", [FEWEST_ROWS, 50, 300])
+@pytest.mark.parametrize("drive", ["steps", "multisine", "sine"])
+def test_a_packet_that_came_again_is_cut_out_and_said(drive: str, rows: int) -> None:
+    record = log(drive)
+    order = np.arange(len(record))
+    sent = np.concatenate([order[: 1500 + rows], order[1500 : 2500 + rows], order[2500:]])
+    found, notes = without_rows_sent_twice(at(record, sent))
+    assert {(note.data["rows"], note.data["count"]) for note in notes} == {(2 * rows, 2)}
+    for name in (SPEED, POSITION, PRESSURE):
+        assert np.array_equal(found[name], record[name])
+
+
+def test_a_copy_in_place_of_rows_that_were_lost_leaves_them_missing() -> None:
+    record = log("multisine")
+    order = np.arange(len(record))
+    order[1600:1700] = order[1500:1600]
+    clean = clean_log(at(record, order), EhaParameters())
+    assert {note.code for note in clean.left_out} == {SensorCode.SENT_TWICE}
+    assert len(clean.record) == len(record)
+    for name in (SPEED, POSITION, PRESSURE):
+        assert np.flatnonzero(np.isnan(clean.record[name])).tolist() == list(range(1600, 1700))
+
+
+def test_a_run_without_noise_that_repeats_is_no_copy() -> None:
+    wave = np.tile(np.round(np.sin(2.0 * np.pi * np.arange(500) / 500.0), 9), 3)
+    record = Record(1e-3, {SPEED: 100.0 * wave, POSITION: 0.01 * wave, PRESSURE: 1e6 * np.roll(wave, 90)})
+    assert without_rows_sent_twice(record) == (record, ())
+
+
+def test_coarse_channels_at_rest_are_no_copies() -> None:
+    rng = np.random.default_rng(2)
+    record = Record(1e-3, {name: rng.integers(0, 3, 4000).astype(np.float64) for name in (SPEED, POSITION, PRESSURE)})
+    assert without_rows_sent_twice(record) == (record, ())
