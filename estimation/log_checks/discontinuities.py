@@ -28,8 +28,8 @@ APART = 10
 
 STEP, STEP_ALONE, STEP_OF_PRESSURE = 3.0, 4.0, 2.2
 """How many times the largest one elsewhere a step must be [dimensionless]: of a position; of one without a velocity
-that says how far the piston went; of a pressure. 640 logs reach 1.9, 2.0 and 1.5 (training, shared), and 9 where
-friction grips."""
+that says how far the piston went; of a pressure. 640 logs reach 1.9, 2.0 and 1.5 (training, shared), 2.5 just after
+a start under load, and 9 where friction grips."""
 
 NEAR = 4
 """Rows on either side over whose mean a step is taken [samples]."""

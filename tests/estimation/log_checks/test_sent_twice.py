@@ -56,7 +56,7 @@ def test_a_copy_in_place_of_rows_that_were_lost_leaves_them_missing() -> None:
 
 
 def test_a_run_without_noise_that_repeats_is_no_copy() -> None:
-    wave = np.tile(np.round(np.sin(2.0 * np.pi * np.arange(500) / 500.0), 9), 3)
+    wave = np.tile(np.round(np.sin(2.0 * np.pi * np.arange(500) / 500.0), 9).astype(np.float64), 3)
     record = Record(1e-3, {SPEED: 100.0 * wave, POSITION: 0.01 * wave, PRESSURE: 1e6 * np.roll(wave, 90)})
     assert without_rows_sent_twice(record) == (record, ())
 
