@@ -133,7 +133,7 @@ def as_wide(row: Array, width: int) -> Array:
 
 
 def circuit_groups(
-    starts: Array, speed: Array, rows: Array, sample_time: float, *, tolerance: float, drive_tolerance: float
+    starts: Array, speed: Array, rows: Array, sample_time: float, *, tolerance: float, drive_tolerance: float, bulge: float = 0.0
 ) -> Iterator[Array]:
     """Run circuits of one kind side by side in steps of controlled error, some at a time.
 
@@ -157,5 +157,5 @@ def circuit_groups(
     """
     plant = circuit_plant(rows.shape[-1])
     control, whose = cast("ErrorControl", plant.control), plant.parameter_class
-    allowed = {"tolerance": tolerance, "drive_tolerance": drive_tolerance}
+    allowed = {"tolerance": tolerance, "drive_tolerance": drive_tolerance, "bulge": bulge}
     return controlled_groups(plant.name, control, starts, speed, rows, sample_time, whose, **allowed)

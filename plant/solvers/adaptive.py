@@ -19,6 +19,11 @@ SMOOTH = 10.0
 """Multiple of the tolerance by which a drive may leave the parabola that one step follows, relative to its size:
 what it leaves swings about that parabola, and next to nothing of it remains over a step."""
 
+STRAIGHT, SAMPLES, MEANS = 0.0, 1.0 / 12.0, 1.0 / 8.0
+"""What straight lines through a drive's samples hold too much over a sample time, as a share of its second difference
+[dimensionless]: nothing where the drive is those lines, what a cubic through the samples leaves out, and the same where
+each sample is the mean over a sample time about it (Taylor's series of the drive)."""
+
 
 @dataclass(frozen=True)
 class ErrorControl:
@@ -112,6 +117,7 @@ def controlled_groups(
     tolerance: float = TOLERANCE,
     drive_tolerance: float | None = None,
     longest: float = np.inf,
+    bulge: float = STRAIGHT,
 ) -> Iterator[Array]:
     """Yield what `controlled_run` returns, up to `LANES` runs at a time, which takes less memory.
 
@@ -154,6 +160,7 @@ def controlled_groups(
             sample_time,
             1.0 / (tolerance * scales),
             bend * control.drive_scale(parameters[0, 0]),
+            bulge,
             min(longest / sample_time, float(len(speed))),
             min(shortest, longest / sample_time),
             states,

@@ -23,8 +23,8 @@ from plant.compiled.source import lines_source, operations_source
 from plant.solvers.adaptive_loop import INNER, ROUNDEST, TINY, run_controlled, smooth
 from plant.solvers.steps import Derivative, Parameters, State, parameter_names, parameter_symbols, solve_linear
 
-Kernel: TypeAlias = Callable[[Array, Array, Array, float, Array, float, float, float, Array], None]
-"""``run(starts, speed, parameter rows, sample time, weights, bend, longest, shortest, states)``, which fills states."""
+Kernel: TypeAlias = Callable[[Array, Array, Array, float, Array, float, float, float, float, Array], None]
+"""``run(starts, speed, parameter rows, sample time, weights, bend, bulge, longest, shortest, states)``, which fills states."""
 
 
 def rodas3_stages(

@@ -43,6 +43,7 @@ def run_controlled(
     sample_time: float,
     weights: Array,
     bend: float,
+    bulge: float,
     longest: float,
     shortest: float,
     states: Array,
@@ -82,7 +83,7 @@ def run_controlled(
     while True:
         if place >= reach and end < n - 1:
             begin, place = end, 0.0
-            end, lift, ramp, curvature = smooth(drive, parameters, begin, bend)
+            end, lift, ramp, curvature = smooth(drive, parameters, begin, bend, bulge)
             reach = float(end - begin)
             if row < 0 or parameters.shape[0] > 1:
                 row = min(begin, parameters.shape[0] - 1)
@@ -120,7 +121,7 @@ def run_controlled(
         size = max(size * growth(error), shortest)
 
 
-def smooth(drive: Array, parameters: Array, begin: int, bend: float) -> tuple[int, float, float, float]:
+def smooth(drive: Array, parameters: Array, begin: int, bend: float, bulge: float) -> tuple[int, float, float, float]:
     """Return how far the drive follows one parabola from a sample on, and that parabola.
 
     Parameters
@@ -140,16 +141,46 @@ def smooth(drive: Array, parameters: Array, begin: int, bend: float) -> tuple[in
     n = drive.shape[0]
     end = begin + 1
     low, high = np.inf, -np.inf
+    if bulge > 0.0 and begin > 0:
+        low = drive[end] - 2.0 * drive[begin] + drive[begin - 1]
+        high = low
+    total = 0.5 * (drive[begin] + drive[end])
     while end < n - 1 and (parameters.shape[0] == 1 or same(parameters[end], parameters[begin])):
         curvature = drive[end + 1] - 2.0 * drive[end] + drive[end - 1]
         lower, upper = min(low, curvature), max(high, curvature)
         length = end + 1 - begin
         if (upper - lower) * length * length > 16.0 * bend or max(-lower, upper) > ROUNDEST * bend:
+            if bulge > 0.0 and length > 2:
+                end -= 1
+                total -= 0.5 * (drive[end] + drive[end + 1])
             break
         low, high = lower, upper
+        total += 0.5 * (drive[end] + drive[end + 1])
         end += 1
-    curvature = 0.5 * (low + high) if end > begin + 1 else 0.0
-    return end, drive[begin] + curvature / 12.0, (drive[end] - drive[begin]) / (end - begin), curvature
+    length = end - begin
+    ramp = (drive[end] - drive[begin]) / length
+    curvature = 0.5 * (low + high) if length > 1 else 0.0
+    if bulge == 0.0:
+        return end, drive[begin] + curvature / 12.0, ramp, curvature
+    turned = slope_at(drive, end) - slope_at(drive, begin)
+    if length == 1:
+        curvature = turned
+    mean = (total - bulge * turned) / length
+    return end, mean - 0.5 * ramp * length + curvature * length * length / 12.0, ramp, curvature
+
+
+def slope_at(drive: Array, sample: int) -> float:
+    """Return the slope of a drive at a sample, from those beside it [the drive's unit a sample].
+
+    Parameters
+    ----------
+    drive : ndarray, shape (n,)
+        Drive at the samples [its SI unit].
+    sample : int
+        Which.
+    """
+    before, after = max(sample - 1, 0), min(sample + 1, drive.shape[0] - 1)
+    return (drive[after] - drive[before]) / (after - before)
 
 
 def same(one: Array, other: Array) -> bool:
@@ -318,5 +349,5 @@ def keep(kernel: ControlledKernel, work: Array, place: int, states: Array, sampl
                 states[sample, i, lane] = work[place + kernel.LANES * i + lane]
 
 
-INNER = (lay, share, same, within, along, growth, unknown, largest, accept, keep)
+INNER = (lay, share, same, slope_at, within, along, growth, unknown, largest, accept, keep)
 """Parts of the loop and of `smooth`, compiled as if they stood there."""

@@ -83,6 +83,8 @@ class Blocks:
         Position that the log begins with [m]; 0 where none is logged.
     settling : float
         Time at the start that does not count [s].
+    averaged : bool
+        Whether each sample of motor speed is the mean of several logged ones.
     """
 
     speed: Array
@@ -98,6 +100,7 @@ class Blocks:
     opening: tuple[float, float] | None = None
     place: float = 0.0
     settling: float = SETTLING
+    averaged: bool = False
 
     @cached_property
     def outputs(self) -> Array:
@@ -216,6 +219,7 @@ def blocks_of(record: Record) -> Blocks:
         opening=opening,
         place=_place(whole),
         settling=_settling(record, whole),
+        averaged=pooled > 1,
     )
 
 

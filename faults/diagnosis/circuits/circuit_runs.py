@@ -18,6 +18,7 @@ from plant.eha.circuit_start import at_rest, under_pressure
 from plant.eha.model import EhaParameters
 from plant.eha.one_sided import as_wide, circuit_groups, circuit_plant
 from plant.eha.simulate import CIRCUIT
+from plant.solvers.adaptive import MEANS, SAMPLES
 from plant.solvers.block_means import block_means
 from plant.solvers.steps import parameter_row
 
@@ -174,19 +175,23 @@ def _brought(blocks: Blocks, width: int) -> tuple[Array, Array]:
     """
     until, before = blocks.earlier or (0, np.empty(0))
     rows = as_wide(_as_logged(blocks, before[None])[0], width)[None, None]
-    (states,) = circuit_groups(_starts(blocks, rows[0]), blocks.speed[: until + 1], rows, blocks.sample_time, **ALLOWED)
+    (states,) = circuit_groups(_starts(blocks, rows[0]), blocks.speed[: until + 1], rows, blocks.sample_time, **_allowed(blocks))
     return _outputs(blocks, states, rows), np.ascontiguousarray(states[-1].T)
 
 
 def _run(blocks: Blocks, starts: Array, rows: Array, since: int = 0) -> Array:
     """Return what circuits do from a sample on, in which they are at some states, shape (m, blocks, outputs)."""
-    groups = circuit_groups(starts, blocks.speed[since:], rows, blocks.sample_time, **ALLOWED)
+    groups = circuit_groups(starts, blocks.speed[since:], rows, blocks.sample_time, **_allowed(blocks))
     found, first = list[Array](), 0
     for states in groups:
         last = first + states.shape[2]
         found.append(_outputs(blocks, states, rows[:, first:last]))
         first = last
     return found[0] if len(found) == 1 else np.concatenate(found)
+
+
+def _allowed(blocks: Blocks) -> dict[str, float]:
+    return {**ALLOWED, "bulge": MEANS if blocks.averaged else SAMPLES}
 
 
 def _in_steps(blocks: Blocks, course: Array, rows: Array) -> Array:
@@ -200,7 +205,7 @@ def _in_steps(blocks: Blocks, course: Array, rows: Array) -> Array:
     for first, last in pairwise(ends.tolist()):
         here = rows * _drift(course[[(first + last) // 2]], rows.shape[-1])[:, None, :]
         speed = blocks.speed[first : last + 1]
-        states = [*circuit_groups(starts, speed, here, blocks.sample_time, **ALLOWED)]
+        states = [*circuit_groups(starts, speed, here, blocks.sample_time, **_allowed(blocks))]
         together = states[0] if len(states) == 1 else np.concatenate(states, axis=2)
         found.append(_outputs(blocks, together, here))
         starts = np.ascontiguousarray(together[-1].T)
