@@ -133,7 +133,14 @@ def as_wide(row: Array, width: int) -> Array:
 
 
 def circuit_groups(
-    starts: Array, speed: Array, rows: Array, sample_time: float, *, tolerance: float, drive_tolerance: float, bulge: float = 0.0
+    starts: Array,
+    speed: Array,
+    rows: Array,
+    sample_time: float,
+    *,
+    tolerance: float,
+    drive_tolerance: float,
+    bulge: float,
 ) -> Iterator[Array]:
     """Run circuits of one kind side by side in steps of controlled error, some at a time.
 
@@ -147,8 +154,8 @@ def circuit_groups(
         Their parameters.
     sample_time : float
         Seconds between samples [s].
-    tolerance, drive_tolerance : float
-        See `plant.solvers.adaptive.controlled_run` [dimensionless].
+    tolerance, drive_tolerance, bulge : float
+        See `plant.solvers.adaptive.controlled_groups` [dimensionless].
 
     Returns
     -------

@@ -20,9 +20,9 @@ SMOOTH = 10.0
 what it leaves swings about that parabola, and next to nothing of it remains over a step."""
 
 STRAIGHT, SAMPLES, MEANS = 0.0, 1.0 / 12.0, 1.0 / 8.0
-"""What straight lines through a drive's samples hold too much over a sample time, as a share of its second difference
-[dimensionless]: nothing where the drive is those lines, what a cubic through the samples leaves out, and the same where
-each sample is the mean over a sample time about it (Taylor's series of the drive)."""
+"""By how much straight lines through a drive's samples exceed its mean over a sample time, over its second difference
+[dimensionless], by Taylor's series: where the drive is those lines, where the samples lie on a curve, and where each is
+the mean of a curve over the sample time about it."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def controlled_groups(
     starts : ndarray, shape (runs, states)
         Initial states in SI.
     speed : ndarray, shape (n,)
-        Drive at the samples [its SI unit], linear between.
+        Drive at the samples [its SI unit].
     parameters : ndarray, shape (1 or n, runs, parameters)
         Parameter rows.
     sample_time : float
@@ -137,6 +137,8 @@ def controlled_groups(
         By how much steps may smooth the drive [dimensionless].
     longest : float
         Longest step [s].
+    bulge : float
+        `STRAIGHT`, `SAMPLES` or `MEANS`: what the drive does between samples [dimensionless].
 
     Yields
     ------

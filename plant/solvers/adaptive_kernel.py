@@ -24,7 +24,7 @@ from plant.solvers.adaptive_loop import INNER, ROUNDEST, TINY, run_controlled, s
 from plant.solvers.steps import Derivative, Parameters, State, parameter_names, parameter_symbols, solve_linear
 
 Kernel: TypeAlias = Callable[[Array, Array, Array, float, Array, float, float, float, float, Array], None]
-"""``run(starts, speed, parameter rows, sample time, weights, bend, bulge, longest, shortest, states)``, which fills states."""
+"""``run(starts, speed, parameter rows, sample time, weights, bend, bulge, longest, shortest, states)`` fills states."""
 
 
 def rodas3_stages(
@@ -126,7 +126,7 @@ def compile_adaptive(
     -------
     callable
         ``run(starts (states, lanes), speed (n,) [rad/s], parameters (1 or n, lanes, parameters), sample time [s],
-        weights (states,), bend [rad/s], longest and shortest step [samples], states (n, states, up to lanes))``.
+        weights (states,), bend [rad/s], bulge, longest and shortest step [samples], states (n, states, up to lanes))``.
     """
     made_of = name, derivative, width, parameter_class, lanes
     takes = signature_of(run_controlled, lanes=lanes, states=width)

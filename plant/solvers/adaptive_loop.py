@@ -64,6 +64,8 @@ def run_controlled(
         One over the error of a step that each state may have [one over its unit].
     bend : float
         By how much a step may smooth the drive [the drive's unit].
+    bulge : float
+        See `smooth` [dimensionless].
     longest, shortest : float
         Steps [count of samples].
     states : ndarray, shape (n, states, up to lanes)
@@ -132,6 +134,10 @@ def smooth(drive: Array, parameters: Array, begin: int, bend: float, bulge: floa
         Parameter rows; where they change, a piece ends.
     bend : float
         By how much it may leave the parabola [the drive's unit].
+    bulge : float
+        By how much straight lines between the samples exceed the drive's mean over a sample time, over its second
+        difference [dimensionless]: 0 where the drive is those lines. Otherwise a piece has the mean of a curve through
+        its samples, so that no flow is lost, and ends one sample before a corner.
 
     Returns
     -------

@@ -85,6 +85,8 @@ class Blocks:
         Time at the start that does not count [s].
     averaged : bool
         Whether each sample of motor speed is the mean of several logged ones.
+    differenced : bool
+        Whether velocity is how far a logged position went: what its error adds to a block, it takes from the next.
     """
 
     speed: Array
@@ -101,6 +103,7 @@ class Blocks:
     place: float = 0.0
     settling: float = SETTLING
     averaged: bool = False
+    differenced: bool = False
 
     @cached_property
     def outputs(self) -> Array:
@@ -220,6 +223,7 @@ def blocks_of(record: Record) -> Blocks:
         place=_place(whole),
         settling=_settling(record, whole),
         averaged=pooled > 1,
+        differenced=_position_goes(whole),
     )
 
 
@@ -238,11 +242,16 @@ def _samples_in_one(record: Record) -> int:
 
 def _velocity(whole: Mapping[str, Array], block: int, sample_time: float) -> Array | None:
     """Return the mean velocity over each block [m/s], None where no motion is logged; position goes first."""
-    if "position_m" in whole and np.any(np.isfinite(whole["position_m"])):
+    if _position_goes(whole):
         return np.diff(bridged(whole["position_m"])[::block]) / (block * sample_time)
     if "velocity_m_s" in whole and np.any(np.isfinite(whole["velocity_m_s"])):
         return _mean(whole["velocity_m_s"], block)
     return None
+
+
+def _position_goes(whole: Mapping[str, Array]) -> bool:
+    """Return whether a position is logged, which then says how fast the piston is."""
+    return "position_m" in whole and bool(np.any(np.isfinite(whole["position_m"])))
 
 
 def _pressure(whole: Mapping[str, Array], block: int, sample_time: float) -> Array | None:

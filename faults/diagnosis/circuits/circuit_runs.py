@@ -175,7 +175,8 @@ def _brought(blocks: Blocks, width: int) -> tuple[Array, Array]:
     """
     until, before = blocks.earlier or (0, np.empty(0))
     rows = as_wide(_as_logged(blocks, before[None])[0], width)[None, None]
-    (states,) = circuit_groups(_starts(blocks, rows[0]), blocks.speed[: until + 1], rows, blocks.sample_time, **_allowed(blocks))
+    speed = blocks.speed[: until + 1]
+    (states,) = circuit_groups(_starts(blocks, rows[0]), speed, rows, blocks.sample_time, **_allowed(blocks))
     return _outputs(blocks, states, rows), np.ascontiguousarray(states[-1].T)
 
 
@@ -191,6 +192,7 @@ def _run(blocks: Blocks, starts: Array, rows: Array, since: int = 0) -> Array:
 
 
 def _allowed(blocks: Blocks) -> dict[str, float]:
+    """Return the errors allowed in runs, and what the motor's speed does between its samples: it has inertia."""
     return {**ALLOWED, "bulge": MEANS if blocks.averaged else SAMPLES}
 
 

@@ -6,7 +6,7 @@ one linear step, each with the spread that is judged of it: what the log leaves 
 so does what it says of them, because the fit did not go that way (consider covariance: Tapley, Schutz and Born,
 Statistical Orbit Determination, 2004, chapter 6). The file may also be right about all of them: both count, as likely
 as they make the log. What is left of a log that no sensor makes is a wrong model's error, which a longer log does not
-average away; that is counted here, once, and where it is.
+average away; that is counted here, once, and where it is. Where noise alone is left, that of a position does not last.
 """
 
 from collections.abc import Mapping
@@ -185,6 +185,28 @@ def near_by(left: Array, seen: NDArray[np.bool_]) -> Array:
     return np.where(whole > 0.0, local / np.where(whole > 0.0, whole, 1.0), 1.0)
 
 
+def taken_back(slopes: Array, seen: NDArray[np.bool_]) -> Array:
+    """Return by how much less a position's noise pulls at a fit than white noise of its velocity would.
+
+    Mean velocity over a block is a difference of two positions. The error of the one between two blocks counts in both,
+    with opposite signs: neighbours have a correlation of -1/2, and nothing of it lasts.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape (m, n)
+        How velocity answers what is fitted and what is seldom known, over its deviation [dimensionless].
+    seen : ndarray, shape (n,)
+        Which blocks are known.
+
+    Returns
+    -------
+    ndarray, shape (m, m)
+        To be taken from the second moment of the pulls [dimensionless].
+    """
+    beside = (slopes[:, 1:] * (seen[1:] & seen[:-1])) @ slopes[:, :-1].T
+    return np.asarray(0.5 * (beside + beside.T), dtype=np.float64)
+
+
 def doubt_of(
     fit: PointFit,
     seldom: Array,
@@ -225,6 +247,8 @@ def doubt_of(
     slopes = np.where(blocks.seen, slopes / weight, 0.0)
     errs = np.sqrt(fit.scales**2 + lasts * near_by(left, blocks.seen)) / weight
     told, erring = (part @ part.T for part in (one.reshape(len(slopes), -1) for one in (slopes, slopes * errs)))
+    if blocks.differenced and not np.any(lasts):
+        erring = erring - taken_back(slopes[..., 0] * min(1.0, blocks.noise[0] / fit.scales[0]), blocks.seen[:, 0])
     prior = np.zeros((len(slopes), len(slopes)))
     prior[:known, :known] = np.linalg.inv(WEAK)
     prior[known:, known:] = np.diag(spreads**-2.0)

@@ -11,6 +11,7 @@ import pytest
 
 from plant.compiled.functions import Scalar, absolute
 from plant.solvers import adaptive_kernel, fixed_step_kernel, trajectory
+from plant.solvers.adaptive import MEANS, SAMPLES, STRAIGHT
 from plant.solvers.adaptive_kernel import compile_adaptive
 from plant.solvers.adaptive_loop import growth, run_controlled, smooth, within
 from plant.solvers.fixed_step_kernel import compile_fixed_step
@@ -85,8 +86,13 @@ def test_runs_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_allclose(found, wanted, rtol=1e-11, atol=1e-14)
 
 
-@pytest.mark.parametrize(("lanes", "kept", "rows"), [(1, 1, 1), (8, 8, 1), (8, 3, 40)])
-def test_steps_of_controlled_error(lanes: int, kept: int, rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("lanes", "kept", "rows", "bulge"),
+    [(1, 1, 1, STRAIGHT), (8, 8, 1, SAMPLES), (8, 3, 40, STRAIGHT), (8, 3, 40, MEANS)],
+)
+def test_steps_of_controlled_error(
+    lanes: int, kept: int, rows: int, bulge: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     model: Any = "damper", rates, 2, Damper, lanes
     run = compile_adaptive(*model)
     text = text_of(monkeypatch, adaptive_kernel, lambda: compile_adaptive.__wrapped__(*model))
@@ -98,7 +104,7 @@ def test_steps_of_controlled_error(lanes: int, kept: int, rows: int, monkeypatch
     parameters = np.repeat(ROWS[None, :lanes], rows, 0)
     parameters[rows // 2 :, :, 1] = 60.0
     starts = np.ascontiguousarray(STARTS[:, :lanes])
-    given = starts, DRIVE, parameters, T, np.array([1e3, 1e2]), 1e-3, 20.0, 1e-3
+    given = starts, DRIVE, parameters, T, np.array([1e3, 1e2]), 1e-3, bulge, 20.0, 1e-3
     found, wanted = np.empty((len(DRIVE), 2, kept)), np.empty((len(DRIVE), 2, kept))
     run_controlled(plain, *given, found)
     run(*given, wanted)
@@ -108,7 +114,7 @@ def test_steps_of_controlled_error(lanes: int, kept: int, rows: int, monkeypatch
 @pytest.mark.parametrize("lost", [(0,), (3,), (7,), (2, 5), tuple(range(8))])
 def test_a_run_without_numbers_ends_and_leaves_those_beside_it_as_they_are(lost: tuple[int, ...]) -> None:
     run = compile_adaptive("damper", rates, 2, Damper, 8)
-    control = T, np.array([1e3, 1e2]), 1e-3, 20.0, 1e-9  # so short that a run which stays there never ends
+    control = T, np.array([1e3, 1e2]), 1e-3, STRAIGHT, 20.0, 1e-9  # so short that a run which stays there never ends
     wanted, found = np.empty((len(DRIVE), 2, 8)), np.empty((len(DRIVE), 2, 8))
     run(STARTS, DRIVE, ROWS[None], *control, wanted)
     parameters = ROWS[None].copy()
@@ -123,11 +129,46 @@ def test_a_run_without_numbers_ends_and_leaves_those_beside_it_as_they_are(lost:
 def test_a_drive_is_smooth_as_far_as_one_parabola_follows_it() -> None:
     line = np.concatenate([np.arange(10.0), np.full(5, 9.0)])
     rows = np.zeros((1, 1, 1))
-    assert smooth(line, rows, 0, 1e-3) == (9, 0.0, 1.0, 0.0)
-    end, lift, ramp, curvature = smooth(0.5 * np.arange(6.0) ** 2, rows, 0, 0.1)
+    assert smooth(line, rows, 0, 1e-3, STRAIGHT) == (9, 0.0, 1.0, 0.0)
+    end, lift, ramp, curvature = smooth(0.5 * np.arange(6.0) ** 2, rows, 0, 0.1, STRAIGHT)
     assert (end, lift, ramp, curvature) == (5, pytest.approx(1.0 / 12.0), 2.5, 1.0)
     changing = np.repeat(np.array([0.0, 1.0]), [4, 11])[:, None, None]
-    assert smooth(line, changing, 0, 1e-3)[0] == 4
+    assert smooth(line, changing, 0, 1e-3, STRAIGHT)[0] == 4
+
+
+def volumes(drive: np.ndarray, bend: float, bulge: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return at which samples pieces of a drive end, and what it has summed up to there."""
+    ends, sums, rows = [0], [0.0], np.zeros((1, 1, 1))
+    while ends[-1] < len(drive) - 1:
+        end, lift, ramp, curvature = smooth(drive, rows, ends[-1], bend, bulge)
+        length = end - ends[-1]
+        sums.append(sums[-1] + length * (lift + 0.5 * ramp * length - curvature * length**2 / 12.0))
+        ends.append(end)
+    return np.array(ends), np.array(sums)
+
+
+@pytest.mark.parametrize("bend", [1e-3, 0.3])
+@pytest.mark.parametrize("bulge", [SAMPLES, MEANS])
+def test_pieces_of_a_curve_hold_as_much_as_it(bulge: float, bend: float) -> None:
+    """A speed that settles exponentially; with long pieces along straight lines 16 times as much was lost."""
+    time = np.arange(60.0)
+    half = 0.5 if bulge == MEANS else 0.0
+    grown = -40.0 * np.exp(-time / 8.0)  # the antiderivative of the speed
+    speed = 5.0 * np.exp(-time / 8.0) if half == 0.0 else np.diff(-40.0 * np.exp(-(np.arange(61.0) - half) / 8.0))
+    ends, sums = volumes(speed, bend, bulge)
+    inside = ends[(ends > 0) & (ends < 59)]  # at the ends of a log there is no slope to go by
+    held, wanted = np.interp(inside, ends, sums), grown[inside]
+    curved = np.abs((held - held[0]) - (wanted - wanted[0])).max()
+    straight = np.abs(np.diff(np.interp(inside, *volumes(speed, bend, STRAIGHT))) - np.diff(wanted)).max()
+    assert curved < 1e-3
+    assert straight > 5.0 * curved
+
+
+def test_a_piece_of_a_curve_ends_one_sample_before_a_corner() -> None:
+    step = np.where(np.arange(30) < 12, 0.0, 1.0)
+    ends, sums = volumes(step, 1e-3, SAMPLES)
+    assert ends.tolist() == [0, 10, 11, 12, 13, 29]
+    assert sums[-1] == pytest.approx(np.sum(0.5 * (step[1:] + step[:-1])))
 
 
 def test_a_step_ends_with_its_piece_or_leaves_enough_of_it() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from plant.compiled.functions import Scalar, absolute
 from plant.errors import HydrostateError
-from plant.solvers.adaptive import ErrorControl, controlled_groups, controlled_run
+from plant.solvers.adaptive import STRAIGHT, ErrorControl, controlled_groups, controlled_run
 from plant.solvers.adaptive_loop import along, growth, same, smooth, within
 from plant.solvers.block_means import block_means
 from plant.solvers.fixed_step_kernel import compile_fixed_step
@@ -112,23 +112,25 @@ def runs_of_controlled_steps() -> dict[str, Any]:
 @NUMBERS.case()
 def pieces_and_steps() -> dict[str, Any]:
     rows = np.zeros((1, 1, 1))
+
+    def piece(drive: np.ndarray, begin: int = 0, bend: float = 1e-3) -> tuple[int, float, float, float]:
+        return smooth(drive, rows, begin, bend, STRAIGHT)
+
     curve = 0.2 * np.arange(14.0) ** 2 + 1e-3 * np.sin(np.arange(14.0))
     cubic = 0.01 * np.arange(14.0) ** 3
     changing = np.repeat(np.arange(2.0), 7)[:, None, None]
     return {
         "smooth": [
-            list(smooth(drive, rows, begin, bend))
+            list(piece(drive, begin, bend))
             for drive in (curve, cubic, DRIVE)
             for begin, bend in ((0, 1e-2), (3, 1e-3), (5, 0.5))
         ],
         "a corner from": edge(
-            lambda one: smooth(np.where(np.arange(9) < 5, 0.0, one * (np.arange(9.0) - 4.0)), rows, 0, 1e-3)[0],
-            1e-6,
-            1.0,
+            lambda one: piece(np.where(np.arange(9) < 5, 0.0, one * (np.arange(9.0) - 4.0)))[0], 1e-6, 1.0
         ),
-        "a straight bend from": edge(lambda one: smooth(one * np.arange(9.0) ** 2, rows, 0, 1e-3)[0], 1e-6, 1.0),
-        "changing": [list(smooth(curve, changing, begin, 1.0)) for begin in (0, 7)],
-        "the last": list(smooth(curve, rows, 12, 1.0)),
+        "a straight bend from": edge(lambda one: piece(one * np.arange(9.0) ** 2)[0], 1e-6, 1.0),
+        "changing": [list(smooth(curve, changing, begin, 1.0, STRAIGHT)) for begin in (0, 7)],
+        "the last": list(piece(curve, 12, 1.0)),
         "same": [same(np.ones((2, 2)), np.array([[1.0, 1.0], [1.0, one]])) for one in (1.0, 1.0 + 1e-15)],
         "within": [
             within(*one)

@@ -73,6 +73,34 @@ def test_what_the_noise_is_not_known_to_is_no_wrong_model() -> None:
     assert variances(14_010, 1.0 - 0.9 / NOISE_ALONE**2)[0] > 20.0 * as_known
 
 
+@pytest.mark.parametrize("slope", [1.0, -1.0], ids=["the same in all blocks", "to and fro"])
+def test_what_a_position_adds_to_one_block_it_takes_from_the_next(slope: float) -> None:
+    """As many draws of an encoder's noise say how far off a fit is."""
+    fit, one = told(410)
+    slopes = np.zeros_like(fit.slopes)
+    slopes[0, :, 0] = 100.0 * NOISE[0] * slope ** np.arange(410)  # next to which the prior counts for little
+    lone, noise = replace(fit, slopes=slopes), np.random.default_rng(0).standard_normal((4000, 411)) / np.sqrt(2.0)
+    weight = slopes[0, one.first :, 0] / NOISE[0]
+    drawn = np.var(np.diff(noise, axis=1)[:, one.first :] @ weight / np.sum(weight**2))
+    white, differenced = (
+        doubt_of(lone, nothing_seldom(410), blocks, CENTRE, SURE, ALL, SPREADS)[0, 0]
+        for blocks in (one, replace(one, differenced=True))
+    )
+    assert white == pytest.approx(1.0 / np.sum(weight**2), rel=0.02)
+    assert differenced == pytest.approx(drawn, rel=0.1)
+    assert differenced < 0.01 * white if slope > 0.0 else differenced > 1.9 * white
+
+
+def test_beside_a_wrong_model_the_noise_of_a_position_is_white() -> None:
+    fit, one = told(410, 0.5)
+    steady = replace(fit, slopes=fit.slopes + NOISE)
+    found = [
+        doubt_of(steady, nothing_seldom(410), blocks, CENTRE, SURE, ALL, SPREADS)
+        for blocks in (one, replace(one, differenced=True))
+    ]
+    np.testing.assert_array_equal(*found)
+
+
 def test_an_error_that_lasts_is_seen_where_noise_hides_it_in_a_block() -> None:
     fit, one = told(14_010)
     noise = NOISE * np.random.default_rng(0).normal(size=fit.fitted.shape)
