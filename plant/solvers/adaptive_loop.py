@@ -136,8 +136,7 @@ def smooth(drive: Array, parameters: Array, begin: int, bend: float, bulge: floa
         By how much it may leave the parabola [the drive's unit].
     bulge : float
         By how much straight lines between the samples exceed the drive's mean over a sample time, over its second
-        difference [dimensionless]: 0 where the drive is those lines. Otherwise a piece has the mean of a curve through
-        its samples, so that no flow is lost, and ends one sample before a corner.
+        difference [dimensionless]: 0 where it is those lines. Else a piece has a curve's mean, and ends before a corner.
 
     Returns
     -------
@@ -148,8 +147,7 @@ def smooth(drive: Array, parameters: Array, begin: int, bend: float, bulge: floa
     end = begin + 1
     low, high = np.inf, -np.inf
     if bulge > 0.0 and begin > 0:
-        low = drive[end] - 2.0 * drive[begin] + drive[begin - 1]
-        high = low
+        low = high = drive[end] - 2.0 * drive[begin] + drive[begin - 1]
     total = 0.5 * (drive[begin] + drive[end])
     while end < n - 1 and (parameters.shape[0] == 1 or same(parameters[end], parameters[begin])):
         curvature = drive[end + 1] - 2.0 * drive[end] + drive[end - 1]
@@ -168,23 +166,15 @@ def smooth(drive: Array, parameters: Array, begin: int, bend: float, bulge: floa
     curvature = 0.5 * (low + high) if length > 1 else 0.0
     if bulge == 0.0:
         return end, drive[begin] + curvature / 12.0, ramp, curvature
-    turned = slope_at(drive, end) - slope_at(drive, begin)
+    turned = _slope_at(drive, end) - _slope_at(drive, begin)
     if length == 1:
         curvature = turned
     mean = (total - bulge * turned) / length
     return end, mean - 0.5 * ramp * length + curvature * length * length / 12.0, ramp, curvature
 
 
-def slope_at(drive: Array, sample: int) -> float:
-    """Return the slope of a drive at a sample, from those beside it [the drive's unit a sample].
-
-    Parameters
-    ----------
-    drive : ndarray, shape (n,)
-        Drive at the samples [its SI unit].
-    sample : int
-        Which.
-    """
+def _slope_at(drive: Array, sample: int) -> float:
+    """Return the slope of a drive at one of its samples, from those beside it [the drive's unit a sample]."""
     before, after = max(sample - 1, 0), min(sample + 1, drive.shape[0] - 1)
     return (drive[after] - drive[before]) / (after - before)
 
@@ -355,5 +345,5 @@ def keep(kernel: ControlledKernel, work: Array, place: int, states: Array, sampl
                 states[sample, i, lane] = work[place + kernel.LANES * i + lane]
 
 
-INNER = (lay, share, same, slope_at, within, along, growth, unknown, largest, accept, keep)
+INNER = (lay, share, same, _slope_at, within, along, growth, unknown, largest, accept, keep)
 """Parts of the loop and of `smooth`, compiled as if they stood there."""

@@ -79,7 +79,7 @@ def test_a_change_is_believed_from_ten_to_one_on(monkeypatch: pytest.MonkeyPatch
 def test_one_circuit_for_all_is_asked_again_where_its_search_ended_short_of_the_best(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    log = blocks(after="major_leakage")
+    log = blocks(after="major_leakage", seconds=5.0)
     two = parted(log, fit_classes(log, ACTUATOR), ACTUATOR)
     assert two is not None
     assert find_onset(log, two, ACTUATOR) is not None
