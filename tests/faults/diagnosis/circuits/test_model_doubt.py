@@ -94,11 +94,11 @@ def test_what_a_position_adds_to_one_block_it_takes_from_the_next(slope: float) 
 def test_beside_a_wrong_model_the_noise_of_a_position_is_white() -> None:
     fit, one = told(410, 0.5)
     steady = replace(fit, slopes=fit.slopes + NOISE)
-    found = [
+    white, differenced = (
         doubt_of(steady, nothing_seldom(410), blocks, CENTRE, SURE, ALL, SPREADS)
         for blocks in (one, replace(one, differenced=True))
-    ]
-    np.testing.assert_array_equal(*found)
+    )
+    np.testing.assert_array_equal(white, differenced)
 
 
 def test_an_error_that_lasts_is_seen_where_noise_hides_it_in_a_block() -> None:
