@@ -136,7 +136,7 @@ def smooth(drive: Array, parameters: Array, begin: int, bend: float, bulge: floa
         By how much it may leave the parabola [the drive's unit].
     bulge : float
         By how much straight lines between samples exceed the drive's mean over a sample time, over its second
-        difference [dimensionless]: 0 where it is those lines. Else a piece has a curve's mean, and ends short of corners.
+        difference [dimensionless]: 0 where it is those lines. Else a piece has a curve's mean, and ends off corners.
 
     Returns
     -------
