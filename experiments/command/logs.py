@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, TypeVar
 import typer
 
 from experiments.command.json_output import Result, json_text, write_results
-from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, emit, note, progress, rendered, unexpected
+from experiments.command.progress_bar import progress
+from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, emit, note, rendered, unexpected
 from plant.errors import HydrostateError, LogWarning, MissingColumnError
 from plant.log.notes import LogCode
 from plant.notes import distinct

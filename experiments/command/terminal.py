@@ -188,27 +188,6 @@ def rendered(*parts: "RenderableType") -> str:
     return "\n".join(line.rstrip() for line in captured.get().strip("\n").splitlines())
 
 
-@contextmanager
-def progress(total: int, what: str) -> Generator[Callable[[], None]]:
-    """Show a bar on standard error, if that is a terminal and there is more than one piece of work.
-
-    Yields
-    ------
-    callable
-        To be called after every piece.
-    """
-    if total < 2 or not sys.stderr.isatty():
-        yield lambda: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=total)
-        yield lambda: bar.advance(task)
-
-
 class _KernelNotice(logging.Handler):
     """Says once that kernels are being compiled, and passes warnings on."""
 

@@ -24,6 +24,7 @@ from estimation.identification.free_run.hammerstein_fit import (
 )
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.free_run.transfer_function import linear_model
+from estimation.progress import tell
 
 ORDERS = 4
 """Order of the linear part at most."""
@@ -79,6 +80,7 @@ def hammerstein_candidates(linear: Sequence[Candidate], data: Channels) -> list[
         best: dict[int, tuple[float, HammersteinFit]] = {}
         for one in _bases(linear):
             order = one.form.order
+            tell("nonlinear inputs")
             fit = fit_hammerstein(kind, one.form, data, denominators.get(order, [one.fit.f]))
             if fit is not None and (order not in best or _bic(fit, data) < best[order][0]):
                 best[order] = _bic(fit, data), fit
@@ -161,6 +163,7 @@ def _held_back(fit: HammersteinFit, data: Channels) -> tuple[float, ...]:
     """Return the free-run error of each block held back, simulated by a fit to the others."""
     target, errors = np.concatenate(data.y), list[float]()
     for masks in blocks(data, BLOCKS):
+        tell("nonlinear inputs")
         part = refitted(fit, data.without(masks))
         output = HammersteinProblem(fit.kind, fit.linear.form, data).jacobian(part.theta)[0]
         errors.append(block_error(output - target, np.concatenate(masks) & np.isfinite(target)))

@@ -9,6 +9,7 @@ from estimation.arrays import Array, BoolArray
 from estimation.identification.free_run.data import Channels, blocks, halves
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem, extended, fit_linear, quick_fit
+from estimation.progress import tell
 
 BLOCKS = 4
 """Blocks of every log, each held back once."""
@@ -109,6 +110,7 @@ def held_back_blocks(fit: LinearFit, data: Channels) -> tuple[float, ...]:
     """
     target = np.concatenate(data.y)
     errors: list[float] = []
+    tell("linear models")
     for masks in blocks(data, BLOCKS):
         mask = np.concatenate(masks) & np.isfinite(target)
         part = fit_linear(fit.form, data.without(masks), [fit.f], bounded=fit.bounded)

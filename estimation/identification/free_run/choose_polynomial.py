@@ -5,7 +5,7 @@ is offered must run well there, and its fits to different blocks must agree wher
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -19,6 +19,7 @@ from estimation.identification.free_run.output_friction import continued, fit_wi
 from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs
 from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, one_more, without_term
 from estimation.identification.free_run.selected_polynomial import Selection, forms_selected, judged_selections
+from estimation.progress import tell
 
 MOST_TERMS = 20
 """Products beside the linear terms."""
@@ -81,9 +82,12 @@ class PolynomialCandidate:
 
 
 def polynomial_candidates(
-    linear: Sequence[Candidate], data: Channels, asked: Asked | None = None
+    linear: Sequence[Candidate], data: Channels, asked: Asked | None = None, bar: float = float("inf")
 ) -> list[PolynomialCandidate]:
     """Return polynomial models: grown from linear ones, of every product, and of the few that explain most.
+
+    The latter two are fitted to all data only while they can still be the best one: a price is not less than the
+    held-back error that it begins with.
 
     Parameters
     ----------
@@ -93,10 +97,15 @@ def polynomial_candidates(
         Scaled.
     asked : Asked, optional
         Sizes that the data do not choose.
+    bar : float
+        Price from which on nobody takes a model [dimensionless].
     """
     delays, wanted = min(linear, key=lambda one: one.held_back).form.delays, asked or Asked()
     parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
-    return [*_grown(linear, data), *_dense(data, parts, delays, wanted), *_selected(data, parts, delays, wanted)]
+    found = _grown(linear, data)
+    for offered in (_dense, _selected):
+        found += offered(data, parts, delays, wanted, min([bar, *(one.price for one in found)]))
+    return found
 
 
 def _grown(linear: Sequence[Candidate], data: Channels) -> list[PolynomialCandidate]:
@@ -136,31 +145,52 @@ def _with_friction(linear: Sequence[Candidate], data: Channels) -> list["_Growth
 
 
 def _dense(
-    data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: Asked
+    data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: Asked, bar: float
 ) -> list[PolynomialCandidate]:
     """Return the models of every product that do best on what was held back, but for those that leave their range."""
     forms = forms_tried(delays, asked)
     judged = sorted(judged_recipes(data, parts, forms, asked), key=lambda one: one.held_back)
     first = [one for one in judged if one.recipe.form in forms][:COMPARED]
-    return _kept([*first, *[one for one in judged if one.recipe.form not in forms][:LARGER]], data)
+    return _kept([*first, *[one for one in judged if one.recipe.form not in forms][:LARGER]], data, bar)
 
 
 def _selected(
-    data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: Asked
+    data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: Asked, bar: float
 ) -> list[PolynomialCandidate]:
     """Return the models of few products that do best on what was held back, but for those that leave their range."""
     judged = judged_selections(data, parts, forms_selected(delays, asked))
-    return _kept(sorted(judged, key=lambda one: one.held_back)[:SELECTIONS], data)
+    return _kept(sorted(judged, key=lambda one: one.held_back)[:SELECTIONS], data, bar)
 
 
-def _kept(judged: Sequence[Judged[Recipe]] | Sequence[Judged[Selection]], data: Channels) -> list[PolynomialCandidate]:
-    """Return models of all data that were judged without a block each, but for those that leave their range."""
+def _kept(
+    judged: Sequence[Judged[Recipe]] | Sequence[Judged[Selection]], data: Channels, bar: float
+) -> list[PolynomialCandidate]:
+    """Return models of all data that were judged without a block each, but for those that leave their range.
+
+    Passed over are those that leave more of what was held back than the price of the best one, or than the bar.
+    """
     found: list[PolynomialCandidate] = []
-    for one in judged:
-        fit = one.recipe.fit(data)
+    known: dict[Recipe, PolynomialFit | None] = {}
+    for one in sorted(judged, key=lambda one: one.held_back):
+        if one.held_back > bar:
+            break
+        tell("polynomial models")
+        recipe = one.recipe
+        fit = _fitted(recipe, data, known) if isinstance(recipe, Recipe) else recipe.fit(data)
         if fit is not None and not is_wild(fit, data):
-            found.append(_candidate(fit, one.recipe.fit, one, data))
+            found.append(_candidate(fit, recipe.fit, one, data))
+            bar = min(bar, found[-1].price)
     return found
+
+
+def _fitted(recipe: Recipe, data: Channels, known: dict[Recipe, PolynomialFit | None]) -> PolynomialFit | None:
+    """Return the fit of a recipe, begun at what is known of the same one with fewer penalties, and remember it."""
+    if recipe not in known:
+        begun = None
+        if recipe.free_run:
+            begun = _fitted(replace(recipe, free_run=recipe.free_run[:-1]), data, known)
+        known[recipe] = recipe.fit(data, begun) if begun is not None or not recipe.free_run else None
+    return known[recipe]
 
 
 def _candidate(
@@ -210,6 +240,7 @@ class _Growth:
             return False
         pool = candidate_terms(self.path[0].variables)
         while len(self.errors) <= most and len(self.errors) - 1 - int(np.argmin(self.errors)) < PATIENCE:
+            tell("products that grow")
             self.fits = [
                 None if fit is None else one_more(fit, pool, part) or fit
                 for fit, part in zip(self.fits, self.parts, strict=True)
@@ -238,10 +269,10 @@ class _Growth:
     def _held_back(self) -> tuple[float, ...]:
         target, errors = np.concatenate(self.data.y), list[float]()
         for fit, mask in zip(self.fits, self.masks, strict=True):
-            ran = None if fit is None else Runs(fit.variables, fit.terms, self.data).run(fit.theta)
+            ran = None if fit is None else Runs(fit.variables, fit.terms, self.data).outputs(fit.theta)
             if ran is None:
                 return (float("inf"),) * len(self.masks)
-            errors.append(block_error(ran[0] - target, np.concatenate(mask) & np.isfinite(target)))
+            errors.append(block_error(ran - target, np.concatenate(mask) & np.isfinite(target)))
         return tuple(errors)
 
 

@@ -15,7 +15,9 @@ from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.choose_linear import CLEARLY, block_error, pooled
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_fit import Form, LinearFit
-from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, Variables, products, variables_of
+from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, variables_of
+from estimation.identification.free_run.polynomial_variables import Variables, products
+from estimation.progress import tell
 
 SIZES = ((1, 2), (2, 2), (3, 2), (3, 3))
 """Lags of the output and of each input that are tried first."""
@@ -97,10 +99,10 @@ class Recipe:
             return None
         runs = Runs(variables, terms, data)
         theta = np.concatenate([coefficients, runs.start_values()])
-        ran = runs.run(theta)
+        ran = runs.outputs(theta)
         if ran is None:
             return None
-        fit = PolynomialFit(variables, terms, theta, float(np.sum((ran[0] - runs.target)[runs.used] ** 2)))
+        fit = PolynomialFit(variables, terms, theta, float(np.sum((ran - runs.target)[runs.used] ** 2)))
         for penalty in self.free_run:
             fit = runs.fit(fit.theta, STEPS, penalty) or fit
         return fit
@@ -292,12 +294,13 @@ def _judged(
     """Return a recipe's fits to all blocks but one, begun at those before; None where one of them runs away."""
     target, fits, errors = np.concatenate(data.y), list[PolynomialFit](), list[float]()
     for index, part in enumerate(parts):
+        tell("polynomial models")
         fit = recipe.fit(part, None if before is None else before.fits[index])
-        ran = None if fit is None else Runs(fit.variables, fit.terms, data).run(fit.theta)
+        ran = None if fit is None else Runs(fit.variables, fit.terms, data).outputs(fit.theta)
         if fit is None or ran is None:
             return None
         fits.append(fit)
-        errors.append(block_error(ran[0] - target, np.isnan(np.concatenate(part.y)) & np.isfinite(target)))
+        errors.append(block_error(ran - target, np.isnan(np.concatenate(part.y)) & np.isfinite(target)))
     return Judged(recipe, tuple(fits), tuple(errors))
 
 

@@ -169,12 +169,15 @@ def _identified(
         structure = "output-error"
     dynamics, held_back, named = LinearDynamics.of(best.fit), best.held_back, "output-error"
     if structure != "output-error":
-        polynomial = polynomial_candidates([best] if best.doubt else linear, part, Asked(order, delay, n_numerator))
+        straight = min([best, *(one for one in linear if not one.doubt)], key=lambda one: one.held_back)
+        bar = (1.0 - CLEAR_MARGIN) * straight.held_back if structure == "auto" and sound else float("inf")
+        bar = bar if nonlinear is None else min(bar, nonlinear.held_back)
+        asked = Asked(order, delay, n_numerator)
+        polynomial = polynomial_candidates([best] if best.doubt else linear, part, asked, bar)
         rows += [polynomial_row(one) for one in polynomial]
         better = min(polynomial, key=lambda one: (one.price, one.held_back), default=None)
         if better is None and structure == "narx":
             raise HydrostateError(f"no polynomial model of {data.output!r} runs free without growing beyond bounds")
-        straight = min([best, *(one for one in linear if not one.doubt)], key=lambda one: one.held_back)
         taken = better is not None and (structure == "narx" or not sound or _clearly_better(better, straight))
         if nonlinear is not None and not (taken and better is not None and better.price < nonlinear.held_back):
             return _nonlinear(nonlinear, data, whole, rows)

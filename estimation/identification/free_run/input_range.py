@@ -5,7 +5,7 @@ import numpy as np
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
-from estimation.identification.free_run.polynomial_fit import BEYOND
+from estimation.identification.free_run.polynomial_variables import BEYOND
 from estimation.identification.notes import IdentificationCode
 from plant.notes import Note
 

@@ -52,10 +52,10 @@ def is_wild(fit: PolynomialFit, data: Channels) -> bool:
     low, high = fit.variables.around(FARTHEST)
     held, total = 0, 0
     for other in reordered(data):
-        ran = Runs(fit.variables, fit.terms, other).run(fit.theta)
+        ran = Runs(fit.variables, fit.terms, other).outputs(fit.theta)
         if ran is None:
             return True
-        held, total = held + int(np.count_nonzero((ran[0] <= low) | (ran[0] >= high))), total + ran[0].size
+        held, total = held + int(np.count_nonzero((ran <= low) | (ran >= high))), total + ran.size
     return held > WILD * total
 
 
@@ -81,10 +81,10 @@ def disagreement(fits: Sequence[PolynomialFit], whole: PolynomialFit, data: Chan
     """
     squares = list[float]()
     for other in reordered(data):
-        own = Runs(whole.variables, whole.terms, other).run(whole.theta)
+        own = Runs(whole.variables, whole.terms, other).outputs(whole.theta)
         for fit in fits:
-            ran = Runs(fit.variables, fit.terms, other).run(fit.theta)
+            ran = Runs(fit.variables, fit.terms, other).outputs(fit.theta)
             if own is None or ran is None:
                 return float("inf")
-            squares.append(float(np.mean((ran[0] - own[0]) ** 2)))
+            squares.append(float(np.mean((ran - own) ** 2)))
     return float(np.sqrt(np.mean(squares)))

@@ -8,7 +8,8 @@ import numpy as np
 
 from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels, Scaling
-from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, Variables, products
+from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs
+from estimation.identification.free_run.polynomial_variables import Variables, products
 
 START_STEPS = 12
 """Refinements of the first outputs of a polynomial run."""

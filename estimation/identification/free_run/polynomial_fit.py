@@ -9,78 +9,17 @@ from estimation.arrays import Array, BoolArray, IntArray
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_fit import LinearFit
 from estimation.identification.free_run.polynomial_kernel import carry, run_free, write_products
+from estimation.identification.free_run.polynomial_variables import BEYOND, Variables, lagged_signals
 from estimation.identification.search.levenberg import levenberg
 
-BEYOND = 0.1
-"""Share of its range by which a signal may leave it in a product before it is held [dimensionless]."""
-
 FARTHEST = 0.2
-"""Likewise, of the output itself, where there are products."""
+"""Share of its range by which the output itself may leave it, where there are products [dimensionless]."""
 
 STEPS, FINAL_STEPS = 8, 40
 """Evaluations after each added term, and at the end."""
 
 TOLERANCE = 1e-8
 """Share of the cost that a further step may promise at the end."""
-
-
-FRICTIONS = {"": 0, "position": 2, "velocity": 3}
-"""What an output that rubs is, and how many values its friction has: what is taken off below and above, and, of a
-velocity, where it rests; a position rests where it was."""
-
-
-@dataclass(frozen=True, eq=False)
-class Variables:
-    """The lagged signals that terms multiply.
-
-    Parameters
-    ----------
-    source, lag : ndarray of int, shape (v,)
-        0 for the output, else the input's number from 1; and how many samples earlier.
-    limits : ndarray, shape (v, 2)
-        Ends at which each is held in products.
-    friction : str
-        One of `FRICTIONS`: dry friction takes a level off what the terms give, and holds the output within it.
-    """
-
-    source: IntArray
-    lag: IntArray
-    limits: Array
-    friction: str = ""
-
-    @property
-    def n_friction(self) -> int:
-        """Values of its friction."""
-        return FRICTIONS[self.friction]
-
-    @property
-    def ends(self) -> Array:
-        """Least and greatest output that was seen, shape (2,)."""
-        own = self.limits[self.source == 0][0]
-        inner = (own[1] - own[0]) / (1.0 + 2.0 * BEYOND)
-        return own + BEYOND * inner * np.array([1.0, -1.0])
-
-    def around(self, share: float) -> Array:
-        """Return ends that a share of the range beyond what was seen is added to, shape (2,).
-
-        Parameters
-        ----------
-        share : float
-            Of the range [dimensionless].
-
-        Returns
-        -------
-        ndarray, shape (2,)
-            Least and greatest output.
-        """
-        low, high = self.ends
-        return np.array([low, high]) + share * (high - low) * np.array([-1.0, 1.0])
-
-    @property
-    def n_start(self) -> int:
-        """First values of the output that a run needs."""
-        own = self.lag[self.source == 0]
-        return int(own.max()) if own.size else 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,6 +126,25 @@ class Runs:
         tuple of ndarray and list of ndarray, or None
             Shapes (n,), and (n, lags) of each log, a column more where the output rubs.
         """
+        return self._run(theta, sloped=True)
+
+    def outputs(self, theta: Array) -> Array | None:
+        """Return the outputs alone, which takes half the time of a run with slopes; None where one runs away.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (p,)
+            All values.
+
+        Returns
+        -------
+        ndarray, shape (n,), or None
+            Of all logs, one after the other.
+        """
+        ran = self._run(theta, sloped=False)
+        return None if ran is None else ran[0]
+
+    def _run(self, theta: Array, *, sloped: bool) -> tuple[Array, list[Array]] | None:
         k, n = self.terms.shape[0], self.variables.n_start
         outs, slopes = list[Array](), list[Array]()
         free = not (self.terms[:, 1] >= 0).any()
@@ -195,7 +153,7 @@ class Runs:
             out, begin = np.zeros(u.shape[0]), self.begins[index]
             out[: begin - n] = first_values(self.data.y[index], begin - n)
             out[begin - n : begin] = theta[k + index * n : k + (index + 1) * n]
-            slope = np.zeros((u.shape[0], n + bool(self.variables.friction)))
+            slope = np.zeros((u.shape[0] if sloped else 0, n + bool(self.variables.friction)))
             one, values, rub = self.variables, theta[:k].copy(), theta[theta.size - self.variables.n_friction :].copy()
             if run_free(values, self.terms, one.source, one.lag, one.limits, ends, begin, u, out, slope, rub) >= 0:
                 return None
@@ -228,7 +186,7 @@ class Runs:
             part, begin = output[place : place + u.shape[0]], self.begins[index]
             place += u.shape[0]
             direct = np.zeros((part.size, last + self.variables.n_friction if starts else count))
-            write_products(*_signals(self.variables, u, part), terms, direct)
+            write_products(*lagged_signals(self.variables, u, part), terms, direct)
             direct[:begin, :count] = 0.0
             if starts:
                 direct[begin - n + np.arange(n), count + index * n + np.arange(n)] = 1.0
@@ -304,35 +262,3 @@ def first_values(y: Array, count: int) -> Array:
     known = y[np.isfinite(y)]
     first = y[:count]
     return np.where(np.isfinite(first), first, known[0] if known.size else 0.0)
-
-
-def products(variables: Variables, terms: IntArray, u: Array, y: Array) -> Array:
-    """Return each term's product of lagged signals, shape (n, k).
-
-    Parameters
-    ----------
-    terms : ndarray of int, shape (k, 3)
-        Variables that each term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
-    u : ndarray, shape (n, m)
-        Inputs.
-    y : ndarray, shape (n,)
-        Output.
-
-    Returns
-    -------
-    ndarray, shape (n, k)
-        One column a term.
-    """
-    out = np.empty((y.size, terms.shape[0]))
-    write_products(*_signals(variables, u, y), terms, out)
-    return out
-
-
-def _signals(variables: Variables, u: Array, y: Array) -> tuple[Array, Array]:
-    """Return the lagged signals as they are and held at their ends, one column each."""
-    single = np.empty((y.size, variables.lag.size))
-    for v, (source, lag) in enumerate(zip(variables.source, variables.lag, strict=True)):
-        series = y if source == 0 else u[:, source - 1]
-        early = min(int(lag), y.size)
-        single[:early, v], single[early:, v] = series[0], series[: y.size - early]
-    return single, np.clip(single, variables.limits[:, 0], variables.limits[:, 1])

@@ -40,14 +40,14 @@ def run_free(
         Inputs; before the first sample they stood at their first values.
     out : ndarray, shape (n,)
         Holds outputs before that sample; the others are written.
-    slope : ndarray, shape (n, l)
-        Written: derivative of each output by the l before it; where the output rubs, the last column is 1 where
-        friction holds it back from above, -1 from below, and 0 where it holds it.
+    slope : ndarray, shape (s, l)
+        Written: derivative of each output by the l before it, in n rows, or none where no slopes are wanted; where the
+        output rubs, the last column is 1 where friction holds it back from above, -1 from below, and 0 where it holds.
     rub : ndarray, shape (f,)
         What friction takes off the output below and above where it rests: at the third value, or of two where it was a
         sample before; there it stays unless more than that moves it. None where nothing rubs.
     """
-    n, n_start = out.size, slope.shape[1]
+    n, n_start, sloped = out.size, slope.shape[1], slope.shape[0] > 0
     if rub.size > 0:
         n_start -= 1
     z, held = limits[:, 0].copy(), limits[:, 0].copy()
@@ -67,6 +67,16 @@ def run_free(
         total = 0.0
         for i in range(terms.shape[0]):
             a, b, c, value = terms[i, 0], terms[i, 1], terms[i, 2], theta[i]
+            if not sloped:
+                if a < 0:
+                    total += value
+                elif b < 0:
+                    total += value * z[a]
+                elif c < 0:
+                    total += value * held[a] * held[b]
+                else:
+                    total += value * held[a] * (held[b] * held[c])
+                continue
             if a < 0:
                 total += value
             elif b < 0:
@@ -88,23 +98,26 @@ def run_free(
             stay = out[t - 1]
             if rub.size > 2:
                 stay = rub[2]
-            slope[t, n_start] = 0.0
+            side = 0.0
             if total - stay > rub[1]:
                 total -= rub[1]
-                slope[t, n_start] = 1.0
+                side = 1.0
             elif stay - total > rub[0]:
                 total += rub[0]
-                slope[t, n_start] = -1.0
+                side = -1.0
             else:
                 total = stay
                 rates[:] = 0.0
                 if rub.size == 2:
                     rates[0] = 1.0
+            if sloped:
+                slope[t, n_start] = side
         if total < ends[0] or total > ends[1]:
             total = min(max(total, ends[0]), ends[1])
             rates[:] = 0.0
-        for k in range(n_start):
-            slope[t, k] = rates[k]
+        if sloped:
+            for k in range(n_start):
+                slope[t, k] = rates[k]
         out[t] = total
     return -1
 

@@ -12,14 +12,8 @@ import numpy as np
 from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_fit import LinearFit
-from estimation.identification.free_run.polynomial_fit import (
-    FINAL_STEPS,
-    STEPS,
-    PolynomialFit,
-    Runs,
-    Variables,
-    variables_of,
-)
+from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, STEPS, PolynomialFit, Runs, variables_of
+from estimation.identification.free_run.polynomial_variables import Variables
 
 MOST_CANDIDATES = 250
 """Products that are compared."""

@@ -16,7 +16,8 @@ from estimation.identification.free_run.choose_linear import block_error
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.dense_polynomial import STEPS, Asked, Judged, every_term, late_by, moments
 from estimation.identification.free_run.linear_fit import Form, LinearFit
-from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, Variables, variables_of
+from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, variables_of
+from estimation.identification.free_run.polynomial_variables import Variables
 
 LAGS = (2, 3, 4)
 """Of the output and of each input, that terms are taken from."""
@@ -116,11 +117,11 @@ def _judged(
     """Return the selection with its errors, or nothing where a fit runs away."""
     target, kept, errors = np.concatenate(data.y), list[PolynomialFit](), list[float]()
     for fit, part in zip(fits, parts, strict=True):
-        ran = None if fit is None else Runs(fit.variables, fit.terms, data).run(fit.theta)
+        ran = None if fit is None else Runs(fit.variables, fit.terms, data).outputs(fit.theta)
         if fit is None or ran is None:
             return []
         kept.append(fit)
-        errors.append(block_error(ran[0] - target, np.isnan(np.concatenate(part.y)) & np.isfinite(target)))
+        errors.append(block_error(ran - target, np.isnan(np.concatenate(part.y)) & np.isfinite(target)))
     return [Judged(recipe, tuple(kept), tuple(errors))]
 
 
@@ -143,10 +144,10 @@ class _Ordered:
         values = np.linalg.lstsq(unit, self.right[:count] / size, rcond=1e-12)[0] / size
         runs = Runs(self.variables, terms, data)
         theta = np.concatenate([values, runs.start_values()])
-        ran = runs.run(theta)
+        ran = runs.outputs(theta)
         if ran is None:
             return None
-        return PolynomialFit(self.variables, terms, theta, float(np.sum((ran[0] - runs.target)[runs.used] ** 2)))
+        return PolynomialFit(self.variables, terms, theta, float(np.sum((ran - runs.target)[runs.used] ** 2)))
 
 
 def _ordered(form: Form, data: Channels) -> _Ordered | None:

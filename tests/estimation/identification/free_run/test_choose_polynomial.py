@@ -1,5 +1,6 @@
 """Which polynomial models are grown, compared and let go on, with the fits themselves made up."""
 
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -7,8 +8,8 @@ import numpy as np
 import pytest
 
 from estimation.identification.free_run import choose_polynomial
-from estimation.identification.free_run.choose_polynomial import _best_grown, _dense, _with_friction
-from estimation.identification.free_run.dense_polynomial import Asked
+from estimation.identification.free_run.choose_polynomial import _best_grown, _dense, _fitted, _with_friction
+from estimation.identification.free_run.dense_polynomial import Asked, Recipe
 from estimation.identification.free_run.linear_fit import Form
 
 DATA: Any = SimpleNamespace(n_samples=400, y=(np.zeros(400),), without=lambda mask: mask)
@@ -79,22 +80,63 @@ def test_growths_are_compared_after_three_products_and_the_best_are_taken_to_twe
     assert [one.most for one in growths] == [[3], [3], [3, 20], [3, 20]]
 
 
-def test_of_the_models_of_every_product_sixteen_and_six_larger_ones_are_fitted_but_for_wild_ones(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def made_up(monkeypatch: pytest.MonkeyPatch, error: Callable[[int], float]) -> list[int]:
+    """Judge sixty models of every product by an error of their rank; return which of them are fitted to all data."""
     small, large = "small", "large"
+    fitted: list[int] = []
 
     def judged(rank: int, form: str) -> Any:
         fit = SimpleNamespace(wild=rank == 3, cost=1.0, theta=np.zeros(2))
-        recipe = SimpleNamespace(form=form, fit=lambda _, fit=fit, rank=rank: None if rank == 5 else fit)
-        return SimpleNamespace(recipe=recipe, held_back=float(rank), block_errors=(), fits=[])
+
+        def whole(_: Any) -> Any:
+            fitted.append(rank)
+            return None if rank == 5 else fit
+
+        return SimpleNamespace(
+            recipe=SimpleNamespace(form=form, fit=whole), held_back=error(rank), block_errors=(), fits=[]
+        )
 
     every = [judged(rank, small if rank % 2 else large) for rank in range(60, 0, -1)]
     monkeypatch.setattr(choose_polynomial, "forms_tried", lambda *_: [small])
     monkeypatch.setattr(choose_polynomial, "judged_recipes", lambda *_: every)
     monkeypatch.setattr(choose_polynomial, "is_wild", lambda fit, _: fit.wild)
     monkeypatch.setattr(choose_polynomial, "disagreement", lambda *_: 0.25)
-    found = _dense(DATA, [], (1,), Asked())
-    odd, even = range(1, 33, 2), range(2, 14, 2)
-    assert [one.held_back for one in found] == [float(rank) for rank in (*odd, *even) if rank not in (3, 5)]
-    assert found[0].price == pytest.approx(np.hypot(1.0, 0.25))
+    return fitted
+
+
+def test_of_the_models_of_every_product_sixteen_and_six_larger_ones_are_fitted_but_for_wild_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made_up(monkeypatch, lambda rank: 1.0 + 1e-6 * rank)
+    found = _dense(DATA, [], (1,), Asked(), np.inf)
+    ranks = sorted((*range(1, 33, 2), *range(2, 14, 2)))
+    assert [one.held_back for one in found] == [1.0 + 1e-6 * rank for rank in ranks if rank not in (3, 5)]
+    assert found[0].price == pytest.approx(np.hypot(1.0, 0.25), abs=1e-5)
+
+
+def test_a_model_that_cannot_be_the_best_one_any_more_is_not_fitted_to_all_data(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # the first one costs 1.031, a spread of 0.25 included: the fifth leaves more than that of what was held back
+    fitted = made_up(monkeypatch, lambda rank: 0.99 + 0.01 * rank)
+    assert [one.held_back for one in _dense(DATA, [], (1,), Asked(), np.inf)] == pytest.approx([1.0, 1.01, 1.03])
+    assert fitted == [1, 2, 3, 4]
+    fitted.clear()
+    assert [one.held_back for one in _dense(DATA, [], (1,), Asked(), 1.005)] == pytest.approx([1.0])
+    assert fitted == [1]
+
+
+def test_a_recipe_goes_on_from_the_same_one_with_fewer_penalties() -> None:
+    steps: list[tuple[Any, Any, Any]] = []
+
+    class Noted(Recipe):
+        def fit(self, data: Any, begun: Any = None) -> Any:
+            steps.append((data, self.free_run, begun))
+            return self.free_run
+
+    known: dict[Any, Any] = {}
+    form = Form(1, (1,), (1,))
+    assert _fitted(Noted(form, 2, 1e-4, (0.1, 0.01)), DATA, known) == (0.1, 0.01)
+    assert _fitted(Noted(form, 2, 1e-4, (0.1, 0.01, 0.001)), DATA, known) == (0.1, 0.01, 0.001)
+    chain = [(), (0.1,), (0.1, 0.01), (0.1, 0.01, 0.001)]
+    assert steps == [(DATA, one, begun) for one, begun in zip(chain, [None, *chain[:-1]], strict=True)]

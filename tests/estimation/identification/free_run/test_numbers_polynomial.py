@@ -28,7 +28,8 @@ from estimation.identification.free_run.input_range import inputs_beyond
 from estimation.identification.free_run.linear_fit import Form, LinearFit, fit_linear
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
-from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, first_values, products
+from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, first_values
+from estimation.identification.free_run.polynomial_variables import products
 from plant.arrays import Array
 from tests.kernels import loops_in_python
 from tests.numbers import Found, Numbers, Roughly, some

@@ -6,7 +6,8 @@ import pytest
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.other_orders import PIECES, REORDERED, disagreement, is_wild, reordered
-from estimation.identification.free_run.polynomial_fit import FARTHEST, PolynomialFit, Variables
+from estimation.identification.free_run.polynomial_fit import FARTHEST, PolynomialFit
+from estimation.identification.free_run.polynomial_variables import Variables
 
 
 def channels(u: Array) -> Channels:

@@ -9,7 +9,8 @@ from scipy.optimize import minimize_scalar
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Scaling
 from estimation.identification.free_run.polynomial_dynamics import SMOOTHED, START_STEPS, PolynomialDynamics
-from estimation.identification.free_run.polynomial_fit import Runs, Variables
+from estimation.identification.free_run.polynomial_fit import Runs
+from estimation.identification.free_run.polynomial_variables import Variables
 
 U = np.random.default_rng(4).uniform(-1.0, 1.0, (60, 1))
 

@@ -18,7 +18,7 @@ from estimation.identification.free_run.linear_fit import Form, fit_linear
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.other_orders import is_wild
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
-from estimation.identification.free_run.polynomial_fit import Runs, products
+from estimation.identification.free_run.polynomial_fit import Runs
 from estimation.identification.free_run.polynomial_kernel import run_free, write_products
 from estimation.identification.free_run.polynomial_terms import (
     STEPS,
@@ -27,6 +27,7 @@ from estimation.identification.free_run.polynomial_terms import (
     candidate_terms,
     one_more,
 )
+from estimation.identification.free_run.polynomial_variables import products
 from estimation.identification.free_run.saved import load_models, save_models
 from plant.errors import HydrostateError
 

@@ -7,7 +7,8 @@ from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_fit import Form, fit_linear
 from estimation.identification.free_run.output_friction import _first_outputs
-from estimation.identification.free_run.polynomial_fit import BEYOND, Runs, Variables, first_values, variables_of
+from estimation.identification.free_run.polynomial_fit import Runs, first_values, variables_of
+from estimation.identification.free_run.polynomial_variables import BEYOND, Variables
 
 SIZES = (60, 90)
 
@@ -81,3 +82,18 @@ def test_gaps_at_the_beginning_are_filled_by_the_first_output_that_is_there() ->
     assert first_values(y, 4).tolist() == [3.0, 3.0, 3.0, 3.0]
     assert first_values(np.full(3, np.nan), 2).tolist() == [0.0, 0.0]
     assert first_values(np.array([1.0, np.nan, 3.0]), 3).tolist() == [1.0, 1.0, 3.0]
+
+
+@pytest.mark.parametrize(("friction", "rub"), [("", ()), ("position", (0.02, 0.03)), ("velocity", (0.02, 0.03, 0.1))])
+def test_outputs_without_slopes_are_those_with_them(friction: str, rub: tuple[float, ...]) -> None:
+    limits = np.array([[-1.0, 1.0]] * 4)
+    variables = Variables(np.array([0, 0, 1, 1]), np.array([1, 2, 3, 4]), limits, friction)
+    terms = np.concatenate([LINEAR, [[0, 2, -1], [0, 0, 1], [2, 3, 3]]])
+    runs = Runs(variables, terms, logs())
+    theta = np.concatenate([[0.1, 1.2, -0.5, 0.3, 0.1, -0.05, -0.02, 0.04], runs.start_values(), rub])
+    ran = runs.run(theta)
+    assert ran is not None
+    assert np.array_equal(runs.outputs(theta), ran[0])
+    linear = Runs(VARIABLES, LINEAR, logs())
+    away = np.concatenate([[0.1, 3.0, 0.0, 0.3, 0.1], linear.start_values()])
+    assert linear.outputs(away) is None

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from estimation.arrays import Array
-from estimation.identification.free_run.polynomial_fit import Variables
 from estimation.identification.free_run.polynomial_terms import MOST_CANDIDATES, _gains, candidate_terms
+from estimation.identification.free_run.polynomial_variables import Variables
 
 RNG = np.random.default_rng(2)
 

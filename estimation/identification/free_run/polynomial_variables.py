@@ -1,0 +1,114 @@
+"""The lagged signals that terms of a polynomial model multiply, and each term's product."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.arrays import Array, IntArray
+from estimation.identification.free_run.polynomial_kernel import write_products
+
+BEYOND = 0.1
+"""Share of its range by which a signal may leave it in a product before it is held [dimensionless]."""
+
+FRICTIONS = {"": 0, "position": 2, "velocity": 3}
+"""What an output that rubs is, and how many values its friction has: what is taken off below and above, and, of a
+velocity, where it rests; a position rests where it was."""
+
+
+@dataclass(frozen=True, eq=False)
+class Variables:
+    """The lagged signals that terms multiply.
+
+    Parameters
+    ----------
+    source, lag : ndarray of int, shape (v,)
+        0 for the output, else the input's number from 1; and how many samples earlier.
+    limits : ndarray, shape (v, 2)
+        Ends at which each is held in products.
+    friction : str
+        One of `FRICTIONS`: dry friction takes a level off what the terms give, and holds the output within it.
+    """
+
+    source: IntArray
+    lag: IntArray
+    limits: Array
+    friction: str = ""
+
+    @property
+    def n_friction(self) -> int:
+        """Values of its friction."""
+        return FRICTIONS[self.friction]
+
+    @property
+    def ends(self) -> Array:
+        """Least and greatest output that was seen, shape (2,)."""
+        own = self.limits[self.source == 0][0]
+        inner = (own[1] - own[0]) / (1.0 + 2.0 * BEYOND)
+        return own + BEYOND * inner * np.array([1.0, -1.0])
+
+    def around(self, share: float) -> Array:
+        """Return ends that a share of the range beyond what was seen is added to, shape (2,).
+
+        Parameters
+        ----------
+        share : float
+            Of the range [dimensionless].
+
+        Returns
+        -------
+        ndarray, shape (2,)
+            Least and greatest output.
+        """
+        low, high = self.ends
+        return np.array([low, high]) + share * (high - low) * np.array([-1.0, 1.0])
+
+    @property
+    def n_start(self) -> int:
+        """First values of the output that a run needs."""
+        own = self.lag[self.source == 0]
+        return int(own.max()) if own.size else 0
+
+
+def products(variables: Variables, terms: IntArray, u: Array, y: Array) -> Array:
+    """Return each term's product of lagged signals, shape (n, k).
+
+    Parameters
+    ----------
+    terms : ndarray of int, shape (k, 3)
+        Variables that each term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
+    u : ndarray, shape (n, m)
+        Inputs.
+    y : ndarray, shape (n,)
+        Output.
+
+    Returns
+    -------
+    ndarray, shape (n, k)
+        One column a term.
+    """
+    out = np.empty((y.size, terms.shape[0]))
+    write_products(*lagged_signals(variables, u, y), terms, out)
+    return out
+
+
+def lagged_signals(variables: Variables, u: Array, y: Array) -> tuple[Array, Array]:
+    """Return the lagged signals as they are and held at their ends, one column each.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n, m)
+        Inputs.
+    y : ndarray, shape (n,)
+        Output.
+
+    Returns
+    -------
+    tuple of ndarray, shape (n, v)
+        Before the first sample each signal stood at its first value.
+    """
+    single = np.empty((y.size, variables.lag.size))
+    for v, (source, lag) in enumerate(zip(variables.source, variables.lag, strict=True)):
+        series = y if source == 0 else u[:, source - 1]
+        early = min(int(lag), y.size)
+        single[:early, v], single[early:, v] = series[0], series[: y.size - early]
+    return single, np.clip(single, variables.limits[:, 0], variables.limits[:, 1])

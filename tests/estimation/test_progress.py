@@ -1,0 +1,32 @@
+"""What a search tells of the models that it tries."""
+
+import numpy as np
+
+from estimation.identification.free_run.data import channels_from
+from estimation.identification.free_run.identify import identify_channels
+from estimation.progress import listening, tell
+
+
+def test_a_search_is_heard_within_the_block_and_by_the_innermost_listener() -> None:
+    outer, inner = list[str](), list[str]()
+    with listening(outer.append):
+        tell("first")
+        with listening(inner.append):
+            tell("second")
+        tell("third")
+    tell("nobody")
+    assert (outer, inner) == (["first", "third"], ["second"])
+
+
+def test_an_identification_tells_each_kind_of_model_more_than_once() -> None:
+    rng = np.random.default_rng(3)
+    u, y = rng.uniform(-1.0, 1.0, 300), np.zeros(300)
+    for t in range(1, 300):
+        y[t] = 0.7 * y[t - 1] + 0.3 * u[t - 1] + 0.2 * u[t - 1] ** 2
+    data = channels_from([u[:, None]], [y + 0.01 * rng.normal(size=300)], 0.01, ["u"], "y")
+    heard = list[str]()
+    with listening(heard.append):
+        identify_channels(data, structure="auto", order=1, delay=1)
+    kinds = list(dict.fromkeys(heard))
+    assert kinds == ["linear models", "nonlinear inputs", "products that grow", "polynomial models"]
+    assert all(heard.count(one) > 1 for one in kinds if one != "linear models")

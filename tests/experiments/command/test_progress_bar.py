@@ -1,0 +1,47 @@
+"""A bar moves with pieces of work, and within one with what it tries."""
+
+import io
+
+import pytest
+
+from estimation.progress import tell
+from experiments.command.progress_bar import progress
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def shown_on(monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    shown = Terminal()
+    monkeypatch.setattr("sys.stderr", shown)
+    monkeypatch.setenv("TERM", "xterm")
+    return shown
+
+
+def test_one_piece_alone_shows_a_bar_once_it_tells_what_it_tries(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = shown_on(monkeypatch)
+    with progress(1, "identifying") as advance:
+        assert terminal.getvalue() == ""
+        for _ in range(3):
+            tell("linear models")
+        advance()
+    assert "identifying: linear models, 3 tried" in terminal.getvalue()
+
+
+def test_several_pieces_count_what_each_of_them_tries(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = shown_on(monkeypatch)
+    with progress(2, "identifying") as advance:
+        tell("linear models")
+        advance()
+        tell("polynomial models")
+    assert "identifying: polynomial models, 1 tried" in terminal.getvalue()
+    assert "1/2" in terminal.getvalue()
+
+
+def test_nothing_is_shown_where_standard_error_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress(2, "identifying") as advance:
+        tell("linear models")
+        advance()
+    assert capsys.readouterr().err == ""
