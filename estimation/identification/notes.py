@@ -66,6 +66,11 @@ class IdentificationCode(Code):
         "{low:.4g} to {high:.4g}: do not rely on it outside that range ({share:.1%} of the samples); a linear model "
         "(--structure output-error) may do better"
     )
+    LINEAR_STANDS_IN = (
+        "these inputs do not determine the polynomial model of {output!r}: its run is uncertain by {undetermined:.0%} "
+        "of the output's deviation in the fitted logs, and a linear model errs by {linear:.0%}, so the linear model "
+        "was simulated instead; fit a log with inputs like these, or see the polynomial run with --structure narx"
+    )
     NO_NONLINEARITY = (
         "neither dead zone nor saturation nor backlash at the input predicts {output!r} better on held-back data: the "
         "linear model was chosen"

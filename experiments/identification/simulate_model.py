@@ -110,10 +110,10 @@ def quality_of(model: "FreeRunModel", data: "Channels") -> dict[str, Any]:
 
 
 def warn_of_range(model: "FreeRunModel", data: "Channels") -> None:
-    """Warn of inputs that lie beyond those that a polynomial model was fitted to."""
-    from estimation.identification.free_run.input_range import inputs_beyond
+    """Warn of inputs that lie beyond those that a polynomial model was fitted to, or do not determine it."""
+    from estimation.identification.free_run.input_range import inputs_beyond, linear_instead
 
-    for note in inputs_beyond(model, data):
+    for note in linear_instead(model, data) or inputs_beyond(model, data):
         warnings.warn(LogWarning(note), stacklevel=2)
 
 

@@ -66,6 +66,8 @@ class PolynomialCandidate:
         How far fits without one block each run from it on inputs in other orders [dimensionless].
     bic : float
         Information criterion of the free run [dimensionless].
+    parts : tuple of PolynomialFit
+        Fits that left out one block each.
     """
 
     fit: PolynomialFit
@@ -74,6 +76,7 @@ class PolynomialCandidate:
     block_errors: tuple[float, ...]
     spread: float
     bic: float
+    parts: tuple[PolynomialFit, ...] = ()
 
     @property
     def price(self) -> float:
@@ -200,7 +203,9 @@ def _candidate(
     data: Channels,
 ) -> PolynomialCandidate:
     spread = disagreement(judged.fits, fit, data)
-    return PolynomialCandidate(fit, refit, judged.held_back, judged.block_errors, spread, _bic(fit, data))
+    return PolynomialCandidate(
+        fit, refit, judged.held_back, judged.block_errors, spread, _bic(fit, data), tuple(judged.fits)
+    )
 
 
 def _bic(fit: PolynomialFit, data: Channels) -> float:
@@ -263,8 +268,8 @@ class _Growth:
         fit = Runs(fit.variables, fit.terms, self.data).fit(fit.theta, FINAL_STEPS) or fit
         parts = [part for part in self.history[count] if part is not None]
         spread = disagreement(parts, fit, self.data)
-        bic = _bic(fit, self.data)
-        return PolynomialCandidate(fit, partial(continued, fit), errors[count], self.block_errors[count], spread, bic)
+        told = (errors[count], self.block_errors[count], spread, _bic(fit, self.data), tuple(parts))
+        return PolynomialCandidate(fit, partial(continued, fit), *told)
 
     def _held_back(self) -> tuple[float, ...]:
         target, errors = np.concatenate(self.data.y), list[float]()

@@ -16,6 +16,7 @@ from estimation.identification.free_run.choose_hammerstein import (
     worthwhile,
 )
 from estimation.identification.free_run.choose_linear import (
+    BLOCKS,
     Candidate,
     chosen,
     halves_error,
@@ -23,13 +24,15 @@ from estimation.identification.free_run.choose_linear import (
     surely_better,
 )
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate, polynomial_candidates
-from estimation.identification.free_run.data import Channels, Scaling, scaled
+from estimation.identification.free_run.data import Channels, Scaling, blocks, scaled, section
 from estimation.identification.free_run.dense_polynomial import Asked
+from estimation.identification.free_run.fallback import Fallback
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.hammerstein_fit import deviations, refitted
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
-from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_fit import LinearFit, fit_linear
 from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
+from estimation.identification.free_run.other_orders import wanders
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.transfer_function import linear_model
@@ -183,12 +186,14 @@ def _identified(
             return _nonlinear(nonlinear, data, whole, rows)
         if taken and better is not None:
             dynamics, held_back, named = _refitted(better, whole), better.held_back, "narx"
+            if structure == "auto" and sound:
+                dynamics = replace(dynamics, fallback=_fallback(better, best, part, whole))
             related = related or polynomial_explains(better, part)
             notes = [] if related else [IdentificationCode.UNRELATED.note(output=data.output)]
             sound = related and np.isfinite(held_back) and held_back < 1.0
     transfer = None
     if isinstance(dynamics, LinearDynamics):
-        fit = fit_linear(best.form, whole, [best.fit.f], bounded=best.fit.bounded)
+        fit = _continued(best, whole)
         dynamics = LinearDynamics.of(fit)
         transfer = linear_model(fit, whole, by) if len(data.inputs) == 1 else None
     model = FreeRunModel(data.inputs, data.output, data.sample_time, named, by, dynamics, transfer)
@@ -281,7 +286,7 @@ def _believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) ->
             notes.append(IdentificationCode.SIMPLER_MODEL_TAKEN.note(order=best.form.order, taken=taken.form.order))
             best = taken
     # a block lies between outputs that pin a slower pole to the drift of this record: it has to win by more than
-    # chance, and where the halves of the record are run, which are pinned by nothing, are judged beside
+    # chance, and halves of the record, which are pinned by nothing, and other orders of the inputs are judged beside
     quick = [one for one in candidates if not (one.doubt or one.fit.bounded or one.outlasts_block(data))]
     if quick and best.outlasts_block(data):
         taken, said = _believable(quick, data, by)
@@ -291,7 +296,9 @@ def _believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) ->
 
 
 def _carries_on(slow: Candidate, quick: Candidate, data: Channels) -> bool:
-    """Return whether a slow model leaves less than a quick one on blocks and halves together."""
+    """Return whether a slow model leaves less than a quick one on blocks and halves together, and does not wander."""
+    if wanders(slow.fit, data):
+        return False
     errors = [np.hypot(one.held_back, halves_error(one.fit, data)) for one in (slow, quick)]
     return not errors[0] > errors[1]
 
@@ -318,25 +325,13 @@ def _refitted(found: PolynomialCandidate, whole: Channels) -> PolynomialDynamics
     return PolynomialDynamics.of(found.refit(section(whole, MOST_FITTED)) or found.fit)
 
 
-def section(data: Channels, most: int) -> Channels:
-    """Return of each log the part in which the first input varies most, so that there are no more samples than wanted.
+def _continued(linear: Candidate, data: Channels) -> LinearFit:
+    """Return a linear model fitted to other data."""
+    return fit_linear(linear.form, data, [linear.fit.f], bounded=linear.fit.bounded)
 
-    Parameters
-    ----------
-    data : Channels
-        Scaled.
-    """
-    total = sum(y.size for y in data.y)
-    if total <= most:
-        return data
-    parts: list[slice] = []
-    for u in data.u:
-        length = max(u.shape[0] * most // total, 1)
-        begins = np.linspace(0, u.shape[0] - length, 11).astype(int)
-        liveliest = max(begins, key=lambda k: float(np.var(u[k : k + length], axis=0).sum()))
-        parts.append(slice(int(liveliest), int(liveliest) + length))
-    return replace(
-        data,
-        u=tuple(np.ascontiguousarray(u[part]) for u, part in zip(data.u, parts, strict=True)),
-        y=tuple(y[part] for y, part in zip(data.y, parts, strict=True)),
-    )
+
+def _fallback(taken: PolynomialCandidate, linear: Candidate, part: Channels, whole: Channels) -> Fallback:
+    """Return what is run where inputs do not determine a polynomial model."""
+    others = tuple(LinearDynamics.of(_continued(linear, part.without(mask))) for mask in blocks(part, BLOCKS))
+    parts = tuple(PolynomialDynamics.of(one) for one in taken.parts)
+    return Fallback(LinearDynamics.of(_continued(linear, whole)), others, parts, linear.held_back)

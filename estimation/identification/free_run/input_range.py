@@ -1,8 +1,8 @@
-"""Whether a polynomial model is asked about inputs that it never saw: there its products say nothing."""
+"""Whether a polynomial model is asked about inputs that it never saw, and whether a linear one stands in there."""
 
 import numpy as np
 
-from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.data import Channels, in_scale
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_variables import BEYOND
@@ -50,3 +50,30 @@ def inputs_beyond(model: FreeRunModel, data: Channels) -> list[Note]:
             )
         )
     return notes
+
+
+def linear_instead(model: FreeRunModel, data: Channels) -> list[Note]:
+    """Return a note if a linear model stands in for a polynomial one that these inputs do not determine.
+
+    Parameters
+    ----------
+    model : FreeRunModel
+        Models of other structures have none.
+    data : Channels
+        In units of the channels; inputs in the model's order.
+
+    Returns
+    -------
+    list of Note
+        One at most, of the log on which the polynomial model is determined least.
+    """
+    dynamics = model.dynamics
+    if not isinstance(dynamics, PolynomialDynamics) or dynamics.fallback is None:
+        return []
+    one, worst = in_scale(data, model.scaling), (0.0, 1.0)
+    for u, y in zip(one.u, one.y, strict=True):
+        found = dynamics.fallback.errors(u, y, dynamics.own_run(u, y))
+        worst = max(worst, found, key=lambda pair: pair[0] / pair[1])
+    if worst[0] < worst[1]:
+        return []
+    return [IdentificationCode.LINEAR_STANDS_IN.note(output=data.output, undetermined=worst[0], linear=worst[1])]

@@ -8,6 +8,8 @@ import numpy as np
 
 from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels, Scaling
+from estimation.identification.free_run.fallback import Fallback
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs
 from estimation.identification.free_run.polynomial_variables import Variables, products
 
@@ -30,12 +32,15 @@ class PolynomialDynamics:
         One a term.
     friction : ndarray, shape (f,)
         Values of the friction; empty where the output does not rub.
+    fallback : Fallback, optional
+        What is run on inputs that do not determine this model.
     """
 
     variables: Variables
     terms: IntArray
     coefficients: Array
     friction: Array = field(default_factory=lambda: np.empty(0))
+    fallback: Fallback | None = None
     kind: ClassVar[str] = "polynomial"
 
     @property
@@ -44,6 +49,24 @@ class PolynomialDynamics:
         return self.coefficients.size + self.friction.size
 
     def run(self, u: Array, y: Array) -> Array:
+        """Return the free run, or that of the linear model where it stands in.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n, m)
+            Inputs, scaled.
+        y : ndarray, shape (n,)
+            Output, scaled; NaN where missing.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output, scaled.
+        """
+        own = self.own_run(u, y)
+        return own if self.fallback is None else self.fallback.instead(u, y, own)
+
+    def own_run(self, u: Array, y: Array) -> Array:
         """Return the free run, its first outputs fitted to those that are there; NaN from where it runs away.
 
         Parameters
@@ -158,6 +181,7 @@ class PolynomialDynamics:
             "terms": [[int(v) for v in term if v >= 0] for term in self.terms],
             "values": self.coefficients.tolist(),
             **({"friction": {"of": one.friction, "values": self.friction.tolist()}} if one.friction else {}),
+            **({} if self.fallback is None else {"fallback": self.fallback.to_dict()}),
         }
 
     @classmethod
@@ -173,7 +197,13 @@ class PolynomialDynamics:
         terms = np.full((len(values["terms"]), 3), -1, dtype=np.int64)
         for row, term in zip(terms, values["terms"], strict=True):
             row[: len(term)] = term
-        return cls(variables, terms, np.array(values["values"], dtype=np.float64), friction)
+        other = values.get("fallback")
+        fallback = None
+        if other is not None:
+            straight = tuple(LinearDynamics.from_dict(one) for one in other["linear_parts"])
+            parts = tuple(cls.from_dict(one) for one in other["parts"])
+            fallback = Fallback(LinearDynamics.from_dict(other["linear"]), straight, parts, float(other["error"]))
+        return cls(variables, terms, np.array(values["values"], dtype=np.float64), friction, fallback)
 
     @classmethod
     def of(cls, fit: PolynomialFit) -> "PolynomialDynamics":

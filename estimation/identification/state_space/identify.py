@@ -9,14 +9,13 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimation.identification.free_run.choose_linear import CLEARLY, pooled
-from estimation.identification.free_run.data import Channels, scaled
+from estimation.identification.free_run.data import Channels, scaled, section
 from estimation.identification.free_run.identify import (
     MOST_CHOSEN,
     MOST_FITTED,
     WARNED,
     Identified,
     identify_channels,
-    section,
 )
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.notes import IdentificationCode

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.identification.free_run import from_records, identify
-from estimation.identification.free_run.data import blocks, channels_from, in_scale, scaled
+from estimation.identification.free_run import from_records
+from estimation.identification.free_run.data import blocks, channels_from, in_scale, scaled, section
 from plant.log.record import Record
 from tests.estimation.identification.free_run.made_channels import NOISE, N, U, answer, channels
 from tests.numbers import Numbers, refused, some, warned
@@ -31,7 +31,7 @@ def data_that_are_cut() -> dict[str, Any]:
         "blocks of few": [mask.tolist() for masks in blocks(replace(one, y=(NOISE[:3],)), 2) for mask in masks],
     }
     for most in (100, 299, 300, 3):
-        part = identify.section(lively, most)
+        part = section(lively, most)
         told[f"section of {most}"] = [[u[0, 0], len(u)] for u in part.u]
     make = partial(channels_from, sample_time=0.1, inputs=("a",), output="y")
     calls: dict[str, Callable[[], Any]] = {

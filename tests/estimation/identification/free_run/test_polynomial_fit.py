@@ -12,7 +12,7 @@ import pytest
 from estimation.arrays import Array
 from estimation.identification.free_run import identify
 from estimation.identification.free_run.choose_polynomial import _pruned
-from estimation.identification.free_run.data import Channels, channels_from, scaled
+from estimation.identification.free_run.data import Channels, channels_from, scaled, section
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import Form, fit_linear
 from estimation.identification.free_run.model import FreeRunModel
@@ -281,8 +281,8 @@ def test_of_long_logs_the_liveliest_part_of_each_is_taken() -> None:
     quiet, u = np.zeros((1000, 1)), np.zeros((3000, 1))
     u[1200:1500, 0] = np.sin(np.arange(300.0))
     data = channels_from([u, quiet], [np.arange(3000.0), np.arange(1000.0)], 1.0, ["u"], "y")
-    assert identify.section(data, 4000) is data
-    part = identify.section(data, 400)
+    assert section(data, 4000) is data
+    part = section(data, 400)
     assert [len(one) for one in part.y] == [300, 100]
     first = int(part.y[0][0])
     np.testing.assert_array_equal(part.u[0], u[first : first + 300])

@@ -19,6 +19,7 @@ from estimation.identification.free_run.choose_linear import (
 from estimation.identification.free_run.data import Channels, channels_from, halves, scaled
 from estimation.identification.free_run.identify import _believable
 from estimation.identification.free_run.linear_fit import Form, LinearFit, fit_linear
+from estimation.identification.free_run.other_orders import wanders
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
 
@@ -43,7 +44,7 @@ def plain() -> tuple[Channels, Candidate]:
 
 def with_pole(one: Candidate, pole: float, errors: tuple[float, ...], doubt: str = "") -> Candidate:
     theta = one.fit.theta.copy()
-    theta[1] = -pole
+    theta[0], theta[1] = one.fit.theta[0] * (1.0 - pole) / 0.3, -pole
     fit = LinearFit(one.fit.form, theta, one.fit.cost)
     return replace(one, fit=fit, held_back=float(np.sqrt(np.mean(np.square(errors)))), block_errors=errors, doubt=doubt)
 
@@ -98,6 +99,22 @@ def test_a_slow_pole_carries_on_where_nothing_pins_it(
     told = dict(zip((0.998, 0.7), errors, strict=True))
     monkeypatch.setattr(identify, "halves_error", lambda fit, _: told[round(-float(fit.f[1]), 3)])
     assert _believable(list(models.values()), data, scaled(data)[1])[0] is models[taken]
+
+
+def test_a_slow_pole_that_only_the_measured_order_holds_is_not_taken(
+    plain: tuple[Channels, Candidate], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data, one = plain
+    monkeypatch.setattr(identify, "halves_error", lambda *_: 0.1)
+    quick, slow = with_pole(one, 0.7, (0.1,) * 4), with_pole(one, 0.998, (0.01,) * 4)
+    assert not wanders(slow.fit, data)
+    assert _believable([quick, slow], data, scaled(data)[1])[0] is slow
+    theta = slow.fit.theta.copy()
+    theta[0] *= 300.0
+    loud = replace(slow, fit=LinearFit(slow.fit.form, theta, slow.fit.cost))
+    assert wanders(loud.fit, data)
+    assert _believable([quick, loud], data, scaled(data)[1])[0] is quick
+    assert _believable([loud], data, scaled(data)[1])[0] is loud  # where nothing quicker may be taken
 
 
 def test_a_half_is_run_by_a_fit_to_the_other(plain: tuple[Channels, Candidate]) -> None:

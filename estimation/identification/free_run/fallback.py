@@ -1,0 +1,111 @@
+"""The linear model that stands in for a polynomial one on inputs that do not determine the latter.
+
+Products are fitted where the training inputs were, and a run on others may lead anywhere. How far a run is determined
+is told without an output: fits that left out one block of the training data each are run on the same inputs. Their
+squared deviations from the model, times as many as there are blocks, are its variance (the jackknife of groups:
+Quenouille 1956, Tukey 1958). Where that is more than the linear model's squared error, the linear one is run.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.identification.free_run.dynamics import Dynamics
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
+
+
+@dataclass(frozen=True, eq=False)
+class Fallback:
+    """What tells whether a polynomial model is run, and what is run instead.
+
+    Parameters
+    ----------
+    linear : LinearDynamics
+        Of the same data.
+    linear_parts, parts : tuple of LinearDynamics and of Dynamics
+        Fits of the linear model and of the polynomial one that left out one block each.
+    error : float
+        Of the linear model on blocks held back, over the output's deviation [dimensionless].
+    """
+
+    linear: LinearDynamics
+    linear_parts: tuple[LinearDynamics, ...]
+    parts: tuple[Dynamics, ...]
+    error: float
+
+    def errors(self, u: Array, y: Array, own: Array) -> tuple[float, float]:
+        """Return the errors to be expected of the polynomial run and of the linear one.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n, m)
+            Inputs, scaled.
+        y : ndarray, shape (n,)
+            Output, scaled; NaN where missing. Only initial states are taken from it.
+        own : ndarray, shape (n,)
+            Free run of the polynomial model, scaled.
+
+        Returns
+        -------
+        tuple of float
+            What the polynomial run is not determined to, infinite where a run has no end; and the linear model's error
+            on held-back blocks together with what its run is not determined to, over the output's deviation in the
+            fitted data [dimensionless].
+        """
+        straight = jackknife(self.linear.run(u, y), [one.run(u, y) for one in self.linear_parts])
+        return jackknife(own, [one.run(u, y) for one in self.parts]), float(np.hypot(self.error, straight))
+
+    def instead(self, u: Array, y: Array, own: Array) -> Array:
+        """Return the polynomial run, or the linear one where that errs less.
+
+        Parameters
+        ----------
+        u, y, own : ndarray
+            As `errors` takes them.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output, scaled.
+        """
+        undetermined, left = self.errors(u, y, own)
+        return own if undetermined < left else self.linear.run(u, y)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return JSON values."""
+        return {
+            "linear": self.linear.to_dict(),
+            "linear_parts": [one.to_dict() for one in self.linear_parts],
+            "parts": [one.to_dict() for one in self.parts],
+            "error": self.error,
+        }
+
+
+def jackknife(whole: Array, parts: Sequence[Array]) -> float:
+    """Return the standard deviation of a run by those of fits that left out a group of data each.
+
+    The first group of a record is never left out, so there is one group more than runs.
+
+    Parameters
+    ----------
+    whole : ndarray, shape (n,)
+        Run of the fit to all data.
+    parts : sequence of ndarray, shape (n,)
+        Runs of the others.
+
+    Returns
+    -------
+    float
+        Root mean square over the run; infinite where one of them is not finite.
+
+    Examples
+    --------
+    >>> jackknife(np.zeros(2), [np.array([0.1, 0.1]), np.array([-0.1, 0.1])])
+    0.14142135623730953
+    """
+    squares = [float(np.mean((one - whole) ** 2)) for one in parts]
+    found = float(np.sqrt(len(squares) * np.mean(squares))) if squares else float("inf")
+    return found if np.isfinite(found) else float("inf")

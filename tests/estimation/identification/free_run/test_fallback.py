@@ -1,0 +1,126 @@
+"""A linear model stands in for a polynomial one where inputs do not determine the latter, and that is said."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.arrays import Array
+from estimation.identification.free_run.data import Channels, channels_from
+from estimation.identification.free_run.fallback import Fallback, jackknife
+from estimation.identification.free_run.identify import Identified, identify_channels
+from estimation.identification.free_run.input_range import linear_instead
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
+from estimation.identification.free_run.linear_fit import Form
+from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
+
+N = 400
+
+
+def gain(value: float) -> LinearDynamics:
+    """Return ``y = value u``."""
+    return LinearDynamics(Form(0, (1,), (0,)), np.array([value, 0.0]))
+
+
+class Fails:
+    """Stands in for a polynomial fit that runs away."""
+
+    def run(self, u: Array, _: Array) -> Array:
+        return np.full(u.shape[0], np.nan)
+
+
+def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
+    x = np.random.default_rng(0).normal(size=(5, 4000))  # five groups of one each, in as many samples
+    whole = x.mean(axis=0)
+    parts = [(x.sum(axis=0) - one) / 4.0 for one in x[1:]]
+    assert jackknife(whole, parts) == pytest.approx(1.0 / np.sqrt(5.0), rel=0.02)
+    assert jackknife(whole, [*parts, np.full(4000, np.nan)]) == np.inf
+    assert jackknife(whole, []) == np.inf
+
+
+@pytest.mark.parametrize(
+    ("apart", "linear_apart", "taken"),
+    [(0.04, 0.0, "own"), (0.06, 0.0, "linear"), (0.06, 0.05, "own"), (0.5, 0.05, "linear")],
+)
+def test_the_linear_run_is_taken_where_it_errs_less(apart: float, linear_apart: float, taken: str) -> None:
+    # runs of a unit input that lie apart by so much on both sides have four times its square as variance
+    parts = tuple(gain(2.0 + sign * apart) for sign in (1, -1, 1, -1))
+    straight = tuple(gain(1.0 + sign * linear_apart) for sign in (1, -1, 1, -1))
+    one = Fallback(gain(1.0), straight, parts, 0.1)
+    u, y, own = np.ones((9, 1)), np.full(9, np.nan), np.full(9, 2.0)
+    assert one.errors(u, y, own) == pytest.approx((2.0 * apart, np.hypot(0.1, 2.0 * linear_apart)))
+    assert np.array_equal(one.instead(u, y, own), own if taken == "own" else np.ones(9))
+
+
+def test_a_run_that_has_no_end_is_replaced() -> None:
+    away: Any = Fails()
+    u, y = np.ones((9, 1)), np.full(9, np.nan)
+    one = Fallback(gain(1.0), (gain(1.0),) * 4, (gain(2.0),) * 3 + (away,), 0.1)
+    assert np.array_equal(one.instead(u, y, np.full(9, 2.0)), np.ones(9))
+    sound = Fallback(gain(1.0), (gain(1.0),) * 4, (gain(2.0),) * 4, 0.1)
+    assert np.array_equal(sound.instead(u, y, np.full(9, np.nan)), np.ones(9))
+
+
+def answered(u: Array) -> Array:
+    y = np.zeros(u.size)
+    for t in range(1, u.size):
+        # the current of a diode into a capacitor with a leak
+        y[t] = y[t - 1] + 0.1 * min(np.exp(2.0 * (u[t - 1] - y[t - 1])) - 1.0, 4.0) - 0.05 * y[t - 1]
+    return y
+
+
+def log(u: Array) -> Channels:
+    y = answered(u)
+    return channels_from([u[:, None]], [y + 0.003 * np.random.default_rng(5).normal(size=u.size)], 1.0, ["u"], "y")
+
+
+@pytest.fixture(scope="module")
+def switched() -> tuple[Channels, Identified]:
+    """Return what two levels of the input tell, which is nothing of the levels between."""
+    u = np.repeat(np.where(np.random.default_rng(4).random(N // 5) < 0.5, -1.0, 1.0), 5)
+    data = log(u)
+    return data, identify_channels(data, structure="auto", order=2, delay=1)
+
+
+@pytest.fixture
+def between() -> Channels:
+    u = np.repeat(np.random.default_rng(6).uniform(-0.5, 0.5, N // 20), 20)
+    return log(u)
+
+
+def test_a_model_of_two_levels_is_not_run_between_them_where_its_fits_disagree(
+    switched: tuple[Channels, Identified], between: Channels
+) -> None:
+    data, found = switched
+    dynamics = found.model.dynamics
+    assert isinstance(dynamics, PolynomialDynamics)
+    assert dynamics.fallback is not None
+    assert found.quality.fit_percent > 90.0
+    assert linear_instead(found.model, data) == []
+    spread = replace(
+        dynamics.fallback, parts=tuple(_bent(one, 0.3 * k) for k, one in enumerate(dynamics.fallback.parts))
+    )
+    torn = replace(found.model, dynamics=replace(dynamics, fallback=spread))
+    (note,) = linear_instead(torn, between)
+    assert note.code == "linear_stands_in"
+    assert note.data["undetermined"] > note.data["linear"]
+    straight = replace(found.model, dynamics=dynamics.fallback.linear)
+    assert np.array_equal(torn.simulate(between.u[0]), straight.simulate(between.u[0]))
+    again = FreeRunModel.from_dict(torn.to_dict())
+    assert np.array_equal(again.simulate(between.u[0]), straight.simulate(between.u[0]))
+
+
+def _bent(one: Any, much: float) -> Any:
+    """Return a fit whose constant is another."""
+    coefficients = one.coefficients.copy()
+    coefficients[np.flatnonzero((one.terms == -1).all(axis=1))] += much
+    return replace(one, coefficients=coefficients)
+
+
+def test_a_polynomial_model_that_is_asked_for_is_run_as_it_is(between: Channels) -> None:
+    found = identify_channels(between, structure="narx", order=1, delay=1).model
+    assert isinstance(found.dynamics, PolynomialDynamics)
+    assert found.dynamics.fallback is None
+    assert linear_instead(found, between) == []
