@@ -260,7 +260,7 @@ def _believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) ->
     free = [one for one in candidates if not one.fit.bounded]
     tempting, other = min(free, key=lambda one: one.held_back), chosen(free)
     bar = BELIEVED if other.doubt else INTEGRATING * other.held_back
-    if tempting.doubt == "time_constant" and tempting.held_back < bar:
+    if tempting.doubt == "time_constant" and tempting.held_back < bar and not wanders(tempting.fit, data):
         return replace(tempting, doubt=""), [IdentificationCode.INTEGRATES.note(output=data.output)]
     if best.doubt == "time_constant":
         radius = float(np.abs(np.roots(best.fit.f)).max())
