@@ -63,7 +63,9 @@ class Fallback:
 
         Parameters
         ----------
-        u, y, own : ndarray
+        u : ndarray, shape (n, m)
+            Inputs, scaled.
+        y, own : ndarray, shape (n,)
             As `errors` takes them.
 
         Returns
