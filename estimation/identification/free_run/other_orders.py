@@ -82,8 +82,13 @@ def wanders(fit: LinearFit, data: Channels) -> bool:
         By the median of the other orders.
     """
     dynamics = LinearDynamics.of(fit)
-    runs = [[dynamics.run(u, np.full(u.shape[0], np.nan)) for u in other.u] for other in reordered(data)]
-    return float(np.median([np.concatenate(one).std() for one in runs])) > WANDERS
+    spreads = list[float]()
+    for other in reordered(data):
+        # a sample at the mean before each log, so that no run begins at the steady gain times its first input
+        begun = [np.concatenate([np.zeros((1, u.shape[1])), u]) for u in other.u]
+        runs = [dynamics.run(u, np.full(u.shape[0], np.nan))[1:] for u in begun]
+        spreads.append(float(np.concatenate(runs).std()))
+    return float(np.median(spreads)) > WANDERS
 
 
 def disagreement(fits: Sequence[PolynomialFit], whole: PolynomialFit, data: Channels) -> float:

@@ -109,6 +109,8 @@ def test_a_slow_pole_that_only_the_measured_order_holds_is_not_taken(
     quick, slow = with_pole(one, 0.7, (0.1,) * 4), with_pole(one, 0.998, (0.01,) * 4)
     assert not wanders(slow.fit, data)
     assert _believable([quick, slow], data, scaled(data)[1])[0] is slow
+    # a sum of its input begins at rest, not at the steady gain of 500 times the first input
+    assert not wanders(LinearFit(one.fit.form, np.array([0.05, -0.9999, 0.0]), 1.0), data)
     theta = slow.fit.theta.copy()
     theta[0] *= 300.0
     loud = replace(slow, fit=LinearFit(slow.fit.form, theta, slow.fit.cost))
