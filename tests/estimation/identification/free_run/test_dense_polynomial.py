@@ -176,7 +176,7 @@ def test_fits_agree_where_the_data_tell_them_and_not_where_they_do_not() -> None
 def test_doubt_counts_beside_the_error_on_what_was_held_back() -> None:
     data = log()
     every = polynomial_candidates(linear_candidates(data, [1], (1,)), data, Asked(order=1, delay=1, n_numerator=1))
-    assert len(every) > 2
+    assert len(every) > 1
     for one in every:
         assert one.price == pytest.approx(np.hypot(one.held_back, one.spread))
         assert one.price > one.held_back
