@@ -102,6 +102,8 @@ ENCODER_ZERO = Hypothesis(
 )
 """Asked of every log too: chambers that hold their volumes, or valves that crack, may pass for an encoder's zero."""
 
+VOLUME = Hypothesis("volume", ("chamber_volume",))
+
 START_LOAD = Hypothesis("start_load", ("start_pressure", "start_level"))
 
 BEGUN = replace(START_LOAD, from_first_sample=True)
@@ -214,7 +216,7 @@ HYPOTHESES = (
     ENCODER_ZERO,
     PLAY,
     DELIVERY,
-    Hypothesis("volume", ("chamber_volume",)),
+    VOLUME,
     START_LOAD,
     Hypothesis("air", ("air_softness",), ({"air_softness": 1e2}, {"air_softness": 1e3})),
     AIR_MIDWAY,

@@ -134,8 +134,8 @@ def promised_beside(
 
 def promising(
     log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], asked: Sequence[Hypothesis]
-) -> tuple[list[Hypothesis], list[Hypothesis]]:
-    """Return the hypotheses that promise most beside those that are taken, best first; and the others.
+) -> tuple[list[Hypothesis], list[Hypothesis], dict[str, float]]:
+    """Return the hypotheses that promise most beside those that are taken, best first; the others; what each promises.
 
     Parameters
     ----------
@@ -150,8 +150,8 @@ def promising(
 
     Returns
     -------
-    tuple of list of Hypothesis
-        The `LIKELIEST`, and the others.
+    tuple of list of Hypothesis, list of Hypothesis, and dict
+        The `LIKELIEST`, the others, and the gain in log-likelihood that each promises, by its name [dimensionless].
     """
     promises = _promises(log.coarsened(), together, found, asked)
     stepped = any(one.from_change for one in asked) and likeliest_step(log).share > STEPPED
@@ -159,7 +159,8 @@ def promising(
     first = [(stepped and one.from_change) or (aired and one.from_entry) for one in asked]
     order = sorted(range(len(asked)), key=lambda i: (not first[i], -promises[i].gain))
     likely = [asked[i] for i in order if first[i] or not asked[i].far][:LIKELIEST]
-    return likely, [one for one in asked if one not in likely]
+    gains = {one.name: each.gain for one, each in zip(asked, promises, strict=True)}
+    return likely, [one for one in asked if one not in likely], gains
 
 
 def _promises(

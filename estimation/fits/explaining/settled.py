@@ -18,6 +18,9 @@ from plant.arrays import Array
 SETTLING = 40
 """Evaluations of the model at most on a way down [count]."""
 
+SLIGHT = 1e-4
+"""Share of the cost that a further step must promise with long model steps [fraction]: these err by more."""
+
 NEAR = 2.0
 """First radius of a search [dimensionless]: it begins where the plain form ended, or a simpler hypothesis."""
 
@@ -54,12 +57,17 @@ def settled(log: GreyBoxLog, tried: Tried, wanted: float = np.inf, every: int = 
         The set at its optimum.
     """
     early, known = coarse(log, tried.delays, tried.together, every), at_end(tried.together[:-1])
-    best = descended(early, tried, tried.point.theta, SETTLING, *known, wanted=wanted)
+    best = _led_down(early, tried, tried.point.theta, *known, wanted=wanted)
     if (revived := _revived(log, best, *known)) is not None:
-        best = min(best, descended(early, best, revived, SETTLING, *known, wanted=wanted), key=lambda one: one.cost)
+        best = min(best, _led_down(early, best, revived, *known, wanted=wanted), key=lambda one: one.cost)
     if len(tried.together[-1].delays) > 1:
         best = _punctual(log, best, every, *known)
     return _entered(early, best, wanted) if any(one.from_entry for one in tried.together) else best
+
+
+def _led_down(log: GreyBoxLog, tried: Tried, start: Array, *more: str, wanted: float) -> Tried:
+    """Return a set of hypotheses led down with long model steps."""
+    return descended(log, tried, start, SETTLING, *more, wanted=wanted, least_share=SLIGHT)
 
 
 def _punctual(log: GreyBoxLog, best: Tried, every: int, *known: str) -> Tried:
@@ -70,7 +78,7 @@ def _punctual(log: GreyBoxLog, best: Tried, every: int, *known: str) -> Tried:
         while least <= (delay := best.delays.get(channel, 0.0) + step) <= most:
             moved = replace(best, delays={channel: delay})
             later = coarse(log, moved.delays, moved.together, every)
-            moved = descended(later, moved, best.point.theta, SETTLING, *known, wanted=best.cost)
+            moved = _led_down(later, moved, best.point.theta, *known, wanted=best.cost)
             if moved.cost >= best.cost:
                 break
             best = moved
@@ -95,7 +103,7 @@ def _entered(log: GreyBoxLog, tried: Tried, wanted: float) -> Tried:
         thetas = np.repeat(theta[None], len(asked) + 1, axis=0)
         thetas[1:, places] = asked
         start = thetas[int(np.argmin(problem.costs([*thetas])))]
-        further = descended(log, tried, start, SETTLING, *more, wanted=wanted)
+        further = _led_down(log, tried, start, *more, wanted=wanted)
         if further.cost > tried.cost - LEAST_BETTER:
             break
         tried, theta = further, further.point.theta
@@ -128,7 +136,13 @@ def gone(log: GreyBoxLog, values: Mapping[str, float]) -> dict[str, float]:
 
 
 def descended(
-    log: GreyBoxLog, tried: Tried, start: Array, evaluations: int, *more: str, wanted: float = np.inf
+    log: GreyBoxLog,
+    tried: Tried,
+    start: Array,
+    evaluations: int,
+    *more: str,
+    wanted: float = np.inf,
+    least_share: float = 0.0,
 ) -> Tried:
     """Return a set of hypotheses led down from a start.
 
@@ -146,6 +160,8 @@ def descended(
         What is freed beside the hypotheses.
     wanted : float
         See `settled` [dimensionless].
+    least_share : float
+        Share of the cost that a further step must promise [fraction].
 
     Returns
     -------
@@ -154,7 +170,7 @@ def descended(
     """
     problem = freed(log, tried.together, *more)
     bounds = flow_bounds(problem.model, [start], log)
-    point = descend(problem.at, start, evaluations, bounds, radius=NEAR, wanted=wanted)
+    point = descend(problem.at, start, evaluations, bounds, radius=NEAR, wanted=wanted, least_share=least_share)
     return replace(tried, point=point, values=problem.model.values(point.theta))
 
 

@@ -210,7 +210,8 @@ def _with_teeth(log: GreyBoxLog, begun: Toothed, fitted: Fitted) -> Toothed | No
         tried = with_teeth(replace(log, counts=(count, 2 * count)), taken, offset)
         held = Toothed(tried, fitted(tried))
         left = held.best.teeth
-        if any(one.count not in left for one in taken):
+        worse = found is None and held.best.cost > begun.best.cost
+        if worse or any(one.count not in left for one in taken):
             return found
         if found is not None and held.best.cost > found.best.cost:  # an overtone that helps none
             break

@@ -115,6 +115,22 @@ def balanced_by(log: GreyBoxLog, mass: float) -> GreyBoxLog:
     return replace(log, parameters=parameters)
 
 
+def balances_mass(log: GreyBoxLog) -> bool:
+    """Return whether the wide form balances mass on a log.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+
+    Returns
+    -------
+    bool
+        Whether it does; else volume.
+    """
+    return bool(usual_values(log)["by_mass"])
+
+
 def delayed(log: GreyBoxLog, delays: Mapping[str, float]) -> GreyBoxLog:
     """Return a log whose channels are brought forward.
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.explaining import explain as explaining
+from estimation.fits.explaining import finished as finishing
 from estimation.fits.explaining import promises as promising
 from estimation.fits.explaining import screened, settled
 from estimation.fits.flow import search as flow_search
@@ -134,7 +135,7 @@ def plan_of_explanations() -> dict[str, Any]:
         with (
             planned(cost, explaining, screened, settled) as plan,
             patch.object(promising, "_promises", promised),
-            patch.object(explaining, "concluded", concluded),
+            patch.object(finishing, "concluded", concluded),
         ):
             for paired in (False, True):
                 plan.clear()

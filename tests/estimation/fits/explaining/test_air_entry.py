@@ -60,7 +60,7 @@ def test_a_dead_pressure_sensor_shows_none() -> None:
 
 def test_air_that_lost_flow_shows_is_tried_first() -> None:
     log = seen(logged(0.03))
-    likely, others = promising(log, (), {**usual_values(log), "case_leakage": 1e-13}, HYPOTHESES)
+    likely, others, _ = promising(log, (), {**usual_values(log), "case_leakage": 1e-13}, HYPOTHESES)
     assert likely[0] is AIR_MIDWAY
     assert AIR_MIDWAY not in others
 

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from estimation.fits.explaining import explain, screened, settled
+from estimation.fits.explaining import finished as finishing
+from estimation.fits.explaining import likeliest as ranking
 from estimation.fits.explaining.delivery import contradicted
-from estimation.fits.explaining.explain import CLOSE, NEVER, ROUNDS
+from estimation.fits.explaining.finished import CLOSE, NEVER, ROUNDS
 from estimation.fits.explaining.tried import Tried
 from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import HYPOTHESES
@@ -38,11 +40,11 @@ def ended(costs: Sequence[float], monkeypatch: pytest.MonkeyPatch) -> tuple[floa
         made.append(costs[len(made)])
         return SimpleNamespace(cost=made[-1], point=SimpleNamespace(theta=np.zeros(1)))
 
-    monkeypatch.setattr(explain, "descended", descended)
-    monkeypatch.setattr(explain, "left_by", lambda *_: 1.0)
+    monkeypatch.setattr(finishing, "descended", descended)
+    monkeypatch.setattr(finishing, "left_by", lambda *_: 1.0)
     nothing: Any = SimpleNamespace(drives=())
     begun: Any = SimpleNamespace(cost=np.inf)
-    return explain._to_its_end(nothing, begun, np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
+    return finishing._to_its_end(nothing, begun, np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
 
 
 def test_a_search_goes_on_while_it_gains_what_tells_hypotheses_apart(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -59,17 +61,17 @@ def test_what_promises_most_is_settled_even_where_its_starts_are_not_what_it_say
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def tried(cost: float) -> Any:
-        return SimpleNamespace(cost=cost)
+        return SimpleNamespace(cost=cost, point=Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), delays={})
 
     settled: list[float] = []
-    monkeypatch.setattr(explain, "settled", lambda _, start, *__: settled.append(start.cost) or start)
-    monkeypatch.setattr(explain, "_finished", lambda _, one, __: one)
-    monkeypatch.setattr(explain, "left_by", lambda *_: 1.0)
+    monkeypatch.setattr(ranking, "settled", lambda _, start, *__: settled.append(start.cost) or start)
+    monkeypatch.setattr(ranking, "finished", lambda _, one, __: one)
+    monkeypatch.setattr(ranking, "in_vain", lambda *_: False)
     nothing: Any = SimpleNamespace(drives=())
-    found = explain._likeliest(nothing, [[tried(np.inf), tried(np.inf)], [tried(9.0), tried(10.0), tried(90.0)]])  # pyright: ignore[reportPrivateUsage]
+    found = ranking.likeliest(nothing, [[tried(np.inf), tried(np.inf)], [tried(9.0), tried(10.0), tried(90.0)]])
     assert [one.cost for one in found] == [9.0]
     assert settled == [np.inf, 9.0, 10.0]
-    alone = explain._likeliest(nothing, [[tried(np.inf)]])  # pyright: ignore[reportPrivateUsage]
+    alone = ranking.likeliest(nothing, [[tried(np.inf)]])
     assert [one.cost for one in alone] == [np.inf]
 
 
@@ -90,15 +92,17 @@ def test_what_is_set_above_the_rig_files_or_has_no_interval_is_void(
 ) -> None:
     problem = SimpleNamespace(model=SimpleNamespace(theta=lambda _: np.zeros(1)))
     fit = replace(made_fit(50.0, 2e8, 1e5), std={"bulk_modulus": 1e5, "relief_pressure": std})
-    monkeypatch.setattr(explain, "delayed", lambda log, _: log)
-    monkeypatch.setattr(explain, "balanced_by", lambda log, _: log)
-    monkeypatch.setattr(explain, "freed", lambda *_: problem)
-    monkeypatch.setattr(explain, "usual_values", lambda _: {})
-    monkeypatch.setattr(explain, "_to_its_end", lambda _, tried, *__, **___: tried)
-    monkeypatch.setattr(explain, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
-    monkeypatch.setattr(explain, "concluded", lambda *_, **__: fit)
+    monkeypatch.setattr(finishing, "delayed", lambda log, _: log)
+    monkeypatch.setattr(finishing, "balanced_by", lambda log, _: log)
+    monkeypatch.setattr(finishing, "freed", lambda *_: problem)
+    monkeypatch.setattr(finishing, "usual_values", lambda _: {})
+    monkeypatch.setattr(finishing, "_to_its_end", lambda _, tried, *__, **___: tried)
+    monkeypatch.setattr(finishing, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
+    monkeypatch.setattr(finishing, "concluded", lambda *_, **__: fit)
+    monkeypatch.setattr(finishing, "coarse", lambda *_: None)
+    monkeypatch.setattr(finishing, "balances_mass", lambda _: False)
     nothing: Any = None
-    found = explain._finished(nothing, relieved(setting))  # pyright: ignore[reportPrivateUsage]
+    found = finishing.finished(nothing, relieved(setting))
     assert found.cost == (np.inf if void else 50.0)
     assert found.fit.cost == (NEVER if void else 50.0)
     assert found.void is void
@@ -135,14 +139,15 @@ def test_all_else_is_asked_beside_a_hypothesis_where_what_slopes_promise_does_no
         return _Made(one.together, point, {}, {"late": 1e-3}, {}, (made_fit(one.cost, 2e8, 1e5),), void)
 
     monkeypatch.setattr(explain, "delayed", lambda log, _: log)
-    monkeypatch.setattr(explain, "promising", lambda *_: ([likely], [far, hidden]))
+    monkeypatch.setattr(explain, "promising", lambda *_: ([likely], [far, hidden], {}))
     monkeypatch.setattr(explain, "own_starts", lambda *_: [{"offset": 1e5}])
     monkeypatch.setattr(settled, "usual_values", lambda _: {"leakage_coefficient": 5e-12, "flow_bias": 2e-6} | FED)
     monkeypatch.setattr(explain, "screened", led)
     monkeypatch.setattr(explain, "skipping", lambda *_: 1)
     monkeypatch.setattr(explain, "left_by", lambda *_: 1.0)
-    monkeypatch.setattr(explain, "settled", lambda _, start, *__: start)
-    monkeypatch.setattr(explain, "_finished", finished)
+    monkeypatch.setattr(ranking, "settled", lambda _, start, *__: start)
+    monkeypatch.setattr(ranking, "finished", finished)
+    monkeypatch.setattr(ranking, "in_vain", lambda *_: False)
     nothing: Any = SimpleNamespace(drives=())
     at_end = {"leakage_coefficient": 1e-12, "flow_bias": 1e-6, "offset": 3e4, **FED}
     coarse = {"leakage_coefficient": 1e-29, "flow_bias": 3e-6, "offset": 4e4, **FED}
@@ -193,9 +198,9 @@ def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
 
     monkeypatch.setattr(explain, "widened", lambda *_: None)
     monkeypatch.setattr(explain, "balanced_by", lambda *_: None)
-    monkeypatch.setattr(explain, "promising", lambda *_: ([], []))
-    monkeypatch.setattr(explain, "_likeliest", lambda *_, **__: [tried(100.0, "relief"), tried(second, "worn")])
-    monkeypatch.setattr(explain, "_left_by_plain", lambda *_: 1.0)
+    monkeypatch.setattr(explain, "promising", lambda *_: ([], [], {}))
+    monkeypatch.setattr(explain, "_alone", lambda *_, **__: [tried(100.0, "relief"), tried(second, "worn")])
+    monkeypatch.setattr(explain, "_plain_point", lambda *_: Point(np.zeros(1), 1.0, np.zeros(1), np.eye(1)))
     monkeypatch.setattr(explain, "skipping", lambda *_: 1)
     monkeypatch.setattr(explain, "left_by", lambda *_: chi)
     monkeypatch.setattr(explain, "_paired", paired)

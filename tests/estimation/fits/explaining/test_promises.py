@@ -13,8 +13,9 @@ FOUND = {**flow_starts(PAPER, PAPER.bulk_modulus)[2], STIFFNESS: 3e7, "case_leak
 
 
 def test_what_slopes_say_nothing_of_is_not_tried_first() -> None:
-    likely, others = promising(wide(), (), FOUND, [MAKEUP_BLOCKED, OFFSET])
+    likely, others, gains = promising(wide(), (), FOUND, [MAKEUP_BLOCKED, OFFSET])
     assert (likely, others) == ([OFFSET], [MAKEUP_BLOCKED])
+    assert gains[OFFSET.name] == pytest.approx(promised_beside(wide().coarsened(), (), FOUND, OFFSET).gain)
 
 
 def test_behind_a_plain_form_that_explains_a_log_all_that_may_hide_is_tried_by_its_slopes() -> None:

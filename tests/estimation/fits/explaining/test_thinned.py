@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.fits.explaining import explain
+from estimation.fits.explaining import finished as finishing
+from estimation.fits.explaining import likeliest as ranking
 from estimation.fits.explaining.settled import coarse
 from estimation.fits.explaining.thinned import FEW, Spared, left_by, skipping, thinned
 from estimation.fits.explaining.tried import Tried
@@ -72,25 +73,25 @@ def test_the_best_of_few_samples_is_sought_anew_with_all(monkeypatch: pytest.Mon
         return replace(one, point=replace(one.point, cost=5.0 if one is begun else one.cost))
 
     problem = freed(coarse(seen(), {}, ()), ())
-    monkeypatch.setattr(explain, "settled", settled)
-    monkeypatch.setattr(explain, "screened", lambda *_: [begun])
-    monkeypatch.setattr(explain, "freed", lambda *_: problem)
-    monkeypatch.setattr(explain, "left_by", lambda _, cost: cost)
+    monkeypatch.setattr(ranking, "settled", settled)
+    monkeypatch.setattr(ranking, "screened", lambda *_: [begun])
+    monkeypatch.setattr(ranking, "freed", lambda *_: problem)
+    monkeypatch.setattr(ranking, "left_by", lambda _, cost: cost)
     spared = Spared(4, 1000.0, ())
-    (found,) = explain._with_all(seen(), [tried], np.inf, spared)  # pyright: ignore[reportPrivateUsage]
+    (found,) = ranking._with_all(seen(), [tried], np.inf, spared)  # pyright: ignore[reportPrivateUsage]
     assert (found.cost, led) == (5.0, [90.0, 80.0])
     led.clear()
-    (kept,) = explain._with_all(seen(), [tried], np.inf, spared._replace(left=100.0))  # pyright: ignore[reportPrivateUsage]
+    (kept,) = ranking._with_all(seen(), [tried], np.inf, spared._replace(left=100.0))  # pyright: ignore[reportPrivateUsage]
     assert (kept.cost, led) == (90.0, [])
 
 
 def test_what_leaves_far_too_much_is_not_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     finished: list[float] = []
-    monkeypatch.setattr(explain, "settled", lambda _, one, *__: one)
-    monkeypatch.setattr(explain, "FEW", 0)
-    monkeypatch.setattr(explain, "_finished", lambda _, one, __: finished.append(one.cost) or one)
-    monkeypatch.setattr(explain, "left_by", lambda _, cost: cost)
+    monkeypatch.setattr(ranking, "settled", lambda _, one, *__: one)
+    monkeypatch.setattr(finishing, "FEW", 0)
+    monkeypatch.setattr(ranking, "finished", lambda _, one, __: finished.append(one.cost) or one)
+    monkeypatch.setattr(finishing, "left_by", lambda _, cost: cost)
     for cost in (9.0, 11.0):
         tried = Tried((), Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), {}, {}, {})
-        explain._likeliest(seen(), [[tried]])  # pyright: ignore[reportPrivateUsage]
+        ranking.likeliest(seen(), [[tried]])
     assert finished == [9.0]

@@ -1,0 +1,133 @@
+"""Sets of hypotheses fitted to the end, with short model steps, by volume and by mass."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.fits.explaining.settled import at_end, coarse, descended
+from estimation.fits.explaining.thinned import FEW, left_by
+from estimation.fits.explaining.tried import Tried
+from estimation.fits.explaining.wide_log import balanced_by, balances_mass, delayed, usual_values
+from estimation.fits.explaining.wide_problem import flow_bounds, freed
+from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.fit import GreyBoxFit, concluded
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.models.flow import STIFFNESS
+from plant.arrays import Array
+
+FINISHING = 12
+"""Evaluations of the model for the last search, with short model steps."""
+
+ROUNDS = 6
+"""How often the last ones are made at most, while each gains what would tell a hypothesis from another [count]."""
+
+UNFINISHED = 10.0
+"""Half the sum of squares over what noise alone makes of it, from which a set of hypotheses is not fitted with short
+model steps [dimensionless]; what explains a log comes to 1.2."""
+
+FINISHED, REACHED = 0.7, 1.5
+"""A search with short model steps goes on while its steps promise to bring the cost to the first share of itself (six
+rounds of it make an eighth), but is never asked for less than the second times what noise alone makes [fractions]."""
+
+FAR_BEHIND = 1.2
+"""How many times the cost that would be of use one still is after twelve evaluations that no more are made for it
+[dimensionless]."""
+
+NEVER = float(np.finfo(np.float64).max)
+"""Cost of a fit that is not what its hypotheses say, so that it is not believed [dimensionless]."""
+
+LITTLE = 1e-3
+"""Share of the cost below which a gain tells nothing of what leaves far more than noise [fraction]; judged."""
+
+CLOSE = 60.0
+"""Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""
+
+ALIKE = 15.0
+"""Difference of log-likelihood up to which two sets of hypotheses are said to explain a log alike [dimensionless]."""
+
+
+def finished(log: GreyBoxLog, tried: Tried, useful: float = np.inf) -> Tried:
+    """Return a set of hypotheses fitted to the end, balanced by volume and by mass.
+
+    Balanced by mass, the inner circuit yields as it does in the plain form. A log that does not tell the two apart is
+    believed neither alone: they may differ by three deviations. The balance in which the set was sought comes first,
+    and the other is not followed where it will not come as low.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    tried : Tried
+        The set, where long model steps led.
+    useful : float
+        Cost above which it is of no use [dimensionless].
+
+    Returns
+    -------
+    Tried
+        The set where short model steps lead, with its fits; one that is not what it says has the cost `NEVER`.
+    """
+    row = delayed(log, tried.delays)
+    done: list[tuple[Tried, FreedProblem]] = []
+    last = at_end(tried.together)
+    sought_by = balances_mass(coarse(log, {}, tried.together))
+    for share in (1.0, 0.0) if sought_by else (0.0, 1.0):
+        own, more = balanced_by(row, share), (STIFFNESS, *last) if share else last
+        problem, begun = freed(own, tried.together, *more), done[-1][0] if done else tried
+        start = problem.model.theta({**usual_values(own), **begun.values})
+        done.append((_to_its_end(own, begun, start, *more, useful=useful), problem))
+        useful = min(useful, done[-1][0].cost + ALIKE)
+    done.sort(key=lambda one: one[0].cost)
+    best = replace(done[0][0], coarse=tried.values)
+    count = [one for one in done if one[0].cost <= best.cost + ALIKE]
+    first, *rivals = (_concluded(problem, one.point, log) for one, problem in count)
+    found = ((one, one.free[0]) for one in best.together)
+    if best.meant and all(one.told(best.values[name], first.std.get(name, 0.0)) for one, name in found):
+        return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
+    return replace(best, void=True, fits=(replace(first, cost=NEVER),))
+
+
+def _concluded(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxFit:
+    least, _ = flow_bounds(problem.model, [point.theta], log)
+    return concluded(problem, point, least=least, warned=False)
+
+
+def _to_its_end(log: GreyBoxLog, tried: Tried, start: Array, *more: str, useful: float = np.inf) -> Tried:
+    """Return the end of a search with short model steps: where long ones end may be far from it."""
+    best = descended(log, tried, start, FINISHING, *more, wanted=min(useful, _hoped(log, tried.cost)))
+    for _ in range(ROUNDS - 1):
+        if best.cost > FAR_BEHIND * useful:
+            break
+        further = descended(log, best, best.point.theta, FINISHING, *more, wanted=min(useful, _hoped(log, best.cost)))
+        gained = best.cost - further.cost
+        if gained > 0.0:
+            best = further
+        if gained < max(CLOSE, LITTLE * best.cost):
+            break
+    return best
+
+
+def _hoped(log: GreyBoxLog, cost: float) -> float:
+    """Return the cost to which a search with short model steps must promise to come, lest it ends."""
+    if len(log.drives) < FEW or not np.isfinite(cost):
+        return np.inf
+    return max(FINISHED * cost, REACHED * cost / left_by(log, cost))
+
+
+def in_vain(log: GreyBoxLog, cost: float) -> bool:
+    """Return whether a long log is left so far from explained that short model steps bring it nowhere near.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    cost : float
+        Half the sum of squares that is left [dimensionless].
+
+    Returns
+    -------
+    bool
+        Whether it is.
+    """
+    return len(log.drives) >= FEW and left_by(log, cost) >= UNFINISHED

@@ -1,0 +1,194 @@
+"""The likeliest of several sets of hypotheses: brought to their optima, led on with all samples, fitted to the end."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.fits.explaining.finished import CLOSE, LITTLE, REACHED, UNFINISHED, finished, in_vain
+from estimation.fits.explaining.screened import NEARLY, screened
+from estimation.fits.explaining.settled import at_end, coarse, settled
+from estimation.fits.explaining.thinned import NOTHING_SPARED, Spared, left_by
+from estimation.fits.explaining.tried import Tried
+from estimation.fits.explaining.wide_log import usual_values
+from estimation.fits.explaining.wide_problem import freed
+from estimation.fits.greybox.log import GreyBoxLog
+
+FINALISTS, CARRIED = 3, 2
+"""Hypotheses that are carried on, and starts of each."""
+
+NEARLY_AS_GOOD = 1.1
+"""What the cost of a finished set is multiplied by before others are compared with it: their model steps are long, and
+have errors [dimensionless]."""
+
+MUCH = 0.2
+"""What the best set of hypotheses leaves at most of what was left, to be searched anew with all samples [fraction]."""
+
+
+def likeliest(
+    log: GreyBoxLog,
+    tried: Iterable[Iterable[Tried]],
+    known: float = np.inf,
+    spared: Spared = NOTHING_SPARED,
+    useful: float = np.inf,
+) -> list[Tried]:
+    """Return the likeliest of several sets of hypotheses, each tried from some starts, the best first.
+
+    The first set is carried on in any case: a few steps from a start are no measure of what promises most. What cannot
+    come close to the best, or to what is known, is not followed to its optimum. Where few samples were ``spared``,
+    all of them count at the end. What leaves far more than any fit that explains a log is not fitted to the end.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    tried : iterable of iterable of Tried
+        The sets, each from its starts.
+    known : float
+        The least cost so far [dimensionless].
+    spared : Spared
+        What is spared.
+    useful : float
+        Cost above which a set is of no use [dimensionless].
+
+    Returns
+    -------
+    list of Tried
+        Those that were carried on and came near the best.
+    """
+    return led_on(log, settled_each(log, tried, known, spared), known, spared, useful)
+
+
+def settled_each(
+    log: GreyBoxLog, tried: Iterable[Iterable[Tried]], known: float = np.inf, spared: Spared = NOTHING_SPARED
+) -> list[Tried]:
+    """Return the likeliest of several sets of hypotheses at their optima, on few samples where these are spared.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    tried : iterable of iterable of Tried
+        The sets, each from its starts.
+    known : float
+        The least cost so far [dimensionless].
+    spared : Spared
+        What is spared.
+
+    Returns
+    -------
+    list of Tried
+        Those that were carried on, the best first.
+    """
+    known *= NEARLY_AS_GOOD
+    first, *others = [ranked(one) for one in tried]
+    sets = [first, *sorted(others, key=lambda one: one[0].cost)[: FINALISTS - 1]]
+    carried = [[one[0], *(start for start in one[1:CARRIED] if start.cost < NEARLY * one[0].cost)] for one in sets]
+    ended: list[Tried] = []
+    for one in carried:
+        wanted = min((known, *(other.cost for other in ended))) + CLOSE
+        best = settled(log, one[0], wanted, spared.every)
+        for start in one[1:]:
+            if apart(one[0], start):
+                best = min(best, settled(log, start, min(wanted, best.cost), spared.every), key=_cost)
+        ended.append(best)
+    return ranked(ended)
+
+
+def led_on(
+    log: GreyBoxLog,
+    ended: Sequence[Tried],
+    known: float = np.inf,
+    spared: Spared = NOTHING_SPARED,
+    useful: float = np.inf,
+) -> list[Tried]:
+    """Return sets of hypotheses at their optima with all samples, the likeliest fitted to the end.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    ended : sequence of Tried
+        The sets, where few samples led if these are spared.
+    known : float
+        The least cost so far [dimensionless].
+    spared : Spared
+        What is spared.
+    useful : float
+        Cost above which a set is of no use [dimensionless].
+
+    Returns
+    -------
+    list of Tried
+        Those near the best, the best first.
+    """
+    known *= NEARLY_AS_GOOD
+    if spared.every > 1:
+        ended = [*_with_all(log, ended, known, spared)]
+    best = min((known, *(one.cost for one in ended)))
+    near = [one for one in ranked(ended) if one.cost <= best + CLOSE]
+    return ranked(one if in_vain(log, one.cost) else finished(log, one, useful) for one in near)
+
+
+def _with_all(log: GreyBoxLog, ended: Iterable[Tried], known: float, spared: Spared) -> Iterator[Tried]:
+    """Yield sets of hypotheses led on where all samples count, as far as they may still explain the log.
+
+    Few samples may have a valley by themselves. So the best set is sought anew with all, where it explains much, but
+    not all yet.
+    """
+    for place, one in enumerate(ranked(ended)):
+        near = one.cost <= NEARLY_AS_GOOD * known + CLOSE
+        much = place == 0 and left_by(log, one.cost) < MUCH * spared.left
+        if near and (much or left_by(log, one.cost) < UNFINISHED):
+            problem = freed(coarse(log, one.delays, one.together), one.together, *at_end(one.together[:-1]))
+            theta = problem.model.theta({**usual_values(log), **one.values})
+            begun = replace(one, point=replace(one.point, theta=theta))
+            further = settled(log, begun, NEARLY_AS_GOOD * known + CLOSE)
+            if place == 0 and REACHED < left_by(log, further.cost) < max(MUCH * spared.left, UNFINISHED):
+                again = ranked(screened(log, one.together, spared.starts))[:CARRIED]
+                again = [start for start in again if apart(further, start)]
+                further = min(further, *(settled(log, start, further.cost) for start in again), key=_cost)
+            known = min(known, further.cost)
+            yield further
+        else:
+            yield one
+
+
+def apart(one: Tried, other: Tried) -> bool:
+    """Return whether two searches for the same came to different places, by how the cost curves there.
+
+    Parameters
+    ----------
+    one, other : Tried
+        A set of hypotheses, from two starts.
+
+    Returns
+    -------
+    bool
+        Whether they did.
+    """
+    unlike = len(one.point.theta) != len(other.point.theta) or one.delays != other.delays
+    if unlike or abs(one.cost - other.cost) > LITTLE * one.cost:
+        return True
+    step = other.point.theta - one.point.theta
+    return bool(0.5 * step @ one.point.gram @ step > LITTLE * one.cost)
+
+
+def ranked(tried: Iterable[Tried]) -> list[Tried]:
+    """Return what was tried, the best first.
+
+    Parameters
+    ----------
+    tried : iterable of Tried
+        In any order.
+
+    Returns
+    -------
+    list of Tried
+        By cost.
+    """
+    return sorted(tried, key=_cost)
+
+
+def _cost(tried: Tried) -> float:
+    return tried.cost

@@ -1,0 +1,107 @@
+"""What is tried by itself, and in pairs, where little is left of a long log, or much."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.fits.explaining import explain
+from estimation.fits.explaining.promises import Promise
+from estimation.fits.explaining.thinned import FEW, Spared
+from estimation.fits.explaining.tried import Tried
+from estimation.fits.greybox.descent import Point
+from estimation.fits.hypotheses import DELIVERY, OFFSET, Hypothesis
+
+LONG: Any = SimpleNamespace(drives=np.zeros((FEW, 1)))
+
+
+def hypothesis(name: str, *, far: bool = False) -> Hypothesis:
+    return Hypothesis(name, ("anything",), far=far)
+
+
+def tried(cost: float, place: float = 0.0, together: Any = ()) -> Tried:
+    return Tried(together, Point(np.full(1, place), cost, np.zeros(1), np.eye(1)), {}, {}, {})
+
+
+LIKELY, FAR, SOME, NONE = hypothesis("likely"), hypothesis("far", far=True), hypothesis("some"), hypothesis("none")
+
+
+@pytest.mark.parametrize(("every", "asked"), [(1, "far some"), (2, "far some none")])
+def test_what_promises_too_little_is_not_tried_where_little_is_left(
+    every: int, asked: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[tuple[str, list[Any]]] = []
+
+    def nearing(_: Any, given: Any, starts: Any, *__: Any) -> Any:
+        told.append((" ".join(one.name for one in given), starts))
+        return [[tried(900.0)]]
+
+    ends = {"a": tried(800.0), "the same": tried(800.0, 0.1), "elsewhere": tried(9e3, 3.0)}
+    monkeypatch.setattr(explain, "screened", lambda _, __, starts, **___: [ends[one] for one in starts])
+    monkeypatch.setattr(explain, "nearing", nearing)
+    monkeypatch.setattr(explain, "settled_each", lambda *_, **__: [tried(800.0)])
+    monkeypatch.setattr(explain, "led_on", lambda *_, **__: [tried(800.0)])
+    monkeypatch.setattr(explain, "likeliest", lambda *_, **__: [])
+    monkeypatch.setattr(explain, "left_by", lambda *_: 1.5)
+    starts: Any = [*ends]
+    # 120 are needed of 1000 to come as low as what is known
+    gains = {"far": 0.0, "some": 121.0 / explain.TRUSTED, "none": 119.0 / explain.TRUSTED}
+    spared = Spared(every, 1.5, starts)
+    explain._alone(LONG, 1000.0, ([LIKELY], [FAR, SOME, NONE], gains), spared, lambda _: False)  # pyright: ignore[reportPrivateUsage]
+    assert told == [(asked, ["a"] if every == 1 else [*ends])]
+
+
+@pytest.mark.parametrize(("likely", "other", "order"), [(500.0, 50.0, [50.0, 500.0]), (50.0, 500.0, [50.0, 500.0])])
+def test_what_leaves_less_on_few_samples_is_led_on_first(
+    likely: float, other: float, order: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ends, led = [tried(likely), tried(other)], list[tuple[float, float]]()
+
+    def led_on(_: Any, ended: Any, known: float = np.inf, *__: Any, **___: Any) -> Any:
+        led.append((ended[0].cost, known))
+        return [tried(0.9 * ended[0].cost)]
+
+    monkeypatch.setattr(explain, "screened", lambda *_, **__: [tried(900.0)])
+    monkeypatch.setattr(explain, "nearing", lambda *_, **__: [])
+    monkeypatch.setattr(explain, "settled_each", lambda *_, **__: [ends.pop(0)])
+    monkeypatch.setattr(explain, "led_on", led_on)
+    monkeypatch.setattr(explain, "left_by", lambda _, cost: cost / 10.0)
+    found = explain._alone(LONG, 900.0, ([LIKELY], [FAR], {}), Spared(4, 90.0, [{}]), lambda _: False)  # pyright: ignore[reportPrivateUsage]
+    assert led == [(order[0], np.inf), (order[1], 0.9 * order[0])]
+    assert [one.cost for one in found] == [0.9 * cost for cost in order]
+
+
+def test_beside_what_leaves_little_no_pair_is_tried_that_cannot_explain_the_log(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[str] = []
+
+    def screened(_: Any, together: Any, *__: Any, **___: Any) -> Any:
+        asked.append(together[-1].name)
+        return [tried(990.0 if together[-1] is LIKELY else 9e3, together=together)]
+
+    # the first leaves 1.8 times the noise of 1000, a pair that explains it at most 1.5
+    gains = {"some": 301.0 / explain.TRUSTED, "none": 299.0 / explain.TRUSTED}
+    monkeypatch.setattr(explain, "delayed", lambda log, _: log)
+    monkeypatch.setattr(explain, "promising", lambda *_: ([LIKELY], [FAR, SOME, NONE], gains))
+    monkeypatch.setattr(explain, "own_starts", lambda *_: [{}])
+    monkeypatch.setattr(explain, "_begun_again", lambda *_: {})
+    monkeypatch.setattr(explain, "skipping", lambda *_: 1)
+    monkeypatch.setattr(explain, "left_by", lambda _, cost: cost / 1000.0)
+    monkeypatch.setattr(explain, "screened", screened)
+    monkeypatch.setattr(explain, "likeliest", lambda *given, **_: [*map(list, given[1])] and [])
+    first = tried(1800.0, together=(hypothesis("first"),))
+    explain._paired(LONG, first, {}, lambda _: False)  # pyright: ignore[reportPrivateUsage]
+    assert asked == ["likely", "far", "some"]
+
+
+@pytest.mark.parametrize(
+    ("one", "gain", "alone"), [(DELIVERY, 49.0, True), (DELIVERY, 51.0, False), (OFFSET, 51.0, True)]
+)
+def test_a_pump_that_delivers_less_beside_another_volume_may_be_a_wrong_area(
+    one: Any, gain: float, alone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(explain, "_explained", lambda *_: True)
+    monkeypatch.setattr(explain, "promised_beside", lambda *_: Promise(gain, 1.0, 1.0))
+    assert explain._by_itself(LONG, tried(9.0, together=(one,)), lambda _: True) is alone  # pyright: ignore[reportPrivateUsage]

@@ -1,0 +1,55 @@
+"""How sets of hypotheses are fitted to the end."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.fits.explaining import finished as finishing
+from estimation.fits.explaining.finished import ALIKE, CLOSE, FAR_BEHIND
+from estimation.fits.explaining.tried import Tried
+from estimation.fits.greybox.descent import Point
+from tests.estimation.fits.short_logs import made_fit
+
+
+@pytest.mark.parametrize(("by_mass", "order"), [(True, [1.0, 0.0]), (False, [0.0, 1.0])])
+def test_the_balance_in_which_a_set_was_sought_comes_first_and_the_other_must_come_as_low(
+    by_mass: bool, order: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    led: list[tuple[float, float]] = []
+
+    def to_its_end(share: Any, tried: Tried, *_: Any, useful: float = np.inf) -> Tried:
+        led.append((share, useful))
+        return replace(tried, point=replace(tried.point, cost=50.0 * len(led)))
+
+    problem = SimpleNamespace(model=SimpleNamespace(theta=lambda _: np.zeros(1)))
+    monkeypatch.setattr(finishing, "delayed", lambda log, _: log)
+    monkeypatch.setattr(finishing, "coarse", lambda *_: None)
+    monkeypatch.setattr(finishing, "balances_mass", lambda _: by_mass)
+    monkeypatch.setattr(finishing, "balanced_by", lambda _, share: share)
+    monkeypatch.setattr(finishing, "freed", lambda *_: problem)
+    monkeypatch.setattr(finishing, "usual_values", lambda _: {})
+    monkeypatch.setattr(finishing, "_to_its_end", to_its_end)
+    monkeypatch.setattr(finishing, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
+    monkeypatch.setattr(finishing, "concluded", lambda *_, **__: made_fit(50.0, 2e8, 1e5))
+    nothing: Any = None
+    begun = Tried((), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {}, {}, {})
+    assert finishing.finished(nothing, begun).cost == 50.0
+    assert led == [(order[0], np.inf), (order[1], 50.0 + ALIKE)]
+
+
+@pytest.mark.parametrize(("cost", "searches"), [(0.9, 2), (1.1, 1)])
+def test_what_stays_far_behind_is_given_up(cost: float, searches: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    useful = 100.0 * CLOSE
+    costs = [cost * FAR_BEHIND * useful] * 2
+
+    def descended(*_: Any, **__: Any) -> Any:
+        return SimpleNamespace(cost=costs.pop(), point=SimpleNamespace(theta=np.zeros(1)))
+
+    monkeypatch.setattr(finishing, "descended", descended)
+    nothing: Any = SimpleNamespace(drives=())
+    begun: Any = SimpleNamespace(cost=np.inf)
+    finishing._to_its_end(nothing, begun, np.zeros(1), useful=useful)  # pyright: ignore[reportPrivateUsage]
+    assert len(costs) == 2 - searches
