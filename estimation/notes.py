@@ -33,16 +33,16 @@ class SensorCode(Code):
         "places; the repeated rows were left out"
     )
     SENT_TWICE = (
-        "the logger wrote {rows} rows twice, in {count} places, with other times, among them those of {channel}; the "
-        "copies were left out"
+        "the logger wrote {rows} rows a second time, under later times ({count} times in the log); the copies were "
+        "left out"
     )
     HELD_ALONE = (
-        "{channel} repeats its last value for {seconds:.3g} s in {count} places, from {begin_s:.3g} s on, while other "
-        "channels go on; the repeated values were left out"
+        "{channel} repeats its last value for {seconds:.3g} s in all while other channels go on ({count} times, first "
+        "at {begin_s:.3g} s); the repeated values were left out"
     )
     ROWS_LOST = (
-        "{jumped} jump from one row to the next at {where} s, as no piston and no oil does: the logger lost rows "
-        "there, though its times go on; the log was used from {begin_s:.4g} to {end_s:.4g} s"
+        "{jumped} jump from one row to the next at {where} s, farther than piston and oil can go: the logger lost rows "
+        "there, although its times go on; only {begin_s:.4g} to {end_s:.4g} s of the log was used"
     )
     POSITION_REZEROED = (
         "{channel} steps by {step:.4g} m at {at_s:.4g} s while everything else goes on as before: its zero was set "
@@ -50,7 +50,7 @@ class SensorCode(Code):
     )
     PRESSURE_REZEROED = (
         "{channel} steps at {where} s (by {step:.3g} Pa), which no flow explains, while position goes on as before: "
-        "its zero was set anew; the log was used from {begin_s:.4g} to {end_s:.4g} s"
+        "its zero was set anew; only {begin_s:.4g} to {end_s:.4g} s of the log was used"
     )
     FILTERED = (
         "{channel} was filtered or averaged before it was logged: its noise is correlated over {rows} rows, so one "
@@ -259,7 +259,8 @@ class RigCode(Code):
     )
     VOLUME_DIFFERS = "the chamber volume is {percent:.0f} ± {half_width:.0f} % of that in the rig file"
     STARTS_UNDER_LOAD = (
-        "the log begins at a differential pressure of {pressure_pa:.3g} Pa, which is a load of {force_n:.3g} N"
+        "the log begins at a differential pressure of {pressure_pa:.3g} Pa: the piston already moves, or a load of "
+        "{force_n:.3g} N acts on it"
     )
     AIR_ENTRAINED = (
         "the oil contains {percent:.2g} ± {half_width:.2g} % of air at atmospheric pressure; bulk modulus is given at "

@@ -115,7 +115,7 @@ def _longest(record: Record, steps: list[_Step]) -> tuple[Record, tuple[Note, ..
         said = SensorCode.PRESSURE_REZEROED.note(channel=PRESSURE, step=steps[0].size, **clock)
     else:
         channel = SPEED if SPEED in record else POSITION
-        said = SensorCode.ROWS_LOST.note(channel=channel, jumped=" and ".join(jumped), **clock)
+        said = SensorCode.ROWS_LOST.note(channel=channel, jumped=", ".join(jumped), **clock)
     return record.slice(first, behind), (said,)
 
 

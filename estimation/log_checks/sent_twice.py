@@ -49,7 +49,7 @@ def without_rows_sent_twice(record: Record) -> tuple[Record, tuple[Note, ...]]:
     Returns
     -------
     tuple of (Record, tuple of Note)
-        The log, and a note for each channel if there are such rows.
+        The log, and a note if there are such rows.
 
     Examples
     --------
@@ -71,7 +71,7 @@ def without_rows_sent_twice(record: Record) -> tuple[Record, tuple[Note, ...]]:
     shown = [record[name] for name in asked if name != SPEED]
     time_passed = sum(_time_passed(values, *copies) for values in shown) > 0.0
     data = {"rows": int(np.count_nonzero(copied)), "count": len(copies[0])}
-    notes = tuple(SensorCode.SENT_TWICE.note(channel=name, **data) for name in asked)
+    notes = (SensorCode.SENT_TWICE.note(channel=SPEED if SPEED in record else asked[0], **data),)
     if time_passed:
         return record.replace(**{name: np.where(copied, np.nan, record[name]) for name in asked}), notes
     kept = {name: record[name][~copied] for name in record}
