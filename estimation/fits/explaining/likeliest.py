@@ -21,6 +21,10 @@ NEARLY_AS_GOOD = 1.1
 """What the cost of a finished set is multiplied by before others are compared with it: their model steps are long, and
 have errors [dimensionless]."""
 
+STRAYED = 1.05
+"""How many times its cost on few samples a set costs with all of them that it has strayed into another valley
+[dimensionless]; the two differ by 1 % in most."""
+
 MUCH = 0.2
 """What the best set of hypotheses leaves at most of what was left, to be searched anew with all samples [fraction]."""
 
@@ -133,8 +137,8 @@ def led_on(
 def _with_all(log: GreyBoxLog, ended: Iterable[Tried], known: float, spared: Spared) -> Iterator[Tried]:
     """Yield sets of hypotheses led on where all samples count, as far as they may still explain the log.
 
-    Few samples may have a valley by themselves. So the best set is sought anew with all, where it explains much, but
-    not all yet.
+    Few samples may have a valley by themselves, and a search with all may end in another. So the best set is sought
+    anew with all, where it explains much, but not all yet, or less than on few samples.
     """
     for place, one in enumerate(ranked(ended)):
         near = one.cost <= NEARLY_AS_GOOD * known + CLOSE
@@ -144,7 +148,8 @@ def _with_all(log: GreyBoxLog, ended: Iterable[Tried], known: float, spared: Spa
             theta = problem.model.theta({**usual_values(log), **one.values})
             begun = replace(one, point=replace(one.point, theta=theta))
             further = settled(log, begun, NEARLY_AS_GOOD * known + CLOSE)
-            if place == 0 and REACHED < left_by(log, further.cost) < max(MUCH * spared.left, UNFINISHED):
+            fits = left_by(log, further.cost) < REACHED and further.cost < STRAYED * one.cost
+            if place == 0 and not fits and left_by(log, further.cost) < max(MUCH * spared.left, UNFINISHED):
                 again = ranked(screened(log, one.together, spared.starts))[:CARRIED]
                 again = [start for start in again if apart(further, start)]
                 further = min(further, *(settled(log, start, further.cost) for start in again), key=_cost)

@@ -85,6 +85,21 @@ def test_the_best_of_few_samples_is_sought_anew_with_all(monkeypatch: pytest.Mon
     assert (kept.cost, led) == (90.0, [])
 
 
+@pytest.mark.parametrize(("ended", "anew"), [(1.12, False), (1.3, True)])
+def test_a_set_that_leaves_more_than_on_few_samples_is_sought_anew(
+    monkeypatch: pytest.MonkeyPatch, ended: float, anew: bool
+) -> None:
+    tried = Tried((), Point(np.zeros(1), 1.1, np.zeros(1), np.eye(1)), flow_starts(PAPER, 2e8)[0], {}, {})
+    problem = freed(coarse(seen(), {}, ()), ())
+    asked: list[Any] = []
+    monkeypatch.setattr(ranking, "settled", lambda _, one, *__: replace(one, point=replace(one.point, cost=ended)))
+    monkeypatch.setattr(ranking, "screened", lambda *_: asked.append(1) or [])
+    monkeypatch.setattr(ranking, "freed", lambda *_: problem)
+    monkeypatch.setattr(ranking, "left_by", lambda _, cost: cost)
+    [*ranking._with_all(seen(), [tried], np.inf, Spared(4, 1000.0, ()))]  # pyright: ignore[reportPrivateUsage]
+    assert bool(asked) is anew
+
+
 def test_what_leaves_far_too_much_is_not_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     finished: list[float] = []
     monkeypatch.setattr(ranking, "settled", lambda _, one, *__: one)
