@@ -152,7 +152,7 @@ def _with_all(log: GreyBoxLog, ended: Iterable[Tried], known: float, spared: Spa
             if place == 0 and not fits and left_by(log, further.cost) < max(MUCH * spared.left, UNFINISHED):
                 again = ranked(screened(log, one.together, spared.starts))[:CARRIED]
                 again = [start for start in again if apart(further, start)]
-                further = min(further, *(settled(log, start, further.cost) for start in again), key=_cost)
+                further = min([further, *(settled(log, start, further.cost) for start in again)], key=_cost)
             known = min(known, further.cost)
             yield further
         else:

@@ -96,8 +96,8 @@ def test_a_set_that_leaves_more_than_on_few_samples_is_sought_anew(
     monkeypatch.setattr(ranking, "screened", lambda *_: asked.append(1) or [])
     monkeypatch.setattr(ranking, "freed", lambda *_: problem)
     monkeypatch.setattr(ranking, "left_by", lambda _, cost: cost)
-    [*ranking._with_all(seen(), [tried], np.inf, Spared(4, 1000.0, ()))]  # pyright: ignore[reportPrivateUsage]
-    assert bool(asked) is anew
+    (found,) = ranking._with_all(seen(), [tried], np.inf, Spared(4, 1000.0, ()))  # pyright: ignore[reportPrivateUsage]
+    assert (found.cost, bool(asked)) == (ended, anew)  # no start leads elsewhere
 
 
 def test_what_leaves_far_too_much_is_not_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
