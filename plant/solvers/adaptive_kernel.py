@@ -20,7 +20,8 @@ from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import kernel_text, pasted
 from plant.compiled.simplify import fused, share_ratios, simplified
 from plant.compiled.source import lines_source, operations_source
-from plant.solvers.adaptive_loop import INNER, ROUNDEST, TINY, run_controlled, smooth
+from plant.solvers.adaptive_loop import INNER, TINY, run_controlled
+from plant.solvers.drive_pieces import ROUNDEST, smooth
 from plant.solvers.steps import Derivative, Parameters, State, parameter_names, parameter_symbols, solve_linear
 
 Kernel: TypeAlias = Callable[[Array, Array, Array, float, Array, float, float, float, float, Array], None]

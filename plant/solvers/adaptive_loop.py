@@ -6,13 +6,11 @@ from typing import Protocol
 import numpy as np
 
 from plant.arrays import Array
+from plant.solvers.drive_pieces import same, slope_at, smooth
 from plant.solvers.fixed_step_loops import Operation, SideBySide, lay, share
 
 TINY = 1e-6
 """Share of a sample time within which a step ends at a sample."""
-
-ROUNDEST = 100.0
-"""A drive that bends by more than this many times what a step may smooth has a corner there."""
 
 
 class ControlledKernel(SideBySide, Protocol):
@@ -65,7 +63,7 @@ def run_controlled(
     bend : float
         By how much a step may smooth the drive [the drive's unit].
     bulge : float
-        See `smooth` [dimensionless].
+        See `plant.solvers.drive_pieces.smooth` [dimensionless].
     longest, shortest : float
         Steps [count of samples].
     states : ndarray, shape (n, states, up to lanes)
@@ -84,6 +82,13 @@ def run_controlled(
     size, taken, row, sample = longest, 1.0, -1, 1
     while True:
         if place >= reach and end < n - 1:
+            if sample < end and parameters.shape[0] > 1 and not same(parameters[end], parameters[row]):
+                # samples before a change lie on the curve of the parameters before it
+                driven = along(lift, ramp, curvature, reach, reach, taken)
+                share(kernel, work, shared, (*driven, taken * sample_time, taken * sample_time))
+                for first in vectors:
+                    kernel.stages_at(slots + first, 0.0)
+                sample = fill(kernel, work, states, sample, end, start, taken)
             begin, place = end, 0.0
             end, lift, ramp, curvature = smooth(drive, parameters, begin, bend, bulge)
             reach = float(end - begin)
@@ -99,11 +104,7 @@ def run_controlled(
         for first in vectors:
             kernel.stages_at(slots + first, 0.0)
         here = begin + place
-        while sample < here - TINY:
-            for first in vectors:
-                kernel.between_at(slots + first, (sample - start) / taken)
-            keep(kernel, work, 5 * block, states, sample)
-            sample += 1
+        sample = fill(kernel, work, states, sample, here, start, taken)
         if left <= 0.0:
             break
         error = largest(kernel, work, 7 * block, lost)
@@ -121,77 +122,6 @@ def run_controlled(
             if sample == near:
                 sample += 1
         size = max(size * growth(error), shortest)
-
-
-def smooth(drive: Array, parameters: Array, begin: int, bend: float, bulge: float) -> tuple[int, float, float, float]:
-    """Return how far the drive follows one parabola from a sample on, and that parabola.
-
-    Parameters
-    ----------
-    drive : ndarray, shape (n,)
-        Drive at the samples [its SI unit].
-    parameters : ndarray, shape (1 or n, lanes, parameters)
-        Parameter rows; where they change, a piece ends.
-    bend : float
-        By how much it may leave the parabola [the drive's unit].
-    bulge : float
-        By how much straight lines between samples exceed the drive's mean over a sample time, over its second
-        difference [dimensionless]: 0 where it is those lines. Else a piece has a curve's mean, and ends off corners.
-
-    Returns
-    -------
-    tuple of (int, float, float, float)
-        Last sample of the piece; where the parabola begins, its mean rise a sample, its curvature [the drive's unit].
-    """
-    n = drive.shape[0]
-    end = begin + 1
-    low, high = np.inf, -np.inf
-    if bulge > 0.0 and begin > 0:
-        low = high = drive[end] - 2.0 * drive[begin] + drive[begin - 1]
-    total = 0.5 * (drive[begin] + drive[end])
-    while end < n - 1 and (parameters.shape[0] == 1 or same(parameters[end], parameters[begin])):
-        curvature = drive[end + 1] - 2.0 * drive[end] + drive[end - 1]
-        lower, upper = min(low, curvature), max(high, curvature)
-        length = end + 1 - begin
-        if (upper - lower) * length * length > 16.0 * bend or max(-lower, upper) > ROUNDEST * bend:
-            if bulge > 0.0 and length > 2:
-                end -= 1
-                total -= 0.5 * (drive[end] + drive[end + 1])
-            break
-        low, high = lower, upper
-        total += 0.5 * (drive[end] + drive[end + 1])
-        end += 1
-    length = end - begin
-    ramp = (drive[end] - drive[begin]) / length
-    curvature = 0.5 * (low + high) if length > 1 else 0.0
-    if bulge == 0.0:
-        return end, drive[begin] + curvature / 12.0, ramp, curvature
-    turned = _slope_at(drive, end) - _slope_at(drive, begin)
-    if length == 1:
-        curvature = turned
-    mean = (total - bulge * turned) / length
-    return end, mean - 0.5 * ramp * length + curvature * length * length / 12.0, ramp, curvature
-
-
-def _slope_at(drive: Array, sample: int) -> float:
-    """Return the slope of a drive at one of its samples, from those beside it [the drive's unit a sample]."""
-    before, after = max(sample - 1, 0), min(sample + 1, drive.shape[0] - 1)
-    return (drive[after] - drive[before]) / (after - before)
-
-
-def same(one: Array, other: Array) -> bool:
-    """Return whether two matrices are equal.
-
-    Parameters
-    ----------
-    one, other : ndarray, shape (n, m)
-        The matrices [any unit].
-    """
-    for i in range(one.shape[0]):
-        for j in range(one.shape[1]):
-            if one[i, j] != other[i, j]:
-                return False
-    return True
 
 
 def within(size: float, left: float, longest: float, shortest: float) -> float:
@@ -322,6 +252,32 @@ def accept(work: Array, block: int) -> None:
         work[i] = work[block + i]
 
 
+def fill(
+    kernel: ControlledKernel, work: Array, states: Array, sample: int, here: float, start: float, taken: float
+) -> int:
+    """Copy the states at the samples within the last step, and return the first sample that is left.
+
+    Parameters
+    ----------
+    kernel : ControlledKernel
+        How states between are found.
+    work : ndarray, shape (numbers,)
+        All numbers.
+    states : ndarray, shape (n, states, up to lanes)
+        Room for them.
+    sample : int
+        First sample of which no state is kept.
+    here, start, taken : float
+        Where the last step ended and began, and its length [count of samples].
+    """
+    while sample < here - TINY:
+        for first in range(0, 8 * kernel.LANES, 8 * kernel.VECTOR):
+            kernel.between_at(work.ctypes.data + first, (sample - start) / taken)
+        keep(kernel, work, 5 * kernel.WIDTH * kernel.LANES, states, sample)
+        sample += 1
+    return sample
+
+
 def keep(kernel: ControlledKernel, work: Array, place: int, states: Array, sample: int) -> None:
     """Copy states to a sample's row.
 
@@ -345,5 +301,5 @@ def keep(kernel: ControlledKernel, work: Array, place: int, states: Array, sampl
                 states[sample, i, lane] = work[place + kernel.LANES * i + lane]
 
 
-INNER = (lay, share, same, _slope_at, within, along, growth, unknown, largest, accept, keep)
+INNER = (lay, share, same, slope_at, within, along, growth, unknown, largest, accept, keep, fill)
 """Parts of the loop and of `smooth`, compiled as if they stood there."""

@@ -15,6 +15,7 @@ from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.class_fit import LASTING, WITHIN
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes, region_scores
+from faults.diagnosis.circuits.model_doubt import distrust
 from faults.diagnosis.circuits.rivals import behind
 
 CHANGES = 0.05
@@ -89,7 +90,9 @@ def odds_of_change(
     Without one, one circuit is there from end to end, or it goes elsewhere within its condition: after a change the
     circuit is in any of the nine conditions alike. Likelihoods count in `LASTING` blocks, as the gain does, and there
     are as many times at which a log may change. Velocity and pressure are tied by the flow, so that a wrong model errs
-    in both at once: they count as one look. Which condition a circuit is in is told as a class is.
+    in both at once: they count as one look. With pressure all three circuits are believed as the least believed one:
+    else a part that is followed to its noise is priced by up to 101 times the information, while its gain counts no
+    more. Which condition a circuit is in is told as a class is.
 
     Parameters
     ----------
@@ -111,15 +114,25 @@ def odds_of_change(
     """
     times = max(len(blocks.velocity) / LASTING, 1.0)
     outputs = len(whole.best.scales)
-    shares = sum(_share(one, outputs, actuator) for one in parts) - _share(whole, outputs, actuator)
-    to_one = gain / outputs + shares - math.log(len(CONDITIONS) * times) + math.log(CHANGES / (1.0 - CHANGES))
+    pressure = blocks.pressure is not None
+    doubts = [distrust(one.best, blocks) if pressure else 1.0 for one in (*parts, whole)]
+    shares = [
+        _share(one, outputs * max(doubts) / doubt, actuator) for one, doubt in zip((*parts, whole), doubts, strict=True)
+    ]
+    to_one = (
+        gain / outputs
+        + sum(shares[:-1])
+        - shares[-1]
+        - math.log(len(CONDITIONS) * times)
+        + math.log(CHANGES / (1.0 - CHANGES))
+    )
     before, after = (one.scores for one in parts)
     to_drift = float(np.max(before) + np.max(after) - np.max(before + after))
     return -float(np.logaddexp(-to_one, -to_drift))
 
 
-def _share(fits: ClassFits, outputs: int, actuator: Actuator) -> float:
+def _share(fits: ClassFits, less: float, actuator: Actuator) -> float:
     """Return the logarithm of the share of its condition's region that a log leaves to a circuit, by its density."""
-    told = fits.information / (LASTING * outputs)
+    told = fits.information / (LASTING * less)
     volume = 0.5 * float(np.linalg.slogdet(np.eye(len(WITHIN)) + WITHIN @ told)[1])
     return float(np.max(region_scores(fits.best, told, actuator))) - volume

@@ -28,7 +28,7 @@ from faults.diagnosis.circuits.class_fit import (
     nominal_runs,
     scales_of,
 )
-from faults.diagnosis.circuits.model_doubt import doubt_of, lasting_power, seldom_known_slopes, spreads_of
+from faults.diagnosis.circuits.model_doubt import distrust, doubt_of, lasting_power, seldom_known_slopes, spreads_of
 from faults.diagnosis.circuits.rivals import behind, between_fits, creeps, explains, other_friction
 from plant.arrays import Array
 
@@ -37,10 +37,6 @@ ROUGHLY_GAINED = 10.0
 
 YIELDING = 5.0
 """Travel in presliding displacements below which a piston counts as stuck [dimensionless]."""
-
-STRUCTURAL = 100.0
-"""By how much a residual that no sensor makes widens what is believed [dimensionless], in variance: it lasts, and it is
-not what the derivatives say that it is."""
 
 ALIKE, ALIKE_COUNT = 0.25, 1.0
 """Squared deviation of actuators of one kind, in units of `WITHIN`, before a log is seen, and how many deviations that
@@ -263,8 +259,7 @@ def believed_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) 
     ndarray, shape (7, 7)
         Inverse covariance of the coordinates, without a prior.
     """
-    unexplained = float(np.max(1.0 - (blocks.noise / fit.scales) ** 2))
-    believed = fit.information / (1.0 + STRUCTURAL * max(unexplained, 0.0))
+    believed = fit.information / distrust(fit, blocks)
     if stuck:
         believed = believed * np.outer(_NO_FRICTION, _NO_FRICTION)
     if blocks.pressure is not None:

@@ -50,12 +50,35 @@ NOISE_ALONE = 1.1
 """Residuals over the sensors' noise, root mean square, up to which nothing else is left [dimensionless]: the noise is
 known to a twentieth, and a log of 1000 blocks tells the size of what is left no better."""
 
+STRUCTURAL = 100.0
+"""By how much a residual that no sensor makes widens what is believed [dimensionless], in variance: it lasts, and it is
+not what the derivatives say that it is."""
+
 LOOKS = 10.0
 """Independent looks that a log gives at a wrong model's error, however long it is [dimensionless]."""
 
 AVERAGED = 10
 """Blocks over which residuals are averaged to see what lasts of them, and to either side of one over which a wrong
 model's error is as large as there [dimensionless]: a tenth of a second."""
+
+
+def distrust(fit: PointFit, blocks: Blocks) -> float:
+    """Return by what a fit's information is divided for what no sensor makes of its residuals.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    blocks : Blocks
+        Its log.
+
+    Returns
+    -------
+    float
+        Factor [dimensionless], 1 where noise alone is left.
+    """
+    unexplained = float(np.max(1.0 - (blocks.noise / fit.scales) ** 2))
+    return 1.0 + STRUCTURAL * max(unexplained, 0.0)
 
 
 def spreads_of(actuator: Actuator) -> Array:

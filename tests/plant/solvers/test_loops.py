@@ -13,7 +13,8 @@ from plant.compiled.functions import Scalar, absolute
 from plant.solvers import adaptive_kernel, fixed_step_kernel, trajectory
 from plant.solvers.adaptive import MEANS, SAMPLES, STRAIGHT
 from plant.solvers.adaptive_kernel import compile_adaptive
-from plant.solvers.adaptive_loop import growth, run_controlled, smooth, within
+from plant.solvers.adaptive_loop import growth, run_controlled, within
+from plant.solvers.drive_pieces import smooth
 from plant.solvers.fixed_step_kernel import compile_fixed_step
 from plant.solvers.fixed_step_loops import run_alone, run_side_by_side
 from plant.solvers.steps import rk4_step
@@ -109,6 +110,18 @@ def test_steps_of_controlled_error(
     run_controlled(plain, *given, found)
     run(*given, wanted)
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-12)
+
+
+def test_samples_before_a_change_of_parameters_know_nothing_of_it() -> None:
+    run = compile_adaptive("damper", rates, 2, Damper, 8)
+    drive = np.zeros(60)
+    control = T, np.array([3e2, 3e1]), 1e-3, STRAIGHT, 20.0, 1e-3
+    changing = np.repeat(ROWS[None], 60, 0)
+    changing[37:, :, 1] = 500.0
+    found, alone = np.empty((60, 2, 8)), np.empty((38, 2, 8))
+    run(STARTS, drive, changing, *control, found)
+    run(STARTS, drive[:38], ROWS[None], *control, alone)
+    np.testing.assert_allclose(found[:38], alone, rtol=1e-12, atol=1e-15)
 
 
 @pytest.mark.parametrize("lost", [(0,), (3,), (7,), (2, 5), tuple(range(8))])

@@ -15,6 +15,7 @@ from faults.diagnosis.changes.onset import find_onset, part_of, parted
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.class_fit import LASTING, WITHIN
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
+from faults.diagnosis.circuits.model_doubt import distrust
 from tests.faults.diagnosis.short_logs import ACTUATOR, blocks
 
 
@@ -79,7 +80,7 @@ def test_a_change_is_believed_from_ten_to_one_on(monkeypatch: pytest.MonkeyPatch
 def test_one_circuit_for_all_is_asked_again_where_its_search_ended_short_of_the_best(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    log = blocks(after="major_leakage", seconds=5.0)
+    log = blocks(after="major_leakage")
     two = parted(log, fit_classes(log, ACTUATOR), ACTUATOR)
     assert two is not None
     assert find_onset(log, two, ACTUATOR) is not None
@@ -94,3 +95,22 @@ def test_one_circuit_for_all_is_asked_again_where_its_search_ended_short_of_the_
     apart = [replace(ends[0], scores=np.array([0.0, *np.full(8, -300.0)])), ends[1]]
     assert odds_of_change(gain_of(lost, halves, apart), apart, lost, steady, ACTUATOR) > math.log(LIKELIER)
     assert not believed(steady, halves, apart, lost, ACTUATOR)
+
+
+def test_a_part_that_is_followed_to_its_noise_is_priced_as_the_others_are() -> None:
+    """Where more than noise is left of the other part, or of both in one, information that is believed counts alike."""
+    rough, parts = 3.0 * blocks().noise, fits((0, 300.0), (3, 300.0))
+    (whole,) = fits((0, 99.0))
+    left = [replace(one, best=replace(one.best, scales=rough)) for one in (*parts, whole)]
+    poor = replace(left[0], information=left[0].information / distrust(left[0].best, blocks()))
+    clean = replace(parts[0], best=replace(parts[0].best, scales=blocks().noise))
+    one, same = (odds_of_change(60.0, [first, left[1]], left[2], blocks(), ACTUATOR) for first in (clean, poor))
+    assert one == pytest.approx(same, abs=1e-9)
+
+
+@pytest.mark.parametrize("seconds", [3.0, 3.5, 4.0, 5.0])
+def test_a_change_after_a_part_that_is_followed_to_its_noise_is_believed(seconds: float) -> None:
+    log = blocks(after="major_leakage", seconds=seconds)
+    two = parted(log, fit_classes(log, ACTUATOR), ACTUATOR)
+    assert two is not None
+    assert odds_of_change(two.gain, two.fits, two.whole, log, ACTUATOR) > math.log(LIKELIER)
