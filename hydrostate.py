@@ -12,7 +12,7 @@ prints itself, and turns into pandas, matplotlib, python-control or plain dictio
 from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib.util import find_spec
-from numbers import Real
+from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,8 +88,8 @@ def _refuse_shadows() -> None:
 
 _refuse_shadows()
 
-from experiments.python_user.answers import Answer, Model, no_such  # noqa: E402 - after the check
-from experiments.python_user.log import Log, known_options, refuse  # noqa: E402 - likewise
+from experiments.python_user.answers import Answer, Model, no_such, refuse  # noqa: E402 - after the check
+from experiments.python_user.log import Log, known_options  # noqa: E402 - likewise
 from experiments.python_user.python_words import options_by_name  # noqa: E402 - likewise
 from plant.lazy import lazily  # noqa: E402 - likewise
 
@@ -291,8 +291,9 @@ def simulate(
     if condition is not None:
         options["condition" if "condition" in simulation.options else "fault"] = condition
     asked = {**simulation.options, **known_options(options, simulation.options, "simulate")}
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
+    if isinstance(seed, bool) or not isinstance(seed, Integral) or seed < 0:  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         refuse(f"seed must be a whole number from 0 up, got {seed!r}")
+    seed = int(seed)  # that of NumPy too
     with options_by_name():
         record = simulation.run(bench, {**asked, "seed": seed, "plant": plant}).record
     return Log(record, bench, kind.name)

@@ -33,7 +33,7 @@ class SensorCode(Code):
         "places; the repeated rows were left out"
     )
     SENT_TWICE = (
-        "the logger wrote {rows} rows a second time, under later times ({count} times in the log); the copies were "
+        "the logger wrote {rows} rows a second time, under later times (places in the log: {count}); the copies were "
         "left out"
     )
     HELD_ALONE = (

@@ -212,6 +212,8 @@ def _logs(logs: Logs, place: int, folder: Path) -> Iterator[Log]:
     if not found:
         said = "no file matches" if has_magic(pattern) else "there is no such file as"
         raise StudyError(f"logs[{place}].glob must match at least one file, got {logs.glob!r}: {said} {pattern}")
+    if strange := [name for name in found if any("\ud800" <= one <= "\udfff" for one in name)]:
+        raise StudyError(f"names of logs must be UTF-8, rename {strange[0]!r} and others like it")
     for name in found:
         path = Path(name)
         relative = path.relative_to(folder) if path.is_relative_to(folder) else path

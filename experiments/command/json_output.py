@@ -162,7 +162,7 @@ def write_whole(path: Path, text: str, option: str = "", *, parents: bool = Fals
         if parents:
             path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as file:
-            file.write(text.encode())
+            file.write(text.encode(errors="replace"))
 
 
 def _folder(out: Path) -> Path:

@@ -48,7 +48,7 @@ def simulate_model(logs: Sequence[Path], path: Path, fit: "ColumnFit", *, as_jso
                     f"the model goes from {len(model.inputs)} inputs to {len(models)} outputs, got columns for "
                     f"{len(inputs)} and {len(outputs)}"
                 )
-            record = record_of(log, (*inputs, outputs[index]), fit.sample_time)
+            record = record_of(log, (*inputs, outputs[index]), fit.sample_time, assumed=model.sample_time)
             data = channels_of([record], inputs, outputs[index], model.sample_time)
             warn_of_range(model, data)
             quality = quality_of(model, channels_of([record], inputs, outputs[index], model.sample_time, split=True))
@@ -85,13 +85,15 @@ def write_simulated(model: "FreeRunModel", data: "Channels", path: Path) -> None
     write_whole(path, pd.DataFrame(columns).to_csv(index=False), "--simulated")
 
 
-def record_of(log: Path, wanted: Sequence[str], sample_time: float | None) -> "Record":
+def record_of(log: Path, wanted: Sequence[str], sample_time: float | None, *, assumed: float = 1.0) -> "Record":
     """Read columns of a log of anything, of which as many samples may be missing as a model can do without.
 
     Parameters
     ----------
     sample_time : float or None
         Between rows of a log without a column of time [s].
+    assumed : float
+        Likewise, where nothing is told [s].
 
     Raises
     ------
@@ -101,7 +103,7 @@ def record_of(log: Path, wanted: Sequence[str], sample_time: float | None) -> "R
     from plant.log.any_columns import read_any
     from plant.log.clock.uniform import MOST_MISSING_TO_RELATE
 
-    return read_any(log, wanted, sample_time=sample_time, most_missing=MOST_MISSING_TO_RELATE)
+    return read_any(log, wanted, sample_time=sample_time, most_missing=MOST_MISSING_TO_RELATE, assumed=assumed)
 
 
 def quality_of(model: "FreeRunModel", data: "Channels") -> dict[str, Any]:
@@ -111,9 +113,9 @@ def quality_of(model: "FreeRunModel", data: "Channels") -> dict[str, Any]:
 
 def warn_of_range(model: "FreeRunModel", data: "Channels") -> None:
     """Warn of inputs that lie beyond those that a polynomial model was fitted to, or do not determine it."""
-    from estimation.identification.free_run.input_range import inputs_beyond, linear_instead
+    from estimation.identification.free_run.input_range import doubts_about_inputs
 
-    for note in linear_instead(model, data) or inputs_beyond(model, data):
+    for note in doubts_about_inputs(model, data):
         warnings.warn(LogWarning(note), stacklevel=2)
 
 

@@ -1,9 +1,9 @@
 """What a log says, in the hands of a Python user: it prints and draws itself, and turns into tables."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -36,6 +36,38 @@ def no_such(owner: str, name: str, known: Sequence[str]) -> str:
     near = get_close_matches(name, known, n=1)
     hint = f"did you mean {near[0]!r}?" if near else f"it has {', '.join(sorted(known))}"
     return f"{owner} has no {name!r}; {hint}"
+
+
+def refuse(message: str) -> NoReturn:
+    """Raise our error.
+
+    Raises
+    ------
+    HydrostateError
+        Always.
+    """
+    from plant.errors import HydrostateError
+
+    raise HydrostateError(message)
+
+
+def names_of(option: str, given: Any) -> list[str]:
+    """Return names of channels that were given as one name or several.
+
+    Raises
+    ------
+    HydrostateError
+        If they are no names.
+
+    Examples
+    --------
+    >>> names_of("input", "valve"), names_of("input", ["valve", "load"])
+    (['valve'], ['valve', 'load'])
+    """
+    names: list[Any] = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
+    if not all(isinstance(one, str) for one in names):
+        refuse(f"{option} must be the name of a channel or a list of names, got {given!r:.80}")
+    return names
 
 
 class Shown:
@@ -220,6 +252,9 @@ class Model(Shown):
         if name.startswith("_") or name == "model" or not hasattr(self.model, name):
             return super().__getattr__(name)
         return getattr(self.model, name)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *(one for one in dir(self.model) if not one.startswith("_"))})
 
     @cached_property
     def _title(self) -> str:

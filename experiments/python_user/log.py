@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
-from experiments.python_user.answers import Answer, Model, Shown, no_such
+from experiments.python_user.answers import Answer, Model, Shown, names_of, no_such, refuse
 from experiments.python_user.python_words import options_by_name
 from experiments.python_user.words_of_answer import Words
 
@@ -32,19 +32,6 @@ FREE_OPTIONS = ("input", "output", "structure", "order", "delay", "n_numerator",
 
 WHOLE = ("order", "delay", "n_numerator")
 """Those of them that are whole numbers, if given."""
-
-
-def refuse(message: str) -> NoReturn:
-    """Raise our error.
-
-    Raises
-    ------
-    HydrostateError
-        Always.
-    """
-    from plant.errors import HydrostateError
-
-    raise HydrostateError(message)
 
 
 def known_options(options: Mapping[str, Any], known: Mapping[str, Any], verb: str) -> Mapping[str, Any]:
@@ -254,11 +241,13 @@ class Log(Shown):
         if not {"input", "output"} <= options.keys():
             refuse(f"input and output are needed, channels among {', '.join(self.channels)}")
         inputs, outputs = options.pop("input"), options.pop("output")
+        asked = {"input": inputs, "output": outputs, "reference": options.get("reference") or ()}
+        names = [name for option, given in asked.items() for name in names_of(option, given)]
         for one in logs:
-            one._tell_sparse((inputs, outputs, options.get("reference") or ()))
+            one._tell_sparse(names)
         return identified([one.related for one in logs], inputs, outputs, options)
 
-    def _tell_sparse(self, asked: "Sequence[Any]") -> None:
+    def _tell_sparse(self, asked: "Sequence[str]") -> None:
         """Warn of channels that lack too many samples for the record; the samples that are there are used now."""
         import warnings
 
@@ -267,7 +256,7 @@ class Log(Shown):
         from plant.errors import LogWarning
         from plant.log.notes import LogCode
 
-        for name in (one for given in asked for one in ([given] if isinstance(given, str) else given)):
+        for name in asked:
             if name not in self.record and name in self.related:
                 count, total = int(np.isnan(self.related[name]).sum()), len(self)
                 said = LogCode.SAMPLES_MASKED.note(

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.python_user.answers import Shown
+from experiments.python_user.answers import Shown, names_of, refuse
 
 if TYPE_CHECKING:
     import numpy as np
@@ -47,6 +47,12 @@ class Relation(Shown):
                 return getattr(self.models[0], name)
         return super().__getattr__(name)
 
+    def __dir__(self) -> list[str]:
+        own = {*super().__dir__()}
+        if len(self.models) == 1:
+            own |= {*dict(*self._entries[:1]), *(one for one in dir(self.models[0]) if not one.startswith("_"))}
+        return sorted(own)
+
     def __str__(self) -> str:
         return f"From {', '.join(self.models[0].inputs)}\n{self.to_frame().to_string(float_format=_FIVE)}"
 
@@ -58,21 +64,41 @@ class Relation(Shown):
 
         Parameters
         ----------
-        log : Log, or array_like of shape (n, m) or (n,)
-            A log with the model's channels, or inputs alone.
+        log : Log, Record, table, or array_like of shape (n, m) or (n,)
+            A log with the model's channels, or a table as `hydrostate.read` takes it; columns are taken by their
+            names. Or inputs alone, in the model's order and on its sample time.
 
         Returns
         -------
         ndarray, shape (n,), or (n, outputs)
             Simulated output, on the model's sample time.
+
+        Raises
+        ------
+        HydrostateError
+            If an input is missing or is not finite.
+
+        Warns
+        -----
+        LogWarning
+            If a linear model is run in place of a polynomial one, or an input lies beyond the range of the fit.
         """
         import numpy as np
 
-        if not hasattr(log, "related"):
-            runs = [one.simulate(log) for one in self.models]
-        else:
-            parts = [_channels(one, log.related) for one in self.models]
-            runs = [one.simulate(part.u[0], part.y[0]) for one, part in zip(self.models, parts, strict=True)]
+        from estimation.identification.free_run.data import Channels
+        from estimation.identification.free_run.from_records import channels_to_run
+
+        runs: list[np.ndarray[Any, Any]] = []
+        for one in self.models:
+            record = _record_of(log, one.sample_time)
+            if record is None:
+                runs.append(one.simulate(log))
+                u = np.asarray(log, dtype=np.float64).reshape(len(runs[-1]), -1)
+                part = Channels(one.inputs, one.output, one.sample_time, (u,), (np.full(len(u), np.nan),))
+            else:
+                part = channels_to_run(record, one.inputs, one.output, one.sample_time)
+                runs.append(one.simulate(part.u[0], part.y[0]))
+            _warn_of_inputs(one, part)
         return runs[0] if len(runs) == 1 else np.column_stack(runs)
 
     def validate(self, log: Any) -> "pd.DataFrame":
@@ -80,18 +106,33 @@ class Relation(Shown):
 
         Parameters
         ----------
-        log : Log
+        log : Log, Record or table
             With the model's channels.
 
         Returns
         -------
         pandas.DataFrame
             By output: ``fit_percent`` and ``rmse`` of the free run, ``one_step_percent`` and ``one_step_rmse``.
+
+        Raises
+        ------
+        HydrostateError
+            If a channel is missing.
+
+        Warns
+        -----
+        LogWarning
+            As `simulate` does.
         """
         import pandas as pd
 
-        parts = [_channels(one, log.related, split=True) for one in self.models]
-        rows = {one.output: vars(one.quality(part.u, part.y)) for one, part in zip(self.models, parts, strict=True)}
+        rows: dict[str, Any] = {}
+        for one in self.models:
+            if (record := _record_of(log, one.sample_time)) is None:
+                refuse(f"a Log, a Record or a table with the channels is needed, got {type(log).__name__}")
+            part = _channels(one, record, split=True)
+            _warn_of_inputs(one, part)
+            rows[one.output] = vars(one.quality(part.u, part.y))
         return pd.DataFrame.from_dict(rows, orient="index")
 
     def to_control(self) -> "TransferFunction | StateSpace":
@@ -167,6 +208,31 @@ def _shared_states(models: "Sequence[FreeRunModel]", outputs: "Sequence[StateSpa
     return control.StateSpace(*one.with_delays_as_states(), one.sample_time, **names)
 
 
+def _record_of(log: Any, sample_time: float) -> "Record | None":
+    """Return the record of a log or of a table, rows without a time `sample_time` apart; None of plain arrays."""
+    from experiments.python_user.log import Log
+    from plant.log.any_columns import read_any
+    from plant.log.frames import by_name, frame_table, is_frame
+    from plant.log.record import Record
+
+    if isinstance(log, str | Path):
+        refuse(f"a log is needed, got the text {str(log)!r}; hydrostate.read opens a file")
+    if isinstance(log, Log | Record):
+        return log.related if isinstance(log, Log) else log
+    table = log if is_frame(log) else by_name(log)
+    return None if table is None else read_any(frame_table(table), assumed=sample_time)
+
+
+def _warn_of_inputs(model: "FreeRunModel", data: "Channels") -> None:
+    import warnings
+
+    from estimation.identification.free_run.input_range import doubts_about_inputs
+    from plant.errors import LogWarning
+
+    for note in doubts_about_inputs(model, data):
+        warnings.warn(LogWarning(note), stacklevel=3)
+
+
 def _channels(model: "FreeRunModel", record: "Record", *, split: bool = False) -> "Channels":
     from estimation.identification.free_run.from_records import channels_of
 
@@ -189,9 +255,8 @@ def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: 
     from experiments.identification.entries import column_entries
 
     asked = dict(options)
-    columns = [
-        [given] if isinstance(given, str) else list(given) for given in (inputs, outputs, asked.pop("reference", ()))
-    ]
+    given = {"input": inputs, "output": outputs, "reference": asked.pop("reference", None) or ()}
+    columns = [names_of(name, one) for name, one in given.items()]
     sources, targets, references = columns
     sample_time = asked.pop("sample_time", None)
     found, data = identify_columns(

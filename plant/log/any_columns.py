@@ -41,6 +41,7 @@ def read_any(
     *,
     sample_time: float | None = None,
     most_missing: float = MOST_MISSING,
+    assumed: float = 1.0,
 ) -> Record:
     """Read columns of a log as they stand, without knowing what they are.
 
@@ -52,9 +53,11 @@ def read_any(
         Columns wanted; a name that is a known channel may stand in another unit, ``motor_speed_rpm`` for
         ``motor_speed_rad_s``. Every column that holds numbers unless told.
     sample_time : float, optional
-        Time between samples [s]; a column of time is then not read. Without either, samples are 1 s apart.
+        Time between samples [s]; a column of time is then not read.
     most_missing : float
         Share of the samples that may be missing [dimensionless].
+    assumed : float
+        Time between samples of a log that has neither [s].
 
     Returns
     -------
@@ -75,17 +78,15 @@ def read_any(
     table = _table(opened, names)
     headings = cleaned(table.headings)
     time = None if sample_time is not None else _time_column(headings)
-    columns = _every(table, headings) if names is None else _wanted(table, headings, names, source)
-    if not columns:
+    columns = _every(table, headings, time) if names is None else _wanted(table, headings, time, names, source)
+    if not set(columns) - {TIME}:
         raise LogError("a column of numbers is needed; the log has none", source)
     clock = None
-    if time is not None:
-        columns[TIME] = _seconds(table, time)
-    else:
+    if time is None:
         step = sample_time if sample_time is not None else table.step
         if step is None:
-            warnings.warn(LogWarning(LogCode.CLOCK_ASSUMED.note(sample_time_s=1.0), source), stacklevel=2)
-        clock = Clock(1.0 if step is None else step, 0.0)
+            warnings.warn(LogWarning(LogCode.CLOCK_ASSUMED.note(sample_time_s=assumed), source), stacklevel=2)
+        clock = Clock(assumed if step is None else step, 0.0)
         columns[TIME] = clock.sample_time * np.arange(len(next(iter(columns.values()))), dtype=np.float64)
     checked = trusted(columns, source=source, required=tuple(names or ()), clock=clock, most_missing=most_missing)
     # nobody knows what these columns are, so no unit of theirs looks wrong
@@ -106,20 +107,24 @@ def _table(tables: Sequence[Table], names: Sequence[str] | None) -> Table:
     return max(tables, key=rank)
 
 
-def _every(table: Table, headings: Sequence[Heading]) -> dict[str, Array]:
-    """Return every column of numbers that has a name of its own and is not time."""
-    found: dict[str, Array] = {}
-    for place, values in table.numbers().items():
+def _every(table: Table, headings: Sequence[Heading], time: Column | None) -> dict[str, Array]:
+    """Return every column of numbers that has a name of its own, and the time [s]."""
+    numbers = table.numbers(time)
+    found: dict[str, Array] = {} if time is None else {TIME: _seconds(numbers[time.position], time)}
+    for place, values in numbers.items():
         name = headings[place].name
         if name and values.dtype.kind != "M" and not _is_time(headings[place]) and name not in found:
             found[name] = values
     return found
 
 
-def _wanted(table: Table, headings: Sequence[Heading], names: Sequence[str], source: str) -> dict[str, Array]:
+def _wanted(
+    table: Table, headings: Sequence[Heading], time: Column | None, names: Sequence[str], source: str
+) -> dict[str, Array]:
+    """Return the columns wanted, and the time [s], read at once: a row that is left out is left out of all."""
     chosen = [_named(headings, name, source) for name in dict.fromkeys(names)]
-    raw = table.read(chosen)
-    found: dict[str, Array] = {}
+    raw = table.read(chosen if time is None else [time, *chosen])
+    found: dict[str, Array] = {} if time is None else {TIME: _seconds(raw[time], time)}
     for column in chosen:
         if column not in raw or raw[column].dtype.kind == "M":
             raise LogError(f"column {column.name!r} must hold numbers", source)
@@ -159,9 +164,8 @@ def _time_column(headings: Sequence[Heading]) -> Column | None:
     return None
 
 
-def _seconds(table: Table, column: Column) -> Array:
+def _seconds(values: Array, column: Column) -> Array:
     """Return time in seconds; dates count from the first."""
-    values = table.read([column])[column]
     if values.dtype.kind != "M":
         return values * column.factor
     missing = np.isnat(values)

@@ -42,7 +42,7 @@ NAMES: Mapping[str, tuple[tuple[str, float], ...]] = {
     ),
     "differential_pressure_pa": (
         (
-            r"diff\w*_?(press|druck)|delta_?p|(press\w*|druck)_?diff|(^|_)dp(_|$)|(load|last)_?(press|druck)|(^|_)p_?(load|diff|l)(_|$)",
+            r"diff\w*_?(press|druck)|delta_?p|(^|_)(δ|∆|d)_?p(_|$)|(press\w*|druck)_?diff|(^|_)dp(_|$)|(load|last)_?(press|druck)|(^|_)p_?(load|diff|l)(_|$)",
             5.0,
         ),
         (r"^(pressure|press|druck)$", 2.5),
@@ -296,6 +296,8 @@ def hint_of(channels: Sequence[str], headings: Sequence[Heading], more: Sequence
         Channels that could do without, but are better named with the others.
     """
     shown = {one.channel: option for one, option in _shown(headings, [*channels, *more])}
+    if set(CHAMBERS) <= {*channels, *more} and len(set(CHAMBERS) & set(shown)) == 1:  # of no use without the other
+        shown = {name: option for name, option in shown.items() if name not in CHAMBERS}
     options = [shown[name] for name in in_order(shown)] if set(shown) & set(channels) else []
     may = f"; perhaps --columns '{','.join(options)}'" if options else ""
     put = ", with the unit of each for UNIT" if any(one.endswith(":UNIT") for one in options) else ""

@@ -45,8 +45,13 @@ class Table:
     began: np.datetime64 | None = None
     label: str = ""
 
-    def numbers(self) -> dict[int, Array]:
+    def numbers(self, time: Column | None = None) -> dict[int, Array]:
         """Return every column that holds numbers or times.
+
+        Parameters
+        ----------
+        time : Column, optional
+            The column of time, of channel ``time_s``. A row without a time is then left out of every column alike.
 
         Returns
         -------
@@ -57,8 +62,12 @@ class Table:
         ------
         NoMemoryError
             If there is not enough memory for them.
+        LogError
+            If the column of time cannot be read.
         """
         columns = [Column(place, one.name, f"{TRUTH}{place}") for place, one in enumerate(self.headings)]
+        if time is not None:
+            columns[time.position] = time
         try:
             found = self.read(columns)
         except LogError:
@@ -69,7 +78,10 @@ class Table:
                 except NoMemoryError:
                     raise
                 except LogError:
-                    continue
+                    if column is time:
+                        raise
+            if time is not None:
+                found = self.read(list(found))
         return {column.position: values for column, values in found.items()}
 
 

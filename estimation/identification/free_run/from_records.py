@@ -89,6 +89,44 @@ def channels_of(
     return channels_from(u, y, wanted, inputs, output)
 
 
+def channels_to_run(record: Record, inputs: Sequence[str], output: str, sample_time: float | None = None) -> Channels:
+    """Return what a model is run on: its inputs, and its output as far as the log has one.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    inputs, output : sequence of str, str
+        Channels; the output may be missing.
+    sample_time : float, optional
+        Wanted [s]; the log's unless told.
+
+    Returns
+    -------
+    Channels
+        An output that is missing is NaN throughout.
+
+    Raises
+    ------
+    LogError
+        If an input is missing.
+
+    Warns
+    -----
+    LogWarning
+        As `channels_of` does.
+    """
+    if output in record:
+        return channels_of([record], inputs, output, sample_time)
+    wanted = record.sample_time if sample_time is None else sample_time
+    columns: list[Array] = []
+    for name in inputs:
+        _tell_bridged([record[name]], name, stacklevel=3)
+        columns.append(_on_clock(bridged(record[name]), record.sample_time, wanted))
+    u = np.column_stack(columns)
+    return Channels(tuple(inputs), output, wanted, (u,), (np.full(len(u), np.nan),))
+
+
 def pieces(record: Record, inputs: Sequence[str]) -> list[Record]:
     """Split a log where an input misses samples that a straight line would get wrong.
 

@@ -77,3 +77,21 @@ def linear_instead(model: FreeRunModel, data: Channels) -> list[Note]:
     if worst[0] < worst[1]:
         return []
     return [IdentificationCode.LINEAR_STANDS_IN.note(output=data.output, undetermined=worst[0], linear=worst[1])]
+
+
+def doubts_about_inputs(model: FreeRunModel, data: Channels) -> list[Note]:
+    """Return what a user must know of a run on these inputs.
+
+    Parameters
+    ----------
+    model : FreeRunModel
+        Any.
+    data : Channels
+        In units of the channels; inputs in the model's order.
+
+    Returns
+    -------
+    list of Note
+        That a linear model stands in; else one on each input beyond its range.
+    """
+    return linear_instead(model, data) or inputs_beyond(model, data)

@@ -145,12 +145,18 @@ class FreeRunModel:
         return FreeRunQuality(*_fit(measured, free, running=True), *_fit(measured, ahead, running=False))
 
     def _scaled(self, u: ArrayLike, y: ArrayLike | None) -> tuple[Array, Array]:
-        inputs = np.asarray(u, dtype=np.float64)
+        try:
+            inputs = np.asarray(u, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise HydrostateError(f"inputs {', '.join(self.inputs)} must be numbers, got {u!r:.60}") from None
         inputs = inputs[:, None] if inputs.ndim == 1 else inputs
         if inputs.ndim != 2 or inputs.shape[1] != len(self.inputs):
             raise HydrostateError(
                 f"inputs {', '.join(self.inputs)} are needed, shape (n, {len(self.inputs)}), got {inputs.shape}"
             )
+        if not np.isfinite(inputs).all():
+            row = int(np.argmax(~np.isfinite(inputs).all(axis=1)))
+            raise HydrostateError(f"inputs {', '.join(self.inputs)} must be finite at every sample, row {row} is not")
         by = self.scaling
         outputs = np.full(inputs.shape[0], np.nan) if y is None else np.asarray(y, dtype=np.float64)
         if outputs.shape != inputs.shape[:1]:

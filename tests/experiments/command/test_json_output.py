@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from estimation.eha.bulk_modulus import Outcome
-from experiments.command.json_output import csv_text, json_text, plain, prepare_output, write_results
+from experiments.command.json_output import csv_text, json_text, plain, prepare_output, write_results, write_whole
 from plant.errors import HydrostateError
 
 
@@ -77,3 +77,8 @@ def test_a_folder_that_may_not_be_written_and_a_folder_in_a_file_s_place_are_ref
     monkeypatch.setattr("os.access", lambda *_: False)
     with pytest.raises(HydrostateError, match="there is no permission to write there"):
         prepare_output(tmp_path / "out")
+
+
+def test_a_page_on_a_file_whose_name_is_no_text_is_written(tmp_path: Path) -> None:
+    write_whole(tmp_path / "page.html", "<p>l\udcf6g.csv ü</p>")
+    assert (tmp_path / "page.html").read_text(encoding="utf-8") == "<p>l?g.csv ü</p>"

@@ -275,3 +275,12 @@ def test_a_test_log_whose_input_leaves_the_fitted_range_is_named(tmp_path: Path)
 )
 def test_a_gain_less_than_its_deviation_is_not_shown_as_a_number(gain: dict[str, object] | None, shown: str) -> None:
     assert _gains(gain) == shown
+
+
+def test_a_log_without_time_is_simulated_on_the_model_s_sample_time(logs: list[Path], tmp_path: Path) -> None:
+    saved, timeless = tmp_path / "model.json", tmp_path / "timeless.csv"
+    run(*logs[:2], "--input", "Valve [%],load", "--output", "flow", "--order", 1, "--out", saved)
+    pd.read_csv(logs[2]).drop(columns="t_ms").to_csv(timeless, index=False)
+    (timed,), (one,) = (json.loads(run(log, "--simulate", saved, "--json").stdout) for log in (logs[2], timeless))
+    assert one["fit_percent"] == pytest.approx(timed["fit_percent"], abs=1e-6)
+    assert [said["data"] for said in one["warnings"]] == [{"sample_time_s": pytest.approx(0.02)}]

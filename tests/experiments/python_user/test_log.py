@@ -166,3 +166,8 @@ def test_an_answer_comes_back_from_another_process_as_it_was(log: hs.Log, verb: 
     assert str(copied) == str(answer)
     pages = [one.report(tmp_path / f"{name}.html").read_text("utf-8") for name, one in (("a", answer), ("b", copied))]
     assert pages[0] == pages[1]
+
+
+def test_a_seed_of_numpy_is_a_seed() -> None:
+    runs = [hs.simulate(duration=0.1, sample_time=1e-3, seed=seed) for seed in (3, np.int64(3))]
+    assert np.array_equal(runs[0]["position_m"], runs[1]["position_m"])

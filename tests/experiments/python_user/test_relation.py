@@ -6,12 +6,14 @@ import control
 import numpy as np
 import pytest
 
+from estimation.identification.free_run.fallback import Fallback
+from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.saved import load_models
 from estimation.identification.model.recursion import filtered
 from experiments.python_user.log import ANY, Log
 from experiments.python_user.relation import Relation, identified
 from plant.eha.rig import Rig
-from plant.errors import NoSuchNameError
+from plant.errors import HydrostateError, LogWarning, NoSuchNameError
 from plant.log.record import Record
 
 T = 0.02
@@ -111,3 +113,75 @@ def test_a_slower_model_is_simulated_on_its_own_clock() -> None:
     slow = identified([record(1)], "load", "heat", {"order": 1, "delay": 1, "sample_time": 2 * T})
     assert slow.sample_time == pytest.approx(2 * T)
     assert slow.simulate(opened(record(2))).shape == (200,)
+
+
+def test_a_table_is_taken_by_the_names_of_its_columns(both: Relation) -> None:
+    log = record(2)
+    table = opened(log).to_frame()
+    begun = both.simulate(opened(log))
+    np.testing.assert_allclose(both.simulate(table[["heat", "load", "flow", "valve"]]), begun)
+    np.testing.assert_allclose(both.simulate(log), begun)
+    np.testing.assert_allclose(both.validate(table)["rmse"], both.validate(opened(log))["rmse"])
+    alone = both.simulate(np.column_stack([log["valve"], log["load"]]))
+    np.testing.assert_allclose(both.simulate(table[["load", "valve"]]), alone)
+    with pytest.warns(LogWarning, match=r"sample time of 0\.02 s"):  # rows without a time are the model's
+        np.testing.assert_allclose(both.simulate({"load": log["load"], "valve": log["valve"]}), alone)
+    with pytest.raises(HydrostateError, match="channel 'valve' is needed"):
+        both.simulate(table[["load"]])
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("run.csv", r"hydrostate\.read opens a file"),
+        ([["a", "b"]], "must be numbers"),
+        ([[0.0, 1.0], [0.0, np.nan]], "finite at every sample, row 1 is not"),
+    ],
+)
+def test_what_is_no_input_is_refused(given: object, said: str, both: Relation) -> None:
+    with pytest.raises(HydrostateError, match=said):
+        both.simulate(given)
+
+
+def test_only_a_log_or_a_table_is_validated_on(both: Relation) -> None:
+    with pytest.raises(HydrostateError, match="got ndarray"):
+        both.validate(np.zeros(30))
+
+
+def test_names_of_channels_are_texts() -> None:
+    with pytest.raises(HydrostateError, match="input must be the name of a channel or a list of names, got 3"):
+        opened(record(1)).identify(input=3, output="heat")
+
+
+def test_completion_offers_what_a_model_has(both: Relation) -> None:
+    one = identified([record(1)], "load", "heat", {"order": 1, "delay": 1})
+    assert {"fit_percent", "sample_time", "simulate"} <= {*dir(one)}
+    assert "fit_percent" not in dir(both)
+
+
+def bent(seed: int, size: float) -> Record:
+    u = size * np.repeat(np.random.default_rng(seed).normal(size=100), 5)
+    y = filtered([0.0, 0.4], [1.0, -0.8], u + 0.3 * u**2)
+    return Record(T, {"valve": u, "heat": y + 0.01 * np.random.default_rng(seed).normal(size=y.size)})
+
+
+def test_inputs_beyond_the_fit_of_a_polynomial_model_are_told() -> None:
+    found = identified([bent(1, 1.0)], "valve", "heat", {"structure": "narx", "order": 1, "delay": 1})
+    found.simulate(bent(1, 1.0))  # a warning would be an error
+    far = bent(2, 4.0)
+    for ask in (found.simulate, found.validate, lambda log: found.simulate(log["valve"])):
+        with pytest.warns(LogWarning, match="input 'valve' ranges from"):
+            ask(far)
+
+
+def test_a_linear_model_that_stands_in_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = identified([bent(1, 1.0)], "valve", "heat", {"structure": "auto", "order": 1, "delay": 1})
+    dynamics = found.models[0].dynamics
+    assert isinstance(dynamics, PolynomialDynamics)
+    assert dynamics.fallback is not None
+    found.simulate(bent(1, 1.0))
+    monkeypatch.setattr(Fallback, "errors", lambda *_: (3.0, 0.1))
+    for given in (bent(1, 1.0), bent(1, 1.0)["valve"]):
+        with pytest.warns(LogWarning, match="linear") as said:
+            found.simulate(given)
+        assert {one.message.note.code for one in said} == {"linear_stands_in"}

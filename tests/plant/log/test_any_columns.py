@@ -109,3 +109,36 @@ def test_as_many_samples_may_be_missing_as_are_allowed(tmp_path: Path) -> None:
         read_any(empty, ["u"], most_missing=0.2)
     with pytest.warns(LogWarning, match="u is missing in 9 of 20"):
         assert np.isfinite(read_any(empty, ["u"], most_missing=0.5)["u"]).sum() == 11
+
+
+GARBAGE = {
+    "a line of text": {40: "=== pause ==="},
+    "a row too short": {40: "40"},
+    "a cell of text out of order": {40: "3,ERR,40"},
+    "a stamp that is none": {40: "2026-01-93 00:00:40,40,40"},
+}
+
+
+@pytest.mark.parametrize("names", [None, ("u", "y")])
+@pytest.mark.parametrize("kind", GARBAGE)
+@pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
+def test_a_row_of_garbage_is_left_out_of_every_column_alike(
+    kind: str, names: tuple[str, ...] | None, tmp_path: Path
+) -> None:
+    stamped = kind.startswith("a stamp")
+    rows = [f"{f'2026-01-01 00:{k // 60:02}:{k % 60:02}' if stamped else k},{k},{2 * k}" for k in range(500)]
+    for line, garbage in GARBAGE[kind].items():
+        rows[line] = garbage
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["time,u,y", *rows]) + "\n")
+    record = read_any(path, names)
+    assert len(record) == 500
+    there = np.isfinite(record["u"]) & np.isfinite(record["y"])
+    assert np.flatnonzero(~there).tolist() == [40]
+    np.testing.assert_allclose(record["u"][there], record.time[there], atol=1e-6)
+    np.testing.assert_allclose(record["y"][there], 2.0 * record.time[there], atol=1e-6)
+
+
+def test_rows_without_a_time_are_as_far_apart_as_is_assumed(tmp_path: Path) -> None:
+    with pytest.warns(LogWarning, match="sample time of 4 s"):
+        assert read_any(written(tmp_path / "a.csv", "u,y", RAMP, RAMP), assumed=4.0).sample_time == 4.0

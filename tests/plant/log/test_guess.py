@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from plant.errors import LogError, LogWarning, MissingColumnError
+from plant.errors import LogError, LogWarning, MissingColumnError, NoChannelError
 from plant.log.files import read_record
 from plant.log.guess import guess_by_name
 from plant.log.headings import Heading
@@ -23,6 +23,8 @@ ROWS = "\n".join(f"{0.001 * k:.3f},{k % 7},{k % 5}" for k in range(20))
         ("Kolbenweg (mm)", "position_m"),
         ("PistonVelocity", "velocity_m_s"),
         ("Delta p / bar", "differential_pressure_pa"),
+        ("Δp bar", "differential_pressure_pa"),
+        ("∆p [bar]", "differential_pressure_pa"),
         ("Druck", "differential_pressure_pa"),
         ("pressure_pa", "differential_pressure_pa"),
         ("p_A [bar]", "pressure_a_pa"),
@@ -110,3 +112,12 @@ def test_a_log_of_one_logger_says_how_the_other_is_merged(tmp_path: Path) -> Non
     path.write_text("time_s,motor_speed_rpm,pressure_bar\n" + ROWS)
     with pytest.raises(LogError, match="if a second logger's file has it, add --with FILE"):
         read_record(path)
+
+
+def test_one_chamber_alone_is_not_offered_by_its_unit(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("Zeit [s],Drehzahl [rpm],Weg [mm],Äp bar\n1,2,3,4\n")
+    with pytest.raises(NoChannelError) as told:
+        read_record(path)
+    assert "position_m=Weg [mm]:mm" in str(told.value)
+    assert "pressure" not in str(told.value)
