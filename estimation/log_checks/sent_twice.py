@@ -53,7 +53,7 @@ def without_rows_sent_twice(record: Record) -> tuple[Record, tuple[Note, ...]]:
 
     Examples
     --------
-    >>> rows = np.random.default_rng(1).standard_normal((3, 200))
+    >>> rows = np.cumsum(np.random.default_rng(1).standard_normal((3, 200)), axis=1)
     >>> sent = rows[:, np.r_[0:110, 100:200]]  # ten rows came again
     >>> names = ("motor_speed_rad_s", "position_m", "differential_pressure_pa")
     >>> len(without_rows_sent_twice(Record(1e-3, dict(zip(names, sent, strict=True))))[0])

@@ -80,10 +80,10 @@ def cells_of(line: str, delimiter: str) -> list[str]:
     """
     if delimiter == BLANKS:
         return line.split()
-    if '"' not in line:
+    if line.count('"') % 2 or '"' not in line:  # a quote that is never closed is none
         return line.split(delimiter)
     try:
-        return next(csv.reader([line], delimiter=delimiter, strict=True))  # a quote that is never closed is none
+        return next(csv.reader([line], delimiter=delimiter))
     except (csv.Error, StopIteration):
         return line.split(delimiter)
 

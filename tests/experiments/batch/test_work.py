@@ -68,7 +68,7 @@ def test_a_log_that_cannot_be_read_is_a_row_and_the_others_are_diagnosed(tmp_pat
     time = np.arange(0.0, 0.5, 1e-3)
     lines = [f"{t:.4f},{100.0 * np.sin(20.0 * t):.6f},{0.03 * np.sin(20.0 * t):.6f}" for t in time]
     good = "time_s,motor_speed_rad_s,velocity_m_s\n" + "\n".join(lines) + "\n"
-    for name, text in (("a.csv", good), ("b.csv", good.replace("0.0000", "zero", 1)), ("c.csv", ""), ("d.csv", good)):
+    for name, text in (("a.csv", good), ("b.csv", good.replace("0.00", "zero.00")), ("c.csv", ""), ("d.csv", good)):
         (tmp_path / name).write_text(text, encoding="utf-8")
     logs = [{"glob": "*.csv", "methods": [{"verb": "diagnose"}]}]
     plan = plan_study(parse_study({"name": "logs", "logs": logs}, "logs.toml"), tmp_path)

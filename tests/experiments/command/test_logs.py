@@ -42,7 +42,9 @@ def hostile(folder: Path, good: Path) -> dict[str, Path]:
         "unit 'parsnip' is unknown": "\n".join(
             [lines[0].replace("position_m", "position_parsnip"), *lines[1:]]
         ).encode(),
-        "must hold numbers, got 'oops'": "\n".join([*lines[:30], "0.029,oops" + others, *lines[31:]]).encode(),
+        "must hold numbers, got 'oops'": "\n".join(
+            [*lines[:30], *(f"{row / 1e3:.3f},oops{others}" for row in range(29, 129)), *lines[130:]]
+        ).encode(),
         "must be finite": "\n".join([*lines[:30], "0.029,inf" + others, *lines[31:]]).encode(),
         "got binary data": bytes(range(256)),
     }
