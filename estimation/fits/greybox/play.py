@@ -1,7 +1,6 @@
 """Play between the piston and its encoder: whether a fit's residuals, or a velocity sensor, show one."""
 
 from collections.abc import Callable, Iterable, Mapping
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -45,7 +44,7 @@ class ShownPlay(NamedTuple):
     size: float
     gain: float
     yields: float = 0.0
-    moved: Mapping[str, float] = MappingProxyType({})
+    moved: Mapping[str, float] = {}
 
 
 NO_PLAY = ShownPlay(0.0, 0.0)

@@ -1,5 +1,6 @@
 """Where the piston may be in its encoder's play, and whether a log's residuals show one."""
 
+import pickle
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -334,3 +335,7 @@ def test_a_play_is_shown_by_chance_as_seldom_as_its_limit_says() -> None:
     assert 1.0 / by_chance == pytest.approx(430.0, rel=0.02)
     assert 1.0 / (3.0 * by_chance) == pytest.approx(140.0, rel=0.03)
     assert 1.0 / float(ndtr(-((2.0 * PLAY_SENSED) ** 0.5))) == pytest.approx(100.0, rel=0.02)
+
+
+def test_what_a_fit_says_of_a_play_comes_back_from_another_process() -> None:
+    assert pickle.loads(pickle.dumps(NO_PLAY)) == NO_PLAY
