@@ -236,18 +236,18 @@ def columns_of_anything() -> dict[str, Any]:
     )
     dates: Any = np.array(["2026-03-01T00:00:00", "NaT", "2026-03-01T00:00:02.5"], dtype="datetime64[ns]")
     dated = table_of("a", {"t": dates})
-    wanted = any_columns._wanted(table, headings, ["x", "position_m", "x"], "a")  # pyright: ignore[reportPrivateUsage]
+    wanted = any_columns._wanted(table, headings, None, ["x", "position_m", "x"], "a")  # pyright: ignore[reportPrivateUsage]
     return {
         "named": {name: named(name) for name in ("x", "X", "position_m", "velocity_m_s", "noet", "zzz")},
         "time columns": [
             None if (one := any_columns._time_column([Heading(unit)])) is None else [one.factor, one.channel]
             for unit in units
         ],  # pyright: ignore[reportPrivateUsage]
-        "every": list(any_columns._every(table, headings)),  # pyright: ignore[reportPrivateUsage]
+        "every": list(any_columns._every(table, headings, None)),  # pyright: ignore[reportPrivateUsage]
         "wanted": {name: values[:3] for name, values in wanted.items()},
-        "text": or_refused(lambda: any_columns._wanted(table, headings, ["note"], "a")),  # pyright: ignore[reportPrivateUsage]
+        "text": or_refused(lambda: any_columns._wanted(table, headings, None, ["note"], "a")),  # pyright: ignore[reportPrivateUsage]
         "seconds": any_columns._seconds(
-            dated, any_columns._time_column(list(dated.headings)) or any_columns.Column(0, "t", "time_s")
+            dates, any_columns._time_column(list(dated.headings)) or any_columns.Column(0, "t", "time_s")
         ),  # pyright: ignore[reportPrivateUsage]
         "table of most": [any_columns._table((table, dated), names).headings[0].name for names in (None, ["t"], ["X"])],  # pyright: ignore[reportPrivateUsage]
     }
