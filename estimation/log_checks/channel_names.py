@@ -7,3 +7,6 @@ SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
 
 PRESSURES = (PRESSURE, *CHAMBERS)
 """Channels of pressure: the difference, and the two chambers'."""
+
+MEASURED = (SPEED, POSITION, VELOCITY, *PRESSURES)
+"""All channels that the checks ask."""

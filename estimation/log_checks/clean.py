@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED, VELOCITY
+from estimation.log_checks.channel_names import MEASURED, POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.channel_physics import channel_mistakes
 from estimation.log_checks.discontinuities import without_discontinuities
 from estimation.log_checks.dropout import without_dropouts
@@ -106,7 +106,7 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
         sound = mended
     sound, hum = without_hum(sound)
     sound, offset = without_velocity_offset(sound)
-    known = [name for name in dict.fromkeys((*CLEANED, *PRESSURES)) if name in sound]
+    known = [name for name in MEASURED if name in sound]
     objections = sensor_objections(sound, parameters)
     dead = any(note.data["channel"] == PRESSURE for note in objections)
     mistakes = changes or channel_mistakes(sound.replace(**{PRESSURE: None}) if dead else sound, parameters)

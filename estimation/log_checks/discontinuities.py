@@ -81,7 +81,7 @@ def without_discontinuities(record: Record) -> tuple[Record, tuple[Note, ...]]:
     notes: list[Note] = []
     position = record[POSITION].copy()
     for step in steps:
-        at = record.start_time + record.sample_time * (step.row + 1)
+        at = float(record.time[step.row + 1])
         if (held := _held_before(record, step)) > 0:
             position[step.row + 1 - held : step.row + 1] = np.nan
             seconds = held * record.sample_time
@@ -107,8 +107,8 @@ def _longest(record: Record, steps: list[_Step]) -> tuple[Record, tuple[Note, ..
     seams = _by_row(record, steps)
     ends = [0, *(row + 1 for row in seams), len(record)]
     first, behind = max(pairwise(ends), key=lambda part: part[1] - part[0])
-    begin, end = (record.start_time + record.sample_time * row for row in (first, behind - 1))
-    where = ", ".join(f"{record.start_time + record.sample_time * (row + 1):.4g}" for row in seams)
+    begin, end = (float(record.time[row]) for row in (first, behind - 1))
+    where = ", ".join(f"{record.time[row + 1]:.4g}" for row in seams)
     jumped = [name for name in (POSITION, PRESSURE, VELOCITY, SPEED) if any(name in one for one in seams.values())]
     clock = {"where": where, "begin_s": begin, "end_s": end}
     if jumped == [PRESSURE]:

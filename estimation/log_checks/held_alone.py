@@ -52,7 +52,7 @@ def without_held_alone(record: Record) -> tuple[Record, tuple[Note, ...]]:
         if not np.any(held):
             continue
         first, _ = stretches(held)
-        begin = record.start_time + record.sample_time * float(first[0])
+        begin = float(record.time[first[0]])
         seconds = record.sample_time * float(np.count_nonzero(held))
         notes.append(SensorCode.HELD_ALONE.note(channel=name, seconds=seconds, count=len(first), begin_s=begin))
         changed[name] = np.where(held, np.nan, record[name])

@@ -10,16 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.arrays import BoolArray, IntArray
-from estimation.log_checks.channel_names import POSITION, PRESSURES, SPEED, VELOCITY
+from estimation.log_checks.channel_names import MEASURED, SPEED
 from estimation.log_checks.held_alone import LEAST_NOISE, is_noisy
 from estimation.notes import SensorCode
 from estimation.stretches import stretches
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
-
-ASKED = (SPEED, POSITION, VELOCITY, *PRESSURES)
-"""Channels that a row must repeat, all that are logged."""
 
 FEWEST_CHANNELS, FEWEST_ROWS = 3, 5
 """Channels that must be logged, and rows in a stretch that is sent again, at least [count]."""
@@ -59,7 +56,7 @@ def without_rows_sent_twice(record: Record) -> tuple[Record, tuple[Note, ...]]:
     >>> len(without_rows_sent_twice(Record(1e-3, dict(zip(names, sent, strict=True))))[0])
     200
     """
-    asked = [name for name in ASKED if name in record]
+    asked = [name for name in MEASURED if name in record]
     if len(asked) < FEWEST_CHANNELS:
         return record, ()
     copies = _copies(np.stack([record[name] for name in asked]))

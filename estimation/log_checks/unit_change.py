@@ -2,13 +2,11 @@
 
 import numpy as np
 
-from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED, VELOCITY
+from estimation.log_checks.channel_names import MEASURED
 from estimation.notes import ChannelCode
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
-
-ASKED = (SPEED, POSITION, VELOCITY, PRESSURE, *PRESSURES)
 
 BLOCKS, FEWEST, LEAST_ROWS = 60, 5, 100
 """Blocks that a log is divided into, blocks on either side of a change, and rows in a block, at least [count]."""
@@ -41,7 +39,7 @@ def unit_changes(record: Record) -> tuple[Note, ...]:
     tuple of Note
         None for a log that is written in one unit throughout.
     """
-    asked = [name for name in dict.fromkeys(ASKED) if name in record]
+    asked = [name for name in MEASURED if name in record]
     size = max(LEAST_ROWS, len(record) // BLOCKS)
     count = len(record) // size
     if count < 2 * FEWEST or len(asked) < 2:
@@ -59,7 +57,7 @@ def unit_changes(record: Record) -> tuple[Note, ...]:
         others = [_ratio(noise[other], k) for other in asked if other != name]
         if any(max(one, 1.0 / one) > OTHERS for one in others):
             continue
-        begin = record.start_time + record.sample_time * _exactly(record[name], k * size, size, factor)
+        begin = float(record.time[_exactly(record[name], k * size, size, factor)])
         times = slip if factor > 1.0 else 1.0 / slip
         found.append(ChannelCode.UNIT_CHANGES.note(channel=name, begin_s=begin, factor=times))
     return tuple(found)

@@ -55,7 +55,10 @@ class Fallback:
             on held-back blocks together with what its run is not determined to, over the output's deviation in the
             fitted data [dimensionless].
         """
-        straight = jackknife(self.linear.run(u, y), [one.run(u, y) for one in self.linear_parts])
+        return self._judged(u, y, own, self.linear.run(u, y))
+
+    def _judged(self, u: Array, y: Array, own: Array, linear: Array) -> tuple[float, float]:
+        straight = jackknife(linear, [one.run(u, y) for one in self.linear_parts])
         return jackknife(own, [one.run(u, y) for one in self.parts]), float(np.hypot(self.error, straight))
 
     def instead(self, u: Array, y: Array, own: Array) -> Array:
@@ -73,8 +76,9 @@ class Fallback:
         ndarray, shape (n,)
             Output, scaled.
         """
-        undetermined, left = self.errors(u, y, own)
-        return own if undetermined < left else self.linear.run(u, y)
+        linear = self.linear.run(u, y)
+        undetermined, left = self._judged(u, y, own, linear)
+        return own if undetermined < left else linear
 
     def to_dict(self) -> dict[str, Any]:
         """Return JSON values."""
