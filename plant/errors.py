@@ -52,6 +52,8 @@ class MissingColumnError(LogError):
         wanted = f"column {column[:80]!r} is needed for {channel}; the log has {known}"
         super().__init__(f"{wanted}; name one of them as {channel}=NAME:UNIT{hint}", source)
         self.channel, self.column, self.known, self.hint = channel, column, known, hint
+        self.bare = wanted
+        """The sentence without advice for a command line."""
 
     def __reduce__(self) -> tuple[object, ...]:
         return MissingColumnError, (self.channel, self.column, self.known, self.source, self.hint)
@@ -72,7 +74,22 @@ class TextColumnError(LogError):
 
 
 class NoChannelError(LogError):
-    """A log lacks the channels of an actuator; as a log of anything it may still be read."""
+    """A log lacks the channels of an actuator; as a log of anything it may still be read.
+
+    Parameters
+    ----------
+    message : str
+        What is missing, and what is there.
+    hint : str
+        What to do on a command line, as clauses, each after a semicolon.
+    """
+
+    def __init__(self, message: str, source: str | None = None, hint: str = "") -> None:
+        super().__init__(f"{message}{hint}", source)
+        self.bare, self.hint = message, hint
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.bare, self.source, self.hint)
 
 
 class SparseLogError(LogError):

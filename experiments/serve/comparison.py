@@ -58,9 +58,9 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
         "logs": logs,
         "links": None if identities is None else [f"logs/{one}" for one in identities],
         "turned": identities and f"compare?first={identities[1]}&second={identities[0]}",
-        "title": _title([row for row in rows if row["changed"]]),
+        "title": _title([row for row in rows if row["changed"]], any(row["interval"] for row in rows)),
         "quantities": _quantities_shown(rows),
-        "probabilities": _probabilities_shown(first.get("probabilities") or {}, second.get("probabilities") or {}),
+        "probabilities": _probabilities_shown(first.get("probabilities"), second.get("probabilities")),
     }
     names = [log["file"] for log in logs]
     headed = {
@@ -90,16 +90,24 @@ def _quantities_shown(rows: Sequence[Mapping[str, Any]]) -> "pd.DataFrame":
     return pd.DataFrame(shown)
 
 
-def _probabilities_shown(first: Mapping[str, float], second: Mapping[str, float]) -> "pd.DataFrame":
-    """Return the conditions that are likely enough in one of two logs, the likeliest first."""
+def _probabilities_shown(first: Mapping[str, float] | None, second: Mapping[str, float] | None) -> "pd.DataFrame":
+    """Return the conditions that are likely enough in one of two logs, the likeliest first; a dash for no diagnosis."""
     import pandas as pd
 
-    shares = {name: (first.get(name, 0.0), second.get(name, 0.0)) for name in {**first, **second}}
+    both = first or {}, second or {}
+    shares = {name: (both[0].get(name, 0.0), both[1].get(name, 0.0)) for name in {**both[0], **both[1]}}
+
+    def told(one: Mapping[str, float], share: float) -> str:
+        return percent_text(share) if one else MISSING
+
     likely = sorted(
         ((name, pair) for name, pair in shares.items() if max(pair) >= LEAST_SHARE), key=lambda one: -max(one[1])
     )
     return pd.DataFrame(
-        [{"condition": in_words(name), "first": percent_text(a), "second": percent_text(b)} for name, (a, b) in likely]
+        [
+            {"condition": in_words(name), "first": told(both[0], a), "second": told(both[1], b)}
+            for name, (a, b) in likely
+        ]
     )
 
 
@@ -226,8 +234,10 @@ def plain_words(result: Mapping[str, Any]) -> str:
     return said if result["unknown"] else f"{said} Probability {percent_text(max(result['probabilities'].values()))} %."
 
 
-def _title(changed: Sequence[Mapping[str, Any]]) -> str:
+def _title(changed: Sequence[Mapping[str, Any]], comparable: bool) -> str:
     """Return which quantities the second log has more of, and less."""
+    if not comparable:
+        return "The two logs cannot be compared: no quantity has an interval in both."
     if not changed:
         return "No certain difference between the two logs."
     found: list[str] = []

@@ -86,6 +86,7 @@ class Gauges(WatchEvents):
             "time_s": last,
             "rows": self._whole,
             "gaps": self.gaps,
+            "left_out": self.left_out,
             "values": dict(values),
             "low": {name: low for name, (low, _) in self._ends.items()},
             "high": {name: high for name, (_, high) in self._ends.items()},

@@ -10,6 +10,7 @@ MEANINGS: Mapping[str, tuple[str, str]] = {
     "hydrostate_stream_up": ("gauge", "Whether a stream is learnt or watched."),
     "hydrostate_stream_rows_total": ("counter", "Rows that came since the stream last began."),
     "hydrostate_stream_gaps_total": ("counter", "Gaps in them that were too long to be filled."),
+    "hydrostate_stream_left_out_total": ("counter", "Rows that held garbage, which was left out."),
     "hydrostate_stream_age_seconds": ("gauge", "Time since its last gauges."),
     "hydrostate_stream_alarm_share": ("gauge", "How far a balance is from an alarm: 1 raises one."),
     "hydrostate_stream_alarms_total": ("counter", "Alarms since the server began."),
@@ -71,6 +72,7 @@ def _values(
             continue
         yield "hydrostate_stream_rows_total", labels, gauges["rows"]
         yield "hydrostate_stream_gaps_total", labels, gauges["gaps"]
+        yield "hydrostate_stream_left_out_total", labels, gauges["left_out"]
         yield "hydrostate_stream_age_seconds", labels, now - gauges["received"]
         for balance, score in gauges["scores"].items():
             threshold = gauges["thresholds"][balance]

@@ -16,7 +16,7 @@ from experiments.command.terminal import clauses, unexpected
 from experiments.serve.comparison import plain_words
 from experiments.serve.process import bind_to_server
 from plant.atomic import replacing
-from plant.errors import HydrostateError
+from plant.errors import HydrostateError, MissingColumnError, NoChannelError
 
 if TYPE_CHECKING:
     from experiments.actuator_kind import ActuatorKind, LogVerb
@@ -24,6 +24,15 @@ if TYPE_CHECKING:
 
 READING, WORKING, WRITING = "reading the log", "working it out", "writing the page"
 """Where the work on a log is."""
+
+OTHER_NAMES = "if the log has them under other names, the rig file of the server must say so"
+"""What helps a log that is refused for its columns: whoever sends it has no command line."""
+
+GUESSED: Mapping[bool, str] = {
+    True: "The log can be read with the columns that its page names.",
+    False: "The columns that could be guessed are too few to read the log; its page shows them.",
+}
+"""What an inspection found, by whether the log reads with the columns that were guessed."""
 
 NO_MEMORY = 77
 """How a process ends whose log asked for more memory than there is: what it still holds, the next log would want."""
@@ -112,12 +121,14 @@ def work_on(task: Task) -> Worked:
             worked = _inspected(task) if task.verb == "inspect" else _found(task)
         except MemoryError:
             os._exit(NO_MEMORY)
+        except (MissingColumnError, NoChannelError) as error:
+            worked = _failed(task, blank, f"{error.bare}; {OTHER_NAMES}")
         except HydrostateError as error:
             worked = _failed(task, blank, error.message if error.source == str(task.log) else str(error))
         except Exception as error:  # whatever a log brings up is told to whoever sent it
             worked = _failed(task, blank, unexpected(error))
     result = plain({"file": task.name, **with_remarks(worked.result, said)})
-    return Worked(_without_path(result, task), plain(worked.entries), plain_words(result))
+    return Worked(_without_path(result, task), plain(worked.entries), worked.said or plain_words(result))
 
 
 def _found(task: Task) -> Worked:
@@ -146,7 +157,7 @@ def _inspected(task: Task) -> Worked:
     found, tables = looked_into(task.log, kind, bench)
     task.phase.write_text(WRITING, encoding="utf-8")
     _write(task, inspect_page({"file": task.name, **found}, tables))
-    return Worked({"outcome": "ok", **found}, None)
+    return Worked({"outcome": "ok", **found}, None, GUESSED[bool(found["reads"])])
 
 
 @cache

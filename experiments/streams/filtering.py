@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.terminal import note
-from experiments.streams.rows import STANDARD_INPUT, open_rows, warn_if_cut
+from experiments.streams.rows import STANDARD_INPUT, garbage_told, open_rows, warn_if_cut
 from experiments.streams.state_file import require_same_rate, state_kept
 from plant.errors import LogError
 
@@ -69,11 +69,11 @@ class Filtering:
         Raises
         ------
         HydrostateError
-            If a row cannot be read, or the stream is not one that can be filtered.
+            If too many rows are garbage, or the stream is not one that can be filtered.
         """
         stream = open_rows(lines, *self.columns, self.source)
         told = stream.start_time
-        with state_kept(self.state, self._save, told) as save_if_due:
+        with garbage_told(stream, self.source), state_kept(self.state, self._save, told) as save_if_due:
             for last, rows, gap in self._pieces(stream):
                 filtered = self._ready(stream, rows, last, gap)
                 channels = dict(zip(stream.channels, rows.T, strict=True))

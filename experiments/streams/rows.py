@@ -1,7 +1,8 @@
 """Rows of a stream: its lines opened by their header, and what is missing of them said on standard error."""
 
 import io
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from itertools import chain
 from typing import TYPE_CHECKING, TextIO
 
@@ -57,6 +58,18 @@ def open_rows(
         return CsvStream(chain([header], rest), mapping, source=source)
 
     return noted(source, lambda: with_rig_columns(opened, rig_columns, columns))
+
+
+@contextmanager
+def garbage_told(stream: "CsvStream", source: str) -> Generator[None]:
+    """Say at the end of this block what was left out of a stream, whatever ends it."""
+    try:
+        yield
+    finally:
+        if stream.left_out:
+            counted = "1 row holds" if stream.left_out == 1 else f"{stream.left_out} rows hold"
+            first = "" if stream.left_out == 1 else "the first: "
+            note(f"{source}: warning: {counted} garbage, which was left out; {first}{stream.first_left_out}")
 
 
 def warn_if_cut(stream: "CsvStream", source: str) -> None:

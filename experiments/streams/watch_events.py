@@ -40,7 +40,7 @@ class WatchEvents:
         self._say = say
         self.watch: Watch | None = None
         self.began = 0.0
-        self.alarms = self.rows = self.gaps = 0
+        self.alarms = self.rows = self.gaps = self.left_out = 0
         self._came = time.monotonic()
 
     def start(self, source: str, watch: "Watch", rig: str, false_alarms: float) -> None:
@@ -71,10 +71,11 @@ class WatchEvents:
         self._line("ready", time, thresholds=named, message="learning is over, alarms are possible from now on")
 
     def alive(self) -> None:
-        """Tell that the watch is alive, how many samples it has taken, and for how long nothing has come."""
+        """Tell that the watch is alive, what it has taken and left out, and for how long nothing has come."""
         time_s = None if self.watch is None else self.watch.last
         silent = round(time.monotonic() - self._came, 3)
-        self._line("alive", time_s, samples=self.rows, silent_s=silent, alarms=self.alarms, message="alive")
+        taken = {"samples": self.rows, "left_out": self.left_out}
+        self._line("alive", time_s, **taken, silent_s=silent, alarms=self.alarms, message="alive")
 
     def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
         """Take notice of samples that the watch has taken: they and the gaps before them are counted.
@@ -141,7 +142,7 @@ class WatchEvents:
             if outcome == "ok" and not self._armed:
                 message += "; the stream ended before learning was over, so no alarm was possible"
         time = None if self.watch is None else self.watch.last
-        self._line("end", time, outcome=outcome, alarms=self.alarms, message=message)
+        self._line("end", time, outcome=outcome, alarms=self.alarms, left_out=self.left_out, message=message)
 
     def _line(self, event: str, time_s: float | None, **entries: Any) -> None:
         clock = datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -82,6 +82,7 @@ class Watched(WatchEvents):
             "received": received,
             "rows": self.rows,
             "gaps": self.gaps,
+            "left_out": self.left_out,
             "values": values,
             **self.nearness(),
         }

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from experiments.command.logs import noted, read_log
 from experiments.command.options import PRESSURE
 from experiments.command.terminal import note
-from experiments.streams.rows import open_rows, warn_if_cut, warn_of_lost
+from experiments.streams.rows import garbage_told, open_rows, warn_if_cut, warn_of_lost
 from experiments.streams.state_file import require_same_rate, state_kept
 from experiments.streams.watch_events import WatchEvents
 from plant.errors import LogError
@@ -143,7 +143,7 @@ def watch_rows(
     Raises
     ------
     LogError
-        If a row cannot be read, or the stream cannot be watched.
+        If too many rows are garbage, or the stream cannot be watched.
     """
     import numpy as np
 
@@ -158,7 +158,7 @@ def watch_rows(
     def save(path: Path) -> None:
         save_watch(watch, path, travelled)
 
-    with state_kept(state, save, watch.last) as save_if_due:
+    with garbage_told(stream, source), state_kept(state, save, watch.last) as save_if_due:
         for last, rows, gap in stream.samples(watch.block):
             channels = dict(zip(stream.channels, rows.T, strict=True))
             samples, _ = _samples(channels, T, source, travelled)
@@ -168,6 +168,7 @@ def watch_rows(
                 watch.interrupt()
                 note(f"{source}: warning: rows are missing before {last:g} s, so learning starts again")
             watch.clock_reads(last - (len(rows) - 1) * T)
+            told.left_out = stream.left_out
             told.events(watch.take(samples))
             told.saw(channels, last, gap)
             save_if_due(watch.last)

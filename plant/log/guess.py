@@ -240,7 +240,7 @@ def missing_channels(
     asked = [name for one in wanted for name in one.split(" or ")]
     more = [name for name in _gained_by(found) if name not in asked]
     hint = hint_of(asked, headings, more)
-    return NoChannelError(f"{absent(wanted)}; the log has {names}{hint}", source)
+    return NoChannelError(f"{absent(wanted)}; the log has {names}", source, hint)
 
 
 def absent(wanted: Sequence[str]) -> str:

@@ -77,7 +77,7 @@
       const part = share(point, balance);
       tiles.push(tile(`${balance} balance, share of an alarm`, part === null ? "learning" : digits(part), part === null ? "" : "%", "100 % raises one"));
     }
-    tiles.push(tile("rows", String(point.rows), "", `${point.gaps} gaps, ${digits(point.time_s)} s`));
+    tiles.push(tile("rows", String(point.rows), "", `${point.gaps} gaps, ${point.left_out} left out, ${digits(point.time_s)} s`));
     gauges.replaceChildren(...tiles);
   }
 

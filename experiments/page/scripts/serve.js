@@ -40,7 +40,7 @@
   // The log's own message is for a terminal; here a log is looked into by dropping it again.
   function advice(log) {
     if (log.state !== "failed" || log.verb === "inspect") return [];
-    return [element("p", { class: "key-line" }, "To see what is in the file, choose inspect and drop it again.")];
+    return [element("p", { class: "key-line" }, "To see which columns the file has, choose inspect and drop it again; the page also gives the lines for a rig file.")];
   }
 
   function stateWords(log) {
@@ -53,7 +53,7 @@
     named.append(log.state === "done" ? element("a", { href: `logs/${log.id}` }, log.name) : log.name);
     const tick = element("input", { type: "checkbox", "aria-label": `Compare ${log.name}` });
     tick.checked = ticked.has(log.id);
-    tick.disabled = log.state !== "done";
+    tick.disabled = log.state !== "done" || log.verb === "inspect"; // which has no quantities
     tick.addEventListener("change", () => {
       if (tick.checked) ticked.add(log.id);
       else ticked.delete(log.id);

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from plant.errors import LogError, LogWarning
 from plant.log.columns import TIME, TRUTH, Column, resolve_columns
-from plant.log.formats.cells import not_a_number, number, wrong_width
+from plant.log.formats.cells import MOST_STRANGE, not_a_number, number, wrong_width
 from plant.log.guess import overlooked
 from plant.log.headings import cleaned
 
@@ -24,12 +24,22 @@ LONGEST_GAP = 1.0
 SAME_RATE = 0.01
 """By how much the rates of a stream, and of what it is continued or compared with, may differ [fraction]."""
 
+BURST = 50.0
+"""Rows in a row that may be garbage in a stream that was clean for long [count]."""
+
+AT_ONCE = 5.0
+"""Rows that may be garbage before any was clean [count]."""
+
 BEHIND = 1e-6
 """Least step in time, as a share of the time between samples, that counts as forward [fraction]."""
 
 
 class CsvStream:
     r"""The rows of a CSV, read as they come.
+
+    A row with too few or too many cells, or whose time is no number or does not increase, is left out. A cell that is
+    no number is a missing sample. Both are counted in `left_out`, and the stream is refused when there are too many: as
+    in a log (`MOST_STRANGE`) in the long run, and at most `BURST` in a row.
 
     Parameters
     ----------
@@ -41,8 +51,8 @@ class CsvStream:
     Raises
     ------
     LogError
-        If there is no header, a column is missing or of an unknown unit, the first rows are broken or fewer than two,
-        or time does not increase.
+        If there is no header, a column is missing or of an unknown unit, most of the first rows are garbage, they are
+        fewer than two, or time does not increase.
 
     Warns
     -----
@@ -59,6 +69,11 @@ class CsvStream:
 
     def __init__(self, lines: Iterable[str], mapping: Mapping[str, str] | None = None, *, source: str) -> None:
         self._source, self._row = source, 0
+        self._allowed = AT_ONCE
+        self.left_out = 0
+        """Rows that were garbage or had a cell of it, so far [count]."""
+        self.first_left_out = ""
+        """What was wrong with the first of them."""
         self._lines = iter(lines)
         header = next((line for line in self._lines if line.strip()), "")
         if not header:
@@ -82,12 +97,16 @@ class CsvStream:
         rows = self._rows()
         first = list(islice(rows, FIRST_ROWS))
         if len(first) < 2:
-            raise LogError(f"at least two rows are needed to know the time between samples, got {len(first)}", source)
-        self.sample_time = median(float(after[0] - before[0]) for before, after in pairwise(first))
+            said = f", and {self.left_out} that were garbage; {self.first_left_out}" if self.left_out else ""
+            raise LogError(
+                f"at least two rows are needed to know the time between samples, got {len(first)}{said}", source
+            )
+        times = [float(row[0]) for _, row in first]
+        self.sample_time = median(after - before for before, after in pairwise(times))
         """Time between samples [s]."""
         if not self.sample_time > 0.0:
             raise LogError(f"{TIME} must increase from row to row, got steps of {self.sample_time:g} s", source)
-        self.start_time = float(first[0][0])
+        self.start_time = times[0]
         """Time of the first row [s]."""
         self._pending = chain(first, rows)
 
@@ -106,18 +125,12 @@ class CsvStream:
         Raises
         ------
         LogError
-            If a row has too few or too many cells, a cell is not a number, or time does not increase.
+            If too many rows or cells are garbage.
         """
         waiting: list[NDArray[np.float64]] = []
         last, gap = self.start_time - self.sample_time, False
-        for number_of_row, row in enumerate(self._pending, start=1):
-            steps = (float(row[0]) - last) / self.sample_time
-            if not steps > BEHIND:
-                raise LogError(
-                    f"{TIME} must increase from row to row, got {row[0]:g} s after {last:g} s in row {number_of_row}",
-                    self._source,
-                )
-            missing = round(steps) - 1
+        for row in self._in_order():
+            missing = round((float(row[0]) - last) / self.sample_time) - 1
             if missing * self.sample_time > LONGEST_GAP:
                 if waiting:
                     yield last, np.array(waiting), gap
@@ -132,7 +145,49 @@ class CsvStream:
         if waiting:
             yield last, np.array(waiting), gap
 
-    def _rows(self) -> Iterator[NDArray[np.float64]]:
+    def _in_order(self) -> Iterator[NDArray[np.float64]]:
+        """Yield the rows whose time increases; a jump ahead is believed if the next row does not go back before it."""
+        last, held = self.start_time - self.sample_time, None
+        for place, row in self._pending:
+            if held is not None:
+                at, ahead = held
+                if last < row[0] < ahead[0]:
+                    self._leave_out(self._goes_back(float(row[0]), float(ahead[0]), at))
+                else:
+                    yield ahead
+                    last = float(ahead[0])
+                held = None
+            time = float(row[0])
+            if not (time - last) / self.sample_time > BEHIND:
+                self._leave_out(self._goes_back(time, last, place))
+            elif time - last > LONGEST_GAP + self.sample_time:
+                held = place, row
+            else:
+                yield row
+                last = time
+        if held is not None:
+            yield held[1]
+
+    def _goes_back(self, time: float, last: float, place: int) -> LogError:
+        said = f"{TIME} must increase from row to row, got {time:g} s after {last:g} s in row {place + 1}"
+        return LogError(said, self._source)
+
+    def _leave_out(self, error: LogError) -> None:
+        """Count what is garbage.
+
+        Raises
+        ------
+        LogError
+            As given, where there is too much of it.
+        """
+        self._allowed -= 1.0
+        if self._allowed < 0.0:
+            raise error
+        self.left_out += 1
+        self.first_left_out = self.first_left_out or error.message
+
+    def _rows(self) -> Iterator[tuple[int, NDArray[np.float64]]]:
+        """Yield rows, each with its place below the header, from 0."""
         for line in self._lines:
             if not line.strip():
                 continue
@@ -142,16 +197,27 @@ class CsvStream:
             if not line.endswith(("\n", "\r")):  # it may end in the middle of a digit
                 self.cut = True
                 return
+            place, self._row = self._row, self._row + 1
             if len(cells) != self._width:
-                raise wrong_width(self._source, self._width, len(cells), self._row)
-            yield np.array([self._value(one, cells[one.position]) for one in self._columns])
-            self._row += 1
+                self._leave_out(wrong_width(self._source, self._width, len(cells), place))
+                continue
+            row, wrong = np.full(len(self._columns), np.nan), None
+            for k, column in enumerate(self._columns):
+                try:
+                    row[k] = self._value(column, cells[column.position], place)
+                except LogError as error:
+                    wrong = wrong or error
+            if wrong is not None:
+                self._leave_out(wrong)
+            if row[0] == row[0]:
+                self._allowed = min(self._allowed + MOST_STRANGE, BURST)
+                yield place, row
 
-    def _value(self, column: Column, cell: str) -> float:
+    def _value(self, column: Column, cell: str, place: int) -> float:
         try:
             value = number(cell.replace(",", ".") if self._delimiter != "," else cell)
         except ValueError as error:
-            raise not_a_number(self._source, column.name, self._row, cell) from error
+            raise not_a_number(self._source, column.name, place, cell) from error
         if value in (float("inf"), float("-inf")) or (column.channel == TIME and value != value):
-            raise not_a_number(self._source, column.name, self._row, cell or "an empty cell")
+            raise not_a_number(self._source, column.name, place, cell or "an empty cell")
         return value * column.factor + column.offset

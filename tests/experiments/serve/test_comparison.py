@@ -53,6 +53,14 @@ def test_the_page_of_two_logs_shows_readers_units_and_no_tag_of_a_name() -> None
     assert "No certain difference" in compare_view(first, first)
 
 
+def test_logs_without_a_quantity_in_common_are_not_called_alike() -> None:
+    first = result(1.0, 0.1, probabilities={"major_leakage": 1.0})
+    page = compare_view(first, {"file": "b.csv", "message": "inspected"})
+    assert "The two logs cannot be compared: no quantity has an interval in both." in page
+    assert "No certain difference" not in page
+    assert "&lt; 0.1" not in page  # it was not diagnosed, so nothing is improbable
+
+
 def test_logs_of_one_name_are_told_apart_and_a_date_that_is_none_leaves_a_log_without_an_actuator() -> None:
     row = {"outcome": "ok", "found_condition": "normal"}
     rows = [("0" * 16, "run.csv", row), ("1" * 16, "run.csv", row), ("2" * 16, "P_2026-99-99.csv", row)]

@@ -96,8 +96,8 @@ def run(pipe: Pipe, state: Path, server: int = 41) -> None:
 
 
 def rows(*_: object) -> list[str]:
-    """Return three seconds of rows, the last of which is broken."""
-    return [HEADER, *(f"{0.01 * k:.2f},20,0.01\n" for k in range(300)), "3.00,x,0\n"]
+    """Return three seconds of rows, then garbage alone."""
+    return [HEADER, *(f"{0.01 * k:.2f},20,0.01\n" for k in range(300)), *["x,x,0\n"] * 60]
 
 
 def test_a_stream_that_breaks_tells_its_last_gauges_before_its_end(

@@ -12,7 +12,7 @@ LINE = re.compile(r'[a-z_]+(\{([a-z]+="([^"\\\n]|\\[\\"n])*",?)+\})? [0-9.e+-]+|
 
 
 def test_every_stream_tells_rows_values_and_how_far_each_balance_is_from_an_alarm() -> None:
-    gauges = {"rows": 5000, "gaps": 1, "received": 97.5, "values": {"position_m": 0.25, "speed": None}}
+    gauges = {"rows": 5000, "gaps": 1, "left_out": 3, "received": 97.5, "values": {"position_m": 0.25, "speed": None}}
     gauges |= {"scores": {"flow": 3.0, "force": 1.0}, "thresholds": {"flow": 12.0, "force": None}}
     state = {"name": "press", "state": "watching", "message": "", "gauges": gauges}
     quiet = {"name": "lift", "state": "failed", "message": "nobody answers", "gauges": None}
@@ -23,6 +23,7 @@ def test_every_stream_tells_rows_values_and_how_far_each_balance_is_from_an_alar
         'hydrostate_stream_up{stream="press"} 1',
         'hydrostate_stream_up{stream="lift"} 0',
         'hydrostate_stream_rows_total{stream="press"} 5000',
+        'hydrostate_stream_left_out_total{stream="press"} 3',
         'hydrostate_stream_age_seconds{stream="press"} 2.5',
         'hydrostate_stream_alarm_share{stream="press",balance="flow"} 0.25',
         'hydrostate_stream_alarms_total{stream="press"} 4',
@@ -33,7 +34,7 @@ def test_every_stream_tells_rows_values_and_how_far_each_balance_is_from_an_alar
 
 
 def test_a_number_that_is_none_is_left_out_and_not_written_as_a_word() -> None:
-    gauges = {"rows": 1, "gaps": 0, "received": 0.0, "values": {"a": float("inf"), "b": float("nan"), "c": 2.0}}
+    gauges = {"rows": 1, "gaps": 0, "left_out": 0, "received": 0.0, "values": {"a": float("inf"), "b": float("nan"), "c": 2.0}}
     gauges |= {"scores": {"flow": float("nan")}, "thresholds": {"flow": 1.0}}
     state = {"name": "press", "state": "watching", "message": "", "gauges": gauges}
     text = exposition({}, None, [(state, 0)], 1.0)

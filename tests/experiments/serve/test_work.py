@@ -67,6 +67,22 @@ def test_what_is_no_log_fails_with_a_reason_that_has_the_client_s_name(verb: str
     assert not (tmp_path / "page.html").exists()
 
 
+@pytest.mark.parametrize("columns", [(), (("position_m", "Weg:mm"),)])
+def test_wrong_columns_are_told_without_options_of_a_command_line(
+    columns: tuple[tuple[str, str], ...], tmp_path: Path
+) -> None:
+    log = tmp_path / "odd.csv"
+    log.write_text("time_s,Druck\n" + "".join(f"{0.01 * k:.2f},{k}\n" for k in range(100)))
+    found = work_on(task(log, tmp_path, plant="eha", columns=columns))
+    said = found.result["message"]
+    assert "the log has 'time_s', 'Druck'" in said.replace("\u00a0", " ")
+    assert work.OTHER_NAMES in said
+    assert "--" not in said
+    assert "hydrostate inspect" not in said
+    inspected = work_on(task(log, tmp_path, plant="eha", verb="inspect"))
+    assert inspected.said == work.GUESSED[False]
+
+
 def test_an_error_of_ours_is_told_to_the_client_and_ends_nothing(
     stack_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

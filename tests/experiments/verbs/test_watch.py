@@ -80,12 +80,21 @@ def test_a_stream_too_short_to_learn_from_says_so(log: Path) -> None:
     assert "before learning was over" in events[-1]["message"]
 
 
-def test_a_broken_row_ends_the_watch_with_a_sentence(log: Path) -> None:
+def test_a_row_of_garbage_does_not_end_the_watch_and_is_counted(log: Path) -> None:
     lines = log.read_text().splitlines(keepends=True)
     code, events, said = _run("-", given="".join([*lines[:3001], lines[3001].replace(",", ",x", 1), *lines[3002:]]))
+    assert code == 0
+    assert (events[-1]["outcome"], events[-1]["left_out"]) == ("ok", 1)
+    assert "warning: 1 row holds garbage, which was left out; column" in said
+    assert "in row 3001" in said
+
+
+def test_a_stream_of_nothing_but_garbage_ends_the_watch_with_a_sentence(log: Path) -> None:
+    lines = log.read_text().splitlines(keepends=True)
+    code, events, said = _run("-", given="".join([*lines[:3001], *(line.replace(",", ",x", 1) for line in lines[3001:])]))
     assert code == 2
     assert events[-1]["outcome"] == "failed"
-    assert "in row 3001" in said
+    assert "in row 30" in said
     assert "Traceback" not in said
 
 

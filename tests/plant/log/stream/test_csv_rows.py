@@ -66,19 +66,58 @@ def test_a_row_that_is_still_being_written_is_left_out() -> None:
     assert stream.cut
 
 
-@pytest.mark.parametrize(
-    ("row", "said"),
-    [
-        ("100,abc,1\n", "column 'motor_speed_rpm' must hold numbers, got 'abc' in row 101"),
-        ("100,inf,1\n", "column 'motor_speed_rpm' must hold numbers, got 'inf' in row 101"),
-        (",1,1\n", "column 'time_ms' must hold numbers, got 'an empty cell' in row 101"),
-        ("100,1\n", "every row must have 3 cells as the header has, got 2 in row 101"),
-        ("50,1,1\n", "time_s must increase from row to row, got 0.05 s after 0.099 s in row 101"),
-    ],
-)
-def test_a_broken_row_is_named(row: str, said: str) -> None:
-    with pytest.raises(LogError, match=f"bench: {said}"):
-        _taken([HEADER, *_rows(100), row])
+GARBAGE = [
+    ("100,abc,1\n", "column 'motor_speed_rpm' must hold numbers, got 'abc' in row 101"),
+    ("100,inf,1\n", "column 'motor_speed_rpm' must hold numbers, got 'inf' in row 101"),
+    (",1,1\n", "column 'time_ms' must hold numbers, got 'an empty cell' in row 101"),
+    ("100,1\n", "every row must have 3 cells as the header has, got 2 in row 101"),
+    ("50,1,1\n", "time_s must increase from row to row, got 0.05 s after 0.099 s in row 101"),
+    (HEADER, "column 'time_ms' must hold numbers, got 'time_ms' in row 101"),
+]
+
+
+@pytest.mark.parametrize(("row", "said"), GARBAGE)
+def test_a_row_of_garbage_is_left_out_and_the_stream_goes_on(row: str, said: str) -> None:
+    stream = CsvStream([HEADER, *_rows(100), row, *_rows(100, 101)], source="bench")
+    ((time, samples, gap),) = stream.samples(1000)
+    speed = samples[:, 0] / (2.0 * np.pi)
+    assert (len(samples), time, gap) == (201, pytest.approx(0.2), False)
+    assert np.isnan(speed[100])
+    np.testing.assert_allclose(np.delete(speed, 100), np.delete(np.arange(201.0), 100))
+    assert stream.left_out == 1
+    assert stream.first_left_out.startswith(said)
+
+
+@pytest.mark.parametrize("row", [row for row, _ in GARBAGE])
+def test_a_stream_that_is_garbage_from_some_row_on_is_refused(row: str) -> None:
+    lines = [HEADER, *_rows(20_000), *[row] * 60]
+    with pytest.raises(LogError, match=r"bench: .* in row 200[2-5]\d"):
+        _taken(lines, most=1000)
+
+
+def test_a_stream_with_two_rows_of_garbage_in_a_hundred_is_refused_in_the_end() -> None:
+    lines = [HEADER, *("garbled\n" if k % 50 == 49 else row for k, row in enumerate(_rows(20_000)))]
+    with pytest.raises(LogError, match="every row must have 3 cells as the header has, got 1 in row"):
+        _taken(lines, most=1000)
+
+
+def test_a_stream_with_one_row_of_garbage_in_two_hundred_goes_on() -> None:
+    lines = [HEADER, *("garbled\n" if k % 200 == 199 else row for k, row in enumerate(_rows(20_000)))]
+    stream = CsvStream(lines, source="bench")
+    assert sum(len(piece) for _, piece, _ in stream.samples(1000)) == 19_999
+    assert stream.left_out == 100
+
+
+def test_a_time_that_lost_its_point_is_no_gap() -> None:
+    lines = [HEADER, *_rows(100), "100000000,1,1\n", *_rows(100, 101)]
+    stream = CsvStream(lines, source="bench")
+    ((_, samples, gap),) = stream.samples(1000)
+    assert (len(samples), gap, stream.left_out) == (201, False, 1)
+
+
+def test_a_stream_of_something_else_says_what_came() -> None:
+    with pytest.raises(LogError, match=r"at least two rows are needed .* got 0, and 3 that were garbage; every row must"):
+        CsvStream([HEADER, "a\n", "b\n", "c\n"], source="bench")
 
 
 @pytest.mark.parametrize(
