@@ -45,6 +45,9 @@ CANDIDATES: Mapping[str, Sequence[str]] = {
 }
 """Units that are tried where a file gives none, the usual ones first."""
 
+LEAST_SHARE = 0.1
+"""How much each of two columns must move for a third to be their difference [fraction of what that moves]; judged."""
+
 UNIT_DOUBT = 0.7
 """What a guess is worth whose unit was guessed too [fraction]; judged."""
 
@@ -206,8 +209,10 @@ def _is_difference(means: Mapping[int, Array], place: int, one: int, other: int)
     if len(basis) < 10 or abs(_alike(means[one], means[other])) > 0.999:
         return False
     solution, *_ = np.linalg.lstsq(basis, means[place], rcond=None)
+    size = np.std(means[place])
     left = means[place] - basis @ solution
-    return bool(np.std(left) < 0.02 * np.std(means[place]) and solution[0] * solution[1] < 0.0)
+    shares = np.abs(solution[:2]) * np.std(basis[:, :2], axis=0)  # a column that is like one of two is no difference
+    return bool(np.std(left) < 0.02 * size and solution[0] * solution[1] < 0.0 and shares.min() > LEAST_SHARE * size)
 
 
 def _with_units(

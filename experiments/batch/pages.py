@@ -75,7 +75,7 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         _text("outcome"),
         _condition("found_condition", "class"),
         _condition("runner_up", "runner-up"),
-        Column("margin", "best is so many times as probable", digits=3),
+        Column("margin", "times as probable as runner-up", digits=3),
         Column("bulk_modulus_pa"),
         Column("bulk_modulus_std_pa", "std", digits=2),
         Column("quantities", "found", words=_quantities),
@@ -86,6 +86,9 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         _text("reason"),
     ),
 }
+
+LISTED = ("logs", "failures")
+"""Tables of cases one by one."""
 
 VERDICT_TONES: Mapping[str, str] = {"better": "good", "worse": "bad"}
 
@@ -107,7 +110,8 @@ def render_batch_report(manifest: Mapping[str, Any], tables: Tables, files: Mapp
     str
         The page; it loads nothing.
     """
-    shown = {name: _shown(tables[name]) for name in COLUMNS if name in tables}
+    listed = {name: one_row_a_log(table) if name in LISTED else table for name, table in tables.items()}
+    shown = {name: _shown(listed[name]) for name in COLUMNS if name in listed}
     columns = {
         name: [column for column in COLUMNS[name] if table[column.source].notna().any()]
         for name, table in shown.items()
@@ -116,12 +120,64 @@ def render_batch_report(manifest: Mapping[str, Any], tables: Tables, files: Mapp
         "manifest": manifest,
         "done": done,
         "shown": shown,
-        "rows": {name: len(table) for name, table in tables.items()},
+        "rows": {name: len(table) for name, table in listed.items()},
+        "failed": int(tables["outcomes"]["failed"].sum()) if "outcomes" in tables else 0,
         "most_listed": MOST_LISTED,
+        "found": _classes_in_words(tables["classes"]) if "classes" in tables else "",
         "pictures": {path.removeprefix("figures/").removesuffix(".svg") for path in files},
         **shown,
     }
     return render_page("batch/report.html", facts, columns, files)
+
+
+def _classes_in_words(classes: pd.DataFrame) -> str:
+    """Return how many logs have which class, in one line."""
+    told = [f"{in_words(row['class'])} in {row['logs']}" for row in classes.to_dict("records") if row["class"] != "none"]
+    none = int(classes.loc[classes["class"] == "none", "logs"].sum())
+    return ", ".join([*told, *([f"no class in {none}"] if none else [])])
+
+
+def one_row_a_log(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table in which a log that several verbs were asked about has one row, in the order of the first ones.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        With ``file`` and ``verb``; a log that a verb was asked about twice keeps its rows, as do cases without a file.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Each cell has what all verbs say, or what each says.
+    """
+    if not {"file", "verb"} <= set(table) or not len(table):
+        return table
+    rows: list[dict[str, Any]] = []
+    for _, group in table.groupby(table["file"].fillna(table.index.to_series().astype(str)), sort=False):
+        each = group.to_dict("records")
+        once = len(each) > 1 and len({one["verb"] for one in each}) == len(each)
+        merged = {name: _told_once(name, each) for name in table} if once else {}
+        rows += [merged] if once and not any(isinstance(one, _Several) for one in merged.values()) else each
+    return pd.DataFrame(rows, columns=table.columns)
+
+
+class _Several:
+    """Numbers that cannot stand in one cell."""
+
+
+def _told_once(name: str, rows: Sequence[Mapping[Any, Any]]) -> Any:
+    """Return what rows say in a column: once, or after each verb where they differ."""
+    told = {row["verb"]: row[name] for row in rows if not pd.isna(row[name])}
+    distinct = list(dict.fromkeys(told.values()))
+    if name == "verb":
+        return ", ".join(told)
+    if len(distinct) < 2:
+        return distinct[0] if distinct else None
+    if name in ("key", "trusted"):
+        return None
+    if not all(isinstance(one, str) for one in distinct):
+        return _Several()
+    return "; ".join(f"{verb}: {one}" for verb, one in told.items())
 
 
 def _shown(table: pd.DataFrame) -> pd.DataFrame:

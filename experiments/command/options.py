@@ -69,8 +69,8 @@ Columns: TypeAlias = Annotated[
     list[str] | None,
     option(
         "CHANNEL=NAME:UNIT",
-        "The name of a channel's column, with its unit if it is not SI: position_m=POS_MM:mm. Repeat the option, or "
-        "separate several by commas.",
+        "The name of a channel's column, with its unit if it is not SI: position_m=POS_MM:mm, or a sensor's scale: "
+        "position_m=CH2:20 mm/V. Repeat the option, or separate several by commas.",
     ),
 ]
 SampleTime: TypeAlias = Annotated[float | None, option("S", "Time between rows [s], for a log without a time column.")]

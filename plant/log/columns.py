@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from plant.errors import HydrostateError, LogError, MissingColumnError, RigError
 from plant.log.headings import Heading, cleaned
-from plant.units import conversion_to, converts
+from plant.log.scale import conversion_of
+from plant.units import converts
 
 CHANNELS: Mapping[str, str] = {
     "motor_speed_rad_s": "rad/s",
@@ -115,8 +116,8 @@ def resolve_columns(
         Column names, in the order of the log. ``Motor speed [rpm]`` is the motor's speed: a channel's name in any
         case, with its unit in brackets or said by the file.
     mapping : Mapping[str, str] or None
-        Foreign names by channel, with a unit after a colon where it is not SI: ``"POS_MM:mm"``. A mapped
-        channel is taken from there alone, whatever the other columns are called.
+        Foreign names by channel, with a unit after a colon where it is not SI: ``"POS_MM:mm"``, or a sensor's scale,
+        ``"CH2:50 bar/V"``. A mapped channel is taken from there alone, whatever the other columns are called.
 
     Raises
     ------
@@ -214,10 +215,10 @@ def _foreign(headings: Sequence[Heading], channel: str, spec: str, source: str) 
             f"column {name[:80]!r} is needed once for {channel}, the log has it {len(positions)} times", source
         )
     heading = headings[positions[0]]
-    unit = heading.unit if unit is None else unit
+    logged, unit = (None, heading.unit) if unit is None else (heading.unit, unit)
     if unit is None or channel.startswith(TRUTH):
         return Column(positions[0], heading.name, channel)
-    return Column(positions[0], heading.name, channel, *_conversion(unit, channel, heading.name, source))
+    return Column(positions[0], heading.name, channel, *_conversion(unit, channel, heading.name, source, logged))
 
 
 def _name_and_unit(spec: str) -> tuple[str, str | None]:
@@ -225,9 +226,11 @@ def _name_and_unit(spec: str) -> tuple[str, str | None]:
     return (name.strip(), unit.strip()) if colon else (spec.strip(), None)
 
 
-def _conversion(unit: str, channel: str, name: str, source: str) -> tuple[float, float]:
+def _conversion(
+    unit: str, channel: str, name: str, source: str, logged: str | None = None
+) -> tuple[float, float]:
     try:
-        return conversion_to(unit, UNITS[channel])
+        return conversion_of(unit, UNITS[channel], logged)
     except ValueError as error:
         raise LogError(f"column {name[:80]!r} cannot become {channel}: {error}", source) from error
 
@@ -266,7 +269,7 @@ def check_columns(mapping: Mapping[str, str]) -> dict[str, str]:
             raise RigError(f"{channel} wants a column as NAME or NAME:UNIT, got {spec!r}")
         if unit is not None and channel in UNITS:
             try:
-                conversion_to(unit, UNITS[channel])
+                conversion_of(unit, UNITS[channel])
             except ValueError as error:
                 raise RigError(f"{channel}={spec[:80]!r}: {error}") from error
     return dict(mapping)

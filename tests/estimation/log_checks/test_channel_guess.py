@@ -103,6 +103,16 @@ def test_a_pressure_that_is_the_difference_of_two_is_the_differential_one() -> N
     assert all("is_difference" not in told(one) for one in alike.values())
 
 
+def test_a_column_that_is_nearly_another_one_is_no_difference_of_two() -> None:
+    rng = np.random.default_rng(4)
+    reference = np.sin(T)
+    position = reference + 0.02 * np.sin(7.0 * T) + 1e-3 * rng.standard_normal(len(T))
+    voltage = -4.0 * np.sin(7.0 * T)
+    headings = [Heading(name) for name in ("t", "a", "b", "c")]
+    found = guess_channels(headings, dict(enumerate((T, voltage, position, reference))), HEALTHY)
+    assert "is_difference" not in [note.code for one in found for note in one.why]
+
+
 def test_a_pressure_that_goes_with_the_pump_says_so_and_one_that_does_not_says_nothing() -> None:
     found = guesses(t__s=T, rpm=SWING, p__bar=SWING + 0.5 * np.sin(9.0 * T))
     assert "follows" in told(found["differential_pressure_pa"])

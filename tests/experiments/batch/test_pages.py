@@ -3,9 +3,10 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 
-from experiments.batch.pages import _or_dash, _quantities, render_batch_report
+from experiments.batch.pages import _or_dash, _quantities, one_row_a_log, render_batch_report
 from experiments.batch.rows import SCHEMA
 from experiments.batch.summary import frame_of, summary_tables
 from experiments.page.numbers import MISSING
@@ -45,3 +46,31 @@ def test_what_was_found_in_a_log_is_short_and_its_path_names_no_machine() -> Non
     assert "velocity lost 0.000 %; bulk modulus 206.7 MPa" in page.replace("\N{NO-BREAK SPACE}", " ")
     assert "/home/ann" not in page
     assert '<td data-head="log">a.csv</td>' in page
+
+
+def test_a_log_that_was_asked_two_questions_has_one_row() -> None:
+    table = pd.DataFrame(
+        {
+            "file": ["a.csv", "b.csv", "a.csv", "b.csv", "c.csv", "c.csv", None, None],
+            "verb": ["diagnose", "diagnose", "estimate", "estimate", "estimate", "estimate", "diagnose", "estimate"],
+            "outcome": ["ok", "failed", "mismatch", "failed", "ok", "ok", "ok", "ok"],
+            "bulk_modulus_pa": [np.nan, np.nan, 2e8, np.nan, 1e8, 3e8, np.nan, np.nan],
+            "reason": [None, "no columns", None, "no columns", None, None, None, None],
+        }
+    )
+    made = one_row_a_log(table)
+    assert made["verb"].tolist() == ["diagnose, estimate"] * 2 + ["estimate"] * 2 + ["diagnose", "estimate"]
+    assert made["outcome"].tolist()[:2] == ["diagnose: ok; estimate: mismatch", "failed"]
+    assert made["bulk_modulus_pa"].tolist()[0] == 2e8
+    assert made["bulk_modulus_pa"].tolist()[2:4] == [1e8, 3e8]  # two methods of one verb stay apart
+    assert made["reason"].tolist()[1] == "no columns"
+
+
+def test_the_report_says_first_how_many_cases_failed() -> None:
+    rows = [{"plant": "log", "file": "a.csv", "verb": "diagnose", "outcome": one} for one in ("ok", "failed", "failed")]
+    rows[0]["found_condition"] = "minor_leakage"
+    tables = summary_tables(frame_of(pa.Table.from_pylist(rows, schema=SCHEMA)))
+    manifest = dict.fromkeys(("study", "question", "source", "config_hash", "rig", "python", "machine", "commit"), "x")
+    page = render_batch_report({**manifest, "cases": 3, "versions": {}}, tables, {}, 3)
+    assert "All 3 cases are done; 2 failed." in " ".join(page.split())
+    assert "Found in the logs: minor leakage in 1, no class in 2." in page
