@@ -132,9 +132,8 @@ def render_batch_report(manifest: Mapping[str, Any], tables: Tables, files: Mapp
 
 def _classes_in_words(classes: pd.DataFrame) -> str:
     """Return how many logs have which class, in one line."""
-    told = [f"{in_words(row['class'])} in {row['logs']}" for row in classes.to_dict("records") if row["class"] != "none"]
-    none = int(classes.loc[classes["class"] == "none", "logs"].sum())
-    return ", ".join([*told, *([f"no class in {none}"] if none else [])])
+    counts = zip(classes["class"], classes["logs"], strict=True)
+    return ", ".join(f"{'no class' if name == 'none' else in_words(name)} in {count}" for name, count in counts)
 
 
 def one_row_a_log(table: pd.DataFrame) -> pd.DataFrame:

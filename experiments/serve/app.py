@@ -305,12 +305,12 @@ def _offer_pages(app: FastAPI, service: Service) -> None:
         path = service.page(id)
         return FileResponse(path, media_type="text/html", headers={"Content-Security-Policy": policy_of_file(path)})
 
-    @app.get("/fleet", response_class=HTMLResponse, responses=why(404, page=True), tags=["pages"])
+    @app.get("/fleet", response_class=HTMLResponse, responses=why(404, 409, page=True), tags=["pages"])
     async def fleet() -> HTMLResponse:
         """Return the page of the fleet: one row per actuator, the worst on top."""
         return shown(await service.fleet())
 
-    @app.get("/actuator", response_class=HTMLResponse, responses=why(404, 422, page=True), tags=["pages"])
+    @app.get("/actuator", response_class=HTMLResponse, responses=why(404, 409, 422, page=True), tags=["pages"])
     async def actuator(name: Annotated[str, Query(min_length=1, max_length=400)]) -> HTMLResponse:
         """Return the page of an actuator with several logs: its trends and its last logs."""
         return shown(await service.actuator(name))

@@ -14,7 +14,11 @@ Diagnosed: TypeAlias = Sequence[tuple[str, str, Mapping[str, Any]]]
 """Identity, name and entries of a row of each log that was diagnosed."""
 
 
-def fleet_view(rows: Diagnosed, pattern: str | None, limits: Mapping[str, float], source: str) -> str:
+Repairs: TypeAlias = Mapping[str, Sequence[float]]
+"""When actuators were repaired, by name [day]."""
+
+
+def fleet_view(rows: Diagnosed, pattern: str | None, limits: Mapping[str, float], repairs: Repairs, source: str) -> str:
     """Return the page of the fleet.
 
     Parameters
@@ -25,10 +29,12 @@ def fleet_view(rows: Diagnosed, pattern: str | None, limits: Mapping[str, float]
         How logs are named.
     limits : Mapping[str, float]
         Limits of severities [their units].
+    repairs : Mapping[str, sequence of float]
+        As `Repairs` says.
     """
     from experiments.fleet.page import fleet_page
 
-    found, pages = _actuators(rows, pattern, limits)
+    found, pages = _actuators(rows, pattern, limits, repairs)
     links = {
         row.name: f"actuator?name={quote(row.name, safe='')}" if len(row.logs) > 1 else pages[row.last.file]
         for row in found
@@ -37,19 +43,19 @@ def fleet_view(rows: Diagnosed, pattern: str | None, limits: Mapping[str, float]
     return fleet_page(found, links, source, home=".")
 
 
-def actuator_view(rows: Diagnosed, pattern: str | None, limits: Mapping[str, float], name: str) -> str:
+def actuator_view(
+    rows: Diagnosed, pattern: str | None, limits: Mapping[str, float], repairs: Repairs, name: str
+) -> str:
     """Return the page of an actuator, empty if there is none of that name.
 
     Parameters
     ----------
-    rows, pattern
+    rows, pattern, limits, repairs
         As for `fleet_view`.
-    limits : Mapping[str, float]
-        Limits of severities [their units].
     """
     from experiments.fleet.actuator_page import actuator_page
 
-    found, pages = _actuators(rows, pattern, limits)
+    found, pages = _actuators(rows, pattern, limits, repairs)
     row = next((one for one in found if one.name == name), None)
     if row is None:
         return ""
@@ -57,7 +63,7 @@ def actuator_view(rows: Diagnosed, pattern: str | None, limits: Mapping[str, flo
 
 
 def _actuators(
-    rows: Diagnosed, pattern: str | None, limits: Mapping[str, float]
+    rows: Diagnosed, pattern: str | None, limits: Mapping[str, float], repairs: Repairs
 ) -> "tuple[list[ActuatorRow], dict[str, str]]":
     """Return the actuators, and the page of each log by its file."""
     from experiments.fleet.actuators import actuator_rows
@@ -75,4 +81,4 @@ def _actuators(
     blank = dict.fromkeys(("outcome", "found_condition", "reason", "quantities", "against"))
     table = [{**blank, **entries, "verb": "diagnose", "file": files[identity]} for identity, _, entries in rows]
     pages = {file: f"logs/{identity}" for identity, file in files.items()}
-    return actuator_rows(log_rows(table, names, limits)), pages
+    return actuator_rows(log_rows(table, names, limits), repairs), pages

@@ -11,7 +11,7 @@ from pebble import ProcessExpired
 
 from experiments.running.refusal import refused
 from experiments.serve.comparison import compare_view
-from experiments.serve.fleet_view import actuator_view, fleet_view
+from experiments.serve.fleet_view import Repairs, actuator_view, fleet_view
 from experiments.serve.jobs import BusyError, Jobs, log_file, page_file, phase_file
 from experiments.serve.limits import RefusedError, Room
 from experiments.serve.live import Stream, Streams
@@ -197,13 +197,16 @@ class Service:
         RefusedError
             If no log was diagnosed yet, or too much is asked at once.
         """
-        revision = await asyncio.to_thread(self.store.revision)
+        repairs = await asyncio.to_thread(self._repairs)
+        revision = f"{await asyncio.to_thread(self.store.revision)} {repairs}"
         page = self._page_of(revision)
         if page is None:
             rows = await asyncio.to_thread(lambda: list(self.store.diagnosed()))
             if not rows:
                 raise RefusedError(404, "no log was diagnosed yet")
-            page = self._page_of(revision) or self._begun(revision, rows)  # another request may have begun it meanwhile
+            page = self._page_of(revision) or self._begun(
+                revision, rows, repairs
+            )  # another request may have begun it meanwhile
         try:
             return await asyncio.shield(page)
         except RefusedError:
@@ -215,10 +218,13 @@ class Service:
         known = self._fleet
         return None if known is None or known[0] != revision or known[1].cancelled() else known[1]
 
-    def _begun(self, revision: str, rows: list[tuple[str, str, dict[str, Any]]]) -> "asyncio.Future[str]":
+    def _begun(
+        self, revision: str, rows: list[tuple[str, str, dict[str, Any]]], repairs: Repairs
+    ) -> "asyncio.Future[str]":
         """Begin the page of the fleet."""
         settings = self.settings
-        made = self._view(fleet_view, rows, settings.pattern, dict(settings.limits), settings.folder.resolve().name)
+        name = settings.folder.resolve().name
+        made = self._view(fleet_view, rows, settings.pattern, dict(settings.limits), repairs, name)
         page = asyncio.ensure_future(made)
         self._fleet = (revision, page)
         return page
@@ -248,10 +254,21 @@ class Service:
             If no log is of that actuator, or too much is asked at once.
         """
         rows = await asyncio.to_thread(lambda: list(self.store.diagnosed()))
-        page = await self._view(actuator_view, rows, self.settings.pattern, dict(self.settings.limits), name)
+        repairs = await asyncio.to_thread(self._repairs)
+        asked = self.settings.pattern, dict(self.settings.limits), repairs, name
+        page = await self._view(actuator_view, rows, *asked)
         if not page:
             raise RefusedError(404, f"no log is of an actuator {name!r}")
         return page
+
+    def _repairs(self) -> Repairs:
+        """Return when actuators were repaired, as the table says now."""
+        from experiments.fleet.outlook import read_maintenance
+
+        try:
+            return read_maintenance(self.settings.maintenance)
+        except HydrostateError as error:
+            raise RefusedError(409, f"the table of repairs cannot be used: {error}") from error
 
     async def _view(self, make: Any, *args: Any) -> str:
         try:

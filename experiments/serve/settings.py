@@ -36,6 +36,8 @@ class Settings:
         How logs are named, as `experiments.fleet.naming.by_pattern` takes it.
     limits : Mapping[str, float]
         Limits of severities [their units].
+    maintenance : Path or None
+        Table of repairs, as `experiments.fleet.outlook.read_maintenance` takes it; it is read for each page.
     workers : int
         Logs that are worked on at once [count].
     seconds : float
@@ -68,6 +70,7 @@ class Settings:
     columns: Mapping[str, str] = field(default_factory=dict[str, str])
     pattern: str | None = None
     limits: Mapping[str, float] = field(default_factory=dict[str, float])
+    maintenance: Path | None = None
     workers: int = 1
     seconds: float = 300.0
     memory: int = 3072 * MB

@@ -40,6 +40,10 @@ def serve(
     limit: Annotated[
         list[str] | None, option("NAME=VALUE", "Limit of a severity in its unit, such as leakage_flow=2.")
     ] = None,
+    maintenance: Annotated[
+        Path | None,
+        option("CSV", "Repairs, with the columns actuator and date; a trend restarts at a repair. Read for each page."),
+    ] = None,
     plant: Plant = None,
     rig: RigFile = None,
     columns: Columns = None,
@@ -65,11 +69,13 @@ def serve(
             f"serve needs FastAPI, uvicorn and pebble: pip install 'hydrostate[serve]' ({error})"
         ) from error
     from experiments.fleet.naming import by_pattern
+    from experiments.fleet.outlook import read_maintenance
     from experiments.verbs.fleet import limits_of_options
 
     load_actuator(plant, rig)
     if pattern is not None:
         by_pattern([], pattern)
+    read_maintenance(maintenance)
     if token is None and not is_loopback(host):
         token = secrets.token_urlsafe(24)
     settings = Settings(
@@ -82,6 +88,7 @@ def serve(
         columns=load_columns(columns),
         pattern=pattern,
         limits=limits_of_options(limit or []),
+        maintenance=None if maintenance is None else maintenance.resolve(),
         workers=workers,
         seconds=seconds,
         memory=memory * MB,

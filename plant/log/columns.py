@@ -226,9 +226,7 @@ def _name_and_unit(spec: str) -> tuple[str, str | None]:
     return (name.strip(), unit.strip()) if colon else (spec.strip(), None)
 
 
-def _conversion(
-    unit: str, channel: str, name: str, source: str, logged: str | None = None
-) -> tuple[float, float]:
+def _conversion(unit: str, channel: str, name: str, source: str, logged: str | None = None) -> tuple[float, float]:
     try:
         return conversion_of(unit, UNITS[channel], logged)
     except ValueError as error:

@@ -64,7 +64,7 @@ def test_logs_without_a_quantity_in_common_are_not_called_alike() -> None:
 def test_logs_of_one_name_are_told_apart_and_a_date_that_is_none_leaves_a_log_without_an_actuator() -> None:
     row = {"outcome": "ok", "found_condition": "normal"}
     rows = [("0" * 16, "run.csv", row), ("1" * 16, "run.csv", row), ("2" * 16, "P_2026-99-99.csv", row)]
-    page = fleet_view([*rows, ("3" * 16, "P_2026-01-02.csv", row)], "{actuator}_{date}.csv", {}, "here")
+    page = fleet_view([*rows, ("3" * 16, "P_2026-01-02.csv", row)], "{actuator}_{date}.csv", {}, {}, "here")
     assert "run.csv (000000)" in page
     assert "run.csv (111111)" in page
     assert "P_2026-99-99.csv" in page
@@ -109,7 +109,7 @@ def test_a_diagnosis_is_told_in_the_words_of_its_page_and_an_unknown_one_with_a_
 def test_an_actuator_of_several_logs_has_a_page_with_its_last_logs() -> None:
     row = {"outcome": "ok", "found_condition": "normal"}
     rows = [(f"{day}" * 16, f"P 1_2026-01-0{day}.csv", row) for day in (1, 2)]
-    named = ("{actuator}_{date}.csv", dict[str, float]())
+    named = ("{actuator}_{date}.csv", dict[str, float](), dict[str, list[float]]())
     fleet = fleet_view([*rows, ("3" * 16, "Q_2026-01-03.csv", row)], *named, "here")
     assert "actuator?name=P%201" in fleet
     assert f"logs/{'3' * 16}" in fleet

@@ -34,7 +34,8 @@ def test_every_stream_tells_rows_values_and_how_far_each_balance_is_from_an_alar
 
 
 def test_a_number_that_is_none_is_left_out_and_not_written_as_a_word() -> None:
-    gauges = {"rows": 1, "gaps": 0, "left_out": 0, "received": 0.0, "values": {"a": float("inf"), "b": float("nan"), "c": 2.0}}
+    gauges = {"rows": 1, "gaps": 0, "left_out": 0, "received": 0.0}
+    gauges |= {"values": {"a": float("inf"), "b": float("nan"), "c": 2.0}}
     gauges |= {"scores": {"flow": float("nan")}, "thresholds": {"flow": 1.0}}
     state = {"name": "press", "state": "watching", "message": "", "gauges": gauges}
     text = exposition({}, None, [(state, 0)], 1.0)

@@ -40,10 +40,12 @@ class Views:
 
     def __init__(self) -> None:
         self.rows: list[list[str]] = []
+        self.args: list[tuple[Any, ...]] = []
         self.error: Exception | None = None
 
     def view(self, make: Any, *args: Any) -> "Future[str]":
         del make
+        self.args.append(args)
         self.rows.append([identity for identity, *_ in args[0]])
         if isinstance(self.error, BusyError):
             raise self.error
@@ -100,6 +102,34 @@ def test_a_page_that_could_not_be_made_is_made_when_it_is_asked_for_again(
         return await service.fleet()
 
     assert asyncio.run(asked()) == "page 2"
+
+
+def test_a_repair_counts_as_soon_as_the_table_has_it_and_a_broken_table_is_named(
+    tmp_path: Path,
+    in_threads: None,  # noqa: ARG001
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    table = tmp_path / "repairs.csv"
+    table.write_text("actuator,date\n")
+    service = Service(Settings(folder=tmp_path / "kept", maintenance=table))
+    service.open()
+    views = Views()
+    monkeypatch.setattr(service.jobs, "view", views.view)
+
+    async def asked() -> None:
+        kept(service, "a")
+        await service.fleet()
+        table.write_text("actuator,date\npress,2026-01-02\n")
+        await service.fleet()
+        await service.actuator("press")
+        table.write_text("actuator,date\npress,soon\n")
+        with pytest.raises(RefusedError, match=r"the table of repairs cannot be used: .*repairs\.csv") as refused:
+            await service.fleet()
+        assert refused.value.status == 409
+
+    asyncio.run(asked())
+    service.close()
+    assert [list(one[3]) for one in views.args] == [[], ["press"], ["press"]]
 
 
 def test_one_who_stops_waiting_takes_the_page_from_no_one_else(

@@ -91,7 +91,8 @@ def test_a_row_of_garbage_does_not_end_the_watch_and_is_counted(log: Path) -> No
 
 def test_a_stream_of_nothing_but_garbage_ends_the_watch_with_a_sentence(log: Path) -> None:
     lines = log.read_text().splitlines(keepends=True)
-    code, events, said = _run("-", given="".join([*lines[:3001], *(line.replace(",", ",x", 1) for line in lines[3001:])]))
+    garbage = [line.replace(",", ",x", 1) for line in lines[3001:]]
+    code, events, said = _run("-", given="".join([*lines[:3001], *garbage]))
     assert code == 2
     assert events[-1]["outcome"] == "failed"
     assert "in row 30" in said

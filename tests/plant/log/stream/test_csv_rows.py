@@ -116,7 +116,7 @@ def test_a_time_that_lost_its_point_is_no_gap() -> None:
 
 
 def test_a_stream_of_something_else_says_what_came() -> None:
-    with pytest.raises(LogError, match=r"at least two rows are needed .* got 0, and 3 that were garbage; every row must"):
+    with pytest.raises(LogError, match=r"at least two rows .* got 0, and 3 that were garbage; every row must"):
         CsvStream([HEADER, "a\n", "b\n", "c\n"], source="bench")
 
 
