@@ -151,11 +151,11 @@ def one_row_a_log(table: pd.DataFrame) -> pd.DataFrame:
     """
     if not {"file", "verb"} <= set(table) or not len(table):
         return table
-    rows: list[dict[str, Any]] = []
+    rows: list[Mapping[Any, Any]] = []
     for _, group in table.groupby(table["file"].fillna(table.index.to_series().astype(str)), sort=False):
         each = group.to_dict("records")
         once = len(each) > 1 and len({one["verb"] for one in each}) == len(each)
-        merged = {name: _told_once(name, each) for name in table} if once else {}
+        merged = {name: _told_once(str(name), each) for name in table} if once else {}
         rows += [merged] if once and not any(isinstance(one, _Several) for one in merged.values()) else each
     return pd.DataFrame(rows, columns=table.columns)
 

@@ -30,7 +30,7 @@ def fleet_view(rows: Diagnosed, pattern: str | None, limits: Mapping[str, float]
     limits : Mapping[str, float]
         Limits of severities [their units].
     repairs : Mapping[str, sequence of float]
-        As `Repairs` says.
+        When actuators were repaired, by name [day].
     """
     from experiments.fleet.page import fleet_page
 
@@ -50,8 +50,12 @@ def actuator_view(
 
     Parameters
     ----------
-    rows, pattern, limits, repairs
+    rows, pattern
         As for `fleet_view`.
+    limits : Mapping[str, float]
+        Limits of severities [their units].
+    repairs : Mapping[str, sequence of float]
+        When actuators were repaired, by name [day].
     """
     from experiments.fleet.actuator_page import actuator_page
 
