@@ -167,12 +167,17 @@ def _no_class_message(found: "Finding") -> str:
 def _estimate_message(found: "Finding") -> str:
     from estimation.finding import NOT_OBSERVABLE_WITH_PRESSURE, OUTCOMES, Outcome
     from estimation.log_checks.channel_names import PRESSURE
-    from estimation.notes import ChannelCode
+    from estimation.notes import ChannelCode, RigCode
 
     modulus = found.quantities["bulk_modulus"]
     if modulus.value is None or modulus.ci95 is None:
         mistakes = [str(note) for note in found.gate.reasons if isinstance(note.code, ChannelCode)]
         seen = found.outcome is Outcome.NOT_OBSERVABLE and PRESSURE in found.channels
+        volume = next((str(note) for note in found.notes if note.code == RigCode.VOLUME_DIFFERS), None)
+        if seen and volume and not mistakes:
+            return clauses(
+                [f"no value of bulk modulus: {volume}; correct chamber_volume, then estimate this log again"]
+            )
         return clauses(mistakes or [NOT_OBSERVABLE_WITH_PRESSURE if seen else OUTCOMES[found.outcome]])
     low, high = (1e-6 * end for end in modulus.ci95)
     said = [f"bulk modulus {1e-6 * modulus.value:.2f} MPa, 95 % interval {low:.2f} to {high:.2f} MPa"]

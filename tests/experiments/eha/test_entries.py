@@ -9,7 +9,7 @@ import pytest
 
 from estimation.eha.estimate import estimate_log
 from estimation.finding import Finding, Outcome, Quantity
-from estimation.notes import EstimateCode, SensorCode
+from estimation.notes import EstimateCode, RigCode, SensorCode
 from experiments.command.json_output import plain
 from experiments.eha.entries import (
     COSTS,
@@ -227,3 +227,17 @@ def test_pressure_is_asked_for_where_it_was_not_used(pressure: bool) -> None:
     message = estimate_entries(unseen)["message"]
     assert ("Log differential pressure" in message) is not pressure
     assert "larger, slower steps" in message
+
+
+def test_a_wrong_volume_in_the_rig_file_is_mended_before_another_drive_is_tried() -> None:
+    found = estimate_log(log(), Rig("rig", EhaParameters()))
+    differs = RigCode.VOLUME_DIFFERS.note(percent=53.0, half_width=5.0)
+    unseen = replace(
+        found,
+        outcome=Outcome.NOT_OBSERVABLE,
+        quantities={**found.quantities, "bulk_modulus": Quantity(None, "Pa")},
+        notes=(*found.notes, differs),
+    )
+    message = estimate_entries(unseen)["message"]
+    assert "53 ± 5 % of that in the rig file; correct chamber_volume" in message
+    assert "slower steps" not in message
