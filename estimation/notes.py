@@ -226,7 +226,7 @@ class RigCode(Code):
     )
     AREA_TO_DISPLACEMENT = (
         "the ratio of pump displacement to piston area is {percent:.2f} ± {half_width:.2f} % of that in the rig file: "
-        "one of the two is wrong, and the log does not show which"
+        "one of the two is wrong, or (below 100 %) the pump is worn, and the log does not show which"
     )
     PUMP_WORN = (
         "the pump delivers {percent:.1f} ± {half_width:.1f} % of its displacement: it is worn, or displacement or "

@@ -62,6 +62,10 @@ class ClassCode(Code):
     NOT_EXCLUDED = (
         "without differential_pressure_pa, other faults are not excluded: {faults} would explain the log about as well"
     )
+    WEAR_NOT_TOLD = (
+        "the log does not tell a worn pump from a sound one: that the pump delivers less than {limit:.0f} % of its "
+        "displacement, which is none of the nine conditions, has a probability of {percent:.0f} %"
+    )
     MODELS_DIVERGED = "the models of all conditions diverged; check units and rig file"
     MODELS_ALIKE = (
         "no class: the models of all conditions move alike under this drive; move the actuator, ideally in steps"

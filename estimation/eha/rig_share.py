@@ -156,6 +156,27 @@ def wear_left_open(remarks: Sequence[Note]) -> float:
     return 0.005 * float(said[0]) if said else 0.0
 
 
+def delivery_left_open(remarks: Sequence[Note]) -> tuple[float, float] | None:
+    """Return what a log says of the pump's delivery, where it does not tell wear from leakage.
+
+    Parameters
+    ----------
+    remarks : sequence of Note
+        What a fit leaves open.
+
+    Returns
+    -------
+    tuple of float, or None
+        Logarithm of the delivery over the displacement, and its standard deviation, with what is presumed of a pump
+        [dimensionless]; None where the log tells, or a worn pump was found.
+    """
+    for note in remarks:
+        if note.code is RigCode.WEAR_NOT_EXCLUDED:
+            width, less = float(note.data["half_width"]), float(note.data["percent"])
+            return 0.01 * (width - less), 0.005 * width
+    return None
+
+
 def with_wear(spreads: Mapping[str, Spread], remarks: Sequence[Note]) -> Mapping[str, Spread]:
     """Return how far each entry of a rig may be off, the pump's displacement downwards by wear that is left open.
 

@@ -103,9 +103,11 @@ def advice_for(
         found.append(AdviceCode.LOG_PRESSURE.note())
     if ClassCode.FRICTION_NOT_VISIBLE in unclear:
         found.append(AdviceCode.MOVE_PISTON.note())
-    if ClassCode.LEAKAGE_AND_BIAS_ALIKE in unclear:
+    alike = ClassCode.LEAKAGE_AND_BIAS_ALIKE in unclear
+    if alike or ClassCode.WEAR_NOT_TOLD in unclear:
         speeds = speeds_held(record)
-        found.append((AdviceCode.MORE_SPEEDS if speeds < 2 else AdviceCode.CLOSER_SPEEDS).note(speeds=speeds))
+        if speeds < 2 or alike:
+            found.append((AdviceCode.MORE_SPEEDS if speeds < 2 else AdviceCode.CLOSER_SPEEDS).note(speeds=speeds))
     if probabilities and max(probabilities.values()) < SURE * sum(probabilities.values()):
         if record.duration < LONG_ENOUGH:
             found.append(AdviceCode.LOG_LONGER.note(duration_s=record.duration))

@@ -115,7 +115,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     if verdict.outcome is not Outcome.OK:
         return replace(found, evidence=EhaEvidence(estimate, scores, None))
     try:
-        judged = partial(_judged, parameters=rig.parameters, estimate=estimate, plain=plain)
+        judged = partial(_judged, parameters=rig.parameters, case=case, plain=plain)
         diagnosis, around, named = over_drift(judged, log, case.strange)
     except (RigError, LogError) as error:
         without = _without_class(found, log, scores, distinct((*case.doubts, *verdict.against)))
@@ -207,10 +207,10 @@ def _of_clean(log: CleanLog, parameters: EhaParameters) -> Diagnosis:
     return diagnose_clean(log, actuator_of(parameters))
 
 
-def _judged(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain) -> Loaded:
+def _judged(log: CleanLog, parameters: EhaParameters, case: _Case, plain: _Plain) -> Loaded:
     """Return a diagnosis with what the balance of flows says of the pump."""
-    found = _diagnosed(log, parameters, estimate, plain)
-    told = whatever_the_pump_delivers(found.diagnosis, actuator_of(found.parameters), estimate)
+    found = _diagnosed(log, parameters, case.estimate, plain)
+    told = whatever_the_pump_delivers(found.diagnosis, actuator_of(found.parameters), case.estimate, case.strange)
     return found._replace(diagnosis=told)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from estimation.fits.explaining.finished import ALIKE, REACHED
 from estimation.fits.explaining.form_fit import weighed
 from estimation.fits.explaining.likeliest import NEARLY_AS_GOOD, apart, led_on, likeliest, ranked, settled_each
-from estimation.fits.explaining.promises import promised_beside, promising
+from estimation.fits.explaining.promises import NOTHING_PROMISED, Promise, promised_beside, promising
 from estimation.fits.explaining.screened import NEARLY, hopeful, nearing, screened
 from estimation.fits.explaining.settled import coarse, gone
 from estimation.fits.explaining.thinned import FEW, Spared, left_by, skipping
@@ -229,11 +229,11 @@ def _begun_again(log: GreyBoxLog, first: Tried) -> Mapping[str, float]:
     return {**ended, **gone(log, ended)}
 
 
-def _delivery_open(log: GreyBoxLog, best: Tried) -> float:
-    """Return how well a log tells what the pump delivers beside what explains it; see `Explanation`."""
+def _delivery_open(log: GreyBoxLog, best: Tried) -> Promise:
+    """Return what another delivery of the pump promises beside what explains a log; see `Explanation`."""
     if DELIVERY.free[0] in best.values:
-        return 0.0
-    return promised_beside(delayed(log, best.delays), best.together, best.values, DELIVERY).deviation
+        return NOTHING_PROMISED
+    return promised_beside(delayed(log, best.delays), best.together, best.values, DELIVERY)
 
 
 def _distinct(tried: Iterable[Tried]) -> list[Tried]:

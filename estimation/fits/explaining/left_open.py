@@ -1,15 +1,16 @@
-"""`valves_unseen(fit)`, `wear_open(deviation)`: what a fit leaves open that would pass for a sound actuator."""
+"""`valves_unseen(fit)`, `wear_open(promise)`: what a fit leaves open that would pass for a sound actuator."""
 
 import numpy as np
 
+from estimation.fits.explaining.promises import Promise
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.models.completed_flow import CRACKS
 from estimation.notes import RigCode
 from plant.notes import Note
 
 OPEN_DELIVERY = 0.1
-"""Standard deviation of the logarithm of the pump's delivery from which a worn pump is not excluded
-[dimensionless]: one that delivers 80 % lies within two of it."""
+"""How far the logarithm of the pump's delivery may lie below that of a sound one, within two deviations, from which a
+worn pump is not excluded [dimensionless]: the probability of one that delivers less than 90 % is then 2 % or more."""
 
 
 def valves_unseen(fit: GreyBoxFit) -> tuple[Note, ...]:
@@ -32,17 +33,21 @@ def valves_unseen(fit: GreyBoxFit) -> tuple[Note, ...]:
     return (RigCode.MAKEUP_UNSEEN.note(side=unseen[0]),) if len(unseen) == 1 else ()
 
 
-def wear_open(deviation: float) -> tuple[Note, ...]:
-    """Return a note where a log does not tell a worn pump from leakage.
+def wear_open(delivery: Promise) -> tuple[Note, ...]:
+    """Return a note where a log does not tell a worn pump from leakage or from a flow bias.
 
     Parameters
     ----------
-    deviation : float
-        Of the logarithm of what the pump delivers, beside all that is fitted [dimensionless].
+    delivery : Promise
+        What a delivery of its own promises beside all that is fitted.
 
     Returns
     -------
     tuple of Note
         One at most.
     """
-    return (RigCode.WEAR_NOT_EXCLUDED.note(percent=200.0 * deviation),) if deviation > OPEN_DELIVERY else ()
+    width = 2.0 * delivery.deviation
+    less = width - delivery.size
+    if not less > OPEN_DELIVERY:
+        return ()
+    return (RigCode.WEAR_NOT_EXCLUDED.note(percent=100.0 * less, half_width=100.0 * width),)

@@ -36,7 +36,7 @@ class Promise(NamedTuple):
     gain : float
         In log-likelihood, Rao's score statistic over two [dimensionless].
     size : float
-        How far what is freed first would move in its fitted coordinate: for a logarithm a relative change
+        How far up what is freed first would move in its fitted coordinate: for a logarithm a relative change
         [dimensionless].
     deviation : float
         How well that coordinate would then be known, what is presumed of it included [dimensionless].
@@ -45,6 +45,10 @@ class Promise(NamedTuple):
     gain: float
     size: float
     deviation: float
+
+
+NOTHING_PROMISED = Promise(0.0, 0.0, 0.0)
+"""Of what is known already."""
 
 
 def promised(
@@ -192,7 +196,7 @@ def _promises(
         names = list(dict.fromkeys((*own, *one.free)))
         gain, moved, variances = step(names)
         place = names.index(one.free[0])
-        promises.append(Promise(gain - before, float(abs(moved[place])), float(variances[place]) ** 0.5))
+        promises.append(Promise(gain - before, -float(moved[place]), float(variances[place]) ** 0.5))
     return promises
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from estimation.fits.explaining.settled import NEAR, at_end, coarse
 from estimation.fits.explaining.tried import Tried
 from estimation.fits.explaining.wide_log import usual_values
-from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_starts
+from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_starts, worn_start
 from estimation.fits.greybox.descent import descend
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.hypotheses import Hypothesis
+from estimation.fits.hypotheses import DELIVERY, Hypothesis
 
 SCREENING = 7
 """Evaluations of the model for a start [count]."""
@@ -51,10 +51,11 @@ def screened(
     asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
     found = at_end(together[:-1])
     problems = [(delays, freed(coarse(log, delays, together, every), together, *found)) for delays in asked]
-    begun = list(product(problems, own_starts(log, together[-1])))
+    begun = own_starts(log, together[-1])
     for start in starts:
         tried: list[Tried] = []
-        for (delays, problem), own in begun:
+        worn = worn_start(log, {**absent, **start}) if together[-1] == DELIVERY else ()
+        for (delays, problem), own in product(problems, (*begun, *worn)):
             guess = problem.model.theta({**absent, **start, **own})
             bounds = flow_bounds(problem.model, [guess], log)
             point = descend(problem.at, guess, SCREENING, bounds, radius=NEAR, wanted=wanted)

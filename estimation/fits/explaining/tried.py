@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from estimation.fits.explaining.promises import NOTHING_PROMISED, Promise
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.hypotheses import Hypothesis
@@ -78,9 +79,8 @@ class Explanation:
         How many other sets of hypotheses explain the log about as well.
     stated_pressure : float
         Absolute pressure that bulk modulus is stated at, where the oil holds air [Pa].
-    delivery_open : float
-        How well the log tells what the pump delivers beside them, as a standard deviation of the logarithm
-        [dimensionless]; zero where that is part of the explanation.
+    delivery_open : Promise
+        What another delivery of the pump promises beside them; nothing where that is part of the explanation.
     """
 
     names: tuple[str, ...]
@@ -89,4 +89,4 @@ class Explanation:
     fit: GreyBoxFit
     rivals: int
     stated_pressure: float
-    delivery_open: float = 0.0
+    delivery_open: Promise = NOTHING_PROMISED

@@ -12,8 +12,9 @@ from estimation.fits.explaining.wide_log import usual_values
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import search_bounds
-from estimation.fits.hypotheses import LEAKAGE_TURBULENT, LIMITS, Hypothesis
-from estimation.log_checks.channel_names import POSITION
+from estimation.fits.greybox.ridge import Ridge
+from estimation.fits.hypotheses import DELIVERY, LEAKAGE_TURBULENT, LEAST_DELIVERY, LIMITS, Hypothesis
+from estimation.log_checks.channel_names import POSITION, SPEED
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.wide_flow import (
@@ -46,6 +47,11 @@ ADIABATIC = 1.4
 LEAST_GAS = 1.0
 """Least gas of the inner circuit's accumulator, in chamber volumes; judged. With less its pressure would follow every
 stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
+
+MOST_WORN = 0.2
+"""Most that a worn pump loses of its displacement where the search for it begins [fraction]; judged."""
+
+FLOW_BIAS = "flow_bias"
 
 POSITION_ZERO = "position_zero"
 
@@ -89,7 +95,51 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedP
     late = {one.late for one in together}
     log = replace(log, timed=tuple(channel for channel in log.timed if channel not in late))
     form = TURBULENT_FLOW_FORM if set(LEAKAGE_TURBULENT.free) <= set(extra) else WIDE_FLOW_FORM
-    return FreedProblem(form, log, tuple(dict.fromkeys((*known, *extra))), LINEAR)
+    return FreedProblem(form, log, tuple(dict.fromkeys((*known, *extra))), LINEAR, Ridge(DELIVERY.free[0], FLOW_BIAS, flow_speed(log)))
+
+
+def flow_speed(log: GreyBoxLog) -> float:
+    """Return the motor speed at which a pump loses as much flow as one flow bias does at all speeds of a log.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+
+    Returns
+    -------
+    float
+        Least squares over the samples, weighted by speed [rad/s]; zero where the motor rests.
+    """
+    speed = np.abs(log.drives[:, WIDE_FLOW_FORM.drives.index(SPEED)])
+    total = float(np.nansum(speed))
+    return float(np.nansum(speed * speed)) / total if total > 0.0 else 0.0
+
+
+def worn_start(log: GreyBoxLog, plain: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
+    """Return where the search for a pump's delivery begins too: with a healthy flow bias, and all else lost by wear.
+
+    At one speed the two nearly cancel, and a search along their ridge ends before it comes to a worn pump.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    plain : Mapping[str, float]
+        What the plain form found [SI].
+
+    Returns
+    -------
+    sequence of Mapping[str, float]
+        One first guess, none where the flow bias is hardly larger than a healthy one [SI].
+    """
+    usual = usual_values(log)
+    displacement, bias = usual[DELIVERY.free[0]], plain[FLOW_BIAS]
+    full = displacement * flow_speed(log)
+    lost = min((bias - usual[FLOW_BIAS]) / full, MOST_WORN) if full > 0.0 else 0.0
+    if lost <= LEAST_DELIVERY:
+        return []
+    return [{DELIVERY.free[0]: (1.0 - lost) * displacement, FLOW_BIAS: bias - lost * full}]
 
 
 def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]]:

@@ -17,6 +17,7 @@ from estimation.fits.greybox.kernel import compile_kernel
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.normal_loops import fill_differences
 from estimation.fits.greybox.problem import OUTLIER, Problem, weighed
+from estimation.fits.greybox.ridge import Ridge
 from estimation.fits.greybox.side_by_side import LANES, MANY, ResidualsRun, compile_side_by_side
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
@@ -47,9 +48,18 @@ class FreedProblem(Problem):
         Parameters that are fitted.
     linear : Mapping[str, float]
         Typical sizes of parameters that are not fitted as logarithms [SI].
+    ridge : Ridge, optional
+        Two parameters that nearly cancel.
     """
 
-    def __init__(self, model: GreyBoxModel, log: GreyBoxLog, free: Sequence[str], linear: Mapping[str, float]) -> None:
+    def __init__(
+        self,
+        model: GreyBoxModel,
+        log: GreyBoxLog,
+        free: Sequence[str],
+        linear: Mapping[str, float],
+        ridge: Ridge | None = None,
+    ) -> None:
         sizes = tuple((name, linear[name]) for name in free if name in linear)
         if not log.gaps.size:  # what a gap leaves open costs as much again to follow
             model = replace(model, jump=())
@@ -60,6 +70,8 @@ class FreedProblem(Problem):
         self._kernels: dict[int, ResidualsRun] = {}
         self._units = np.array([linear.get(name, np.nan) for name in free])
         self._logarithmic = np.isnan(self._units)
+        self._ridge = ridge
+        self._placed = None if ridge is None else ridge.placed(self.model.unknowns)
 
     @classmethod
     def of(cls, model: GreyBoxModel, log: GreyBoxLog) -> "FreedProblem":
@@ -87,7 +99,7 @@ class FreedProblem(Problem):
 
     def on(self, log: GreyBoxLog) -> "FreedProblem":
         """Return the same problem of another log; see `Problem.on`."""
-        return FreedProblem(self._bare, log, self.model.unknowns, self._sizes)
+        return FreedProblem(self._bare, log, self.model.unknowns, self._sizes, self._ridge)
 
     def at_each(self, thetas: Sequence[Array]) -> list[Point]:
         """Return the misfit at several points, which is quicker than one after another.
@@ -104,10 +116,10 @@ class FreedProblem(Problem):
         """
         if self.log.passes_on:  # each has a variance of its own
             return [self.at(theta) for theta in thetas]
-        rows = np.vstack([self._rows(_nudged(theta), self.log.parameters) for theta in thetas])
+        rows = np.vstack([self._rows(self._nudged(theta), self.log.parameters) for theta in thetas])
         found = self._residuals(rows, None, self._variances(thetas[0]))[..., : len(rows)]
         parts = np.split(found, len(thetas), axis=-1)
-        return [self._point(at, *weighed(*_differences(part, len(at)))) for at, part in zip(thetas, parts, strict=True)]
+        return [self._point(at, *weighed(*self._slopes(part, at))) for at, part in zip(thetas, parts, strict=True)]
 
     def at_beside(self, theta: Array, known: Mapping[str, Array]) -> Point:
         """Return the misfit at a point at which the slopes of some unknowns are known, for a fit has found them.
@@ -126,13 +138,15 @@ class FreedProblem(Problem):
         """
         names = self.model.unknowns
         asked = [place for place, name in enumerate(names) if name not in known]
-        rows = self._rows(_nudged(theta)[[0, *(1 + place for place in asked)]], self.log.parameters)
+        rows = self._rows(self._nudged(theta)[[0, *(1 + place for place in asked)]], self.log.parameters)
         here, columns = _differences(self._residuals(rows, None, self._variances(theta)), len(asked))
         slopes = np.empty((*here.shape, len(names)))
         slopes[..., asked] = columns
         for place, name in enumerate(names):
             if name in known:
                 slopes[..., place] = known[name].reshape(here.shape)
+        if self._placed is not None and names[self._placed.nudged] not in known:
+            self._placed.turn_back(slopes, theta)
         return self._point(theta, *weighed(here, slopes))
 
     def costs(self, thetas: Sequence[Array]) -> Array:
@@ -235,8 +249,8 @@ class FreedProblem(Problem):
         own = drives is None and parameters is self.log.parameters
         here, columns = self._remembered(theta, variance) if own else (None, None)
         if here is None or columns is None:
-            found = self._residuals(self._rows(_nudged(theta), parameters), drives, variance)
-            here, columns = _differences(found, len(theta))
+            found = self._residuals(self._rows(self._nudged(theta), parameters), drives, variance)
+            here, columns = self._slopes(found, theta)
             if own and len(here[0]) <= MOST_REMEMBERED:
                 self._last = [*self._last[-1:], (theta.copy(), variance, here, columns)]
         if errors.size:
@@ -252,6 +266,20 @@ class FreedProblem(Problem):
             if np.array_equal(point, theta) and np.array_equal(known, variance):
                 return here, columns
         return None, None
+
+    def _nudged(self, theta: Array) -> Array:
+        """Return a point and its neighbours, a row each; one that is on a ridge lies along it."""
+        points = theta + NUDGE * _neighbours(len(theta))
+        if self._placed is not None:
+            self._placed.turn(points, theta, NUDGE)
+        return points
+
+    def _slopes(self, found: Array, theta: Array) -> tuple[Array, Array]:
+        """Return the residuals at a point and their slopes, of those at `_nudged`."""
+        here, slopes = _differences(found, len(theta))
+        if self._placed is not None:
+            self._placed.turn_back(slopes, theta)
+        return here, slopes
 
     def _rows(self, thetas: Array, parameters: Array) -> Array:
         """Return the parameters at some points, shape (points, parameters)."""
@@ -294,11 +322,6 @@ class FreedProblem(Problem):
 def _by_itself(model: GreyBoxModel, *given: Any) -> tuple[float, Array, Array]:
     """Run a model by itself: most problems run it side by side alone, and need not load this kernel."""
     return compile_kernel(model)(*given)
-
-
-def _nudged(theta: Array) -> Array:
-    """Return a point and its neighbours, a row each."""
-    return theta + NUDGE * _neighbours(len(theta))
 
 
 @cache

@@ -4,33 +4,42 @@ Where pressure is logged, the balance says what the pump delivers, or that the l
 (`estimation.fits.flow.fit`). It follows the oil to the sensors' noise, and a circuit follows the piston to a few
 percent: what a circuit says of the pump beside a balance that holds is what it leaves of friction. Without pressure,
 circuits with a worn pump are compared (`other_faults`). If a log does not tell, a pump that delivers less leaves less
-leakage to it, and bulk modulus is larger by as much.
+leakage to it, and bulk modulus is larger by as much. The probability that the pump is worn is then none of the nine's.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from estimation.eha.explained import WORN
 from estimation.eha.result import BulkModulusEstimate
-from estimation.eha.rig_share import wear_left_open
+from estimation.eha.rig_share import delivery_left_open, wear_left_open
+from estimation.finding import NORMAL_95
 from estimation.fits.hypotheses import OFFSET
+from estimation.notes import RigCode
 from faults.diagnosis.beyond_nine.near_enough import lies_beside, only_beside
-from faults.diagnosis.beyond_nine.other_faults import DELIVERIES, faults_outside, presumed_of_wear
+from faults.diagnosis.beyond_nine.other_faults import DELIVERIES, WORTH_SAYING, faults_outside, presumed_of_wear
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.class_regions import fit_classes, is_stuck
 from faults.diagnosis.evidence import Scoreboard, bounded
-from faults.notes import AgainstCode
+from faults.notes import AgainstCode, ClassCode
 from plant.arrays import Array
 from plant.notes import Note
 
 OFFSETS = {OFFSET.name, "pressure_drift"}
 """Hypotheses that an offset of the speed may pass for."""
 
+UNLIKELY = math.log(1e-3)
+"""Log-likelihood of a delivery below the likeliest one's from which no circuit is fitted with it [dimensionless]."""
 
-def whatever_the_pump_delivers(diagnosis: Diagnosis, actuator: Actuator, estimate: BulkModulusEstimate) -> Diagnosis:
+
+def whatever_the_pump_delivers(
+    diagnosis: Diagnosis, actuator: Actuator, estimate: BulkModulusEstimate, strange: Sequence[Note] = ()
+) -> Diagnosis:
     """Return a diagnosis with what the balance of flows says of the pump.
 
     Parameters
@@ -41,19 +50,54 @@ def whatever_the_pump_delivers(diagnosis: Diagnosis, actuator: Actuator, estimat
         The healthy actuator, with a pump that delivers what the balance found.
     estimate : BulkModulusEstimate
         The balance, and what it leaves open.
+    strange : sequence of Note
+        What explains the log.
 
     Returns
     -------
     Diagnosis
         Where the balance tells what the pump delivers, without the circuit's doubt of it; where it leaves that open,
-        with classes weighed over it (`probabilities_over_wear`); else, and without pressure, the same.
+        with classes weighed over it (`probabilities_over_wear`); else, and without pressure, the same. Classes sum to
+        the probability that the pump is not worn (`chance_of_wear`).
     """
     if known := known_of_flow(estimate):
-        return replace(diagnosis, against=tuple(note for note in diagnosis.against if note.code not in known))
-    found = probabilities_over_wear(diagnosis.scoreboard, actuator, estimate.remarks, shipped_calibration())
-    if found is None:
-        return diagnosis
-    return replace(diagnosis, probabilities=found)
+        told = replace(diagnosis, against=tuple(note for note in diagnosis.against if note.code not in known))
+    else:
+        found = probabilities_over_wear(diagnosis.scoreboard, actuator, estimate.remarks, shipped_calibration())
+        told = diagnosis if found is None else replace(diagnosis, probabilities=found)
+    chance = chance_of_wear((*estimate.remarks, *strange))
+    if chance < WORTH_SAYING:
+        return told
+    note = ClassCode.WEAR_NOT_TOLD.note(percent=100.0 * chance, limit=100.0 * WORN)
+    left = {name: (1.0 - chance) * share for name, share in told.probabilities.items()}
+    return replace(told, probabilities=left, not_told=(*told.not_told, note))
+
+
+def chance_of_wear(said: Sequence[Note]) -> float:
+    """Return the probability that a pump delivers less than `WORN`, by what the balance of flows says of it.
+
+    Parameters
+    ----------
+    said : sequence of Note
+        What the balance leaves open, and what explains the log.
+
+    Returns
+    -------
+    float
+        Of a normal distribution, with what is presumed of a pump [probability]; zero where a worn pump was found,
+        which speaks against all nine conditions, and where wear is excluded.
+    """
+    if (left := delivery_left_open(said)) is not None:
+        return _below(math.log(WORN), *left)
+    for note in said:
+        if note.code is RigCode.AREA_TO_DISPLACEMENT:
+            return _below(100.0 * WORN, note.data["percent"], note.data["half_width"] / NORMAL_95)
+    return 0.0
+
+
+def _below(limit: float, mean: float, std: float) -> float:
+    """Return the probability that a normal variable is below a limit."""
+    return 0.5 * math.erfc((mean - limit) / (math.sqrt(2.0) * std)) if std > 0.0 else float(mean < limit)
 
 
 def whatever_fault(diagnosis: Diagnosis, actuator: Actuator, calibration: Calibration) -> Diagnosis:
@@ -120,7 +164,8 @@ def probabilities_over_wear(
 ) -> Mapping[str, float] | None:
     """Return the probability of each condition, whatever the pump delivers, where a log does not tell.
 
-    The conditions are scored again for pumps that deliver `DELIVERIES` of their displacement; see `summed_over_wear`.
+    The conditions are scored again for pumps that deliver `DELIVERIES` of their displacement, as far as the balance
+    of flows leaves them likely; see `summed_over_wear`.
 
     Parameters
     ----------
@@ -138,36 +183,46 @@ def probabilities_over_wear(
     Mapping[str, float] or None
         Probability by condition [probability]; None where wear is excluded or found, and without pressure.
     """
-    if board.blocks.pressure is None or not wear_left_open(remarks):
+    left = delivery_left_open(remarks)
+    if board.blocks.pressure is None or left is None:
         return None
-    healthy, scores = actuator.circuit, [board.fits.scores]
-    for share in DELIVERIES:
+    size, deviation = left
+    likely = -0.5 * ((np.log([1.0, *DELIVERIES]) - size) / deviation) ** 2
+    likely -= np.max(likely)
+    healthy, scores, kept = actuator.circuit, [board.fits.scores], [likely[0]]
+    for share, one in zip(DELIVERIES, likely[1:], strict=True):
+        if one < UNLIKELY:
+            continue
+        kept.append(one)
         worn = replace(healthy, pump_displacement=share * healthy.pump_displacement)
         fits = fit_classes(board.blocks, replace(actuator, circuit=worn), start=board.fits.best.coordinates)
         scores.append(fits.scores)
-    return summed_over_wear(board, np.array(scores), calibration)
+    return summed_over_wear(board, np.array(scores), calibration, np.array(kept))
 
 
-def summed_over_wear(board: Scoreboard, scores: Array, calibration: Calibration) -> Mapping[str, float]:
+def summed_over_wear(
+    board: Scoreboard, scores: Array, calibration: Calibration, likely: Array | None = None
+) -> Mapping[str, float]:
     """Return the probability of each condition, summed over what a pump may deliver.
-
-    Pumps count by what is presumed of one before the log is seen: half a normal distribution of the logarithm of what
-    it delivers over its displacement, of deviation `PRESUMED`.
 
     Parameters
     ----------
     board : Scoreboard
         The evidences of a sound pump.
     scores : ndarray, shape (1 + pumps, 9)
-        How well each condition holds the log with a sound pump, then with one that delivers each of `DELIVERIES`:
-        log-likelihoods [dimensionless].
+        How well each condition holds the log with a sound pump, then with worn ones: log-likelihoods [dimensionless].
     calibration : Calibration
         Weights of the evidences.
+    likely : ndarray, shape (1 + pumps,), optional
+        Log-likelihoods of these pumps [dimensionless]. Without it, the worn ones deliver `DELIVERIES` and count by what
+        is presumed of a pump before a log is seen: half a normal distribution of the logarithm of what it delivers over
+        its displacement, of deviation `PRESUMED`.
 
     Returns
     -------
     Mapping[str, float]
         Probability by condition [probability].
     """
-    summed = np.logaddexp.reduce(scores + presumed_of_wear([1.0, *DELIVERIES])[:, None], axis=0)
+    likely = presumed_of_wear([1.0, *DELIVERIES]) if likely is None else likely
+    summed = np.logaddexp.reduce(scores + likely[:, None], axis=0)
     return replace(board, log_odds={**board.log_odds, "parameters": bounded(summed)}).probabilities(calibration)

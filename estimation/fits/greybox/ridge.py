@@ -1,0 +1,95 @@
+"""`Ridge`: two parameters of a fit that nearly cancel, and how a finite difference by one of them is taken."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from plant.arrays import Array
+
+STEEPEST = 1e3
+"""Farthest that one logarithm goes along a ridge with the other [dimensionless]: beyond, its parameter has vanished."""
+
+
+class Ridge(NamedTuple):
+    """Two parameters, both fitted as logarithms, that nearly cancel when they rise together.
+
+    A difference over a finite step of one alone holds half its curvature, which does not cancel with the slope by the
+    other. Where make-up valves open and close, that was larger than what is left of the two: they seemed known a
+    hundred times too well. So the step is taken along the ridge, and the slope by the other is subtracted.
+
+    Parameters
+    ----------
+    nudged, along : str
+        The parameters; the slope by the first is taken along the ridge.
+    ratio : float
+        Rise of the second with that of the first along the ridge [unit of the second over that of the first].
+    """
+
+    nudged: str
+    along: str
+    ratio: float
+
+    def placed(self, free: Sequence[str]) -> "PlacedRidge | None":
+        """Return the ridge among the unknowns of a fit, None where one of the two is not free.
+
+        Parameters
+        ----------
+        free : sequence of str
+            The unknowns.
+        """
+        if self.nudged not in free or self.along not in free:
+            return None
+        return PlacedRidge(free.index(self.nudged), free.index(self.along), self.ratio)
+
+
+class PlacedRidge(NamedTuple):
+    """A ridge among the unknowns of a fit.
+
+    Parameters
+    ----------
+    nudged, along : int
+        Their places.
+    ratio : float
+        See `Ridge`.
+    """
+
+    nudged: int
+    along: int
+    ratio: float
+
+    def steepness(self, theta: Array) -> float:
+        """Return how far the second logarithm goes along the ridge with the first [dimensionless].
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Fitted coordinates [dimensionless].
+        """
+        return min(self.ratio * float(np.exp(theta[self.nudged] - theta[self.along])), STEEPEST)
+
+    def turn(self, points: Array, theta: Array, nudge: float) -> None:
+        """Turn the neighbour of a point that is nudged by the first parameter onto the ridge, in place.
+
+        Parameters
+        ----------
+        points : ndarray, shape (1 + unknowns, unknowns)
+            The point and its neighbours [dimensionless].
+        theta : ndarray, shape (unknowns,)
+            The point [dimensionless].
+        nudge : float
+            How far each neighbour is nudged [dimensionless].
+        """
+        points[1 + self.nudged, self.along] += np.log1p(nudge * self.steepness(theta))
+
+    def turn_back(self, slopes: Array, theta: Array) -> None:
+        """Turn the slope along the ridge into that by the first parameter alone, in place.
+
+        Parameters
+        ----------
+        slopes : ndarray, shape (..., unknowns)
+            Slopes, the first parameter's along the ridge [dimensionless].
+        theta : ndarray, shape (unknowns,)
+            Where they were taken [dimensionless].
+        """
+        slopes[..., self.nudged] -= self.steepness(theta) * slopes[..., self.along]
