@@ -9,8 +9,10 @@ import pytest
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.eha.estimate import estimate_log
-from estimation.eha.rig_share import fitted_responses, scaled_responses, with_total, with_wear
+from estimation.eha.rig_share import delivery_left_open, fitted_responses, scaled_responses, with_total, with_wear
 from estimation.finding import Quantity
+from estimation.fits.explaining.left_open import wear_open
+from estimation.fits.explaining.promises import Promise
 from estimation.fits.flow.fit import fit_flow
 from estimation.notes import EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
@@ -174,8 +176,14 @@ def test_total_intervals_cover_where_rigs_are_as_wrong_as_they_are_said_to_be() 
 
 def test_wear_that_is_not_excluded_opens_displacement_downwards_alone() -> None:
     known = {"pump_displacement": Spread(0.03, 0.02), "chamber_volume": Spread.of(0.15)}
-    said = (RigCode.WEAR_NOT_EXCLUDED.note(percent=24.0),)
+    said = (RigCode.WEAR_NOT_EXCLUDED.note(percent=24.0, half_width=20.0),)
     assert with_wear(known, said) == {**known, "pump_displacement": Spread(pytest.approx(0.12), 0.02)}
     assert with_wear({}, said) == {"pump_displacement": Spread(pytest.approx(0.12), 0.0)}
-    assert with_wear(known, (RigCode.WEAR_NOT_EXCLUDED.note(percent=4.0),)) == known
+    assert with_wear(known, (RigCode.WEAR_NOT_EXCLUDED.note(percent=4.0, half_width=4.0),)) == known
     assert with_wear(known, (RigCode.PUMP_WORN.note(percent=80.0, half_width=1.0),)) == known
+
+
+def test_what_is_left_open_of_a_delivery_is_where_it_likeliest_is_and_how_well_that_is_known() -> None:
+    (noted,) = wear_open(Promise(1.0, -0.04, 0.05))
+    assert delivery_left_open((noted,)) == (pytest.approx(-0.04), pytest.approx(0.05))
+    assert delivery_left_open(()) is None

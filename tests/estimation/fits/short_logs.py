@@ -56,6 +56,22 @@ def log(
     return simulate(CIRCUIT, speed, sample_time, circuit_of(p), sensors=sensors, rng=rng)
 
 
+@cache
+def at_one_speed(delivery: float = 0.85, speed: float = 100.0) -> Record:
+    """A pump that delivers a share of its displacement, to and fro at one speed; held for 50 ms or longer."""
+    rng = np.random.default_rng(3)
+    turned = speed * np.where(rng.random(40) < 0.5, -1.0, 1.0).repeat(50)
+    worn = replace(PAPER, pump_displacement=delivery * PAPER.pump_displacement)
+    return simulate(CIRCUIT, turned, 1e-3, circuit_of(worn), sensors=BENCH, rng=rng)
+
+
+def lost_in_bias(delivery: float = 0.85, speed: float = 100.0) -> dict[str, float]:
+    """What a plain fit finds of such a log: the flow bias takes up what the pump loses [SI]."""
+    start = {**flow_starts(PAPER, PAPER.bulk_modulus)[2], STIFFNESS: 3e7, "case_leakage": 4e-13}
+    lost = (1.0 - delivery) * PAPER.pump_displacement * speed
+    return {**start, "leakage_coefficient": PAPER.leakage_coefficient, "flow_bias": PAPER.flow_bias + lost}
+
+
 def seen(record: Record, p: EhaParameters = PAPER, **uncertainties: float) -> GreyBoxLog:
     return flow_log(record, p, uncertainties, VARIANCES)
 

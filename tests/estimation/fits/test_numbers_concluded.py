@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.explaining.objections import fit_explains_all
-from estimation.fits.explaining.promises import Promise, slopes_of
+from estimation.fits.explaining.promises import NOTHING_PROMISED, Promise, slopes_of
 from estimation.fits.explaining.tried import Tried
 from estimation.fits.explaining.wide_log import widened
 from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_starts
@@ -42,7 +42,7 @@ def plain(cost: float, form: Any = FLOW_FORM, modulus: float = 2e8, **how: Any) 
 
 
 def concluded(
-    fits: list[GreyBoxFit], strange: GreyBoxFit, *names: str, sensed: Any = None, open_by: float = 0.0, **how: Any
+    fits: list[GreyBoxFit], strange: GreyBoxFit, *names: str, sensed: Any = None, open_by: Promise = NOTHING_PROMISED, **how: Any
 ) -> Any:
     """Return what is told of a log by its plain fits, and by one under hypotheses."""
     values = {name: (value, strange.std[name]) for name, value in strange.values.items() if name in strange.std}

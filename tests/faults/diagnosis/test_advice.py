@@ -113,6 +113,13 @@ def test_a_log_that_holds_one_speed_is_told_to_hold_more() -> None:
     assert said == AdviceCode.MORE_SPEEDS.note(speeds=1)
 
 
+def test_more_speeds_are_asked_for_where_a_worn_pump_is_not_told() -> None:
+    worn = (ClassCode.WEAR_NOT_TOLD.note(percent=5.0, limit=90.0),)
+    (said,) = advice_for(staircase([100.0, -100.0]), SURE, (), worn, ALL)
+    assert said == AdviceCode.MORE_SPEEDS.note(speeds=1)
+    assert codes(advice_for(staircase([100.0, -50.0, 20.0]), SURE, (), worn, ALL)) == [AdviceCode.NOTHING]
+
+
 def test_a_log_that_decides_needs_nothing() -> None:
     assert codes(advice_for(staircase([100.0]), SURE, (), (), ALL)) == [AdviceCode.NOTHING]
 

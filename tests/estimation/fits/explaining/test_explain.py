@@ -13,6 +13,7 @@ from estimation.fits.explaining import finished as finishing
 from estimation.fits.explaining import likeliest as ranking
 from estimation.fits.explaining.delivery import contradicted
 from estimation.fits.explaining.finished import CLOSE, NEVER, ROUNDS
+from estimation.fits.explaining.promises import NOTHING_PROMISED
 from estimation.fits.explaining.tried import Tried
 from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import HYPOTHESES
@@ -206,7 +207,7 @@ def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
     monkeypatch.setattr(explain, "_paired", paired)
     monkeypatch.setattr(explain, "weighed", lambda _: {})
     monkeypatch.setattr(explain, "usual_pressure", lambda *_: 0.0)
-    monkeypatch.setattr(explain, "_delivery_open", lambda *_: 0.0)
+    monkeypatch.setattr(explain, "_delivery_open", lambda *_: NOTHING_PROMISED)
     monkeypatch.setattr(explain, "ALIKE", 4.0)
     nothing: Any = None
     found = explain.explain(nothing, nothing, [{}], lambda fit: fit.cost < least, hopeless=hopeless)

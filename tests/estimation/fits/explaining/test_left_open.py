@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.explaining.left_open import OPEN_DELIVERY, valves_unseen, wear_open
+from estimation.fits.explaining.promises import NOTHING_PROMISED, Promise
 from estimation.notes import RigCode
 from tests.estimation.fits.short_logs import made_fit
 
@@ -29,6 +30,19 @@ def test_one_valve_that_is_not_felt_beside_one_that_is(stds: dict[str, float], s
     assert all(note.code is RigCode.MAKEUP_UNSEEN for note in said)
 
 
-def test_wear_is_open_by_two_deviations_from_the_limit_on() -> None:
-    assert wear_open(OPEN_DELIVERY) == ()
-    assert [note.data["percent"] for note in wear_open(0.15)] == [pytest.approx(30.0)]
+@pytest.mark.parametrize(
+    ("size", "deviation", "percent"),
+    [
+        (0.0, 0.5 * OPEN_DELIVERY, None),
+        (0.0, 0.15, 30.0),
+        (-0.08, 0.02, 12.0),  # known well, but well below a sound pump
+        (0.08, 0.08, None),  # as much above one
+        (-0.05, 0.02, None),
+    ],
+)
+def test_wear_is_open_where_two_deviations_below_what_is_likeliest_come_to_the_limit(
+    size: float, deviation: float, percent: float | None
+) -> None:
+    said = wear_open(Promise(1.0, size, deviation))
+    assert [note.data["percent"] for note in said] == ([] if percent is None else [pytest.approx(percent)])
+    assert wear_open(NOTHING_PROMISED) == ()

@@ -4,9 +4,10 @@ import pytest
 
 from estimation.fits.explaining.promises import promised, promised_beside, promising
 from estimation.fits.flow.search import flow_starts
+from estimation.fits.greybox import freed_problem
 from estimation.fits.hypotheses import DELIVERY, MAKEUP_BLOCKED, MAY_HIDE, OFFSET
 from estimation.models.flow import STIFFNESS
-from tests.estimation.fits.short_logs import PAPER, log, seen, wide
+from tests.estimation.fits.short_logs import PAPER, at_one_speed, log, lost_in_bias, seen, wide
 
 FOUND = {**flow_starts(PAPER, PAPER.bulk_modulus)[2], STIFFNESS: 3e7, "case_leakage": 4e-13}
 """What a plain fit may have found [SI]."""
@@ -32,3 +33,22 @@ def test_what_is_taken_already_leaves_less_to_tell() -> None:
     known = {**FOUND, "pressure_offset": 1e3}
     alone, beside = (promised_beside(wide(), taken, known, DELIVERY) for taken in ((), (OFFSET,)))
     assert beside.deviation > alone.deviation
+
+
+def test_what_a_worn_pump_at_one_speed_promises_does_not_hang_on_the_step_of_its_slopes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Forward slopes by delivery and flow bias hold curvature that does not cancel, which looked like knowledge."""
+    worn = seen(at_one_speed())
+    fine = promised(worn, PAPER, lost_in_bias(), DELIVERY)
+    monkeypatch.setattr(freed_problem, "NUDGE", 10.0 * freed_problem.NUDGE)
+    assert promised(worn, PAPER, lost_in_bias(), DELIVERY) == pytest.approx(fine, rel=0.02)
+
+
+def test_less_of_what_is_freed_is_promised_as_less() -> None:
+    pressure = log(0.5)["differential_pressure_pa"]
+    low, high = (
+        promised(seen(log(0.5).replace(differential_pressure_pa=pressure + off)), PAPER, FOUND, OFFSET)
+        for off in (-3e5, 3e5)
+    )
+    assert low.size < 0.0 < high.size

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from estimation.fits.explaining.wide_log import usual_values, widened
-from estimation.fits.explaining.wide_problem import POSITION_ZERO, flow_bounds, freed, own_starts
+from estimation.fits.explaining.wide_problem import (
+    MOST_WORN,
+    POSITION_ZERO,
+    flow_bounds,
+    flow_speed,
+    freed,
+    own_starts,
+    worn_start,
+)
 from estimation.fits.greybox import freed_problem
 from estimation.fits.greybox.log import greybox_log
 from estimation.fits.hypotheses import BEGUN, ENCODER_ZERO, HYPOTHESES, OFFSET_AT_REST, Hypothesis
@@ -14,7 +22,7 @@ from estimation.models.flow import FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
-from tests.estimation.fits.short_logs import wide
+from tests.estimation.fits.short_logs import PAPER, at_one_speed, lost_in_bias, seen, wide
 
 RIG = EhaParameters()
 VARIANCES = {"differential_pressure_pa": 1e6}
@@ -45,6 +53,20 @@ def test_an_offset_at_rest_is_first_taken_to_be_what_the_sensor_reads_there() ->
     measured = np.full_like(log.measured, 1e5)
     measured[0] = np.nan
     assert list(own_starts(replace(log, measured=measured), OFFSET_AT_REST)) == [{"pressure_offset": 1e5}]
+
+
+def test_what_the_flow_bias_holds_beyond_a_healthy_one_is_first_taken_for_wear() -> None:
+    log = widened(seen(at_one_speed()), PAPER)
+    assert flow_speed(log) == pytest.approx(100.0, rel=3e-2)  # of means about each sample
+    (start,) = worn_start(log, lost_in_bias())
+    assert start["pump_displacement"] == pytest.approx(0.85 * PAPER.pump_displacement, rel=1e-2)
+    assert start["flow_bias"] == pytest.approx(PAPER.flow_bias)
+    (most,) = worn_start(log, lost_in_bias(0.5))
+    assert most["pump_displacement"] == pytest.approx((1.0 - MOST_WORN) * PAPER.pump_displacement)
+    assert most["flow_bias"] > PAPER.flow_bias
+    assert worn_start(log, lost_in_bias(1.0)) == []
+    still = replace(log, drives=np.zeros_like(log.drives))
+    assert worn_start(still, lost_in_bias()) == []
 
 
 @pytest.mark.parametrize("opening", [1e2, 1e4])

@@ -4,6 +4,7 @@ from dataclasses import replace
 from unittest.mock import patch
 
 import numpy as np
+import pytest
 
 from estimation.fits.explaining.left_open import OPEN_DELIVERY
 from estimation.fits.explaining.objections import DOUBTED
@@ -11,7 +12,7 @@ from estimation.fits.explaining.promises import Promise
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow.asked import asked_of
 from estimation.fits.greybox.chance import LARGEST_CHI_SQUARE
-from estimation.fits.hypotheses import HYPOTHESES
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
@@ -30,6 +31,15 @@ def test_a_fit_that_leaves_more_than_the_noise_of_sensors_is_asked_for_all_that_
         assert asked == HYPOTHESES
         assert [note.code for note in remarks] == [RigCode.WEAR_NOT_EXCLUDED]  # what is left open stays so
         assert asked_of(plain, PAPER, sound, sound, loaded=False, moving=False) == ((), remarks)
+
+
+def test_a_worn_pump_that_is_asked_for_stays_open_until_it_is_found() -> None:
+    """The plain form is told where the search ends short of it."""
+    sound = made_fit(400.0, 2e8, 1e5)
+    with all_promise(Promise(12.0, -0.14, 0.03)):
+        asked, remarks = asked_of(seen(log(0.2)), PAPER, sound, sound, loaded=False, moving=False)
+    assert DELIVERY in asked
+    assert [note.data["percent"] for note in remarks] == [pytest.approx(20.0)]
 
 
 def test_a_short_log_is_not_asked_for_all_where_noise_alone_leaves_as_much_by_chance() -> None:

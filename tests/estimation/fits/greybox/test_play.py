@@ -13,7 +13,7 @@ from scipy.special import ndtr
 
 from estimation.fits.explaining.form_fit import FormFit
 from estimation.fits.explaining.objections import DOUBTED
-from estimation.fits.explaining.promises import Promise
+from estimation.fits.explaining.promises import NOTHING_PROMISED, Promise
 from estimation.fits.flow import asked
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import plain as plain_flow
@@ -242,7 +242,7 @@ def concluded(
     fit = replace(made_fit(500.0, 2e8, 1e5), play=ShownPlay(3e-5, plain, moved={"bulk_modulus": -0.02}))
     played = replace(made_fit(100.0, 2.1e8, 1e5, chi=chi), play=ShownPlay(1e-5, strange))
     values = {name: (value, played.std[name]) for name, value in played.values.items()}
-    explanation = SimpleNamespace(names=("position_play",), values=values, fit=played, delivery_open=0.0)
+    explanation = SimpleNamespace(names=("position_play",), values=values, fit=played, delivery_open=NOTHING_PROMISED)
 
     def explained(*_: Any, asked: Sequence[Hypothesis], paired: bool, **__: Any) -> Any:
         assert asked == (PLAY,)

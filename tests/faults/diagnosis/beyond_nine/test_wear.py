@@ -8,33 +8,34 @@ import numpy as np
 import pytest
 
 from estimation.eha.rig_share import DELIVERY_ENTRY
-from estimation.finding import Gate
+from estimation.finding import NORMAL_95, Gate
 from estimation.fits.hypotheses import PRESUMED
 from estimation.notes import RigCode
 from experiments.open_benchmark.kinds import make
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine import wear
 from faults.diagnosis.beyond_nine.other_faults import DELIVERIES
-from faults.diagnosis.beyond_nine.wear import probabilities_over_wear, whatever_the_pump_delivers
+from faults.diagnosis.beyond_nine.wear import chance_of_wear, probabilities_over_wear, whatever_the_pump_delivers
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.evidence import Scoreboard, bounded, weigh
-from faults.notes import AgainstCode
+from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
+from plant.notes import Note
 from plant.sensors.sensors import BENCH
 from tests.faults.diagnosis.short_logs import ACTUATOR as RIG
 from tests.faults.diagnosis.short_logs import OFF, blocks, log, made_classes
 
 HEALTHY = EhaParameters()
 ACTUATOR = actuator_of(HEALTHY)
-OPEN = (RigCode.WEAR_NOT_EXCLUDED.note(percent=30.0),)
+OPEN = (RigCode.WEAR_NOT_EXCLUDED.note(percent=30.0, half_width=30.0),)
 BETWEEN = 0.4
 """How far the leakage is from minor to major, in its logarithm [fraction]."""
 
@@ -128,6 +129,49 @@ def test_a_circuit_may_doubt_the_pump_where_the_balance_leaves_wear_open(board: 
     judged = whatever_the_pump_delivers(Diagnosis(found, (off,), {}, {}, {}, (), board), ACTUATOR, said(remarks=OPEN))
     assert judged.against == (off,)
     assert judged.probabilities != found
+
+
+@pytest.mark.parametrize(
+    ("note", "chance"),
+    [
+        (RigCode.WEAR_NOT_EXCLUDED.note(percent=30.0, half_width=30.0), 0.2412),
+        (RigCode.WEAR_NOT_EXCLUDED.note(percent=100.0 * (0.08 - np.log(0.9)), half_width=8.0), 0.5),
+        (RigCode.AREA_TO_DISPLACEMENT.note(percent=92.0, half_width=NORMAL_95), 0.02275),
+        (RigCode.PUMP_WORN.note(percent=80.0, half_width=1.0), 0.0),
+        (AgainstCode.PUMP_OFF.note(percent=-15.0), 0.0),
+    ],
+)
+def test_a_pump_is_worn_with_the_probability_that_it_delivers_less_than_nine_tenths(note: Note, chance: float) -> None:
+    assert chance_of_wear((note,)) == pytest.approx(chance, rel=1e-3)
+
+
+def test_the_nine_lose_the_probability_that_the_pump_is_worn(board: Scoreboard) -> None:
+    found = board.probabilities(shipped_calibration())
+    diagnosis = Diagnosis(found, (), {}, {}, {}, (), board)
+    near = (RigCode.AREA_TO_DISPLACEMENT.note(percent=91.0, half_width=2.0 * NORMAL_95),)
+    judged = whatever_the_pump_delivers(diagnosis, ACTUATOR, said("delivery"), near)
+    chance = chance_of_wear(near)
+    assert 0.3 < chance < 0.32
+    assert judged.probabilities == pytest.approx({name: (1.0 - chance) * one for name, one in found.items()})
+    assert [note.code for note in judged.not_told] == [ClassCode.WEAR_NOT_TOLD]
+    assert judged.not_told[0].data == {"percent": pytest.approx(100.0 * chance), "limit": pytest.approx(90.0)}
+    open_ = whatever_the_pump_delivers(diagnosis, ACTUATOR, said(remarks=OPEN))
+    assert sum(open_.probabilities.values()) == pytest.approx(1.0 - chance_of_wear(OPEN))
+
+
+def test_no_circuit_is_fitted_with_a_pump_that_the_balance_excludes(
+    board: Scoreboard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried: list[float] = []
+
+    def fitted(_: Any, actuator: Any, start: Any) -> Any:
+        tried.append(actuator.circuit.pump_displacement / ACTUATOR.circuit.pump_displacement)
+        return board.fits
+
+    monkeypatch.setattr(wear, "fit_classes", fitted)
+    near = (RigCode.WEAR_NOT_EXCLUDED.note(percent=15.0, half_width=5.0),)
+    assert probabilities_over_wear(board, ACTUATOR, near, shipped_calibration()) is not None
+    assert tried == [pytest.approx(0.9)]
 
 
 @pytest.mark.slow

@@ -1,0 +1,42 @@
+"""A slope along a ridge, turned back, is the slope by one parameter."""
+
+import numpy as np
+import pytest
+
+from estimation.fits.greybox.ridge import STEEPEST, PlacedRidge, Ridge
+
+RIDGE = Ridge("delivery", "bias", 100.0)
+
+
+def test_a_ridge_is_where_both_parameters_are_free() -> None:
+    assert RIDGE.placed(("modulus", "bias", "delivery")) == PlacedRidge(2, 1, 100.0)
+    assert RIDGE.placed(("modulus", "delivery")) is None
+    assert RIDGE.placed(("modulus", "bias")) is None
+
+
+def test_a_neighbour_on_the_ridge_gains_of_the_second_what_it_gains_of_the_first_times_the_ratio() -> None:
+    placed, theta, nudge = PlacedRidge(0, 1, 100.0), np.log([2e-6, 4e-5]), 1e-3
+    points = theta + nudge * np.eye(3, 2, -1)
+    placed.turn(points, theta, nudge)
+    bias = np.exp(points[:, 1])
+    assert bias[1] - bias[0] == pytest.approx(100.0 * nudge * 2e-6)
+    assert bias[2] == pytest.approx(4e-5 * np.exp(nudge))
+
+
+def test_a_slope_turned_back_is_that_of_the_first_parameter_alone() -> None:
+    """Of a residual that is the difference of two flows the slope along the ridge is nothing."""
+    placed, theta, nudge = PlacedRidge(0, 1, 100.0), np.log([2e-6, 4e-5]), 1e-6
+
+    def residual(at: np.ndarray) -> float:
+        return float(100.0 * np.exp(at[0]) - np.exp(at[1]))
+
+    points = theta + nudge * np.eye(3, 2, -1)
+    placed.turn(points, theta, nudge)
+    slopes = np.array([[(residual(point) - residual(theta)) / nudge for point in points[1:]]])
+    assert abs(slopes[0, 0]) < 1e-9
+    placed.turn_back(slopes, theta)
+    assert slopes[0] == pytest.approx([2e-4, -4e-5], rel=1e-5)
+
+
+def test_a_parameter_that_has_vanished_leaves_no_steep_ridge() -> None:
+    assert PlacedRidge(0, 1, 100.0).steepness(np.log([2e-6, 1e-30])) == STEEPEST
