@@ -95,7 +95,9 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedP
     late = {one.late for one in together}
     log = replace(log, timed=tuple(channel for channel in log.timed if channel not in late))
     form = TURBULENT_FLOW_FORM if set(LEAKAGE_TURBULENT.free) <= set(extra) else WIDE_FLOW_FORM
-    return FreedProblem(form, log, tuple(dict.fromkeys((*known, *extra))), LINEAR, Ridge(DELIVERY.free[0], FLOW_BIAS, flow_speed(log)))
+    free = tuple(dict.fromkeys((*known, *extra)))
+    ridge = Ridge(DELIVERY.free[0], FLOW_BIAS, flow_speed(log)) if DELIVERY.free[0] in free else None
+    return FreedProblem(form, log, free, LINEAR, ridge)
 
 
 def flow_speed(log: GreyBoxLog) -> float:

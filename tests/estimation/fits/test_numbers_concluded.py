@@ -42,7 +42,12 @@ def plain(cost: float, form: Any = FLOW_FORM, modulus: float = 2e8, **how: Any) 
 
 
 def concluded(
-    fits: list[GreyBoxFit], strange: GreyBoxFit, *names: str, sensed: Any = None, open_by: Promise = NOTHING_PROMISED, **how: Any
+    fits: list[GreyBoxFit],
+    strange: GreyBoxFit,
+    *names: str,
+    sensed: Any = None,
+    open_by: Promise = NOTHING_PROMISED,
+    **how: Any,
 ) -> Any:
     """Return what is told of a log by its plain fits, and by one under hypotheses."""
     values = {name: (value, strange.std[name]) for name, value in strange.values.items() if name in strange.std}
@@ -104,7 +109,7 @@ def conclusions_of_the_flow_form() -> dict[str, Any]:
         "played, shown": concluded(
             [replace(plain(200.0), play=ShownPlay(3e-5, 9.0))], strange, "position_play", sensed=ShownPlay(3e-5, 2.3)
         ),
-        "wear is left open": concluded([plain(200.0)], strange, "volume", open_by=0.12),
+        "wear is left open": concluded([plain(200.0)], strange, "volume", open_by=Promise(0.0, 0.0, 0.12)),
         "a play is left": concluded([plain(200.0)], strange, "delivery", sensed=sensed),
         "held volumes": concluded(
             [plain(100.0, HELD_FLOW_FORM), plain(130.0), plain(128.0, MASS_FLOW_FORM)], strange, "delivery"

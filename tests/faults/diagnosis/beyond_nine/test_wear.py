@@ -164,7 +164,7 @@ def test_no_circuit_is_fitted_with_a_pump_that_the_balance_excludes(
 ) -> None:
     tried: list[float] = []
 
-    def fitted(_: Any, actuator: Any, start: Any) -> Any:
+    def fitted(_: Any, actuator: Any, **__: Any) -> Any:
         tried.append(actuator.circuit.pump_displacement / ACTUATOR.circuit.pump_displacement)
         return board.fits
 
