@@ -64,7 +64,7 @@ class ClassCode(Code):
     )
     WEAR_NOT_TOLD = (
         "the log does not tell a worn pump from a sound one: that the pump delivers less than {limit:.0f} % of its "
-        "displacement, which is none of the nine conditions, has a probability of {percent:.0f} %"
+        "displacement, which is none of the nine conditions, has a probability of {percent:.2g} %"
     )
     MODELS_DIVERGED = "the models of all conditions diverged; check units and rig file"
     MODELS_ALIKE = (

@@ -66,7 +66,7 @@ def whatever_the_pump_delivers(
         found = probabilities_over_wear(diagnosis.scoreboard, actuator, estimate.remarks, shipped_calibration())
         told = diagnosis if found is None else replace(diagnosis, probabilities=found)
     chance = chance_of_wear((*estimate.remarks, *strange))
-    if chance < WORTH_SAYING:
+    if chance < WORTH_SAYING and not wear_left_open(estimate.remarks):
         return told
     note = ClassCode.WEAR_NOT_TOLD.note(percent=100.0 * chance, limit=100.0 * WORN)
     left = {name: (1.0 - chance) * share for name, share in told.probabilities.items()}

@@ -37,7 +37,10 @@ def test_one_valve_that_is_not_felt_beside_one_that_is(stds: dict[str, float], s
         (0.0, 0.15, 30.0),
         (-0.08, 0.02, 12.0),  # known well, but well below a sound pump
         (0.08, 0.08, None),  # as much above one
-        (-0.05, 0.02, None),
+        (-0.05, 0.02, 9.0),
+        (-0.05, 0.024, 9.8),  # two deviations below
+        (-0.04, 0.025, None),
+        (-0.029, 0.001, None),
     ],
 )
 def test_wear_is_open_where_two_deviations_below_what_is_likeliest_come_to_the_limit(
