@@ -37,6 +37,11 @@ class Ridge(NamedTuple):
         ----------
         free : sequence of str
             The unknowns.
+
+        Returns
+        -------
+        PlacedRidge or None
+            Their places.
         """
         if self.nudged not in free or self.along not in free:
             return None
@@ -51,7 +56,7 @@ class PlacedRidge(NamedTuple):
     nudged, along : int
         Their places.
     ratio : float
-        See `Ridge`.
+        See `Ridge` [unit of the second over that of the first].
     """
 
     nudged: int
@@ -65,6 +70,11 @@ class PlacedRidge(NamedTuple):
         ----------
         theta : ndarray, shape (unknowns,)
             Fitted coordinates [dimensionless].
+
+        Returns
+        -------
+        float
+            Ratio of the two steps, `STEEPEST` at most [dimensionless].
         """
         return min(self.ratio * float(np.exp(theta[self.nudged] - theta[self.along])), STEEPEST)
 
