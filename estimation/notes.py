@@ -13,7 +13,7 @@ class SensorCode(Code):
     SENSOR_CONSTANT = "{channel} is {value:g} Pa throughout: the sensor is dead or not connected"
     SENSOR_NOISE_ONLY = "{channel} shows nothing but noise ({noise:.3g} Pa) while the motor turns: the sensor is dead"
     SENSOR_CLIPPED = (
-        "{channel} is at the end of its range ({levels} Pa) in {percent:.2g} % of its samples; they were left out"
+        "{channel} is at the end of its range ({levels} {unit}) in {percent:.2g} % of its samples; they were left out"
     )
     HUM = "{channel} contains a hum of {amplitude_pa:.3g} Pa at {frequency_hz:.4g} Hz; it was removed"
     HELD = (

@@ -13,6 +13,7 @@ from estimation.log_checks.held_alone import without_held_alone
 from estimation.log_checks.hum import without_hum
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
 from estimation.log_checks.outliers import without_gross_outliers
+from estimation.log_checks.position_range import without_position_beyond_range
 from estimation.log_checks.sensor_check import sensor_objections, without_saturated
 from estimation.log_checks.sent_twice import without_rows_sent_twice
 from estimation.log_checks.unit_change import unit_changes
@@ -33,7 +34,7 @@ class CleanLog:
     Parameters
     ----------
     record : Record
-        The log, without repeated samples and rows, dropouts, gross outliers, clipped pressures, steps of a zero, hum,
+        The log, without repeated samples and rows, dropouts, gross outliers, clipped pressures and positions, steps of a zero, hum,
         an offset of its velocity sensor, and samples of like noise; its longest part where rows were lost.
     variances : Mapping[str, float]
         Measurement variance of each of its channels [SI squared].
@@ -101,6 +102,7 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     clipped: tuple[Note, ...] = ()
     if PRESSURE in sound:
         sound, clipped = without_saturated(sound, parameters)
+    sound, beyond = without_position_beyond_range(sound)
     mended, steps = (sound, ()) if changes else without_discontinuities(sound)
     if steps and not (changes := channel_mistakes(sound, parameters)):  # channels of another meaning may jump
         sound = mended
@@ -113,7 +115,7 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     if mistakes:  # a sensor cannot be judged by channels of another meaning
         objections = steps = ()
     sound, filtered = without_correlated_noise(sound)
-    left_out = (*held, *twice, *dropouts, *alone, *outliers, *clipped, *steps, *hum, *offset, *filtered)
+    left_out = (*held, *twice, *dropouts, *alone, *outliers, *clipped, *beyond, *steps, *hum, *offset, *filtered)
     variances = {**measurement_variances(sound, known), **_thinned_variances(sound, filtered)}
     return CleanLog(sound, variances, left_out, objections, mistakes)
 

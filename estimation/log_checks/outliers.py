@@ -40,6 +40,10 @@ REACH, BESIDE = 10, 3.0
 """Samples beside a gross outlier in which the burst that it belongs to may still ring, and what counts there as
 standing out, in the measure of `GROSS` [count, dimensionless]; judged."""
 
+FEWEST_ALIKE, MOST_ALIKE = 3, 0.8
+"""Gross outliers of one value from which a logger writes it in place of a lost sample, and their share of all gross
+outliers of the channel [count, fraction]; judged."""
+
 CONFIRMING = 5e-3
 """Span over which motion of the encoder confirms a velocity [s]."""
 
@@ -113,6 +117,45 @@ def without_bursts(values: Array, sound: Array, noise: float) -> Array:
     stands[there] = distance > BESIDE * (percentile(distance, USUAL) + noise)
     near = np.convolve(lost, np.ones(2 * REACH + 1), "same") > 0.5
     return np.where(stands & near, np.nan, sound)
+
+
+def without_written_for_lost(values: Array, sound: Array, noise: float) -> Array:
+    """Return a channel without the value that its logger writes in place of a lost sample, such as zero.
+
+    Such a sample is a gross outlier only where the channel is far from that value. Nearer to it, it stands out too.
+
+    Parameters
+    ----------
+    values, sound : ndarray, shape (n,)
+        A channel, and the same without its gross outliers [any unit]; NaN where missing.
+    noise : float
+        Standard deviation of its noise [the channel's unit].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        The channel without both.
+
+    Examples
+    --------
+    >>> course = np.concatenate([np.full(20, 0.2), np.full(60, 50.0)])
+    >>> course[[10, 30, 45, 60]] = 0.0
+    >>> sound = without_outliers(course, 1e-2)
+    >>> np.flatnonzero(np.isnan(without_written_for_lost(course, sound, 1e-2))).tolist()
+    [10, 30, 45, 60]
+    """
+    stood_out = values[np.isnan(sound) & np.isfinite(values)]
+    if len(stood_out) < FEWEST_ALIKE:
+        return sound
+    written, counts = np.unique(stood_out, return_counts=True)
+    often = int(np.argmax(counts))
+    if counts[often] < max(FEWEST_ALIKE, MOST_ALIKE * len(stood_out)):
+        return sound
+    there = np.isfinite(sound)
+    window = WINDOWS[-1][0]
+    distance = np.zeros(len(values))
+    distance[there] = np.abs(sound[there] - _running_ranks(sound[there], window, [window // 2])[0])
+    return np.where((values == written[often]) & (distance > BESIDE * noise), np.nan, sound)
 
 
 def _running_ranks(values: Array, window: int, ranks: Sequence[int]) -> Array:
@@ -216,6 +259,7 @@ def without_gross_outliers(record: Record, channels: Sequence[str]) -> tuple[Rec
             sound = np.where(np.isnan(without_outliers(values - moved, noise)), sound, values)
         if name in PRESSURES:  # nothing hangs on a sample of what is compared, as it does on one of what drives
             sound = without_bursts(values, sound, noise)
+        sound = without_written_for_lost(values, sound, noise)
         lost = _missing(sound) - _missing(values)
         if lost:
             said.append(SensorCode.OUTLIERS_LEFT_OUT.note(channel=name, count=lost, total=len(record)))

@@ -191,17 +191,29 @@ def _frozen_position(record: Record, p: EhaParameters) -> Note | None:
     stretch = _longest_hold(record[POSITION], record.sample_time)
     if stretch is None:
         return None
-    slid, rests = _slid(record, stretch)
+    slid, rests = shows_motion(record, stretch)
     if slid or jumped(record, stretch, p) or (not rests and missed_motion(record, stretch, p)):
         return _says_frozen(POSITION, stretch, record)
     return None
 
 
-def _slid(record: Record, stretch: slice) -> tuple[bool, bool]:
-    """Return whether measured velocity shows motion over the stretch, and whether a live sensor shows rest.
+def shows_motion(record: Record, stretch: slice) -> tuple[bool, bool]:
+    """Return whether measured velocity shows motion over a stretch, and whether a live sensor shows rest.
 
     Velocity may be differentiated from the encoder over a window, so the ends of the stretch do not count, and a
     velocity that is still too says nothing.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    stretch : slice
+        Its samples.
+
+    Returns
+    -------
+    tuple of bool
+        Motion, rest; neither where velocity is not logged or says nothing.
     """
     if VELOCITY not in record:
         return False, False
@@ -280,7 +292,7 @@ def without_saturated(record: Record, parameters: EhaParameters) -> tuple[Record
         around = counts[2 * reach + 1 :] > counts[: -2 * reach - 1]
         share = 100.0 * np.count_nonzero(clipped) / np.count_nonzero(np.isfinite(values))
         at = " and ".join(f"{level:.4g}" for level in levels)
-        said.append(SensorCode.SENSOR_CLIPPED.note(channel=channel, levels=at, percent=share))
+        said.append(SensorCode.SENSOR_CLIPPED.note(channel=channel, levels=at, unit="Pa", percent=share))
         lost = (channel, PRESSURE) if _is_difference(record) else (channel,)
         left_out = clipped | (close & around)
         record = record.replace(**{name: np.where(left_out, np.nan, record[name]) for name in lost})

@@ -68,7 +68,7 @@ def read_whole_or_sparse(read: "Callable[..., Record]") -> Reading:
             except SparseLogError:
                 raise refused from None
             return Reading(record, said, refusal=str(refused))
-    if all(one.note.code is not LogCode.CHANNEL_LEFT_OUT for one in said):
+    if not any(one.note.code in (LogCode.CHANNEL_LEFT_OUT, LogCode.CHANNEL_LOGGED_IN_PART) for one in said):
         return Reading(record, said)
     with caught():
         return Reading(record, said, sparse=read(most_missing=MOST_MISSING_TO_RELATE))

@@ -6,7 +6,7 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError, NoChannelError, SparseLogError
-from plant.log.chamber_pressures import CHAMBERS, tells_difference, with_difference
+from plant.log.chamber_pressures import CHAMBERS, PRESSURE, tells_difference, with_difference
 from plant.log.clock.uniform import FEWEST_SAMPLES, MOST_MISSING, Channels, Checked, long_enough, on_uniform_clock
 from plant.log.clock.uniform import Clock as Clock
 from plant.log.columns import TIME, TRUTH
@@ -20,6 +20,12 @@ SHORTEST, LONGEST = 1e-8, 1e4
 
 REQUIRED = ("motor_speed_rad_s", "position_m or velocity_m_s")
 """Channels that a log must hold: all of these, either one where a line says "or"."""
+
+BALANCED = ("motor_speed_rad_s", "position_m", PRESSURE, *CHAMBERS)
+"""Channels of the balance of flows. If one begins late or ends early, the rest of the log is worth less than it."""
+
+LEAST_SPAN = 0.5
+"""Share of a log that has to be left if it is used only where such a channel is logged [fraction]; judged."""
 
 
 def trusted(
@@ -71,7 +77,8 @@ def trusted(
         _finite(complete, source)
         timed = _rows_with_time(complete, source, notes)
         on_clock = on_uniform_clock(timed, source, clock, notes, most_missing)
-        channels = _masked(on_clock.channels, required, source, notes, most_missing)
+        first, whole = _logged_together(on_clock, notes, most_missing)
+        channels = _masked(whole, required, source, notes, most_missing)
         if not SHORTEST <= on_clock.sample_time <= LONGEST:
             raise LogError(
                 f"the sample time must be from {SHORTEST:g} s to {LONGEST:g} s, got {on_clock.sample_time:.3g} s; "
@@ -79,7 +86,8 @@ def trusted(
                 source,
             )
         notes += implausible(on_clock.sample_time, channels)
-    return Checked(on_clock.sample_time, on_clock.start_time, channels, tuple(notes))
+    start_time = on_clock.start_time + first * on_clock.sample_time
+    return Checked(on_clock.sample_time, start_time, channels, tuple(notes))
 
 
 def alternatives(wanted: str) -> list[str]:
@@ -145,6 +153,29 @@ def _slower(values: Array) -> int:
         return 1
     usual = float(np.median(np.diff(present)))
     return round(usual) if len(present) >= (1.0 - MOST_MISSING) * (len(values) / usual - 1.0) else 1
+
+
+def _logged_together(on_clock: Checked, notes: list[Note], most_missing: float) -> tuple[int, Channels]:
+    """Return the first sample of the part in which each channel of `BALANCED` is logged, and that part."""
+    channels = on_clock.channels
+    total = len(next(iter(channels.values())))
+    first, behind = 0, total
+    for name in [name for name in BALANCED if name in channels]:
+        present = np.flatnonzero(np.isfinite(channels[name]))
+        if not 0 < len(present) < (1.0 - most_missing) * total:
+            continue
+        begin, end = int(present[0]), int(present[-1]) + 1
+        part = channels[name][begin:end]
+        steady = np.count_nonzero(np.isnan(part)) <= most_missing * len(part) or _slower(part) > 1
+        lost = total - len(part) > most_missing * total
+        if not (steady and lost) or min(end, behind) - max(begin, first) < LEAST_SPAN * total:
+            continue
+        first, behind = max(begin, first), min(end, behind)
+        begin_s, end_s = (on_clock.start_time + at * on_clock.sample_time for at in (begin, end - 1))
+        notes.append(LogCode.CHANNEL_LOGGED_IN_PART.note(channel=name, begin_s=begin_s, end_s=end_s))
+    if behind - first == total:
+        return 0, channels
+    return first, {name: values[first:behind] for name, values in channels.items()}
 
 
 def _masked(

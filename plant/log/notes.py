@@ -29,6 +29,9 @@ class LogCode(Code):
     SAMPLES_MASKED = "{channel} is missing in {count} of {total} samples ({percent:.2g} %); those samples are not used"
     CHANNEL_SLOWER = "{channel} has one value in {rows} rows"
     CHANNEL_LEFT_OUT = "{channel} is missing in {count} of {total} samples ({percent:.2g} %); the channel is not used"
+    CHANNEL_LOGGED_IN_PART = (
+        "{channel} is logged only from {begin_s:.4g} s to {end_s:.4g} s; only this part of the log is used"
+    )
     LINES_SKIPPED = "lines skipped between rows of data (comments, or the header again): {count}"
     ROWS_LEFT_OUT = "lines left out because they hold no row of data: {count} (the first is line {line}: {said!r})"
     CELLS_NO_NUMBERS = (

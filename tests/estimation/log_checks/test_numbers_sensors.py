@@ -154,7 +154,7 @@ def holds_that_mean_something() -> dict[str, Any]:
 
 @NUMBERS.case()
 def pistons_that_slid() -> dict[str, Any]:
-    slid = sensor_check._slid  # pyright: ignore[reportPrivateUsage]
+    slid = sensor_check.shows_motion
 
     def by(speed: float, size: float = 1e-4, quantum: float = 1e-6, count: int = 400) -> list[bool]:
         position = quantum * (np.arange(600) % 3)

@@ -7,7 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.log_checks.sensor_check import _frozen_velocity, _slid, holds, sensor_objections, without_saturated
+from estimation.log_checks.sensor_check import (
+    _frozen_velocity,
+    holds,
+    sensor_objections,
+    shows_motion,
+    without_saturated,
+)
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
@@ -179,7 +185,7 @@ def test_a_piston_slid_if_its_velocity_makes_more_way_than_the_encoder_resolves(
     noise = 1e-7 * np.random.default_rng(1).standard_normal(400)
     steps = 1e-5 * np.round(np.linspace(0.0, 40.0, 400))
     record = Record(1e-3, {"position_m": steps, "velocity_m_s": speed + noise})
-    assert _slid(record, slice(100, 300)) == found
+    assert shows_motion(record, slice(100, 300)) == found
 
 
 def test_of_sensors_that_are_hardly_there_nothing_is_said() -> None:
@@ -207,6 +213,6 @@ def test_the_noise_of_an_averaged_velocity_is_no_motion_of_a_piston_that_is_stuc
         rng = np.random.default_rng(seed)
         noise = np.convolve(1e-3 * rng.standard_normal(6000 + rows - 1), np.ones(rows) / rows, "valid")
         record = Record(1e-3, {"position_m": position, "velocity_m_s": moving + noise})
-        assert not _slid(record, still)[0]
-        accused += _slid(record.replace(velocity_m_s=moving + noise + 3e-3), still)[0]
+        assert not shows_motion(record, still)[0]
+        accused += shows_motion(record.replace(velocity_m_s=moving + noise + 3e-3), still)[0]
     assert accused == 40  # three millimetres a second are motion

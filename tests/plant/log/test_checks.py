@@ -208,6 +208,36 @@ def test_a_channel_of_which_nine_tenths_are_lost_at_random_is_left_out() -> None
     assert checked.notes[0].data["count"] == np.count_nonzero(np.isnan(lost))
 
 
+@pytest.mark.parametrize(("first", "behind"), [(300, N), (0, 700), (200, 800)])
+def test_a_log_is_used_where_its_pressure_is_logged(first: int, behind: int) -> None:
+    pressure = np.full(N, np.nan)
+    pressure[first:behind] = 1e5 * TIME[first:behind]
+    checked = check(differential_pressure_pa=pressure)
+    np.testing.assert_array_equal(checked.channels["differential_pressure_pa"], pressure[first:behind])
+    np.testing.assert_array_equal(checked.channels["velocity_m_s"], VELOCITY[first:behind])
+    assert checked.start_time == pytest.approx(TIME[first])
+    (note,) = checked.notes
+    assert note.code == LogCode.CHANNEL_LOGGED_IN_PART
+    assert note.data["begin_s"] == pytest.approx(TIME[first])
+    assert note.data["end_s"] == pytest.approx(TIME[behind - 1])
+
+
+def test_a_slow_pressure_that_begins_late_is_used_too() -> None:
+    pressure = np.full(N, np.nan)
+    pressure[300::10] = 1e5
+    checked = check(differential_pressure_pa=pressure)
+    assert len(checked.channels["velocity_m_s"]) == N - 309
+    assert [note.code for note in checked.notes] == [LogCode.CHANNEL_LOGGED_IN_PART, LogCode.CHANNEL_SLOWER]
+
+
+@pytest.mark.parametrize("channel", ["differential_pressure_pa", "motor_voltage_v"])
+def test_a_channel_of_less_than_half_of_a_log_or_outside_the_balance_is_left_out(channel: str) -> None:
+    lost = np.full(N, 1.0)
+    lost[: 600 if channel.endswith("pa") else 300] = np.nan
+    checked = check(**{channel: lost})
+    assert (channel in checked.channels, len(checked.channels["velocity_m_s"])) == (False, N)
+
+
 def test_channels_with_times_of_their_own_are_put_on_the_clock_of_the_fastest() -> None:
     when = TIME[5::10] + 3.7e-4
     rows = np.argsort(np.concatenate([TIME, when]), kind="stable")
