@@ -102,3 +102,15 @@ def test_a_log_of_anything_relates_a_column_with_holes() -> None:
         model = log.identify(input="coil", output="gap", order=1, delay=1)
     assert model.denominator == pytest.approx([1.0, -0.5], abs=0.02)
     assert model.simulate(log).shape == (400,)
+
+
+def test_a_pressure_that_begins_late_shortens_no_log_whose_other_channels_are_related(
+    run: pd.DataFrame, tmp_path: Path
+) -> None:
+    late = run.copy()
+    late.loc[:699, "differential_pressure_pa"] = np.nan
+    late.to_csv(path := tmp_path / "late.csv", index=False)
+    with pytest.warns(LogWarning, match=r"is logged only from 0\.7 s to"):
+        log = hs.read(path)
+    assert (len(log.record), len(log.related)) == (len(run) - 700, len(run))
+    assert log.record.start_time == pytest.approx(0.7)

@@ -34,8 +34,8 @@ class CleanLog:
     Parameters
     ----------
     record : Record
-        The log, without repeated samples and rows, dropouts, gross outliers, clipped pressures and positions, steps of a zero, hum,
-        an offset of its velocity sensor, and samples of like noise; its longest part where rows were lost.
+        The log, without repeated samples and rows, dropouts, gross outliers, clipped pressures and positions, steps of
+        a zero, hum, an offset of its velocity sensor, and samples of like noise; its longest part where rows were lost.
     variances : Mapping[str, float]
         Measurement variance of each of its channels [SI squared].
     left_out : tuple of Note

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from estimation.log_checks.measurement_noise import measurement_variances
-from estimation.log_checks.outliers import without_bursts, without_gross_outliers, without_outliers
+from estimation.log_checks.outliers import (
+    without_bursts,
+    without_gross_outliers,
+    without_outliers,
+    without_written_for_lost,
+)
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import circuit_of
@@ -121,3 +126,31 @@ def test_samples_beside_an_outlier_that_ring_no_more_than_elsewhere_stay() -> No
     values[::100] += 40.0
     sound = without_outliers(values, 1.0)
     assert np.array_equal(without_bursts(values, sound, 1.0), sound, equal_nan=True)
+
+
+@pytest.mark.parametrize("written", [0.0, -9999.0])
+def test_what_a_logger_writes_in_place_of_lost_samples_is_left_out_near_it_too(written: float) -> None:
+    sound = log("minor_leakage", "prbs")
+    rng = np.random.default_rng(7)
+    changes, lost = {}, {}
+    for name in ("motor_speed_rad_s", "position_m", "differential_pressure_pa"):
+        lost[name] = rng.random(len(sound)) < 3e-3
+        changes[name] = np.where(lost[name], written, sound[name])
+    mended, notes = without_gross_outliers(sound.replace(**changes), CHANNELS)
+    assert {str(note.data["channel"]) for note in notes} == set(changes)
+    for name, gone in lost.items():
+        noise = measurement_variances(sound, (name,))[name] ** 0.5
+        wrong = np.abs(mended[name] - sound[name])[gone & np.isfinite(mended[name])]
+        assert np.max(wrong, initial=0.0) < 6.0 * noise
+        assert np.count_nonzero(np.isnan(mended[name]) & ~gone) == 0
+
+
+def test_outliers_of_unlike_values_take_no_others_with_them() -> None:
+    values = np.random.default_rng(8).normal(0.0, 1.0, 400)
+    values[[50, 150, 250, 350]] = 100.0, -90.0, 80.0, 100.0
+    values[200] = 5.0
+    sound = without_outliers(values, 1.0)
+    np.testing.assert_array_equal(without_written_for_lost(values, sound, 1.0), sound)
+    values[[50, 150, 250, 350]] = 100.0
+    sound = without_outliers(values, 1.0)
+    np.testing.assert_array_equal(without_written_for_lost(values, sound, 1.0), sound)

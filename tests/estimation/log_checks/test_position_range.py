@@ -5,14 +5,16 @@ import pytest
 
 from estimation.log_checks.position_range import without_position_beyond_range
 from estimation.notes import SensorCode
+from plant.arrays import Array
 from plant.log.record import Record
+from plant.sensors.sensors import differentiated
 
-TIME = 1e-3 * np.arange(4000)
-COURSE = 0.05 * np.sin(2.0 * np.pi * TIME)
+TIME: Array = 1e-3 * np.arange(4000.0)
+COURSE: Array = 0.05 * np.sin(2.0 * np.pi * TIME)
 
 
-def log(position: np.ndarray, course: np.ndarray = COURSE, noise: float = 1e-3) -> Record:
-    velocity = np.gradient(course, 1e-3) + np.random.default_rng(5).normal(0.0, noise, len(course))
+def log(position: Array, course: Array = COURSE) -> Record:
+    velocity = differentiated(course, 1e-3, 2e-3) + np.random.default_rng(5).normal(0.0, 1e-3, len(course))
     return Record(1e-3, {"position_m": np.round(position, 6), "velocity_m_s": velocity})
 
 
