@@ -215,12 +215,12 @@ def test_an_alarm_stays_in_the_heading_of_the_live_view(opened: Any, raised: int
     page.route("**/events", lambda route: route.fulfill(content_type="text/event-stream", body=body))
     page.add_init_script(  # the answer ends at once, which is no matter here
         "addEventListener('DOMContentLoaded', () => new MutationObserver((all) => all.forEach((one) => {"
-        "window.said ??= one.target.textContent }))"
+        "document.documentElement.dataset.said ??= one.target.textContent }))"
         ".observe(document.querySelector('.live-state'), { childList: true }))"
     )
     page.reload()
-    page.wait_for_function("window.said !== undefined")
-    assert page.evaluate("window.said").startswith(begin)
+    page.wait_for_selector("html[data-said]", state="attached")  # an expression would be waited for by eval
+    assert page.locator("html").get_attribute("data-said").startswith(begin)
     assert page.locator(".live-state").evaluate("one => one.classList.contains('alarmed')") is (raised > 0)
 
 
