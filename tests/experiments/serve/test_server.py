@@ -23,6 +23,11 @@ MB = 1 << 20
 PATIENCE = 120_000
 """How long a browser waits for a server that has much else to do [ms]."""
 
+MARK = """([selector, name]) => new MutationObserver(() => { document.documentElement.dataset[name] = "" })
+    .observe(document.querySelector(selector), { childList: true })"""
+"""Sets an attribute of the page when an element's content is next set, to the same or not: that can be waited for, where
+an expression cannot, since the page's policy forbids eval."""
+
 
 def test_hostile_clients_get_no_server_error_no_file_outside_the_folder_and_no_memory(tmp_path: Path) -> None:
     found = attack(tmp_path, 240, 80, {**MIX, "chunked": 0.5})
@@ -88,6 +93,7 @@ def opened(browser: Any, served: Server, paths: dict[str, str]) -> Iterator[Any]
     def visit(name: str, width: int = 1280, scheme: str = "light") -> Any:
         context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
         contexts.append(context)
+        context.set_default_timeout(PATIENCE)
         page = context.new_page()
         page.complaints, page.asked = [], []
         page.on("console", lambda one: page.complaints.append(one.text))
@@ -126,7 +132,7 @@ def test_a_log_that_is_chosen_is_sent_worked_on_and_listed_and_two_are_compared(
     page = opened("home")
     page.select_option("#verb", "inspect")
     page.set_input_files("#file", str(tmp_path / "<i>three.csv"))
-    page.get_by_role("link", name="<i>three.csv").wait_for(timeout=PATIENCE)
+    page.get_by_role("link", name="<i>three.csv").wait_for()
     for name in ("one.csv", "two.csv"):
         page.get_by_role("checkbox", name=f"Compare {name}").check()
     page.get_by_role("button", name="Compare the two ticked").click()
@@ -144,7 +150,7 @@ def test_a_log_that_failed_says_how_to_look_into_it_and_one_that_was_looked_into
         page.select_option("#verb", verb)
         page.set_input_files("#file", str(tmp_path / name))
         rows.append(page.locator("tr", has_text=name))
-        rows[-1].locator("td", has_text=f"failed ({verb})").wait_for(timeout=PATIENCE)
+        rows[-1].locator("td", has_text=f"failed ({verb})").wait_for()
     said = [row.get_by_text("choose inspect and drop it again").count() for row in rows]
     assert said == [1, 0]
 
@@ -154,14 +160,14 @@ def test_a_log_that_the_server_does_not_delete_stays_and_the_page_says_why(opene
     (tmp_path / "stays.csv").write_text("a,b\n1,2\n3,4\n")
     page.set_input_files("#file", str(tmp_path / "stays.csv"))
     row = page.locator("tr", has_text="stays.csv")
-    row.locator("td", has_text="failed").wait_for(timeout=PATIENCE)
+    row.locator("td", has_text="failed").wait_for()
     page.on("dialog", lambda dialog: dialog.accept())
     page.route("**/api/logs/*", lambda route: route.fulfill(status=429, json={"detail": "the server is busy"}))
     page.get_by_role("button", name="Delete stays.csv").click()
-    page.get_by_text("stays.csv was not deleted: the server is busy").wait_for(timeout=PATIENCE)
+    page.get_by_text("stays.csv was not deleted: the server is busy").wait_for()
     page.unroute("**/api/logs/*")
     page.get_by_role("button", name="Delete stays.csv").click()
-    row.wait_for(state="detached", timeout=PATIENCE)
+    row.wait_for(state="detached")
 
 
 def test_a_log_may_be_dropped_anywhere_and_a_refusal_stays_in_sight(opened: Any) -> None:
@@ -172,13 +178,12 @@ def test_a_log_may_be_dropped_anywhere_and_a_refusal_stays_in_sight(opened: Any)
         document.body.dispatchEvent(new DragEvent("drop", { dataTransfer: files, bubbles: true, cancelable: true }));
     }"""
     page.evaluate(drop, ["empty.csv", ""])
-    page.get_by_text("Not taken: empty.csv: the body must be the file itself, but it is empty.").wait_for(
-        timeout=PATIENCE
-    )
-    page.wait_for_timeout(1500)  # the list is looked at meanwhile
+    page.get_by_text("Not taken: empty.csv: the body must be the file itself, but it is empty.").wait_for()
+    page.evaluate(MARK, ["[role=status]", "looked"])
+    page.wait_for_selector("html[data-looked]", state="attached")  # the list was asked for and told anew
     assert "Not taken: empty.csv" in page.get_by_role("status").inner_text()
     page.evaluate(drop, ["dropped beside.csv", "a,b\n1,2\n3,4\n"])
-    page.locator("tr", has_text="dropped beside.csv").locator("td", has_text="failed").wait_for(timeout=PATIENCE)
+    page.locator("tr", has_text="dropped beside.csv").locator("td", has_text="failed").wait_for()
     assert "Not taken" not in page.get_by_role("status").inner_text()
 
 
@@ -197,12 +202,13 @@ def test_an_answer_that_comes_late_does_not_undo_a_newer_one(opened: Any, tmp_pa
     (tmp_path / "late answer.csv").write_text("a,b\n1,2\n3,4\n")
     page.set_input_files("#file", str(tmp_path / "late answer.csv"))
     row = page.locator("tr", has_text="late answer.csv")
-    row.locator("td", has_text="failed").wait_for(timeout=PATIENCE)
+    row.locator("td", has_text="failed").wait_for()
     (route, old) = held[0]
-    with page.expect_response("**/api/logs?most=*"):
+    with page.expect_response("**/api/logs?most=*") as late:
         route.fulfill(response=old)
-    page.wait_for_timeout(100)
-    assert "failed" in row.inner_text(timeout=PATIENCE)
+    late.value.finished()
+    page.evaluate("fetch('api/health').then((answer) => answer.text())")  # what came before it was dealt with by then
+    assert "failed" in row.inner_text()
 
 
 @pytest.mark.parametrize(("raised", "begin"), [(0, "Watching: learning is over."), (2, "2 alarms, the last at ")])
@@ -219,19 +225,19 @@ def test_an_alarm_stays_in_the_heading_of_the_live_view(opened: Any, raised: int
         ".observe(document.querySelector('.live-state'), { childList: true }))"
     )
     page.reload()
-    page.wait_for_selector("html[data-said]", state="attached")  # an expression would be waited for by eval
+    page.wait_for_selector("html[data-said]", state="attached")
     assert page.locator("html").get_attribute("data-said").startswith(begin)
     assert page.locator(".live-state").evaluate("one => one.classList.contains('alarmed')") is (raised > 0)
 
 
 def test_the_live_view_shows_gauges_and_what_the_watch_tells(opened: Any) -> None:
+    from playwright.sync_api import expect  # which not every developer has
+
     page = opened("live")
     assert page.locator(".gauges li").count() == 7
     assert page.locator(".histories canvas").count() == 6
     assert page.locator(".alarms tbody tr").first.is_visible()
-    rows = int(page.locator(".gauges strong").last.inner_text())
-    for _ in range(50):
-        page.wait_for_timeout(200)
-        if int(page.locator(".gauges strong").last.inner_text()) > rows:
-            return
-    pytest.fail("no more rows came")
+    told = page.locator(".gauges strong").last
+    rows = told.inner_text()
+    expect(told).not_to_have_text(rows, timeout=PATIENCE)
+    assert int(told.inner_text()) > int(rows)
