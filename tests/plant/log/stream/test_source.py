@@ -38,8 +38,8 @@ def publish(port: int, topic: str, messages: list[str]) -> None:
                 time.sleep(0.02)
                 client.publish(topic, message, qos=1)
     finally:
+        client.disconnect()  # first: the loop looks at nothing else for a second
         client.loop_stop()
-        client.disconnect()
 
 
 def through_broker(port: int, topic: str, messages: list[str]) -> tuple[list[str], Received]:
