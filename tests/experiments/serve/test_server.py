@@ -25,8 +25,8 @@ PATIENCE = 120_000
 
 MARK = """([selector, name]) => new MutationObserver(() => { document.documentElement.dataset[name] = "" })
     .observe(document.querySelector(selector), { childList: true })"""
-"""Sets an attribute of the page when an element's content is next set, to the same or not: that can be waited for, where
-an expression cannot, since the page's policy forbids eval."""
+"""Sets an attribute of the page when an element's content is next set, to the same or not. Attributes can be waited
+for; expressions cannot, since the page's policy forbids eval."""
 
 
 def test_hostile_clients_get_no_server_error_no_file_outside_the_folder_and_no_memory(tmp_path: Path) -> None:
