@@ -4,6 +4,7 @@ Flow is that of the pump running freely to tank, velocity that of the piston beh
 """
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -191,13 +192,18 @@ def sensitivities(p: DiaphragmMotorParameters) -> Rows:
 
 
 def _peak(p: DiaphragmMotorParameters) -> tuple[float, float]:
-    """Return where the pump's flow peaks [Hz], by a parabola, and the flow [m^3/s]."""
+    """Return where the pump's flow peaks [Hz], by a parabola, and the flow [m^3/s]; frequencies are tried uphill."""
     frequencies = np.arange(380.0, 581.0, 20.0)
-    flows = np.array([operate(pump_alone(p), f, SWING).outlet_flow for f in frequencies])
-    k = min(max(int(np.argmax(flows)), 1), len(flows) - 2)
-    a, b, _ = np.polyfit(frequencies[k - 1 : k + 2] - frequencies[k], flows[k - 1 : k + 2], 2)
+    flow = cache(lambda k: operate(pump_alone(p), frequencies[k], SWING).outlet_flow)
+    last = len(frequencies) - 1
+    k, before = last // 2, -1
+    while k != before:
+        before, k = k, max((one for one in (k, k - 1, k + 1) if 0 <= one <= last), key=flow)
+    k = min(max(k, 1), last - 1)
+    flows = np.array([flow(one) for one in (k - 1, k, k + 1)])
+    a, b, _ = np.polyfit(frequencies[k - 1 : k + 2] - frequencies[k], flows, 2)
     shift = -0.5 * b / a
-    return float(frequencies[k] + shift), float(flows[k] + 0.5 * b * shift)
+    return float(frequencies[k] + shift), float(flows[1] + 0.5 * b * shift)
 
 
 @tabled

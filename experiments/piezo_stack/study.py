@@ -44,9 +44,9 @@ class StackSettings:
 
 def _find(settings: StackSettings, track: Track) -> Found:
     wanted = {**flow.figure_points(), "design map": (flow.QUICK_GRID if settings.quick else flow.DESIGN_GRID).points()}
-    points = [point for some in wanted.values() for point in some]
-    rows = iter(track(flow.sweep(RIG, points), len(points), description="operating points"))
-    tables = {name: pd.DataFrame([next(rows) for _ in some]) for name, some in wanted.items()}
+    points = list(dict.fromkeys(point for some in wanted.values() for point in some))
+    rows = dict(zip(points, track(flow.sweep(RIG, points), len(points), description="operating points"), strict=True))
+    tables = {name: pd.DataFrame([rows[point] for point in some]) for name, some in wanted.items()}
     tables["figure 10 loops"] = flow.stack_loops(RIG)
     tables["figure 10 loop widths"] = flow.loop_widths(tables["figure 10 loops"])
     tables["pump cycle"] = flow.pump_cycle(RIG, flow.OperatingPoint(50.0, flow.HIGH_VOLTAGE, flow.HIGH_BIAS, 20.0))
