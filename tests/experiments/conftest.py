@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -46,14 +47,6 @@ def study() -> Found:
 
 
 @pytest.fixture(scope="session")
-def written(study: Found, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of the written study."""
-    folder = tmp_path_factory.mktemp("results") / "study"
-    write_result(NINE_CONDITIONS, SMALL, study, folder)
-    return folder
-
-
-@pytest.fixture(scope="session")
 def drawn(study: Found) -> dict[str, Figure]:
     """Return every figure, drawn and laid out once."""
     with styled():
@@ -61,6 +54,15 @@ def drawn(study: Found) -> dict[str, Figure]:
         for figure in figures.values():
             figure.draw_without_rendering()
     return figures
+
+
+@pytest.fixture(scope="session")
+def written(study: Found, drawn: dict[str, Figure], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the written study, with the figures as they were drawn."""
+    folder = tmp_path_factory.mktemp("results") / "study"
+    figures = {name: lambda _, figure=figure: figure for name, figure in drawn.items()}
+    write_result(replace(NINE_CONDITIONS, figures=figures), SMALL, study, folder)
+    return folder
 
 
 STACK = StackSettings(seed=7, quick=True, voltage_limit_v=140.0, power_limit_w=1e3)
