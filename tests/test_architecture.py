@@ -104,7 +104,7 @@ def _imports_below(node: ast.AST, source: Source, *, eager: bool) -> Iterator[Im
 
 
 def _doctest_imports(source: Source) -> Iterator[Import]:
-    for node in ast.walk(source.tree):
+    for node in ast.walk(source.tree) if ">>>" in source.text else ():
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and ">>>" in node.value:
             for example in doctest.DocTestParser().get_examples(node.value):
                 for found in _imports_below(ast.parse(example.source), source, eager=False):
@@ -173,7 +173,7 @@ def prints_outside_experiments(sources: Sequence[Source]) -> list[str]:
     return [
         f"{source.path}:{node.lineno}: calls print, which only experiments may"
         for source in sources
-        if source.layer in LAYERS[:-1]
+        if source.layer in LAYERS[:-1] and "print" in source.text
         for node in ast.walk(source.tree)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print"
     ]

@@ -132,7 +132,7 @@ def pages(texts: dict[str, str]) -> list[Page]:
     floats = FLOATS.union(*(_aliases(tree, FLOATS) for tree in trees.values()))
     arrays = ARRAYS.union(*(_aliases(tree, ARRAYS) for tree in trees.values()))
     public = {path: tree for path, tree in trees.items() if not re.search(r"/_(?!_init__)", path)}
-    pasted = frozenset(name for tree in trees.values() for name in _pasted(tree))
+    pasted = frozenset(name for path, tree in trees.items() if "pasted(" in texts[path] for name in _pasted(tree))
     return [Page(path, tree, floats, arrays, pasted) for path, tree in public.items()]
 
 

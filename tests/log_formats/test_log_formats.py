@@ -2,7 +2,8 @@
 
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +33,15 @@ ALSO_REFUSED = {name: way for name, way in MORE.items() if way.refused}
 @pytest.fixture(scope="module")
 def log() -> pd.DataFrame:
     healthy, rng = EhaParameters(), np.random.default_rng(5)
-    drive = make_drive("prbs", 4.0, T, healthy, rng)
+    drive = make_drive("prbs", 2.0, T, healthy, rng)
     record = simulate(LUMPED, drive, T, healthy, sensors=BENCH, rng=rng)
-    return record.slice(0, 4000).to_frame()[list(SI)]
+    return record.slice(0, 2000).to_frame()[list(SI)]
+
+
+@pytest.fixture(scope="module")
+def written(log: pd.DataFrame, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Return the file of a way that is read, written once."""
+    return cache(lambda name: READ[name].write(log, tmp_path_factory.mktemp("way")))
 
 
 def options_of(way: Way, path: Path) -> dict[str, Any]:
@@ -65,8 +72,10 @@ def test_there_are_25_ways_of_which_23_are_read() -> None:
 
 
 @pytest.mark.parametrize("name", READ)
-def test_a_log_is_one_record_however_it_is_written(name: str, log: pd.DataFrame, tmp_path: Path) -> None:
-    path = READ[name].write(log, tmp_path)
+def test_a_log_is_one_record_however_it_is_written(
+    name: str, log: pd.DataFrame, written: Callable[[str], Path]
+) -> None:
+    path = written(name)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LogWarning)
         assert_same(read_record(path, **options_of(READ[name], path)), log)
@@ -81,9 +90,8 @@ def test_so_it_is_of_instruments_and_scripts(name: str, log: pd.DataFrame, tmp_p
 
 
 @pytest.mark.parametrize("name", READ)
-def test_inspect_finds_every_channel_however_the_log_is_written(name: str, log: pd.DataFrame, tmp_path: Path) -> None:
-    path = READ[name].write(log, tmp_path)
-    found = inspected(path)
+def test_inspect_finds_every_channel_however_the_log_is_written(name: str, written: Callable[[str], Path]) -> None:
+    found = inspected(written(name))
     wanted = set(SI) - ({"differential_pressure_pa"} if name == "two loggers" else set())
     wanted -= {"time_s"} if name in ("no time", "TDMS with a step") else set()
     assert wanted <= found["columns"].keys()
@@ -106,8 +114,10 @@ def test_rounded_and_copied_stamps_are_mended_with_a_note(write: Any, log: pd.Da
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", READ)
-def test_a_log_gives_one_estimate_however_it_is_written(name: str, log: pd.DataFrame, tmp_path: Path) -> None:
-    path = READ[name].write(log, tmp_path)
+def test_a_log_gives_one_estimate_however_it_is_written(
+    name: str, log: pd.DataFrame, written: Callable[[str], Path]
+) -> None:
+    path = written(name)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LogWarning)
         found = hs.read(path, **options_of(READ[name], path)).estimate()
