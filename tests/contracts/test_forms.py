@@ -11,13 +11,14 @@ from estimation.filters.run import METHODS, Estimate, run_filter
 from estimation.log_checks.first_belief import first_belief
 from estimation.models.eha_forms import BULK_MODULUS, FORMS
 from estimation.models.model import ProcessModel
-from faults.conditions import CONDITIONS, Condition, parameters_for
+from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import sine
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
 from plant.log.record import CHANNELS, Record
 from plant.sensors.sensors import BENCH
 from plant.solvers.steps import parameter_row
+from tests.thinned import thinned
 
 EVERY_FORM = pytest.mark.parametrize("model", FORMS.values(), ids=FORMS)
 EVERY_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
@@ -89,9 +90,9 @@ def test_the_compiled_step_holds_the_bounds(model: ProcessModel) -> None:
 
 @EVERY_FORM
 @EVERY_METHOD
-@pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
-def test_the_covariance_stays_symmetric_and_positive(method: Method, model: ProcessModel, condition: Condition) -> None:
-    parameters = parameters_for(condition)
+@pytest.mark.parametrize("condition", thinned(CONDITIONS, ["normal", "major_leakage_major_friction"]))
+def test_the_covariance_stays_symmetric_and_positive(method: Method, model: ProcessModel, condition: str) -> None:
+    parameters = parameters_for(CONDITIONS[condition])
     estimate = filtered(method, model, bench_log(parameters), parameters)
     covariance = estimate.belief.covariance
     assert np.all(estimate.variance > 0.0)

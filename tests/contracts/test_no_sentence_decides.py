@@ -31,10 +31,11 @@ T = 2e-3
 """Sample time of the logs [s]."""
 
 LONG = {
-    "estimate": ("at_rest", "far_off", "frozen_encoder", "frozen_pressure"),
+    "estimate": ("at_rest", "far_off", "frozen_encoder", "frozen_pressure", "frozen_velocity", "healthy", "stuck"),
     "diagnose": ("dead_pressure", "far_off", "frozen_encoder", "frozen_pressure"),
 }
-"""Logs that take seconds each, of which a call of the slow tests consists: the others bring up every kind of note."""
+"""Logs that take seconds each, or of which a verb says what it says of another: a call of the slow tests consists of
+them. The others bring up every kind of note."""
 
 SPEED, POSITION, VELOCITY, PRESSURE = "motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa"
 

@@ -15,6 +15,7 @@ from plant.eha.simulate import LUMPED, simulate
 from plant.errors import HydrostateError
 from plant.sensors.sensors import BENCH, PAPER
 from tests.estimation.tuning.likelihood_fit import fit_likelihood
+from tests.thinned import thinned
 
 RIG = EhaParameters()
 MOTION = SENSED[:2]
@@ -61,9 +62,9 @@ def test_pressure_turns_tens_of_percent_into_fractions(sine: Card) -> None:
     assert logged.friction_force < 2e-3 < 0.05 < sine.friction_force
 
 
-@EVERY_CONDITION
-def test_a_further_sensor_and_a_longer_log_never_tell_less(condition: Condition) -> None:
-    parameters = parameters_for(condition)
+@pytest.mark.parametrize("name", thinned(CONDITIONS, ["normal", "minor_leakage_minor_friction", "major_friction"]))
+def test_a_further_sensor_and_a_longer_log_never_tell_less(name: str) -> None:
+    parameters = parameters_for(CONDITIONS[name])
     long, short = speed("steps", parameters), speed("steps", parameters)[:4000]
     whole = identifiability_card(parameters, long, 1e-3).relative_std
     for poorer in (
@@ -71,7 +72,7 @@ def test_a_further_sensor_and_a_longer_log_never_tell_less(condition: Condition)
         identifiability_card(parameters, long, 1e-3, ["position_m"]),
         identifiability_card(parameters, short, 1e-3),
     ):
-        assert all(whole[name] <= std * (1.0 + 1e-6) for name, std in poorer.relative_std.items())
+        assert all(whole[one] <= std * (1.0 + 1e-6) for one, std in poorer.relative_std.items())
 
 
 def test_the_volumes_uncertainty_is_bulk_modulus_own(steps: Card) -> None:

@@ -13,6 +13,7 @@ from experiments.batch import run_on_terminal
 from experiments.batch.part_store import PartStore, open_store
 from plant.errors import HydrostateError
 from tests.experiments.batch.conftest import rows_in_parts, run_into, small_plan
+from tests.thinned import thinned
 
 
 def begun(folder: Path, parts: int) -> PartStore:
@@ -55,7 +56,7 @@ def without_cases(store: PartStore, _: np.random.Generator) -> None:
 
 
 @pytest.mark.parametrize("damage", [truncated, half_written, zeroed, without_manifest, without_cases])
-@pytest.mark.parametrize("parts", [1, 2, 4])
+@pytest.mark.parametrize("parts", thinned([1, 2, 4], [2]))
 def test_a_store_is_resumed_after_any_damage_at_any_moment(
     damage: Callable[[PartStore, np.random.Generator], None], parts: int, tmp_path: Path, reference: pa.Table
 ) -> None:

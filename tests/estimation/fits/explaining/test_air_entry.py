@@ -21,6 +21,7 @@ from experiments.open_benchmark.machine import Machine
 from experiments.open_benchmark.run import run
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
+from tests.thinned import thinned
 
 PAPER, MACHINE = EhaParameters(), Machine(quadratic=1.1e6, linear=0.0, coulomb=490.0)
 
@@ -65,7 +66,7 @@ def test_air_that_lost_flow_shows_is_tried_first() -> None:
     assert AIR_MIDWAY not in others
 
 
-@pytest.mark.parametrize(("at", "lasting"), [(2.0, 0.5), (3.0, 0.1)])
+@pytest.mark.parametrize(("at", "lasting"), thinned([(2.0, 0.5), (3.0, 0.1)], [(2.0, 0.5)]))
 def test_air_that_gets_in_is_named_with_its_time_and_bulk_modulus_is_right(at: float, lasting: float) -> None:
     clean = clean_log(logged(0.03, at=at, lasting=lasting), PAPER)
     fit = fit_flow(clean.record, PAPER, PAPER.bulk_modulus, {}, clean.variances)
