@@ -59,7 +59,7 @@ def steps(folder: Path) -> dict[str, Path]:
     paths = {suffix: folder / f"steps{suffix}" for suffix in (".csv", ".parquet", ".mat")}
     for path in paths.values():
         made = invoke(
-            *("simulate", "--plant", "lumped", "--condition", "minor_friction", "--drive", "steps", "--duration", 6),
+            *("simulate", "--plant", "lumped", "--condition", "minor_friction", "--drive", "steps", "--duration", 4),
             *("--sample-time", 2e-3, "--seed", 5, "--out", path),
         )
         assert made.exit_code == 0, made.output

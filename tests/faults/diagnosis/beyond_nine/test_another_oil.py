@@ -51,7 +51,7 @@ def test_a_circuit_is_fitted_again_around_stiff_oil_that_alone_speaks_against_it
 def test_a_log_of_stiff_oil_gets_its_class_without_pressure_and_says_so() -> None:
     truth = replace(parameters_for(CONDITIONS["minor_leakage"]), bulk_modulus=4.0 * HEALTHY.bulk_modulus)
     rng = np.random.default_rng(8)
-    log = simulate(CIRCUIT, make_drive("steps", 4.0, 2e-3, truth, rng), 2e-3, truth, sensors=BENCH, rng=rng)
+    log = simulate(CIRCUIT, make_drive("steps", 3.0, 2e-3, truth, rng), 2e-3, truth, sensors=BENCH, rng=rng)
     found = diagnose_log(log.replace(differential_pressure_pa=None), Rig("paper", HEALTHY))
     assert (found.condition, found.unknown) == ("minor_leakage", False)
     (said,) = (note for note in found.notes if note.code == ClassCode.OIL_STIFFER_CLASS)
