@@ -194,7 +194,11 @@ def sensitivities(p: DiaphragmMotorParameters) -> Rows:
 def _peak(p: DiaphragmMotorParameters) -> tuple[float, float]:
     """Return where the pump's flow peaks [Hz], by a parabola, and the flow [m^3/s]; frequencies are tried uphill."""
     frequencies = np.arange(380.0, 581.0, 20.0)
-    flow = cache(lambda k: operate(pump_alone(p), frequencies[k], SWING).outlet_flow)
+
+    @cache
+    def flow(k: int) -> float:
+        return operate(pump_alone(p), float(frequencies[k]), SWING).outlet_flow
+
     last = len(frequencies) - 1
     k, before = last // 2, -1
     while k != before:
