@@ -45,7 +45,7 @@ def deviations(record: Record, true: float) -> float:
 
 @pytest.mark.parametrize("condition", thinned(["normal", "major_leakage"], ["normal"]))
 def test_noise_of_position_does_not_pass_for_soft_oil(condition: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    record, true = log(condition, 5, 4.0)
+    record, true = log(condition, 5)
     assert abs(deviations(record, true)) < 3.0
     monkeypatch.setattr("estimation.fits.flow.log.FELT_NOISE", np.inf)  # as if all of it were the pressure sensor's
     value, std = fit_flow(record, HEALTHY, 2e8).parameters["bulk_modulus"]
