@@ -146,8 +146,7 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     sound = _sound(blocks, fits, actuator, runs)
     gains, worn = dict[str, float](), list[_Tried]()
     found: tuple[float, _Fault, _Tried] | None = None
-    for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best, sound.actuator)):
-        tried = _with(fault, blocks, sound, runs)
+    for fault, tried in _with_each(blocks, sound, runs):
         gain = tried.score - sound.score + fault.presumed
         gains[fault.name] = max(gain, gains.get(fault.name, gain))
         worn += [tried] if fault.name == WORN else []
@@ -175,6 +174,40 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     open_ = {name: chance for name, chance in chances.items() if name != EARLY or chance > WORTH_SAYING}
     scores = np.array([best, *(one.fits.scores for one in worn)]) if WORN in odds else None
     return Outside((), _not_excluded(open_), scores, sum(chances.values()))
+
+
+def circuits_with_faults(
+    blocks: Blocks, fits: ClassFits, actuator: Actuator, gained: float
+) -> Iterator[tuple[float, ClassFits]]:
+    """Yield circuits with each of the faults that are looked for, fitted to a log without pressure.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks, without pressure.
+    fits : ClassFits
+        The circuits without a fault that were fitted to it.
+    actuator : Actuator
+        The healthy actuator.
+    gained : float
+        Log-likelihood that one must gain on these to be of use [dimensionless]: a search that is sure to end `HOPELESS`
+        below that ends early.
+
+    Yields
+    ------
+    tuple of float and ClassFits
+        What is presumed of the fault before a log is seen, a log-likelihood beside that of a sound actuator
+        [dimensionless], and the circuits with it.
+    """
+    runs = nominal_runs(blocks, actuator)
+    for fault, tried in _with_each(blocks, _sound(blocks, fits, actuator, runs), runs, HOPELESS - gained):
+        yield fault.presumed - GAIN, tried.fits
+
+
+def _with_each(blocks: Blocks, sound: _Tried, runs: Array, behind: float = HOPELESS) -> Iterator[tuple[_Fault, _Tried]]:
+    """Yield each fault, and the circuit with it that explains a log best."""
+    for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best, sound.actuator)):
+        yield fault, _with(fault, blocks, sound, runs, behind)
 
 
 def _not_excluded(faults: Mapping[str, float]) -> tuple[Note, ...]:
@@ -271,17 +304,17 @@ def largest_pressure(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float
     return float(np.max(np.abs(predicted(seen, rows)[0, blocks.first :, 1])))
 
 
-def _with(fault: _Fault, blocks: Blocks, sound: _Tried, runs: Array) -> _Tried:
-    """Return the circuit with a fault that explains a log best."""
+def _with(fault: _Fault, blocks: Blocks, sound: _Tried, runs: Array, behind: float) -> _Tried:
+    """Return the circuit with a fault that explains a log best, unless it is so far behind the sound one."""
     faulty = replace(sound.actuator, circuit=fault.circuit)
-    wanted = LASTING * (HOPELESS - sound.score)  # no region holds a circuit better than its misfit says
+    wanted = LASTING * (behind - sound.score)  # no region holds a circuit better than its misfit says
     if not fault.elsewhere:
         start = sound.fits.best.coordinates
         return _Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
     runs = nominal_runs(blocks, faulty)
     start = faulty.conditions[int(np.argmin([misfit(blocks, run) for run in runs]))]
     roughly = _Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
-    if roughly.score < sound.score - HOPELESS:
+    if roughly.score < sound.score - behind:
         return roughly
     anew = _Tried(faulty, fit_classes(blocks, faulty, runs=runs, wanted=wanted))
     return max(roughly, anew, key=lambda one: one.score)

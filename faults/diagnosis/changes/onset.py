@@ -15,6 +15,7 @@ from estimation.finding import Change
 from faults.conditions import CONDITIONS
 from faults.diagnosis.changes.change_odds import believed, gain_of
 from faults.diagnosis.changes.end_stop import stopped
+from faults.diagnosis.changes.fault_throughout import fault_throughout
 from faults.diagnosis.changes.split import GAIN, in_one_condition, likeliest_split
 from faults.diagnosis.changes.warming import Drift, drift_of
 from faults.diagnosis.circuits.actuator import Actuator
@@ -32,7 +33,7 @@ from plant.notes import Note
 from plant.solvers.adaptive import LANES
 
 SOFTENED = 30.0
-"""The same where both are in one condition, from which the oil is asked whether it softened [dimensionless]: steady
+"""Log-likelihood that two circuits must gain before the oil is asked whether it softened [dimensionless]: steady
 training logs of the open benchmark gain up to 27, those into which air gets 95 to 126."""
 
 ONE_SIDED = 1.645
@@ -143,9 +144,10 @@ def _last_of(window: Record, actuator: Actuator) -> LastPart:
     two, drift = parted(blocks, fits, actuator), drift_of(blocks, fits, actuator)
     if drift is not None and (two is None or drift.gain > two.gain):
         return LastPart(window, window, blocks, fits, None, drift=drift)
-    found = None if two is None else find_onset(blocks, two, actuator)
+    against = () if two is None else softened(two)
+    found = None if two is None or against else find_onset(blocks, two, actuator)
     if found is None:
-        return LastPart(window, window, blocks, fits, None, () if two is None else softened(two))
+        return LastPart(window, window, blocks, fits, None, against)
     onset, blocks, fits = found
     rest = window.slice(round(onset.since / window.sample_time), None)
     ends = onset.ci95[0] + window.start_time, onset.ci95[1] + window.start_time
@@ -209,8 +211,8 @@ def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change,
     -------
     tuple of Change, Blocks and ClassFits, or None
         The change, the log with all before it taken as missing, and the circuits that fit the rest, which go on from
-        where the circuit before had brought the piston; None for a log in one condition throughout, and where no
-        circuit follows what came before.
+        where the circuit before had brought the piston; None for a log in one condition throughout, where no circuit
+        follows what came before, and where one with a fault outside the nine explains the log as well.
     """
     (before, after), (first, last) = two.fits, two.conditions
     if two.gain < GAIN or first == last:
@@ -218,6 +220,8 @@ def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change,
     if unexplained(two.parts[0], before, actuator):  # what comes and goes has no last condition, but a quiet stretch
         return None
     if not believed(blocks, two.parts, two.fits, two.whole, actuator):
+        return None
+    if fault_throughout(blocks, two.parts, two.fits, two.whole, actuator):
         return None
     row = parameter_rows(before.best.coordinates[None], actuator.circuit, actuator.rated)[0]
     low, best, high = _when(blocks, row, after.best.coordinates, two.place, actuator)
@@ -230,6 +234,9 @@ def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change,
 def softened(two: Parted) -> tuple[Note, ...]:
     """Return a note where the oil of a log without pressure softened: air got in, which no condition has.
 
+    It is asked whatever conditions the parts are in: air in the oil may pass for friction, and no condition softens
+    the oil.
+
     Parameters
     ----------
     two : Parted
@@ -240,8 +247,7 @@ def softened(two: Parted) -> tuple[Note, ...]:
     tuple of Note
         None with pressure, from which the flow balance tells it.
     """
-    first, last = two.conditions
-    if two.parts[0].pressure is not None or first != last or two.gain < SOFTENED:
+    if two.parts[0].pressure is not None or two.gain < SOFTENED:
         return ()
     at = COORDINATES.index("bulk_modulus")
     fallen = float(two.fits[1].best.coordinates[at] - two.fits[0].best.coordinates[at])

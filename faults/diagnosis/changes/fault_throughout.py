@@ -1,0 +1,49 @@
+"""Without pressure: did the condition change within a log, or was a fault outside the nine there from end to end?
+
+A sound circuit leaves a pattern of a worn pump's log, and two sound circuits one after the other leave less of it.
+Where one circuit with the fault explains the log as well as the two, nothing changed within it.
+"""
+
+import math
+from collections.abc import Sequence
+
+from faults.diagnosis.beyond_nine.other_faults import circuits_with_faults
+from faults.diagnosis.changes.change_odds import LIKELIER, gain_of, odds_of_change
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.class_regions import ClassFits
+
+
+def fault_throughout(
+    blocks: Blocks, parts: Sequence[Blocks], fits: Sequence[ClassFits], whole: ClassFits, actuator: Actuator
+) -> bool:
+    """Return whether a fault outside the nine, from end to end, leaves a change of condition unlikely.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    parts : sequence of Blocks
+        What is before the change, and after it.
+    fits : sequence of ClassFits
+        Sound circuits fitted to each.
+    whole : ClassFits
+        Sound circuits fitted to all.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    bool
+        Whether the change is not `LIKELIER` times as likely as some fault, with what is presumed of both. Never with
+        pressure, where the balance of flows looks for such faults.
+    """
+    if blocks.pressure is not None:
+        return False
+    least = math.log(LIKELIER)
+    needed = odds_of_change(gain_of(whole, parts, fits), fits, whole, blocks, actuator) - least
+    for presumed, faulty in circuits_with_faults(blocks, whole, actuator, needed):
+        odds = odds_of_change(gain_of(faulty, parts, fits), fits, faulty, blocks, actuator)
+        if odds - presumed <= least:
+            return True
+    return False
