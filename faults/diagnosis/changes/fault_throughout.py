@@ -1,4 +1,4 @@
-"""Without pressure: did the condition change within a log, or was a fault outside the nine there from end to end?
+"""Without pressure, one fault outside the nine from end to end may pass for a change of condition within a log.
 
 A sound circuit leaves a pattern of a worn pump's log, and two sound circuits one after the other leave less of it.
 Where one circuit with the fault explains the log as well as the two, nothing changed within it.

@@ -1,0 +1,29 @@
+"""What a log's truth is without pressure: that of a plain one where the pressure sensor alone is strange."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.open_benchmark.draws import draw_plain
+from experiments.open_benchmark.kinds import KINDS
+from experiments.open_benchmark.logger import PRESSURES
+from experiments.open_benchmark.score import OF_PRESSURE, without_pressure
+
+NAMES = [name for name in KINDS if name.startswith(OF_PRESSURE)]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_of_such_kinds_the_pressure_sensor_alone_is_strange(name: str) -> None:
+    plain = draw_plain("normal", "steps", np.random.default_rng(0))
+    strange = KINDS[name].draw(plain, np.random.default_rng(1))
+    assert strange != plain
+    sensors = {**strange.logger.sensors, **{one: plain.logger.sensors[one] for one in PRESSURES}}
+    assert replace(strange, logger=replace(strange.logger, sensors=sensors)) == plain
+
+
+def test_without_pressure_their_condition_is_right_and_nothing_need_be_named() -> None:
+    reversed_ = {"set": "pressure_reversed", "accept": "unknown", "condition": "minor_leakage", "named": "sign"}
+    assert without_pressure(reversed_) == {**reversed_, "accept": "minor_leakage", "named": ""}
+    for other in ({**reversed_, "set": "speed_sign_reversed"}, {"set": "pressure_reversed", "accept": "unknown"}):
+        assert without_pressure(other) == other
