@@ -22,6 +22,7 @@ from faults.diagnosis.advice import advice_for, oil_advice
 from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
 from faults.diagnosis.beyond_nine.drift import over_drift
 from faults.diagnosis.beyond_nine.load import Loaded, under_load
+from faults.diagnosis.beyond_nine.sound_circuit import another_sound_circuit
 from faults.diagnosis.beyond_nine.wear import whatever_fault, whatever_the_pump_delivers
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
@@ -37,7 +38,7 @@ from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import healthy_severities, limits_of, severities, what_is_not_told, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
 from faults.eha.bank import mathematical_bank
-from faults.notes import ClassCode
+from faults.notes import AgainstCode, ClassCode
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
 from plant.errors import LogError, RigError
@@ -300,6 +301,17 @@ def diagnose_clean(
         If the log has neither position nor velocity, or is too short.
     """
     numbers = shipped_calibration() if calibration is None else calibration
+    found = _around(log, actuator, library, numbers)
+    if all(note.code is not AgainstCode.UNEXPLAINED for note in found.against):
+        return found
+    other = another_sound_circuit(found.scoreboard.blocks, found.scoreboard.fits, actuator)
+    return found if other is None else _around(log, other, library, numbers)
+
+
+def _around(
+    log: CleanLog, actuator: Actuator, library: Mapping[str, LinearModel] | None, numbers: Calibration
+) -> Diagnosis:
+    """Return the diagnosis of a log around one healthy circuit."""
     board = weigh(log.record, actuator, library)
     pressure = board.blocks.pressure is not None
     region = how_near(board.fits, board.blocks, actuator)

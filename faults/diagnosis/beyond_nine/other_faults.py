@@ -17,6 +17,7 @@ import numpy as np
 from estimation.eha.rig_share import DELIVERY_ENTRY
 from estimation.fits.hypotheses import PRESUMED
 from faults.conditions import CONDITIONS
+from faults.diagnosis.beyond_nine.sound_circuit import Tried, sound_circuit
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
@@ -70,9 +71,6 @@ SO_SET = math.log(math.log(SETTINGS[1] / SETTINGS[0]) / math.log(10.0))
 """Log-likelihood that a low relief valve is set so, before a log is seen [dimensionless]: it may be set to a tenth of
 what it should be, below which no piston slides, and each of `SETTINGS` stands for those about it."""
 
-WIDER = 5.0
-"""By how much wider make-up valves are tried [dimensionless]: no rig file knows them."""
-
 
 class Outside(NamedTuple):
     """What is said of faults outside the nine conditions.
@@ -94,18 +92,6 @@ class Outside(NamedTuple):
     open: tuple[Note, ...] = ()
     worn: Array | None = None
     faulty: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class _Tried:
-    """A circuit, and how well it explains a log within the regions of the nine conditions."""
-
-    actuator: Actuator
-    fits: ClassFits
-
-    @property
-    def score(self) -> float:
-        return float(np.max(self.fits.scores))
 
 
 @dataclass(frozen=True)
@@ -143,9 +129,9 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     if blocks.pressure is not None or is_stuck(blocks, actuator):
         return Outside()
     runs = nominal_runs(blocks, actuator)
-    sound = _sound(blocks, fits, actuator, runs)
-    gains, worn = dict[str, float](), list[_Tried]()
-    found: tuple[float, _Fault, _Tried] | None = None
+    sound = sound_circuit(blocks, fits, actuator, runs)
+    gains, worn = dict[str, float](), list[Tried]()
+    found: tuple[float, _Fault, Tried] | None = None
     for fault, tried in _with_each(blocks, sound, runs):
         gain = tried.score - sound.score + fault.presumed
         gains[fault.name] = max(gain, gains.get(fault.name, gain))
@@ -200,11 +186,11 @@ def circuits_with_faults(
         [dimensionless], and the circuits with it.
     """
     runs = nominal_runs(blocks, actuator)
-    for fault, tried in _with_each(blocks, _sound(blocks, fits, actuator, runs), runs, HOPELESS - gained):
+    for fault, tried in _with_each(blocks, sound_circuit(blocks, fits, actuator, runs), runs, HOPELESS - gained):
         yield fault.presumed - GAIN, tried.fits
 
 
-def _with_each(blocks: Blocks, sound: _Tried, runs: Array, behind: float = HOPELESS) -> Iterator[tuple[_Fault, _Tried]]:
+def _with_each(blocks: Blocks, sound: Tried, runs: Array, behind: float = HOPELESS) -> Iterator[tuple[_Fault, Tried]]:
     """Yield each fault, and the circuit with it that explains a log best."""
     for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best, sound.actuator)):
         yield fault, _with(fault, blocks, sound, runs, behind)
@@ -304,31 +290,20 @@ def largest_pressure(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float
     return float(np.max(np.abs(predicted(seen, rows)[0, blocks.first :, 1])))
 
 
-def _with(fault: _Fault, blocks: Blocks, sound: _Tried, runs: Array, behind: float) -> _Tried:
+def _with(fault: _Fault, blocks: Blocks, sound: Tried, runs: Array, behind: float) -> Tried:
     """Return the circuit with a fault that explains a log best, unless it is so far behind the sound one."""
     faulty = replace(sound.actuator, circuit=fault.circuit)
     wanted = LASTING * (behind - sound.score)  # no region holds a circuit better than its misfit says
     if not fault.elsewhere:
         start = sound.fits.best.coordinates
-        return _Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
+        return Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
     runs = nominal_runs(blocks, faulty)
     start = faulty.conditions[int(np.argmin([misfit(blocks, run) for run in runs]))]
-    roughly = _Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
+    roughly = Tried(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
     if roughly.score < sound.score - behind:
         return roughly
-    anew = _Tried(faulty, fit_classes(blocks, faulty, runs=runs, wanted=wanted))
+    anew = Tried(faulty, fit_classes(blocks, faulty, runs=runs, wanted=wanted))
     return max(roughly, anew, key=lambda one: one.score)
-
-
-def _sound(blocks: Blocks, fits: ClassFits, actuator: Actuator, runs: Array) -> _Tried:
-    """Return the circuit without a fault that explains a log best, among some that differ in what no rig file knows."""
-    tried, healthy = [_Tried(actuator, fits)], actuator.circuit
-    undrained = replace(healthy, pump_case_leakage=0.0)
-    wider = {"makeup_conductance": WIDER * healthy.makeup_conductance}
-    for circuit in (undrained, replace(healthy, **wider), replace(undrained, **wider)):
-        other = replace(actuator, circuit=circuit)
-        tried.append(_Tried(other, fit_classes(blocks, other, runs=runs, start=fits.best.coordinates)))
-    return max(tried, key=lambda one: one.score)
 
 
 def _delivering(share: float) -> Note:

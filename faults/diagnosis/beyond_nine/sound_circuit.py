@@ -1,0 +1,92 @@
+"""Without pressure: the sound circuit that explains a log best, among some that differ in what no rig file knows.
+
+A rig file says little of make-up valves and of the drain from the pump's case. What these explain is no fault, and a
+log that they explain is not unexplained.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.class_fit import nominal_runs
+from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
+from faults.diagnosis.circuits.out_of_model import unexplained
+from plant.arrays import Array
+
+WIDER = 5.0
+"""By how much wider make-up valves are tried [dimensionless]: no rig file knows them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A circuit, and how well it explains a log within the regions of the nine conditions.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        What it is fitted around.
+    fits : ClassFits
+        The fit.
+    """
+
+    actuator: Actuator
+    fits: ClassFits
+
+    @property
+    def score(self) -> float:
+        """Log-likelihood of the condition that holds it best [dimensionless]."""
+        return float(np.max(self.fits.scores))
+
+
+def sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator, runs: Array) -> Tried:
+    """Return the circuit without a fault that explains a log best, among some that differ in what no rig file knows.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks, without pressure.
+    fits : ClassFits
+        The circuits fitted to it around the actuator.
+    actuator : Actuator
+        The healthy actuator.
+    runs : ndarray, shape (9, n, outputs)
+        What its nine nominal circuits do [m/s].
+
+    Returns
+    -------
+    Tried
+        That circuit: the actuator's, one without a drain from the pump's case, with wider make-up valves, or both.
+    """
+    tried, healthy = [Tried(actuator, fits)], actuator.circuit
+    undrained = replace(healthy, pump_case_leakage=0.0)
+    wider = {"makeup_conductance": WIDER * healthy.makeup_conductance}
+    for circuit in (undrained, replace(healthy, **wider), replace(undrained, **wider)):
+        other = replace(actuator, circuit=circuit)
+        tried.append(Tried(other, fit_classes(blocks, other, runs=runs, start=fits.best.coordinates)))
+    return max(tried, key=lambda one: one.score)
+
+
+def another_sound_circuit(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Actuator | None:
+    """Return a healthy actuator that follows a log which the rig file's does not, as far as a circuit must.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    fits : ClassFits
+        The circuits fitted to it around the actuator.
+    actuator : Actuator
+        The healthy actuator of the rig file.
+
+    Returns
+    -------
+    Actuator or None
+        One that differs in what no rig file knows, such as the width of its make-up valves; None where that does not
+        help, and with pressure, where a flow balance is fitted to such things.
+    """
+    if blocks.pressure is not None:
+        return None
+    sound = sound_circuit(blocks, fits, actuator, nominal_runs(blocks, actuator))
+    return None if unexplained(blocks, sound.fits, sound.actuator) else sound.actuator
