@@ -96,6 +96,14 @@ def test_without_pressure_oil_that_softens_within_a_log_is_in_no_condition() -> 
     assert not softened(two._replace(gain=0.99 * SOFTENED))
     assert not softened(two._replace(parts=[replace(one, pressure=one.velocity) for one in two.parts]))
     assert find_onset(blocks, two, ACTUATOR) is None
+    elsewhere = replace(two.fits[1], scores=np.roll(two.fits[1].scores, 1))
+    assert softened(two._replace(fits=[two.fits[0], elsewhere])), "no condition softens the oil"
+
+
+def test_oil_that_softens_is_no_change_to_another_condition() -> None:
+    found = last_part(foreign("air_midway", 9707).replace(differential_pressure_pa=None), ACTUATOR)
+    assert found.onset is None
+    assert [note.code for note in found.against] == [AgainstCode.OIL_SOFTENS]
 
 
 def test_a_log_in_one_condition_is_judged_whole() -> None:

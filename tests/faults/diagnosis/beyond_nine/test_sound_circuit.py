@@ -1,0 +1,58 @@
+"""Without pressure, what no rig file knows of a sound circuit leaves no log unexplained."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.clean import clean_log
+from experiments.open_benchmark.kinds import make
+from faults.diagnosis.beyond_nine import sound_circuit as subject
+from faults.diagnosis.beyond_nine.sound_circuit import WIDER, another_sound_circuit, sound_circuit
+from faults.diagnosis.circuits.class_fit import nominal_runs
+from faults.diagnosis.circuits.class_regions import fit_classes
+from faults.diagnosis.circuits.out_of_model import unexplained
+from faults.diagnosis.diagnose import diagnose_clean
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from tests.faults.diagnosis.short_logs import ACTUATOR, blocks, classes
+
+LOG, FITS = blocks(pressure=False), classes(pressure=False)
+
+
+def test_the_rig_files_circuit_is_the_best_of_its_own_log() -> None:
+    found = sound_circuit(LOG, FITS, ACTUATOR, nominal_runs(LOG, ACTUATOR))
+    assert found.score >= float(np.max(FITS.scores))
+    assert found.score - float(np.max(FITS.scores)) < 1.0
+
+
+def test_another_is_taken_only_if_it_follows_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    narrow = replace(ACTUATOR.circuit, makeup_conductance=0.02 * ACTUATOR.circuit.makeup_conductance)
+    other = replace(ACTUATOR, circuit=narrow)
+    asked = fit_classes(LOG, other)
+    best = sound_circuit(LOG, asked, other, nominal_runs(LOG, other))
+    assert best.score > float(np.max(asked.scores))
+    found = another_sound_circuit(LOG, asked, other)
+    assert found is not None
+    assert found.circuit == best.actuator.circuit
+    assert best.actuator.circuit.makeup_conductance == pytest.approx(WIDER * narrow.makeup_conductance)
+    monkeypatch.setattr(subject, "unexplained", lambda *_: ["left"])
+    assert another_sound_circuit(LOG, asked, other) is None
+
+
+def test_with_pressure_none_is_sought() -> None:
+    assert another_sound_circuit(blocks(), classes(), ACTUATOR) is None
+
+
+@pytest.mark.slow
+def test_a_plain_log_that_wider_valves_explain_gets_its_class() -> None:
+    """Of the open benchmark, under multisines: the rig file's circuit leaves 16 % of the velocity, this one 10 %."""
+    log = make("plain", "training", 9753).log
+    record = Record(1e-3, {name: log[name].to_numpy() for name in ("motor_speed_rad_s", "position_m", "velocity_m_s")})
+    clean = clean_log(record, EhaParameters())
+    found = diagnose_clean(clean, ACTUATOR)
+    assert not found.unknown
+    assert found.condition == "major_leakage_minor_friction"
+    board = found.scoreboard
+    rigs = fit_classes(board.blocks, ACTUATOR)
+    assert unexplained(board.blocks, rigs, ACTUATOR)

@@ -1,0 +1,59 @@
+"""Without pressure, a worn pump's log is not taken for a change of condition, and a change is not taken for a fault."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from experiments.open_benchmark.kinds import make
+from faults.diagnosis.changes import fault_throughout as subject
+from faults.diagnosis.changes.change_odds import LIKELIER, gain_of, odds_of_change
+from faults.diagnosis.changes.fault_throughout import fault_throughout
+from faults.diagnosis.changes.onset import last_part, parted
+from faults.diagnosis.circuits.class_regions import ClassFits
+from plant.log.record import Record
+from tests.faults.diagnosis.short_logs import ACTUATOR, blocks, classes
+
+CHANGED = blocks("normal", "major_leakage", pressure=False)
+
+
+@pytest.fixture(scope="module")
+def two() -> Any:
+    from faults.diagnosis.circuits.class_regions import fit_classes
+
+    found = parted(CHANGED, fit_classes(CHANGED, ACTUATOR), ACTUATOR)
+    assert found is not None
+    return found
+
+
+def test_a_worn_pump_that_two_sound_circuits_explain_better_than_one_is_no_change() -> None:
+    log = make("worn_pump", "training", 1240).log
+    record = Record(1e-3, {name: log[name].to_numpy() for name in ("motor_speed_rad_s", "position_m", "velocity_m_s")})
+    assert last_part(record, ACTUATOR).onset is None  # two gain 77 on one sound circuit, a pump of 80 % gains 52
+
+
+def test_a_seal_that_gives_way_is_no_fault_from_end_to_end(two: Any) -> None:
+    assert not fault_throughout(CHANGED, two.parts, two.fits, two.whole, ACTUATOR)
+
+
+@pytest.mark.parametrize(("beyond", "throughout"), [(1.0, False), (-1.0, True)])
+def test_a_change_has_to_be_likelier_than_a_fault_by_as_much_as_than_none(
+    two: Any, monkeypatch: pytest.MonkeyPatch, beyond: float, throughout: bool
+) -> None:
+    """A circuit that explains no more than the sound one, of a fault that is presumed to be there by so much."""
+    gain = gain_of(two.whole, two.parts, two.fits)
+    odds = odds_of_change(gain, two.fits, two.whole, CHANGED, ACTUATOR)
+    asked: list[float] = []
+
+    def one_fault(*args: Any) -> Iterator[tuple[float, ClassFits]]:
+        asked.append(args[-1])
+        yield odds - beyond - subject.math.log(LIKELIER), two.whole
+
+    monkeypatch.setattr(subject, "circuits_with_faults", one_fault)
+    assert fault_throughout(CHANGED, two.parts, two.fits, two.whole, ACTUATOR) == throughout
+    assert asked == [pytest.approx(odds - subject.math.log(LIKELIER))]
+
+
+def test_with_pressure_the_balance_of_flows_looks_for_faults(two: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(subject, "circuits_with_faults", lambda *_: pytest.fail("asked"))
+    assert not fault_throughout(blocks(), two.parts, two.fits, classes(), ACTUATOR)
