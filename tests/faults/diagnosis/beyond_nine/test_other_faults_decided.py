@@ -10,7 +10,7 @@ import pytest
 from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS
 from faults.diagnosis import diagnose
-from faults.diagnosis.beyond_nine import other_faults, wear
+from faults.diagnosis.beyond_nine import other_faults, sound_circuit, wear
 from faults.diagnosis.beyond_nine.other_faults import Outside, faults_outside
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
@@ -45,7 +45,8 @@ def looked(
         asked.append((actuator.circuit, start is not None))
         return fits(score(actuator.circuit))
 
-    monkeypatch.setattr(other_faults, "fit_classes", fitted)
+    for module in (other_faults, sound_circuit):
+        monkeypatch.setattr(module, "fit_classes", fitted)
     monkeypatch.setattr(other_faults, "nominal_runs", lambda *_: np.zeros((9, 1, 1)))
     monkeypatch.setattr(other_faults, "misfit", lambda *_: 0.0)
     monkeypatch.setattr(other_faults, "largest_pressure", lambda *_: pressure)
@@ -160,7 +161,8 @@ def test_a_search_for_a_fault_need_not_come_nearer_than_twenty_to_the_sound_circ
         return fits(3.0 if actuator.circuit.makeup_conductance != SOUND.makeup_conductance else 0.0)
 
     looked(monkeypatch, lambda _: 0.0)
-    monkeypatch.setattr(other_faults, "fit_classes", fitted)
+    for module in (other_faults, sound_circuit):
+        monkeypatch.setattr(module, "fit_classes", fitted)
     faults_outside(LOG, fits(0.0), ACTUATOR)
     assert len(wanted) == 14  # three pumps twice, two settings, two valves that stick and two seats of each
     assert set(wanted) == {30.0 * (20.0 - 3.0)}
