@@ -1,5 +1,6 @@
 """Where a compiled filter keeps what: the names of everything that goes into it and from sample to sample."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
@@ -17,6 +18,9 @@ from plant.compiled.late_last import late_last
 from plant.compiled.simplify import Nodes, fused, rewritten, simplified
 from plant.compiled.source import CALLED, symbols_in
 from plant.errors import HydrostateError
+
+_NUMBERED = re.compile(r"[abykcdtw](?:0|[1-9]\d{0,3})")
+"""Names that a kernel numbers."""
 
 
 @dataclass(frozen=True)
@@ -106,12 +110,9 @@ def layout(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> Layout
     parameters = tuple(field.name for field in fields(model.parameters))
     noise = tuple(f"q{i}" for i in range(model.width)) + tuple(f"r{c}" for c in range(len(channels)))
     settings = tuple(setting.name for setting in rule.settings)
-    own = {*carried, *noise, *settings, *CALLED, "h", "share", "j"} | {
-        f"{x}{i}" for x in "abykcdtw" for i in range(9999)
-    }
-    clash = own & set(parameters)
-    if clash:
-        raise HydrostateError(f"{model.name}: a parameter may not be named {sorted(clash)[0]!r}, the kernel uses it")
+    own = {*carried, *noise, *settings, *CALLED, "h", "share", "j"}
+    if clash := [name for name in sorted(parameters) if name in own or _NUMBERED.fullmatch(name)]:
+        raise HydrostateError(f"{model.name}: a parameter may not be named {clash[0]!r}, the kernel uses it")
     return Layout(carried, (*parameters, *noise, *settings, "h", "share"), len(channels))
 
 

@@ -149,7 +149,8 @@ def node(
     """
     known = tuple(id(one) for pair in slopes for one in pair)
     key = (operation, tuple(id(argument) for argument in arguments), value, known)
-    return _NODES.setdefault(key, Expression(operation, arguments, value, slopes))
+    known_as = _NODES.get(key)  # most are met again
+    return _NODES.setdefault(key, Expression(operation, arguments, value, slopes)) if known_as is None else known_as
 
 
 def constant(value: float) -> Expression:

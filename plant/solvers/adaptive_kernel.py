@@ -135,24 +135,31 @@ def compile_adaptive(
     return load_native(f"{name}_adaptive_{lanes}", lambda: _text(*made_of), entries, made_of).run_controlled
 
 
-def _text(name: str, derivative: Derivative, width: int, parameter_class: type[Parameters], lanes: int) -> str:
-    """Write the kernel."""
+@cache
+def _lines(derivative: Derivative, width: int, parameter_class: type[Parameters]) -> tuple[dict[str, str], list[str]]:
+    """Return the lines of a plant, and the constants that they share; the same for any lanes."""
     names = parameter_names(parameter_class)
     outputs = _outputs(derivative, width, parameter_symbols(parameter_class))
     outputs = simplified(share_ratios(outputs), set(names))
     moving = {f"{letter}{i}" for letter in "xw" for i in range(width)} | {*_SHARED}
     fixed, stages = hoisted(outputs, moving, "c")
-    span = range(width)
-    parts = [[f"{letter}{i}" for i in span] for letter in "xnrosyw"]
-    parts += [["error"], [*_SHARED], [*names], [*fixed]]
-    every = [name for part in parts for name in part]
-    slots = {name: lanes * i for i, name in enumerate(every)}
-    vector = min(lanes, native_width())
     lines = {
         "settle": lines_source("settle", fixed),
         "stages": lines_source("stages", fused(stages)),
         "between": lines_source("between", fused(_between(width))),
     }
+    return lines, [*fixed]
+
+
+def _text(name: str, derivative: Derivative, width: int, parameter_class: type[Parameters], lanes: int) -> str:
+    """Write the kernel."""
+    lines, fixed = _lines(derivative, width, parameter_class)
+    names, span = parameter_names(parameter_class), range(width)
+    parts = [[f"{letter}{i}" for i in span] for letter in "xnrosyw"]
+    parts += [["error"], [*_SHARED], [*names], fixed]
+    every = [name for part in parts for name in part]
+    slots = {name: lanes * i for i, name in enumerate(every)}
+    vector = min(lanes, native_width())
     sizes = {"LANES": lanes, "VECTOR": vector, "WIDTH": width, "COLUMNS": len(names), "NUMBERS": lanes * len(every)}
     parts = (
         operations_source(lines, slots, vector) + f"\nmove = moving({lanes})",

@@ -20,6 +20,7 @@ from estimation.fits.greybox.fit import NEAR_ENOUGH, GreyBoxFit, Search, conclud
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
+from estimation.fits.greybox.side_by_side import LANES
 from estimation.models.completed_flow import CRACKS, completed
 from estimation.models.flow import (
     FLOW_FORM,
@@ -298,7 +299,7 @@ def _guess(
     problem = FreedProblem.of(form, log.beginning(search.screened).coarsened())
     around = {STIFFNESS: 0.0, **starts[0]}
     guesses = _guesses_about(around, problem.model)
-    likeliest = guesses[int(np.argmin(problem.costs(guesses)))]
+    likeliest = guesses[int(np.argmin(problem.costs(guesses, LANES)))]
     bounds = flow_bounds(form, guesses, log)
     found = descend(problem.at, likeliest, search.evaluations, bounds, search.near_enough, GUESSED_WITHIN)
     return problem.model.values(found.theta), explained(problem, found)

@@ -45,7 +45,8 @@ def drive_variance(
     if not any(spread > 0.0 for spread in log.drive_std):
         return 0.0
     rough, samples, spread = problem.coarse, len(log.drives), np.array(log.drive_std)
-    undisturbed = rough.residuals(theta) if undisturbed is None else undisturbed
+    if undisturbed is None:  # by the kernel of the draws: by one of its own it would be compiled for this run alone
+        undisturbed = next(iter(rough.disturbed(theta, [log.drives])))
     if samples <= SAMPLES_KEPT:
         moved = rough.disturbed_together(theta, _noisy_drives(log)) - undisturbed[..., None]
         return np.sum((bread @ (slopes.T @ moved.reshape(-1, DRAWS))) ** 2, axis=1) / DRAWS

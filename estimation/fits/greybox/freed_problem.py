@@ -139,6 +139,8 @@ class FreedProblem(Problem):
         names = self.model.unknowns
         asked = [place for place, name in enumerate(names) if name not in known]
         rows = self._rows(self._nudged(theta)[[0, *(1 + place for place in asked)]], self.log.parameters)
+        # what is asked beside it takes `MANY`, and a kernel takes longer to compile than this run
+        rows = np.concatenate([rows, np.repeat(rows[-1:], max(0, LANES + 1 - len(rows)), axis=0)])
         here, columns = _differences(self._residuals(rows, None, self._variances(theta)), len(asked))
         slopes = np.empty((*here.shape, len(names)))
         slopes[..., asked] = columns
@@ -149,13 +151,15 @@ class FreedProblem(Problem):
             self._placed.turn_back(slopes, theta)
         return self._point(theta, *weighed(here, slopes))
 
-    def costs(self, thetas: Sequence[Array]) -> Array:
+    def costs(self, thetas: Sequence[Array], lanes: int = MANY) -> Array:
         """Return the cost at several points, without slopes: eight points take as long as one with its slopes.
 
         Parameters
         ----------
         thetas : sequence of ndarray, shape (unknowns,)
             Fitted coordinates [dimensionless].
+        lanes : int
+            Points side by side: `MANY`, or `LANES` where a search has that kernel and few points need no other.
 
         Returns
         -------
@@ -163,7 +167,7 @@ class FreedProblem(Problem):
             As of `Problem.at` [dimensionless]; noise of driving channels counts as at the first point.
         """
         points = np.array(thetas)
-        errors = self._residuals(self._rows(points, self.log.parameters), None, self._variances(points[0]))
+        errors = self._residuals(self._rows(points, self.log.parameters), None, self._variances(points[0]), lanes)
         errors = errors[..., : len(points)]
         weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)
         misfit = np.einsum("ijk,ijk->k", (1.0 - 0.5 * weight) * weight * errors, errors)
@@ -229,8 +233,11 @@ class FreedProblem(Problem):
         """
         if self.log.gaps.size:  # what a gap leaves open only the other kernel follows
             return super().disturbed_together(theta, drives)
-        rows = np.repeat(self._rows(theta[None], self.log.parameters), drives.shape[-1], axis=0)
-        return self._side_by_side(rows, drives, self._variances(theta))[..., : len(rows)]
+        most = LANES if len(theta) < LANES else MANY  # as many as its slopes take: no kernel for the drives alone
+        row, variance = self._rows(theta[None], self.log.parameters), self._variances(theta)
+        parts = [drives[..., first : first + most] for first in range(0, drives.shape[-1], most)]
+        found = [self._side_by_side(np.repeat(row, part.shape[-1], axis=0), part, variance) for part in parts]
+        return found[0] if len(found) == 1 else np.concatenate(found, axis=-1)
 
     def _run(
         self,
@@ -289,13 +296,16 @@ class FreedProblem(Problem):
         rows[:, self._columns] = values
         return rows
 
-    def _residuals(self, rows: Array, drives: Array | None, variance: Array) -> Array:
-        """Return the normalised residuals under some parameters, shape (outputs, blocks, rows or more)."""
+    def _residuals(self, rows: Array, drives: Array | None, variance: Array, most: int = MANY) -> Array:
+        """Return the normalised residuals under some parameters, shape (outputs, blocks, rows or more).
+
+        ``most`` run side by side.
+        """
         # one run is cheaper alone, and what a gap leaves open only its kernel follows
         if len(rows) == 1 or self.log.gaps.size:
             return np.stack([self._alone(row, drives, variance) for row in rows], axis=-1)
         shared = (self.log.drives if drives is None else drives)[..., None]
-        groups = [rows[first : first + MANY] for first in range(0, len(rows), MANY)]
+        groups = [rows[first : first + most] for first in range(0, len(rows), most)]
         found = each(lambda some: self._side_by_side(some, shared, variance), groups)
         return found[0] if len(found) == 1 else np.concatenate(found, axis=-1)
 

@@ -58,8 +58,9 @@ def compile_side_by_side(model: GreyBoxModel, lanes: int) -> ResidualsRun:
     return kernel.residuals_side_by_side
 
 
-def _source(model: GreyBoxModel, lanes: int) -> str:
-    """Write the kernel."""
+@cache
+def _written(model: GreyBoxModel) -> tuple[dict[str, str], list[str], int]:
+    """Return the lines of a model, all that stands in memory, and the count of states; the same for any lanes."""
     names, drives = parameter_names(model.parameters), range(len(model.drives))
     p = parameter_symbols(model.parameters)
     begun = {f"x{i}": as_expression(value) for i, value in enumerate(model.initial(p))}
@@ -73,20 +74,26 @@ def _source(model: GreyBoxModel, lanes: int) -> str:
         simplified(dict(zip(begun, moved, strict=True)), {*names, "h", "share"}), {*moving, "j"}, "c"
     )
     every = [*moving, *shown, "h", *names, *settled, "share"]
-    vector = min(lanes, native_width())
     lines = {
         "begin": lines_source("begin", begun),
         "settle": lines_source("settle", settled),
         "step": packed_source("step", fused(stepped)),
         "show": lines_source("show", shown),
     }
+    return lines, every, len(begun)
+
+
+def _source(model: GreyBoxModel, lanes: int) -> str:
+    """Write the kernel."""
+    lines, every, width = _written(model)
+    vector = min(lanes, native_width())
     sizes = {
         "LANES": lanes,
         "VECTOR": vector,
-        "WIDTH": len(begun),
-        "DRIVES": len(drives),
-        "OUTPUTS": len(shown),
-        "COLUMNS": len(names),
+        "WIDTH": width,
+        "DRIVES": len(model.drives),
+        "OUTPUTS": len(model.outputs),
+        "COLUMNS": len(parameter_names(model.parameters)),
         "NUMBERS": lanes * len(every),
         "RUNAWAY": RUNAWAY,
     }

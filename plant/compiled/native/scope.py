@@ -39,9 +39,10 @@ def family(kind: AnyKind) -> str:
 
 @cache
 def _assigned(node: ast.AST) -> frozenset[str]:
-    return frozenset(
-        part.id for part in ast.walk(node) if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store)
-    )
+    if isinstance(node, ast.Name):
+        return frozenset((node.id,)) if isinstance(node.ctx, ast.Store) else frozenset()
+    # a loop within a loop is asked again with it: what each part assigns is found once
+    return frozenset().union(*map(_assigned, ast.iter_child_nodes(node)))
 
 
 def assigned_in(nodes: Sequence[ast.AST]) -> set[str]:
