@@ -15,10 +15,9 @@ from estimation.models.model import ProcessModel
 from plant.compiled.expression import ordered
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.machine import native_width
-from plant.compiled.native.operations import ROWS
 from plant.compiled.native.signature import signature
 from plant.compiled.paste import kernel_text, pasted
-from plant.compiled.source import Slot, lines_source, operations_source
+from plant.compiled.source import ROWS, Slot, lines_source, operations_source
 
 LANES = 32
 """Filters side by side: as many as keep a vector unit busy; fewer leave it waiting, more do not help."""

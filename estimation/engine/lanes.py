@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Protocol, TypeAlias
 
 from estimation.arrays import Array, IntArray
-from plant.compiled.native.operations import ROWS
+from plant.compiled.source import ROWS
 
 AHEAD = 512
 """Bytes of each log that are fetched ahead of their use: the memory answers within a few samples of all lanes."""

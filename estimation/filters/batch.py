@@ -18,7 +18,7 @@ from estimation.engine.kernels import LANES
 from estimation.engine.rule import Rule
 from estimation.engine.runner import aligned, prepared, read_off, run_rule
 from estimation.filters.ekf import EKF
-from plant.compiled.native.operations import ROWS
+from plant.compiled.source import ROWS
 from plant.errors import HydrostateError
 
 FEWEST_IN_LANES = 8

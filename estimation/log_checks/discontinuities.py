@@ -167,25 +167,29 @@ def _pressure_strays(record: Record, *, noisy: bool = False) -> Array:
     """
     pressure, speed, T = record[PRESSURE], record[SPEED], record.sample_time
     rise, swept, turned = np.diff(pressure), np.diff(record[POSITION]), 0.5 * T * (speed[1:] + speed[:-1])
-    shifted = [np.roll(one, k) for one in (swept, turned) for k in (-1, 0, 1)]
-    middle = 0.5 * T * (pressure[1:] + pressure[:-1])
-    before = (np.roll(rise, 1),) if noisy else ()
-    known = np.stack([*shifted, middle, T * np.sign(turned), *before])
-    known[:, [0, -1]] = 0.0
-    there = np.isfinite(rise) & np.all(np.isfinite(known), axis=0)
-    left = rise
-    if np.count_nonzero(there) < FEWEST_ROWS // 2:
-        return left
+    known = np.zeros((9 if noisy else 8, len(rise)))
+    for place, one in enumerate((swept, turned)):
+        known[3 * place, 1:-1], known[3 * place + 1, 1:-1], known[3 * place + 2, 1:-1] = one[2:], one[1:-1], one[:-2]
+    known[6, 1:-1] = (0.5 * T * (pressure[1:] + pressure[:-1]))[1:-1]
+    known[7, 1:-1] = T * np.sign(turned[1:-1])
+    if noisy:
+        known[8, 1:-1] = rise[:-2]
+    whole = np.isfinite(rise) & np.all(np.isfinite(known), axis=0)
+    if np.count_nonzero(whole) < FEWEST_ROWS // 2:
+        return rise
+    known[:, ~whole] = 0.0
+    course, left, kept = np.where(whole, rise, 0.0), rise, whole
+    gram, pull = known @ known.T, known @ course
     for _ in range(3):
-        rows = known[:, there]
-        sizes = np.linalg.norm(rows, axis=1)
+        out = known[:, whole & ~kept]  # few: what they are part of is taken off, and not summed anew
+        inner, toward = gram - out @ out.T, pull - out @ course[whole & ~kept]
+        sizes = np.sqrt(np.diag(inner))
         sizes[sizes == 0.0] = 1.0
-        rows = rows / sizes[:, None]
-        found = np.linalg.lstsq(rows @ rows.T, rows @ rise[there], rcond=1e-10)[0]
-        left = rise - (found / sizes) @ known
-        sizes = np.abs(left)
-        place = int(0.99 * (np.count_nonzero(there) - 1))
-        there &= sizes <= 3.0 * np.partition(sizes[there], place)[place]
+        found = np.linalg.lstsq(inner / np.outer(sizes, sizes), toward / sizes, rcond=1e-10)[0]
+        left = np.where(whole, course - (found / sizes) @ known, np.nan)
+        far = np.abs(left)
+        place = int(0.99 * (np.count_nonzero(kept) - 1))
+        kept = kept & (far <= 3.0 * np.partition(far[kept], place)[place])
     return left
 
 

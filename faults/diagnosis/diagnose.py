@@ -100,12 +100,11 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     """
     log = clean_log(record, rig.parameters) if seen is None else seen[0]
     asked = seen is None and not log.mistakes  # else it is not wanted, or known what is wrong
-    plain = _Plain(log, rig.parameters, begun(partial(_of_clean, log, rig.parameters)) if asked else None)
+    plain = _begun(log, rig.parameters) if asked else _Plain(log, rig.parameters, None, None)
     estimate = estimated(log, rig, EstimateOptions())[1] if seen is None else seen[1]
     found, case = finding_of(log, estimate, rig), _set_right(log, rig, estimate)
     log, rig = case.log, case.rig
-    scored = log.record.slice(0, round(LONGEST / log.record.sample_time) + 1) if log.mistakes else log.record
-    scores = score_mathematical(scored, mathematical_bank(rig.parameters))
+    scores = plain.scores_of(log, rig.parameters)
     verdict = models_verdict(scores, log.record)
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
     unsure = (*_healthy_of_the_paper(plain.parameters), *estimate.rig_notes)
@@ -188,20 +187,40 @@ def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tupl
 
 
 class _Plain(NamedTuple):
-    """A diagnosis of the log as it came and around the rig as its file says: most logs need no other.
+    """Diagnosis and nominal models of the log as it came, around the rig as its file says: most logs need no others.
 
-    It is begun beside the estimate of bulk modulus, which may set log and rig right; then it is not asked for. Where
-    that is known already, there is nothing to begin it beside.
+    They are begun beside the estimate of bulk modulus, which may set log and rig right; then they are not asked for.
+    Where that is known already, there is nothing to begin them beside.
     """
 
     log: CleanLog
     parameters: EhaParameters
     result: Callable[[], Diagnosis] | None
+    scores: Callable[[], Scores] | None
 
     def of(self, log: CleanLog, parameters: EhaParameters) -> Diagnosis:
-        if self.result is not None and log is self.log and parameters == self.parameters:
+        if self.result is not None and self._has(log, parameters):
             return self.result()
         return _of_clean(log, parameters)
+
+    def scores_of(self, log: CleanLog, parameters: EhaParameters) -> Scores:
+        if self.scores is not None and self._has(log, parameters):
+            return self.scores()
+        return _scores_of(log, parameters)
+
+    def _has(self, log: CleanLog, parameters: EhaParameters) -> bool:
+        return log is self.log and parameters == self.parameters
+
+
+def _begun(log: CleanLog, parameters: EhaParameters) -> _Plain:
+    works = partial(_of_clean, log, parameters), partial(_scores_of, log, parameters)
+    return _Plain(log, parameters, begun(works[0]), begun(works[1]))
+
+
+def _scores_of(log: CleanLog, parameters: EhaParameters) -> Scores:
+    """Return how the nine nominal models follow a log, or its beginning where a channel is mistaken."""
+    record = log.record.slice(0, round(LONGEST / log.record.sample_time) + 1) if log.mistakes else log.record
+    return score_mathematical(record, mathematical_bank(parameters))
 
 
 def _of_clean(log: CleanLog, parameters: EhaParameters) -> Diagnosis:

@@ -8,6 +8,9 @@ from plant.compiled.expression import Expression, ordered
 Slot: TypeAlias = int | tuple[int, int]
 """Where a number stands: so many numbers behind a step's address, or behind another address, by its place in a row."""
 
+ROWS = 8
+"""Samples of as many logs that `plant.compiled.native.operations.transpose` turns at a time."""
+
 CALLED = ("present", "sign", "sqrt", "exp", "log", "tanh", "sin", "cos", "atan", "ratios", "roots", "where", "fma")
 """Functions that lines call (`plant.compiled.native.lines`): no symbol may have their names."""
 

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 LEVEL = 1
-"""How hard LLVM optimises: at 0 a kernel runs half as fast, at 2 it runs no faster and takes a tenth more to compile."""
+"""How hard LLVM optimises: at 0 a kernel runs half as fast, at 2 no faster, and it takes a tenth more to compile."""
 
 UNROLLED = False
 """Whether LLVM unrolls loops: a step is hundreds of instructions by then, and twice as many run 7 % slower, for they
@@ -37,9 +37,7 @@ def target() -> str:
     import llvmlite
 
     how = f"O{LEVEL} unrolled {UNROLLED}"
-    return (
-        f"{llvmlite.__version__} {version} {llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features} {how}"
-    )
+    return f"{llvmlite.__version__} {version} {llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features} {how}"
 
 
 @cache

@@ -8,10 +8,7 @@ from plant.compiled.native.kinds import BOOL, FLOAT, INT, NOTHING, Held, several
 from plant.compiled.native.lines import Lines, names_of, vector
 from plant.compiled.native.operators import convert
 from plant.compiled.native.scope import Scope
-from plant.compiled.source import Slot
-
-ROWS = 8
-"""Samples of as many logs that `transpose` turns at a time."""
+from plant.compiled.source import ROWS, Slot
 
 Functions = Mapping[str, ast.FunctionDef]
 Operation = Callable[[Scope, Sequence[Held]], Held]
