@@ -136,8 +136,8 @@ def _steps_of_pressure(record: Record) -> list[_Step]:
     """Return where pressure steps farther from what compresses the oil than elsewhere."""
     if PRESSURE not in record or SPEED not in record or record.sample_time > SLOWEST_PRESSURE:
         return []
-    rows = _places(_pressure_strays(record, noisy=True), STEP_OF_PRESSURE)
-    strayed = _pressure_strays(record) if rows else np.empty(0)
+    rows = _places(pressure_strays(record, noisy=True), STEP_OF_PRESSURE)
+    strayed = pressure_strays(record) if rows else np.empty(0)
     return [_Step(PRESSURE, k, _size(strayed, k)) for k in rows]
 
 
@@ -158,12 +158,23 @@ def _without(values: Array, rows: list[int]) -> Array:
     return out
 
 
-def _pressure_strays(record: Record, *, noisy: bool = False) -> Array:
-    """Return what is left of the change of pressure from row to row beside what pump, piston and leakage explain [Pa].
-
-    A noisy row is followed by a change the other way, which may be counted among what explains; a step is not.
+def pressure_strays(record: Record, *, noisy: bool = False) -> Array:
+    """Return what is left of the change of pressure from row to row beside what pump, piston and leakage explain.
 
     Valves and seals bend this line, so rows that stray far from it are left out before it is drawn again.
+
+    Parameters
+    ----------
+    record : Record
+        A log with motor speed, position and differential pressure.
+    noisy : bool
+        Whether the change before counts among what explains: a noisy row is followed by a change the other way, a step
+        is not.
+
+    Returns
+    -------
+    ndarray, shape (n - 1,)
+        The rest [Pa]; NaN where a sample that it needs is missing.
     """
     pressure, speed, T = record[PRESSURE], record[SPEED], record.sample_time
     rise, swept, turned = np.diff(pressure), np.diff(record[POSITION]), 0.5 * T * (speed[1:] + speed[:-1])

@@ -22,14 +22,7 @@ from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.greybox.side_by_side import LANES
 from estimation.models.completed_flow import CRACKS, completed
-from estimation.models.flow import (
-    FLOW_FORM,
-    HELD_FLOW_FORM,
-    MASS_FLOW_FORM,
-    STIFFNESS,
-    reaches_relief,
-    relieving,
-)
+from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.eha.model import EhaParameters

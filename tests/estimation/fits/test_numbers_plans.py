@@ -170,7 +170,7 @@ def plan_of_the_flow_form() -> dict[str, Any]:
             with (
                 planned(cost, flow_search, greybox_fit) as plan,
                 patch.object(flow_search, "concluded", concluded),
-                patch.object(FreedProblem, "costs", lambda _, thetas: np.arange(len(thetas))),
+                patch.object(FreedProblem, "costs", lambda _, thetas, _lanes: np.arange(len(thetas))),
                 patch.object(flow_search, "each", lambda work, items: [work(item) for item in items]),
                 patch.object(greybox_fit, "each", lambda work, items: [work(item) for item in items]),
             ):

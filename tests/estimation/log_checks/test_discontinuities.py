@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.log_checks.clean import clean_log
-from estimation.log_checks.discontinuities import without_discontinuities
+from estimation.log_checks.discontinuities import pressure_strays, without_discontinuities
 from estimation.notes import ChannelCode, SensorCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -103,3 +103,30 @@ def test_a_velocity_under_the_name_of_position_is_named_and_not_mended() -> None
     clean = clean_log(record.replace(**{POSITION: jerky, VELOCITY: record[POSITION]}), EhaParameters())
     assert [note.code for note in clean.mistakes] == [ChannelCode.CHANNELS_SWAPPED]
     assert not {SensorCode.POSITION_REZEROED, SensorCode.ROWS_LOST} & {note.code for note in clean.left_out}
+
+
+@pytest.mark.parametrize("noisy", [False, True])
+def test_what_explains_a_change_of_pressure_is_least_squares_of_rows_that_do_not_stray(noisy: bool) -> None:
+    record = log("steps")
+    pressure = record[PRESSURE].copy()
+    pressure[700:720] = np.nan
+    record = record.replace(**{PRESSURE: pressure})
+    found = pressure_strays(record, noisy=noisy)
+    speed, position, rise = record[SPEED], record[POSITION], np.diff(pressure)
+    pumped, swept = 0.5e-3 * (speed[1:] + speed[:-1]), np.diff(position)
+    columns = [
+        *(np.roll(one, k) for one in (swept, pumped) for k in (-1, 0, 1)),
+        0.5e-3 * (pressure[1:] + pressure[:-1]),
+    ]
+    columns += [1e-3 * np.sign(pumped), *((np.roll(rise, 1),) if noisy else ())]
+    rows = np.stack(columns, axis=1)
+    rows[[0, -1]] = 0.0
+    there = np.isfinite(rise) & np.isfinite(rows).all(axis=1)
+    kept, wanted = there, rise
+    for _ in range(3):
+        size = np.linalg.norm(rows[kept], axis=0)
+        wanted = rise - (rows / size) @ np.linalg.lstsq(rows[kept] / size, rise[kept])[0]
+        far = np.abs(wanted)
+        kept = kept & (far <= 3.0 * np.sort(far[kept])[int(0.99 * (np.count_nonzero(kept) - 1))])
+    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-6 * np.nanmax(np.abs(wanted)))
+    assert np.isnan(found[705])

@@ -1,12 +1,14 @@
 """When a log's class is unknown, and what stands in its place: every way that leads there, on short logs."""
 
+from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
 
 from estimation.finding import Finding, Outcome
+from estimation.log_checks.clean import clean_log
 from estimation.notes import ChannelCode, EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import diagnose
@@ -149,3 +151,29 @@ def test_a_drive_that_is_nothing_tells_no_class() -> None:
     assert found.outcome is Outcome.NOT_OBSERVABLE
     assert found.condition is None
     assert ClassCode.MODELS_ALIKE in codes(found)
+
+
+def test_nominal_models_of_a_plain_log_are_run_beside_the_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
+    order: list[str] = []
+
+    def noted(name: str) -> None:
+        run = getattr(diagnose, name)
+        monkeypatch.setattr(diagnose, name, lambda *given, **how: order.append(name) or run(*given, **how))
+
+    def at_once(work: Callable[[], object]) -> Callable[[], object]:
+        found = work()
+        return lambda: found
+
+    for name in ("estimated", "score_mathematical"):
+        noted(name)
+    monkeypatch.setattr(diagnose, "begun", at_once)
+    found, usual = diagnose_log(log(), RIG), plain()
+    assert (found.probabilities, found.severities) == (usual.probabilities, usual.severities)
+    assert order == ["score_mathematical", "estimated"]
+
+
+def test_nominal_models_of_a_log_that_is_set_right_are_run_anew() -> None:
+    came = clean_log(log(), HEALTHY)
+    of_another = partial(pytest.fail, "these are of another log")
+    begun = diagnose._Plain(came, HEALTHY, None, of_another)  # pyright: ignore[reportPrivateUsage]
+    assert begun.scores_of(replace(came), HEALTHY).by_condition == plain().evidence.scores.by_condition

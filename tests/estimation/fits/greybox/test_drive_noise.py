@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.fits.greybox import drive_noise
+from estimation.fits.greybox import drive_noise, freed_problem
 from estimation.fits.greybox.drive_noise import drive_variance
 from tests.estimation.fits.short_logs import problem, usual
 
@@ -17,3 +17,16 @@ def test_draws_for_a_long_log_are_those_for_a_short_one(monkeypatch: pytest.Monk
     assert np.all(np.asarray(kept) > 0.0)
     monkeypatch.setattr(drive_noise, "SAMPLES_KEPT", 10)
     np.testing.assert_allclose(drive_variance(one, theta, bread, slopes), kept, rtol=1e-9)
+
+
+def test_a_run_without_noise_takes_no_kernel_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = problem()
+    theta = usual(one)
+    slopes = one.slopes(theta)
+    bread = np.asarray(np.linalg.inv(slopes.T @ slopes + np.eye(len(theta))), dtype=np.float64)
+    given = drive_variance(one, theta, bread, slopes, one.coarse.residuals(theta))
+    monkeypatch.setattr(
+        freed_problem, "_by_itself", lambda *_: pytest.fail("this kernel would be compiled for one run")
+    )
+    found = drive_variance(one.on(one.log), theta, bread, slopes)
+    np.testing.assert_allclose(found, given, rtol=1e-6)

@@ -207,3 +207,72 @@ def test_other_drives_of_a_log_with_gaps_or_of_a_long_one_are_run_one_by_one(
     for errors, one in zip(found, drives, strict=True):
         np.testing.assert_allclose(errors, open_gap.residuals(theta, drives=one), rtol=1e-7, atol=1e-7)
     assert np.max(np.abs(found[0] - together[0])) > 1.0
+
+
+def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Lanes of the kernels that a problem asks for, one after the other."""
+    asked: list[int] = []
+
+    def noted(model: GreyBoxModel, lanes: int) -> object:
+        asked.append(lanes)
+        return compile_side_by_side(model, lanes)
+
+    monkeypatch.setattr(freed_problem, "compile_side_by_side", noted)
+    return asked
+
+
+def test_drives_that_are_drawn_take_no_kernel_beside_that_of_the_slopes(
+    problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = replace(problem.log, drives=problem.log.drives[:, :2], parameters=parameter_row(flow_parameters(HEALTHY)))
+    held = FreedProblem.of(HELD_FLOW_FORM, log)
+    values = {**vars(flow_parameters(HEALTHY)), "case_leakage": 1e-13, "speed_lead": 1e-5, "makeup_opening": 1e3}
+    theta = HELD_FLOW_FORM.theta({**values, "accumulator_stiffness": 1e8})
+    assert len(theta) < LANES
+    drives = log.drives[..., None] * (1.0 + 1e-3 * np.arange(MANY))
+    asked = asked_for(monkeypatch)
+    held.at(theta)
+    found = held.disturbed_together(theta, drives)
+    assert asked == [LANES]
+    for place in (0, LANES, MANY - 1):
+        one = held.residuals(theta, drives=np.ascontiguousarray(drives[..., place]))
+        np.testing.assert_allclose(found[..., place], one, rtol=1e-7, atol=1e-7)
+
+
+def test_slopes_beside_known_ones_take_the_kernel_that_all_slopes_take(
+    problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (theta,) = points(problem, 1)
+    own = problem.on(problem.log)
+    asked = asked_for(monkeypatch)
+    whole = own.at(theta)
+    _, slopes = own.linearised(theta)
+    known = dict(zip(own.model.unknowns, slopes.T, strict=True))
+    del known[own.model.unknowns[2]]
+    beside = own.at_beside(theta, known)
+    assert asked == [MANY]
+    assert beside.cost == pytest.approx(whole.cost, rel=1e-12)
+    assert beside.gradient == pytest.approx(whole.gradient, rel=1e-9, abs=1e-9 * np.max(np.abs(whole.gradient)))
+
+
+def test_costs_of_a_search_may_be_taken_by_its_own_kernel(
+    problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    thetas, own = [*points(problem, LANES + 3)], problem.on(problem.log)
+    asked = asked_for(monkeypatch)
+    found = own.costs(thetas, LANES)
+    assert asked == [LANES]
+    np.testing.assert_array_equal(found, problem.costs(thetas))
+
+
+def test_lines_of_a_model_are_written_once_for_all_widths(monkeypatch: pytest.MonkeyPatch) -> None:
+    traced: list[GreyBoxModel] = []
+    step = side_by_side.model_step
+    monkeypatch.setattr(side_by_side, "model_step", lambda model, *given: traced.append(model) or step(model, *given))
+    form = replace(FLOW_FORM, name="another_name")
+    texts = [
+        text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(form, LANES)),
+        text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(form, MANY)),
+    ]
+    assert traced == [form]
+    assert texts[0] != texts[1]

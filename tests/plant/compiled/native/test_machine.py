@@ -1,0 +1,21 @@
+"""Machine code is made as a kernel wants it: small, for its loops hold all that there is to do side by side."""
+
+import pytest
+
+from plant.compiled.native import machine
+from plant.compiled.native.program import Module
+from plant.compiled.native.signature import signature
+
+TEXT = """
+def roots(values):
+    for k in range(6):
+        values[k] = math.sqrt(values[k]) / (1.0 + values[k])
+"""
+
+
+def test_loops_stay_rolled(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = Module(TEXT)
+    module.enter("roots", tuple(one.kind for one in signature("values : ndarray, shape (n,)")))
+    rolled = machine.assembled(module.ir())
+    monkeypatch.setattr(machine, "UNROLLED", True)
+    assert len(rolled) < len(machine.assembled(module.ir()))
