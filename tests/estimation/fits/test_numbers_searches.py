@@ -48,9 +48,9 @@ def counted() -> Iterator[list[int]]:
         asked.extend(len(self.log.measured) for _ in thetas)
         return at_each(self, thetas)
 
-    def sums(self: FreedProblem, thetas: Sequence[Array]) -> Array:
+    def sums(self: FreedProblem, thetas: Sequence[Array], *lanes: int) -> Array:
         asked.extend(len(self.log.measured) for _ in thetas)
-        return costs(self, thetas)
+        return costs(self, thetas, *lanes)
 
     with (
         patch.object(Problem, "at", one),
