@@ -92,13 +92,14 @@ class Relation(Shown):
         for one in self.models:
             record = _record_of(log, one.sample_time)
             if record is None:
-                runs.append(one.simulate(log))
-                u = np.asarray(log, dtype=np.float64).reshape(len(runs[-1]), -1)
+                run, judged = one.judged_run(log)
+                u = np.asarray(log, dtype=np.float64).reshape(len(run), -1)
                 part = Channels(one.inputs, one.output, one.sample_time, (u,), (np.full(len(u), np.nan),))
             else:
                 part = channels_to_run(record, one.inputs, one.output, one.sample_time)
-                runs.append(one.simulate(part.u[0], part.y[0]))
-            _warn_of_inputs(one, part)
+                run, judged = one.judged_run(part.u[0], part.y[0])
+            runs.append(run)
+            _warn_of_inputs(one, part, None if judged is None else [judged])
         return runs[0] if len(runs) == 1 else np.column_stack(runs)
 
     def validate(self, log: Any) -> "pd.DataFrame":
@@ -223,13 +224,15 @@ def _record_of(log: Any, sample_time: float) -> "Record | None":
     return None if table is None else read_any(frame_table(table), assumed=sample_time)
 
 
-def _warn_of_inputs(model: "FreeRunModel", data: "Channels") -> None:
+def _warn_of_inputs(
+    model: "FreeRunModel", data: "Channels", judged: "Sequence[tuple[float, float]] | None" = None
+) -> None:
     import warnings
 
     from estimation.identification.free_run.input_range import doubts_about_inputs
     from plant.errors import LogWarning
 
-    for note in doubts_about_inputs(model, data):
+    for note in doubts_about_inputs(model, data, judged):
         warnings.warn(LogWarning(note), stacklevel=3)
 
 

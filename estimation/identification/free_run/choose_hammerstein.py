@@ -23,6 +23,7 @@ from estimation.identification.free_run.hammerstein_fit import (
     refitted,
 )
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
+from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.transfer_function import linear_model
 from estimation.progress import tell
 
@@ -64,6 +65,8 @@ class HammersteinCandidate:
 def hammerstein_candidates(linear: Sequence[Candidate], data: Channels) -> list[HammersteinCandidate]:
     """Return models of each kind before linear ones of several orders, the best of each judged on blocks held back.
 
+    Those that leave too much of the data of their own fit to be worthwhile are not judged.
+
     Parameters
     ----------
     linear : sequence of Candidate
@@ -75,6 +78,8 @@ def hammerstein_candidates(linear: Sequence[Candidate], data: Channels) -> list[
     for one in linear:
         if one.doubt != "time_constant":
             denominators.setdefault(one.form.order, []).append(one.fit.f)
+    # what leaves more of what it was fitted to than may be left of what was not has no chance there
+    bar = (1.0 - BENT_MARGIN) * min(one.held_back for one in linear)
     found: list[HammersteinCandidate] = []
     for kind in NONLINEARITIES:
         best: dict[int, tuple[float, HammersteinFit]] = {}
@@ -85,7 +90,9 @@ def hammerstein_candidates(linear: Sequence[Candidate], data: Channels) -> list[
             if fit is not None and (order not in best or _bic(fit, data) < best[order][0]):
                 best[order] = _bic(fit, data), fit
         found += [
-            HammersteinCandidate(fit, _held_back(fit, data), bic, _doubt(fit, data)) for bic, fit in best.values()
+            HammersteinCandidate(fit, _held_back(fit, data), bic, _doubt(fit, data))
+            for bic, fit in best.values()
+            if np.sqrt(fit.cost / data.n_samples) < bar
         ]
     return found
 
@@ -164,7 +171,7 @@ def _held_back(fit: HammersteinFit, data: Channels) -> tuple[float, ...]:
     target, errors = np.concatenate(data.y), list[float]()
     for masks in blocks(data, BLOCKS):
         tell("nonlinear inputs")
-        part = refitted(fit, data.without(masks))
+        part = refitted(fit, data.without(masks), COARSE)
         output = HammersteinProblem(fit.kind, fit.linear.form, data).jacobian(part.theta)[0]
         errors.append(block_error(output - target, np.concatenate(masks) & np.isfinite(target)))
     return tuple(errors)

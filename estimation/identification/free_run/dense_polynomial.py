@@ -11,12 +11,13 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from estimation.arrays import Array, IntArray
+from estimation.arrays import IntArray
 from estimation.identification.free_run.choose_linear import CLEARLY, block_error, pooled
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.linear_fit import Form, LinearFit
+from estimation.identification.free_run.linear_fit import COARSE, Form, LinearFit
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, variables_of
-from estimation.identification.free_run.polynomial_variables import Variables, products
+from estimation.identification.free_run.polynomial_moments import Moments, moments, one_step_values
+from estimation.identification.free_run.polynomial_variables import Variables
 from estimation.progress import tell
 
 SIZES = ((1, 2), (2, 2), (3, 2), (3, 3))
@@ -79,7 +80,9 @@ class Recipe:
     one_step: float
     free_run: tuple[float, ...] = ()
 
-    def fit(self, data: Channels, begun: PolynomialFit | None = None) -> PolynomialFit | None:
+    def fit(
+        self, data: Channels, begun: PolynomialFit | None = None, known: "Moments | None" = None
+    ) -> PolynomialFit | None:
         """Return the model of given data; None where it runs away or there are too few samples.
 
         Parameters
@@ -88,13 +91,13 @@ class Recipe:
             Scaled; outputs held back are NaN.
         begun : PolynomialFit, optional
             What the same recipe without its last penalty gives on these data, if that is known.
+        known : tuple, optional
+            Moments of these data for this size, as `moments` returns them, if they are known.
         """
         if begun is not None:
-            return Runs(begun.variables, begun.terms, data).fit(begun.theta, STEPS, self.free_run[-1]) or begun
-        empty = LinearFit(self.form, np.zeros(self.form.n_values), 0.0)
-        variables = variables_of(empty, data)[0]
-        terms = every_term(variables.lag.size, self.degree)
-        coefficients = _one_step(variables, terms, data, self.one_step)
+            return self._descended(begun, data, self.free_run[-1])
+        variables, terms = _size(self.form, self.degree, data)
+        coefficients = one_step_values(terms, known or moments(variables, terms, data), self.one_step)
         if coefficients is None:
             return None
         runs = Runs(variables, terms, data)
@@ -104,8 +107,12 @@ class Recipe:
             return None
         fit = PolynomialFit(variables, terms, theta, float(np.sum((ran - runs.target)[runs.used] ** 2)))
         for penalty in self.free_run:
-            fit = runs.fit(fit.theta, STEPS, penalty) or fit
+            fit = self._descended(fit, data, penalty)
         return fit
+
+    @staticmethod
+    def _descended(fit: PolynomialFit, data: Channels, penalty: float) -> PolynomialFit:
+        return Runs(fit.variables, fit.terms, data).fit(fit.theta, STEPS, penalty, COARSE) or fit
 
 
 Kind = TypeVar("Kind")
@@ -229,7 +236,12 @@ def judged_recipes(
     for form, degree in sizes:
         if len(every_term(form.order + form.n_b, degree)) > MOST_TERMS:
             continue
-        tried = [one for penalty in ONE_STEP if (one := _judged(Recipe(form, degree, penalty), data, parts))]
+        known = [_moments_of(form, degree, part) for part in parts]
+        tried = [
+            one
+            for penalty in ONE_STEP
+            if (one := _judged(Recipe(form, degree, penalty), data, parts, known=known)) is not None
+        ]
         found += tried
         best[form, degree] = min((one.held_back for one in tried), default=float("inf"))
     descended = [
@@ -289,13 +301,17 @@ def larger(form: Form, asked: Asked) -> list[Form]:
 
 
 def _judged(
-    recipe: Recipe, data: Channels, parts: Sequence[Channels], before: Judged[Recipe] | None = None
+    recipe: Recipe,
+    data: Channels,
+    parts: Sequence[Channels],
+    before: Judged[Recipe] | None = None,
+    known: Sequence[Moments] | None = None,
 ) -> Judged[Recipe] | None:
     """Return a recipe's fits to all blocks but one, begun at those before; None where one of them runs away."""
     target, fits, errors = np.concatenate(data.y), list[PolynomialFit](), list[float]()
     for index, part in enumerate(parts):
         tell("polynomial models")
-        fit = recipe.fit(part, None if before is None else before.fits[index])
+        fit = recipe.fit(part, None if before is None else before.fits[index], None if known is None else known[index])
         ran = None if fit is None else Runs(fit.variables, fit.terms, data).outputs(fit.theta)
         if fit is None or ran is None:
             return None
@@ -304,42 +320,10 @@ def _judged(
     return Judged(recipe, tuple(fits), tuple(errors))
 
 
-def moments(variables: Variables, terms: IntArray, data: Channels) -> tuple[Array, Array, int]:
-    """Return sums of products of terms with each other and with the output, one step ahead.
-
-    Parameters
-    ----------
-    terms : ndarray of int, shape (k, 3)
-        Variables that each term multiplies; -1 stands for 1.
-    data : Channels
-        Scaled; outputs held back are NaN.
-
-    Returns
-    -------
-    tuple of ndarray (k, k), ndarray (k,) and int
-        The sums, and how many samples they are of.
-    """
-    count = terms.shape[0]
-    gram, right, n = np.zeros((count, count)), np.zeros(count), 0
-    for u, y in zip(data.u, data.y, strict=True):
-        known = np.isfinite(y)
-        used = known.copy()
-        used[: max(int(variables.lag.max()), 1)] = False
-        for lag in range(1, variables.n_start + 1):
-            used[lag:] &= known[:-lag]
-        rows = products(variables, terms, u, np.where(known, y, 0.0))[used]
-        gram, right, n = gram + rows.T @ rows, right + rows.T @ y[used], n + rows.shape[0]
-    return gram, right, n
+def _size(form: Form, degree: int, data: Channels) -> tuple[Variables, IntArray]:
+    variables = variables_of(LinearFit(form, np.zeros(form.n_values), 0.0), data)[0]
+    return variables, every_term(variables.lag.size, degree)
 
 
-def _one_step(variables: Variables, terms: IntArray, data: Channels, penalty: float) -> Array | None:
-    """Return coefficients of the least squares of the one-step error; None where there are too few samples."""
-    gram, right, n = moments(variables, terms, data)
-    if n < terms.shape[0]:
-        return None
-    size = np.sqrt(np.diag(gram) / n)
-    size[size == 0.0] = 1.0
-    # linear terms are free but for what keeps equations solvable
-    weight = np.where(terms[:, 1] >= 0, penalty, 1e-6 * penalty) + 1e-12
-    unit = gram / np.outer(size, size) + n * np.diag(weight)
-    return np.linalg.solve(unit, right / size) / size
+def _moments_of(form: Form, degree: int, data: Channels) -> Moments:
+    return moments(*_size(form, degree, data), data)

@@ -55,14 +55,10 @@ class Fallback:
             on held-back blocks together with what its run is not determined to, over the output's deviation in the
             fitted data [dimensionless].
         """
-        return self._judged(u, y, own, self.linear.run(u, y))
+        return self.judged(u, y, own)[1]
 
-    def _judged(self, u: Array, y: Array, own: Array, linear: Array) -> tuple[float, float]:
-        straight = jackknife(linear, [one.run(u, y) for one in self.linear_parts])
-        return jackknife(own, [one.run(u, y) for one in self.parts]), float(np.hypot(self.error, straight))
-
-    def instead(self, u: Array, y: Array, own: Array) -> Array:
-        """Return the polynomial run, or the linear one where that errs less.
+    def judged(self, u: Array, y: Array, own: Array) -> tuple[Array, tuple[float, float]]:
+        """Return the polynomial run, or the linear one where that errs less, and the errors of both.
 
         Parameters
         ----------
@@ -73,12 +69,14 @@ class Fallback:
 
         Returns
         -------
-        ndarray, shape (n,)
-            Output, scaled.
+        tuple of ndarray, shape (n,), and tuple of float
+            Output, scaled, and what `errors` returns.
         """
         linear = self.linear.run(u, y)
-        undetermined, left = self._judged(u, y, own, linear)
-        return own if undetermined < left else linear
+        straight = jackknife(linear, [one.run(u, y) for one in self.linear_parts])
+        undetermined = jackknife(own, [one.run(u, y) for one in self.parts])
+        left = float(np.hypot(self.error, straight))
+        return own if undetermined < left else linear, (undetermined, left)
 
     def to_dict(self) -> dict[str, Any]:
         """Return JSON values."""

@@ -9,7 +9,8 @@ from estimation.arrays import Array, BoolArray
 from estimation.fits.greybox.covariance import automatic_lags, least_squares_covariance
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
-from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem, fit_linear
+from estimation.identification.free_run.least_squares import Counted
+from estimation.identification.free_run.linear_fit import COARSE, Form, LinearFit, Problem, fit_linear
 from estimation.identification.free_run.linear_kernel import decay_rows, settles
 from estimation.identification.search.levenberg import levenberg
 
@@ -18,6 +19,9 @@ TOLERANCE, MOST_STEPS = 1e-9, 60
 
 REFINED = 3
 """Starts that are carried on."""
+
+NEAR = 1e-3
+"""As `COARSE`, of the linear model before the nonlinearity's values move."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +65,7 @@ class HammersteinProblem:
         self.input = np.concatenate([u[:, 0] for u in data.u])
         self.target = np.concatenate(data.y)
         self.used: BoolArray = np.isfinite(self.target)
+        self.counted = Counted(self.used)
         self.n_static = len(self.kind.names)
         self.n_starts = len(data.u) if self.kind.remembers else 0
 
@@ -115,27 +120,28 @@ class HammersteinProblem:
                 jacobian[part, self.n_static + index] = answers[:, -1]
         return output, jacobian
 
-    def descend(self, values: Array, starts: Array, linear: Array) -> HammersteinFit:
+    def descend(self, values: Array, starts: Array, linear: Array, least_gain: float = 0.0) -> HammersteinFit:
         """Return the minimum that one start leads to.
 
         Parameters
         ----------
         values, starts, linear : ndarray, shapes (k,), (logs,) and (p,)
             Where to begin.
+        least_gain : float
+            As `levenberg` takes it [dimensionless].
         """
         ahead, n_b, n = self.n_static + self.n_starts, self.form.n_b, self.form.order
-        target = self.target[self.used]
 
         def at(theta: Array) -> tuple[float, Array, Array]:
             output, jacobian = self.jacobian(theta)
-            left, kept = output[self.used] - target, jacobian[self.used]
-            return float(left @ left), kept.T @ kept, kept.T @ left
+            left = output - self.target
+            return self.counted.square(left), *self.counted.normal_equations(jacobian, left)
 
         def acceptable(theta: Array) -> bool:
             return self.kind.may(self.input, theta[: self.n_static]) and settles(theta[ahead + n_b : ahead + n_b + n])
 
         start = np.concatenate([values, starts, linear])
-        cost, best = levenberg(at, start, acceptable, tolerance=TOLERANCE, most_steps=MOST_STEPS)
+        cost, best = levenberg(at, start, acceptable, tolerance=TOLERANCE, most_steps=MOST_STEPS, least_gain=least_gain)
         return HammersteinFit(
             self.name,
             best[: self.n_static],
@@ -179,8 +185,8 @@ def fit_hammerstein(kind: str, form: Form, data: Channels, denominators: Sequenc
     fits: list[HammersteinFit] = []
     for _, values, f in _apart(sorted(tried, key=lambda one: one[0])):
         behind, _ = problem.behind_nonlinearity(values, _first(problem))
-        near = fit_linear(form, behind, [f])
-        fits.append(problem.descend(values, _first(problem), near.theta))
+        near = fit_linear(form, behind, [f], least_gain=NEAR)
+        fits.append(problem.descend(values, _first(problem), near.theta, COARSE))
     return min(fits, key=lambda one: one.cost) if fits else None
 
 
@@ -197,19 +203,32 @@ def _apart(ranked: Sequence[tuple[float, Array, Array]]) -> list[tuple[float, Ar
     return kept
 
 
-def refitted(fit: HammersteinFit, data: Channels) -> HammersteinFit:
-    """Return the fit taken on, on other data of as many logs.
+def finished(fit: HammersteinFit, data: Channels) -> HammersteinFit:
+    """Return the fit taken on to its minimum, on its own data.
 
     Parameters
     ----------
     data : Channels
         Scaled.
     """
+    return HammersteinProblem(fit.kind, fit.linear.form, data).descend(fit.values, fit.starts, fit.linear.theta)
+
+
+def refitted(fit: HammersteinFit, data: Channels, least_gain: float = 0.0) -> HammersteinFit:
+    """Return the fit taken on, on other data of as many logs.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    least_gain : float
+        As `levenberg` takes it [dimensionless].
+    """
     problem = HammersteinProblem(fit.kind, fit.linear.form, data)
     starts = fit.starts if len(fit.starts) == problem.n_starts else _first(problem)
     behind, _ = problem.behind_nonlinearity(fit.values, starts)
-    begun = fit_linear(fit.linear.form, behind, [fit.linear.f])
-    return problem.descend(fit.values, starts, begun.theta)
+    begun = fit_linear(fit.linear.form, behind, [fit.linear.f], least_gain=max(NEAR, least_gain))
+    return problem.descend(fit.values, starts, begun.theta, least_gain)
 
 
 def deviations(fit: HammersteinFit, data: Channels) -> Array:

@@ -27,8 +27,9 @@ from estimation.identification.free_run.choose_polynomial import PolynomialCandi
 from estimation.identification.free_run.data import Channels, Scaling, blocks, scaled, section
 from estimation.identification.free_run.dense_polynomial import Asked
 from estimation.identification.free_run.fallback import Fallback
+from estimation.identification.free_run.fewer_samples import on_fewer
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
-from estimation.identification.free_run.hammerstein_fit import deviations, refitted
+from estimation.identification.free_run.hammerstein_fit import deviations, finished, refitted
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import LinearFit, fit_linear
 from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
@@ -56,8 +57,9 @@ WARNED = (
 HIGHEST = 6
 """Order of a linear model at most, where the data choose."""
 
-MOST_CHOSEN, MOST_FITTED = 10_000, 100_000
-"""Samples on which structures are compared, and on which a polynomial model is fitted at the end."""
+MOST_CHOSEN, MOST_COMPARED, MOST_FITTED = 10_000, 5_000, 100_000
+"""Samples on which linear models are compared, on which nonlinear ones are compared with them, and on which a nonlinear
+model is fitted at the end."""
 
 CLEAR_MARGIN = 0.15
 """Share by which a nonlinear model must do better than the linear one on what was held back."""
@@ -160,10 +162,13 @@ def _identified(
     sound = related and not best.doubt
     if structure in ADOPTED:
         return _adopted(structure, best, data, by, rows, [] if related else notes)
+    compared, judged, own = part, linear, best
+    if structure != "output-error":
+        compared, judged, own = on_fewer(linear, best, part, section(whole, MOST_COMPARED))
     nonlinear = None
     if structure == "hammerstein" or (structure == "auto" and len(data.inputs) == 1):
-        nonlinear = _worthwhile_nonlinearity(linear, best, whole, rows, surely=structure == "auto")
-        if nonlinear is not None and not related and not bend_explains(nonlinear.fit, part):
+        nonlinear = _worthwhile_nonlinearity(judged, own, compared, rows, surely=structure == "auto")
+        if nonlinear is not None and not related and not bend_explains(nonlinear.fit, compared):
             nonlinear = None
     if structure == "hammerstein":
         if nonlinear is not None:
@@ -172,11 +177,11 @@ def _identified(
         structure = "output-error"
     dynamics, held_back, named = LinearDynamics.of(best.fit), best.held_back, "output-error"
     if structure != "output-error":
-        straight = min([best, *(one for one in linear if not one.doubt)], key=lambda one: one.held_back)
+        straight = min([own, *(one for one in judged if not one.doubt)], key=lambda one: one.held_back)
         bar = (1.0 - CLEAR_MARGIN) * straight.held_back if structure == "auto" and sound else float("inf")
         bar = bar if nonlinear is None else min(bar, nonlinear.held_back)
         asked = Asked(order, delay, n_numerator)
-        polynomial = polynomial_candidates([best] if best.doubt else linear, part, asked, bar)
+        polynomial = polynomial_candidates([own] if own.doubt else judged, compared, asked, bar)
         rows += [polynomial_row(one) for one in polynomial]
         better = min(polynomial, key=lambda one: (one.price, one.held_back), default=None)
         if better is None and structure == "narx":
@@ -187,8 +192,8 @@ def _identified(
         if taken and better is not None:
             dynamics, held_back, named = _refitted(better, whole), better.held_back, "narx"
             if structure == "auto" and sound:
-                dynamics = replace(dynamics, fallback=_fallback(better, best, part, whole))
-            related = related or polynomial_explains(better, part)
+                dynamics = replace(dynamics, fallback=_fallback(better, own, compared, whole))
+            related = related or polynomial_explains(better, compared)
             notes = [] if related else [IdentificationCode.UNRELATED.note(output=data.output)]
             sound = related and np.isfinite(held_back) and held_back < 1.0
     transfer = None
@@ -217,12 +222,12 @@ def _fed_back(model: FreeRunModel, data: Channels) -> list[Note]:
 
 
 def _worthwhile_nonlinearity(
-    linear: Sequence[Candidate], best: Candidate, whole: Channels, rows: list[dict[str, Any]], *, surely: bool
+    linear: Sequence[Candidate], best: Candidate, data: Channels, rows: list[dict[str, Any]], *, surely: bool
 ) -> HammersteinCandidate | None:
     """Return the best model with a nonlinearity at its input, or None where none is better than every linear one."""
-    if len(whole.inputs) > 1:
-        raise HydrostateError(f"structure hammerstein takes one input, got {', '.join(whole.inputs)}: use narx")
-    found = hammerstein_candidates(linear, section(whole, MOST_CHOSEN))
+    if len(data.inputs) > 1:
+        raise HydrostateError(f"structure hammerstein takes one input, got {', '.join(data.inputs)}: use narx")
+    found = hammerstein_candidates(linear, data)
     rows += [hammerstein_row(one) for one in found]
     return worthwhile(found, linear, best, surely=surely)
 
@@ -230,8 +235,8 @@ def _worthwhile_nonlinearity(
 def _nonlinear(taken: HammersteinCandidate, data: Channels, whole: Channels, rows: list[dict[str, Any]]) -> Identified:
     """Return a model with a nonlinearity at its input, fitted to all data."""
     part = section(whole, MOST_FITTED)
-    # on the data of the comparison a further descent would lead to a model that no block has judged
-    fit = taken.fit if section(whole, MOST_CHOSEN) is whole else refitted(taken.fit, part)
+    # on the data of the comparison a start elsewhere might lead to a model that no block has judged
+    fit = finished(taken.fit, whole) if section(whole, MOST_COMPARED) is whole else refitted(taken.fit, part)
     dynamics = HammersteinDynamics.of(fit, deviations(fit, part))
     model = FreeRunModel(data.inputs, data.output, data.sample_time, "hammerstein", scaled(data)[1], dynamics)
     quality = model.quality(data.u, data.y)
@@ -314,9 +319,9 @@ def _clearly_better(nonlinear: PolynomialCandidate, linear: Candidate) -> bool:
     return nonlinear.price < (1.0 - CLEAR_MARGIN) * linear.held_back and 2 * won >= len(pairs)
 
 
-def _undetermined(candidate: Candidate, data: Channels, by: Scaling) -> bool:
+def _undetermined(one: Candidate, data: Channels, by: Scaling) -> bool:
     """Return whether a pole and a zero cancel, or the steady gain is less than its standard deviation."""
-    model = linear_model(candidate.fit, data, by)
+    model = linear_model(one.fit, data, by)
     return bool(model.cancellations) or not model.dc_gain_std < abs(model.dc_gain)
 
 

@@ -1,5 +1,7 @@
 """Whether a polynomial model is asked about inputs that it never saw, and whether a linear one stands in there."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from estimation.identification.free_run.data import Channels, in_scale
@@ -52,7 +54,9 @@ def inputs_beyond(model: FreeRunModel, data: Channels) -> list[Note]:
     return notes
 
 
-def linear_instead(model: FreeRunModel, data: Channels) -> list[Note]:
+def linear_instead(
+    model: FreeRunModel, data: Channels, judged: Sequence[tuple[float, float]] | None = None
+) -> list[Note]:
     """Return a note if a linear model stands in for a polynomial one that these inputs do not determine.
 
     Parameters
@@ -61,6 +65,8 @@ def linear_instead(model: FreeRunModel, data: Channels) -> list[Note]:
         Models of other structures have none.
     data : Channels
         In units of the channels; inputs in the model's order.
+    judged : sequence of tuple of float, optional
+        What `FreeRunModel.judged_run` has told of each log, where it was run [dimensionless].
 
     Returns
     -------
@@ -70,16 +76,18 @@ def linear_instead(model: FreeRunModel, data: Channels) -> list[Note]:
     dynamics = model.dynamics
     if not isinstance(dynamics, PolynomialDynamics) or dynamics.fallback is None:
         return []
-    one, worst = in_scale(data, model.scaling), (0.0, 1.0)
-    for u, y in zip(one.u, one.y, strict=True):
-        found = dynamics.fallback.errors(u, y, dynamics.own_run(u, y))
-        worst = max(worst, found, key=lambda pair: pair[0] / pair[1])
-    if worst[0] < worst[1]:
+    if judged is None:
+        one, errors = in_scale(data, model.scaling), dynamics.fallback.errors
+        judged = [errors(u, y, dynamics.own_run(u, y)) for u, y in zip(one.u, one.y, strict=True)]
+    undetermined, linear = max([(0.0, 1.0), *judged], key=lambda pair: pair[0] / pair[1])
+    if undetermined < linear:
         return []
-    return [IdentificationCode.LINEAR_STANDS_IN.note(output=data.output, undetermined=worst[0], linear=worst[1])]
+    return [IdentificationCode.LINEAR_STANDS_IN.note(output=data.output, undetermined=undetermined, linear=linear)]
 
 
-def doubts_about_inputs(model: FreeRunModel, data: Channels) -> list[Note]:
+def doubts_about_inputs(
+    model: FreeRunModel, data: Channels, judged: Sequence[tuple[float, float]] | None = None
+) -> list[Note]:
     """Return what a user must know of a run on these inputs.
 
     Parameters
@@ -88,10 +96,12 @@ def doubts_about_inputs(model: FreeRunModel, data: Channels) -> list[Note]:
         Any.
     data : Channels
         In units of the channels; inputs in the model's order.
+    judged : sequence of tuple of float, optional
+        As `linear_instead` takes it [dimensionless].
 
     Returns
     -------
     list of Note
         That a linear model stands in; else one on each input beyond its range.
     """
-    return linear_instead(model, data) or inputs_beyond(model, data)
+    return linear_instead(model, data, judged) or inputs_beyond(model, data)

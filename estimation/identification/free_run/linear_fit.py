@@ -8,7 +8,8 @@ import numpy as np
 from estimation.arrays import Array, BoolArray
 from estimation.identification.fit.output_error import minimise
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.least_squares import least_squares
+from estimation.identification.free_run.lagged_columns import columns_of, shifted
+from estimation.identification.free_run.least_squares import Counted, least_squares
 from estimation.identification.free_run.linear_kernel import decay_rows, settles
 from estimation.identification.search.criterion import Structure, polynomial, stabilised
 from estimation.identification.search.descent import stable
@@ -20,6 +21,9 @@ TOLERANCE, MOST_STEPS = 1e-9, 80
 
 MOST_SEARCHED = 100_000
 """Samples of which the global minimum is searched; more begin at other starts alone."""
+
+COARSE = 1e-5
+"""Share of the cost that two steps in a row must gain each while models are compared: what is taken is fitted on."""
 
 PASSES = 12
 """Of the iteration of Steiglitz and McBride."""
@@ -94,6 +98,7 @@ class Problem:
         self.bounds = np.concatenate([[0], np.cumsum([y.size for y in data.y])])
         self.y = np.concatenate(data.y)
         self.used: BoolArray = np.isfinite(self.y)
+        self.counted = Counted(self.used)
         self.n_parameters = form.n_values + form.order * len(data.y)
 
     def linear_columns(self, f: Array) -> Array:
@@ -121,7 +126,7 @@ class Problem:
             place = 0
             for answer, level, size, delay in zip(rows, levels / float(f.sum()), form.sizes, form.delays, strict=False):
                 for k in range(size):
-                    out[first:last, place + k] = _shifted(answer, delay + k, level)
+                    out[first:last, place + k] = shifted(answer, delay + k, level)
                 place += size
             for k in range(n):
                 out[first + k : last, n_b + 1 + index * n + k] = rows[-1, : last - first - k]
@@ -145,7 +150,7 @@ class Problem:
             Sum of squared residuals, and values.
         """
         n_b, columns = self.form.n_b, self.linear_columns(f)
-        values, cost = least_squares(columns[self.used], self.y[self.used])
+        values, cost = least_squares(columns, self.y, self.counted)
         return cost, np.concatenate([values[:n_b], f[1:], values[n_b:]])
 
     def jacobian(self, theta: Array) -> tuple[Array, Array]:
@@ -175,10 +180,10 @@ class Problem:
             moved = (output[part] - theta[n_b + n])[None, :]
             decay_rows(f, moved, np.array([before]), np.zeros(n + 1))
             for k in range(1, n + 1):
-                jacobian[part, n_b + k - 1] = -_shifted(moved[0], k, before / float(f.sum()))
+                jacobian[part, n_b + k - 1] = -shifted(moved[0], k, before / float(f.sum()))
         return output, jacobian
 
-    def descend(self, theta: Array, *, bounded: bool = False) -> LinearFit:
+    def descend(self, theta: Array, *, bounded: bool = False, least_gain: float = 0.0) -> LinearFit:
         """Return the minimum that one start leads to.
 
         Parameters
@@ -187,15 +192,15 @@ class Problem:
             All values.
         bounded : bool
             Whether every time constant must stay within the record.
+        least_gain : float
+            As `levenberg` takes it [dimensionless].
         """
         n_b, n = self.form.n_b, self.form.order
-        target = self.y[self.used]
 
         def at(values: Array) -> tuple[float, Array, Array]:
             output, jacobian = self.jacobian(values)
-            left = output[self.used] - target
-            kept = jacobian if self.used.all() else jacobian[self.used]
-            return float(left @ left), kept.T @ kept, kept.T @ left
+            left = output - self.y
+            return self.counted.square(left), *self.counted.normal_equations(jacobian, left)
 
         # poles within a circle are those of the polynomial stretched by its radius within the unit circle
         stretched = longest_pole(self.data.longest) ** -np.arange(1.0, n + 1.0) if bounded else np.ones(n)
@@ -205,6 +210,7 @@ class Problem:
             lambda values: settles(values[n_b : n_b + n]) and bool(stable(values[n_b : n_b + n] * stretched)),
             tolerance=TOLERANCE,
             most_steps=MOST_STEPS,
+            least_gain=least_gain,
         )
         return LinearFit(self.form, best, cost, bounded)
 
@@ -225,36 +231,9 @@ def longest_pole(n_samples: int) -> float:
     return float(np.exp(-1.0 / n_samples))
 
 
-def _shifted(series: Array, lag: int, before: float) -> Array:
-    """Return a series some samples later, a level in front of it."""
-    out = np.full(series.size, before)
-    out[lag:] = series[: max(series.size - lag, 0)]
-    return out
-
-
-def columns_of(form: Form, u: Array) -> Array:
-    """Return the lagged inputs of one log; before it every input stood at its first value.
-
-    Parameters
-    ----------
-    u : ndarray, shape (n, m)
-        Inputs.
-
-    Returns
-    -------
-    ndarray, shape (n, n_b)
-        One column a numerator coefficient.
-    """
-    shifted: list[Array] = []
-    for index, (size, delay) in enumerate(zip(form.sizes, form.delays, strict=True)):
-        one = u[:, index]
-        for k in range(size):
-            lag = min(delay + k, one.size)
-            shifted.append(np.concatenate([np.full(lag, one[0]), one[: one.size - lag]]))
-    return np.column_stack(shifted) if shifted else np.zeros((u.shape[0], 0))
-
-
-def fit_linear(form: Form, data: Channels, starts: Sequence[Array] = (), *, bounded: bool = False) -> LinearFit:
+def fit_linear(
+    form: Form, data: Channels, starts: Sequence[Array] = (), *, bounded: bool = False, least_gain: float = 0.0
+) -> LinearFit:
     """Return the best linear model of one form.
 
     Parameters
@@ -265,6 +244,8 @@ def fit_linear(form: Form, data: Channels, starts: Sequence[Array] = (), *, boun
         Denominators to begin at beside those that are searched; where some are given, only they are.
     bounded : bool
         Whether every time constant must stay within the record.
+    least_gain : float
+        As `levenberg` takes it [dimensionless].
 
     Returns
     -------
@@ -279,7 +260,28 @@ def fit_linear(form: Form, data: Channels, starts: Sequence[Array] = (), *, boun
     for cost, theta in ranked:
         if len(kept) < 3 and all(cost - other > 1e-7 * cost for other, _ in kept):
             kept.append((cost, theta))
-    return min((problem.descend(theta, bounded=bounded) for _, theta in kept), key=lambda fit: fit.cost)
+    fits = (problem.descend(theta, bounded=bounded, least_gain=least_gain) for _, theta in kept)
+    return min(fits, key=lambda fit: fit.cost)
+
+
+def fit_coarsely(form: Form, data: Channels, starts: Sequence[Array] = (), *, bounded: bool = False) -> LinearFit:
+    """Return the best linear model of one form, as near to its minimum as a comparison of models needs.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    starts : sequence of ndarray, shape (n + 1,)
+        As `fit_linear` takes them.
+    bounded : bool
+        Likewise.
+
+    Returns
+    -------
+    LinearFit
+        The lowest minimum found.
+    """
+    return fit_linear(form, data, starts, bounded=bounded, least_gain=COARSE)
 
 
 def extended(fit: LinearFit) -> list[Array]:

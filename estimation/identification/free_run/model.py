@@ -106,8 +106,30 @@ class FreeRunModel:
         ndarray, shape (n,)
             Output; NaN from where a polynomial model runs away.
         """
+        return self.judged_run(u, y)[0]
+
+    def judged_run(self, u: ArrayLike, y: ArrayLike | None = None) -> tuple[Array, tuple[float, float] | None]:
+        """Return the free run, and what tells whether a linear model stands in, worked out once for both.
+
+        Parameters
+        ----------
+        u : array_like, shape (n, m) or (n,)
+            Inputs in the model's order, no gaps.
+        y : array_like, shape (n,), optional
+            As `simulate` takes it.
+
+        Returns
+        -------
+        tuple of ndarray, shape (n,), and tuple of float or None
+            Output, and what `Fallback.errors` returns; None of models that have no other to stand in.
+        """
         inputs, outputs = self._scaled(u, y)
-        return self.scaling.y_mean + self.scaling.y_std * self.dynamics.run(inputs, outputs)
+        errors: tuple[float, float] | None = None
+        if isinstance(self.dynamics, PolynomialDynamics):
+            run, errors = self.dynamics.judged_run(inputs, outputs)
+        else:
+            run = self.dynamics.run(inputs, outputs)
+        return self.scaling.y_mean + self.scaling.y_std * run, errors
 
     def predict(self, u: ArrayLike, y: ArrayLike) -> Array:
         """Return the prediction one step ahead from measured outputs, shape (n,); NaN where they are missing.

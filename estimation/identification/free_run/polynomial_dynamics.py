@@ -63,8 +63,25 @@ class PolynomialDynamics:
         ndarray, shape (n,)
             Output, scaled.
         """
+        return self.judged_run(u, y)[0]
+
+    def judged_run(self, u: Array, y: Array) -> tuple[Array, tuple[float, float] | None]:
+        """Return the same with the errors to be expected of both models.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n, m)
+            Inputs, scaled.
+        y : ndarray, shape (n,)
+            Output, scaled; NaN where missing.
+
+        Returns
+        -------
+        tuple of ndarray, shape (n,), and tuple of float or None
+            Output, scaled, and what `Fallback.errors` returns; None where no linear model may stand in.
+        """
         own = self.own_run(u, y)
-        return own if self.fallback is None else self.fallback.instead(u, y, own)
+        return (own, None) if self.fallback is None else self.fallback.judged(u, y, own)
 
     def own_run(self, u: Array, y: Array) -> Array:
         """Return the free run, its first outputs fitted to those that are there; NaN from where it runs away.

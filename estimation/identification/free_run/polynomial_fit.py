@@ -8,6 +8,7 @@ import numpy as np
 from estimation.arrays import Array, BoolArray, IntArray
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_fit import LinearFit
+from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_kernel import carry, run_free, write_products
 from estimation.identification.free_run.polynomial_variables import BEYOND, Variables, lagged_signals
 from estimation.identification.search.levenberg import levenberg
@@ -147,12 +148,9 @@ class Runs:
     def _run(self, theta: Array, *, sloped: bool) -> tuple[Array, list[Array]] | None:
         k, n = self.terms.shape[0], self.variables.n_start
         outs, slopes = list[Array](), list[Array]()
-        free = not (self.terms[:, 1] >= 0).any()
-        ends = np.array([-1e9, 1e9]) if free else self.variables.around(FARTHEST)
+        ends = self.ends
         for index, u in enumerate(self.data.u):
-            out, begin = np.zeros(u.shape[0]), self.begins[index]
-            out[: begin - n] = first_values(self.data.y[index], begin - n)
-            out[begin - n : begin] = theta[k + index * n : k + (index + 1) * n]
+            out, begin = self.begun(theta, index), self.begins[index]
             slope = np.zeros((u.shape[0] if sloped else 0, n + bool(self.variables.friction)))
             one, values, rub = self.variables, theta[:k].copy(), theta[theta.size - self.variables.n_friction :].copy()
             if run_free(values, self.terms, one.source, one.lag, one.limits, ends, begin, u, out, slope, rub) >= 0:
@@ -160,6 +158,33 @@ class Runs:
             outs.append(out)
             slopes.append(slope)
         return np.concatenate(outs), slopes
+
+    @property
+    def ends(self) -> Array:
+        """Ends at which the output is held: none where there are no products, shape (2,)."""
+        free = not (self.terms[:, 1] >= 0).any()
+        return np.array([-1e9, 1e9]) if free else self.variables.around(FARTHEST)
+
+    def begun(self, theta: Array, index: int) -> Array:
+        """Return the outputs of a log before its run, and zeros behind them.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (p,)
+            All values.
+        index : int
+            Of the log.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Scaled.
+        """
+        n, y, begin = self.variables.n_start, self.data.y[index], self.begins[index]
+        out, first = np.zeros(y.size), self.terms.shape[0] + index * n
+        out[: begin - n] = first_values(y, begin - n)
+        out[begin - n : begin] = theta[first : first + n]
+        return out
 
     def sensitivities(self, output: Array, slopes: Sequence[Array], terms: IntArray, *, starts: bool) -> Array:
         """Return the derivative of the free run by coefficients of terms, and by the other values where wanted.
@@ -201,7 +226,7 @@ class Runs:
             rows.append(direct)
         return np.concatenate(rows)
 
-    def fit(self, theta: Array, steps: int, penalty: float = 0.0) -> PolynomialFit | None:
+    def fit(self, theta: Array, steps: int, penalty: float = 0.0, least_gain: float = 0.0) -> PolynomialFit | None:
         """Return the minimum of the squared free-run error that is reached from given values, if they run at all.
 
         Parameters
@@ -210,37 +235,37 @@ class Runs:
             All values.
         penalty : float
             Weight of the squared coefficients of products beside the mean squared error [dimensionless].
+        least_gain : float
+            As `levenberg` takes it [dimensionless].
         """
-        target = self.target[self.used]
+        equations, count = NormalEquations(self, self.ends), int(np.count_nonzero(self.used))
         weight = np.zeros(theta.size)
-        weight[: self.terms.shape[0]] = penalty * target.size * (self.terms[:, 1] >= 0)
+        weight[: self.terms.shape[0]] = penalty * count * (self.terms[:, 1] >= 0)
         nowhere, least = (np.eye(theta.size), np.zeros(theta.size)), np.inf
 
         def at(values: Array) -> tuple[float, Array, Array]:
             nonlocal least
-            ran = self.run(values)
+            ran = equations.outputs(values)
             if ran is None:
                 return np.inf, *nowhere
-            left = ran[0][self.used] - target
-            reached = float(left @ left + weight @ values**2)
+            left = ran - self.target
+            reached = float(np.sum(left[self.used] ** 2) + weight @ values**2)
             if not reached < least:  # the step is rejected, and its slopes are not asked for
                 return reached, *nowhere
-            jacobian = self.sensitivities(*ran, self.terms, starts=True)
-            jacobian = jacobian if self.used.all() else jacobian[self.used]
-            gram = jacobian.T @ jacobian
+            gram, right = equations.sums(left)
             # first values of a log whose outputs are held back have no effect
             gram[np.diag_indices_from(gram)] += 1e-12 * max(float(np.diag(gram).max()), 1.0) + weight
             if not np.isfinite(gram).all():
                 return np.inf, *nowhere
             least = reached
-            return reached, gram, jacobian.T @ left + weight * values
+            return reached, gram, right + weight * values
 
         rubbing = slice(theta.size - self.variables.n_friction, theta.size)
 
         def acceptable(values: Array) -> bool:
             return bool((values[rubbing][:2] >= 0.0).all())
 
-        cost, best = levenberg(at, theta, acceptable, tolerance=TOLERANCE, most_steps=steps)
+        cost, best = levenberg(at, theta, acceptable, tolerance=TOLERANCE, most_steps=steps, least_gain=least_gain)
         if not np.isfinite(cost):
             return None
         return PolynomialFit(self.variables, self.terms, best, cost - float(weight @ best**2))

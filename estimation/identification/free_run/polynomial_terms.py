@@ -12,6 +12,7 @@ import numpy as np
 from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_fit import LinearFit
+from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, STEPS, PolynomialFit, Runs, variables_of
 from estimation.identification.free_run.polynomial_variables import Variables
 
@@ -20,6 +21,9 @@ MOST_CANDIDATES = 250
 
 TRIED = 4
 """Of the best products, how many are tried until one lowers the error."""
+
+DEPENDENT = 1e-12
+"""Share of the squared sensitivities that a direction must have to be told from rounding."""
 
 LEAST_GAIN = 1e-4
 """Share of the squared error that a term must explain to be added."""
@@ -58,14 +62,9 @@ def one_more(fit: PolynomialFit, pool: IntArray, data: Channels) -> PolynomialFi
     data : Channels
         Scaled; outputs held back are NaN.
     """
-    runs = Runs(fit.variables, fit.terms, data)
-    ran = runs.run(fit.theta)
-    if ran is None:
+    gains = _gains_of(fit, pool, data)
+    if gains is None:
         return None
-    own = runs.sensitivities(*ran, fit.terms, starts=True)[runs.used]
-    residual = runs.target[runs.used] - ran[0][runs.used]
-    every = runs.sensitivities(*ran, pool, starts=False)[runs.used]
-    gains = _gains(own, every, residual)
     for k in np.argsort(-gains)[:TRIED]:
         if not gains[k] > LEAST_GAIN * fit.cost:
             return None
@@ -84,17 +83,38 @@ def without_term(fit: PolynomialFit, index: int, data: Channels) -> PolynomialFi
     return Runs(fit.variables, terms, data).fit(np.delete(fit.theta, index), STEPS)
 
 
-def _gains(own: Array, every: Array, residual: Array) -> Array:
-    """Return how much of the squared residual each candidate explains beside what is there, in the linearised run."""
+def _gains_of(fit: PolynomialFit, pool: IntArray, data: Channels) -> Array | None:
+    """Return how much of the squared residual each product explains; None where the fit runs away."""
+    count = fit.terms.shape[0]
+    every = Runs(fit.variables, np.concatenate([fit.terms, pool]), data)
+    equations = NormalEquations(every, Runs(fit.variables, fit.terms, data).ends)
+    ran = equations.outputs(np.concatenate([fit.theta[:count], np.zeros(pool.shape[0]), fit.theta[count:]]))
+    if ran is None:
+        return None
+    asked = slice(count, count + pool.shape[0])
+    beside, square, right = equations.sums_beside(every.target - ran, asked)
+    kept = np.delete(np.arange(square.size), np.arange(square.size)[asked])
+    return _gains(beside[:, kept], beside[:, asked], square[asked], right[kept], right[asked])
+
+
+def _gains(own: Array, shared: Array, square: Array, right: Array, explained: Array) -> Array:
+    """Return how much of the squared residual each candidate explains beside what is there, in the linearised run.
+
+    Given are products of sensitivities: of the values that are there with each other and with the candidates, of the
+    candidates with themselves, and of both with the residual.
+    """
     with np.errstate(over="ignore", invalid="ignore"):
-        size = np.einsum("ij,ij->j", every, every)
-        usable = np.isfinite(size) & (size > 0.0)
-        size = np.where(usable, size, 1.0)
-        scale = np.sqrt(np.einsum("ij,ij->j", own, own))
-        basis = np.linalg.qr(own / np.where(scale > 0.0, scale, 1.0))[0]
-        shadow = basis.T @ every
+        usable = np.isfinite(square) & (square > 0.0) & np.isfinite(shared).all(axis=0)
+        size = np.where(usable, square, 1.0)
+        scale = np.sqrt(np.diag(own))
+        scale[scale == 0.0] = 1.0
+        # what the data do not tell of the values that are there is nothing to be beside
+        powers, directions = np.linalg.eigh(own / np.outer(scale, scale))
+        told = powers > DEPENDENT * powers[-1]
+        basis = directions[:, told] / np.sqrt(powers[told]) / scale[:, None]
+        shadow = basis.T @ np.where(usable, shared, 0.0)
         power = 1.0 - np.einsum("ij,ij->j", shadow, shadow) / size
-        explained = every.T @ residual - shadow.T @ (basis.T @ residual)
+        explained = explained - shadow.T @ (basis.T @ right)
     # what is nearly a sum of those that are there only makes values undetermined
     fresh = usable & (power > 1e-6)
     return np.where(fresh, explained, 0.0) ** 2 / np.where(fresh, power * size, 1.0)

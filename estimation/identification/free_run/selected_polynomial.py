@@ -14,9 +14,10 @@ import numpy as np
 from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.choose_linear import block_error
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.dense_polynomial import STEPS, Asked, Judged, every_term, late_by, moments
-from estimation.identification.free_run.linear_fit import Form, LinearFit
+from estimation.identification.free_run.dense_polynomial import STEPS, Asked, Judged, every_term, late_by
+from estimation.identification.free_run.linear_fit import COARSE, Form, LinearFit
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, variables_of
+from estimation.identification.free_run.polynomial_moments import moments
 from estimation.identification.free_run.polynomial_variables import Variables
 
 LAGS = (2, 3, 4)
@@ -206,4 +207,4 @@ def best_first(gram: Array, right: Array, most: int) -> IntArray:
 
 
 def _descended(fit: PolynomialFit | None, data: Channels) -> PolynomialFit | None:
-    return None if fit is None else Runs(fit.variables, fit.terms, data).fit(fit.theta, STEPS) or fit
+    return None if fit is None else Runs(fit.variables, fit.terms, data).fit(fit.theta, STEPS, least_gain=COARSE) or fit

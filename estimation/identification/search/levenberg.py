@@ -19,6 +19,7 @@ def levenberg(
     tolerance: float,
     most_steps: int,
     slower: float = 3.0,
+    least_gain: float = 0.0,
 ) -> tuple[float, Array]:
     """Minimise a sum of squares from one start; a step that is not acceptable is rejected like one that raises it.
 
@@ -36,6 +37,9 @@ def levenberg(
         Evaluations at most.
     slower : float
         Factor on the damping after a step that gains less than half of what it promised [dimensionless].
+    least_gain : float
+        Share of the cost; where two accepted steps in a row gain less each, with little damping, the descent ends: with
+        much of it a step is short and says nothing [dimensionless].
 
     Returns
     -------
@@ -54,7 +58,7 @@ def levenberg(
     """
     theta, step, factor = start.copy(), np.zeros(start.size), np.zeros((start.size, start.size))
     cost, gram, gradient = at(theta)
-    damping = 1e-3
+    damping, idle = 1e-3, 0
     for _ in range(most_steps):
         if not solve_damped(gram, gradient, damping, step, factor):
             damping = max(10.0 * damping, 1e-10)
@@ -64,7 +68,8 @@ def levenberg(
         new = at(trial) if acceptable(trial) else (np.inf, gram, gradient)
         if new[0] < cost:
             gained, theta, (cost, gram, gradient) = cost - new[0], trial, new
-            if near and damping <= 1e-2:
+            idle = idle + 1 if gained < least_gain * cost and damping <= 1e-2 else 0
+            if idle == 2 or (near and damping <= 1e-2):
                 break
             damping = max(0.1 * damping, 1e-14) if gained > 0.5 * promised else slower * damping
         elif near or damping > 1e12:

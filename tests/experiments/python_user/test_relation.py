@@ -1,6 +1,7 @@
 """Models between any channels as a Python user holds them: of one output and of several, fitted and loaded."""
 
 from pathlib import Path
+from typing import Any
 
 import control
 import numpy as np
@@ -180,8 +181,15 @@ def test_a_linear_model_that_stands_in_is_told(monkeypatch: pytest.MonkeyPatch) 
     assert isinstance(dynamics, PolynomialDynamics)
     assert dynamics.fallback is not None
     found.simulate(bent(1, 1.0))
-    monkeypatch.setattr(Fallback, "errors", lambda *_: (3.0, 0.1))
+    told = list[int]()
+
+    def judged(*given: Any) -> Any:
+        told.append(1)
+        return given[-1], (3.0, 0.1)
+
+    monkeypatch.setattr(Fallback, "judged", judged)
     for given in (bent(1, 1.0), bent(1, 1.0)["valve"]):
         with pytest.warns(LogWarning, match="linear") as said:
             found.simulate(given)
         assert {one.message.note.code for one in said} == {"linear_stands_in"}
+    assert len(told) == 2  # the fits without a block are run once for the result and the warning

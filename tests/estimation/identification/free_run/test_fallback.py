@@ -51,16 +51,16 @@ def test_the_linear_run_is_taken_where_it_errs_less(apart: float, linear_apart: 
     one = Fallback(gain(1.0), straight, parts, 0.1)
     u, y, own = np.ones((9, 1)), np.full(9, np.nan), np.full(9, 2.0)
     assert one.errors(u, y, own) == pytest.approx((2.0 * apart, np.hypot(0.1, 2.0 * linear_apart)))
-    assert np.array_equal(one.instead(u, y, own), own if taken == "own" else np.ones(9))
+    assert np.array_equal(one.judged(u, y, own)[0], own if taken == "own" else np.ones(9))
 
 
 def test_a_run_that_has_no_end_is_replaced() -> None:
     away: Any = Fails()
     u, y = np.ones((9, 1)), np.full(9, np.nan)
     one = Fallback(gain(1.0), (gain(1.0),) * 4, (gain(2.0),) * 3 + (away,), 0.1)
-    assert np.array_equal(one.instead(u, y, np.full(9, 2.0)), np.ones(9))
+    assert np.array_equal(one.judged(u, y, np.full(9, 2.0))[0], np.ones(9))
     sound = Fallback(gain(1.0), (gain(1.0),) * 4, (gain(2.0),) * 4, 0.1)
-    assert np.array_equal(sound.instead(u, y, np.full(9, np.nan)), np.ones(9))
+    assert np.array_equal(sound.judged(u, y, np.full(9, np.nan))[0], np.ones(9))
 
 
 def answered(u: Array) -> Array:

@@ -52,7 +52,7 @@ def test_what_was_planted_is_found_within_its_interval(planted: Planted) -> None
         )
     assert found.held_back_percent > 94.0
     kinds = {row["nonlinearity"] for row in found.candidates if row["structure"] == "hammerstein"}
-    assert kinds == set(NONLINEARITIES)
+    assert planted.kind in kinds <= set(NONLINEARITIES)
 
 
 def test_a_model_is_the_same_after_it_was_saved(planted: Planted) -> None:
@@ -173,9 +173,17 @@ def test_a_denominator_with_an_unbelievable_time_constant_is_no_start(monkeypatc
     assert given == [[-1.0]] * len(NONLINEARITIES)  # it alone is better than none
 
 
-def test_the_best_of_each_kind_and_order_is_judged_so_that_a_smaller_one_may_do_better() -> None:
+def test_the_best_of_each_kind_and_order_is_judged_so_that_a_smaller_one_may_do_better(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     data = scaled(logged(PLANTED[0], 3))[0]
-    found = hammerstein_candidates(linear_candidates(data, [1, 2, 3], (1,)), data)
+    linear = linear_candidates(data, [1, 2, 3], (1,))
+    hopeful = hammerstein_candidates(linear, data)
+    # a saturation explains less of its own data than a linear model of what it has not seen
+    assert "dead-zone" in {one.fit.kind for one in hopeful}
+    assert "saturation" not in {one.fit.kind for one in hopeful}
+    monkeypatch.setattr("estimation.identification.free_run.choose_hammerstein.BENT_MARGIN", -100.0)
+    found = hammerstein_candidates(linear, data)
     orders = {kind: [one.fit.linear.form.order for one in found if one.fit.kind == kind] for kind in NONLINEARITIES}
     assert orders == {kind: [1, 2, 3] for kind in NONLINEARITIES}
     assert chosen_hammerstein(found).fit.kind == "dead-zone"
@@ -235,7 +243,7 @@ def test_the_bend_that_was_judged_is_the_one_that_is_given(monkeypatch: pytest.M
     monkeypatch.setattr("estimation.identification.free_run.identify.refitted", refit)
     identified(data)
     assert again == []
-    monkeypatch.setattr("estimation.identification.free_run.identify.MOST_CHOSEN", data.n_samples - 1)
+    monkeypatch.setattr("estimation.identification.free_run.identify.MOST_COMPARED", data.n_samples - 1)
     identified(data)
     assert again == [data.n_samples]  # it was judged on less
 

@@ -124,7 +124,9 @@ def products_that_are_chosen() -> dict[str, Any]:
     told["pools"] = {str(n): [len(pool), pool[-1], int((pool[:, 2] >= 0).sum())] for n, pool in pools.items()}
     own = np.column_stack([U, np.roll(U, 1), np.zeros(N)])
     every = np.column_stack([np.roll(U, 2), U + 1e-4 * NOISE, U + 1e-2 * NOISE, np.zeros(N), NOISE])
-    told["gains"] = polynomial_terms._gains(own, every, answer())
+    square = np.einsum("ij,ij->j", every, every)
+    both = own.T @ answer(), every.T @ answer()
+    told["gains"] = polynomial_terms._gains(own.T @ own, own.T @ every, square, *both)
     told["without"] = ended(polynomial_terms.without_term(one, 4, data()))
     told["nothing more"] = polynomial_terms.one_more(one, np.array([[0, 0, -1]]), data()) is None
     told["pruned"] = len(choose_polynomial._pruned(grown(2), data()).terms)

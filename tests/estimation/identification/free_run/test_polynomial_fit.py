@@ -16,6 +16,7 @@ from estimation.identification.free_run.data import Channels, channels_from, sca
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import Form, fit_linear
 from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.other_orders import is_wild
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import Runs
@@ -223,19 +224,19 @@ def test_a_rejected_step_is_not_asked_for_its_slopes(monkeypatch: pytest.MonkeyP
     start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
     assert start is not None
     runs, costs, asked = Runs(start.variables, start.terms, data), list[float](), list[int]()
-    run, sensitivities = Runs.run, Runs.sensitivities
+    outputs, sums = NormalEquations.outputs, NormalEquations.sums
 
-    def running(self: Runs, theta: Array) -> Any:
-        found = run(self, theta)
-        costs.append(np.inf if found is None else float(np.nansum((found[0] - self.target) ** 2)))
+    def running(self: NormalEquations, theta: Array) -> Any:
+        found = outputs(self, theta)
+        costs.append(np.inf if found is None else float(np.nansum((found - runs.target) ** 2)))
         return found
 
-    def asking(self: Runs, *given: Any, **how: Any) -> Array:
+    def asking(self: NormalEquations, left: Array) -> Any:
         asked.append(len(costs) - 1)
-        return sensitivities(self, *given, **how)
+        return sums(self, left)
 
-    monkeypatch.setattr(Runs, "run", running)
-    monkeypatch.setattr(Runs, "sensitivities", asking)
+    monkeypatch.setattr(NormalEquations, "outputs", running)
+    monkeypatch.setattr(NormalEquations, "sums", asking)
     far = start.theta * np.array([1.0, 0.2, -1.0, -4.0, 1.0, 1.0])
     assert runs.fit(far, 40) is not None
     lowering = [k for k, cost in enumerate(costs) if cost < min(costs[:k], default=np.inf)]

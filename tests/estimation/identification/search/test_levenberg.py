@@ -66,3 +66,16 @@ def test_it_never_asks_beyond_what_is_acceptable_nor_more_often_than_it_may() ->
     seen.clear()
     levenberg(at, np.array([-1.2, 1.0]), lambda _: True, tolerance=1e-12, most_steps=5)
     assert len(seen) <= 6
+
+
+def test_where_two_steps_in_a_row_gain_too_little_it_ends() -> None:
+    asked = list[int]()
+    for least_gain in (0.0, 1e-3, 2.0):
+        valley = Valley(floor=3.0)
+        cost, _ = levenberg(
+            valley, np.array([-1.2, 1.0]), lambda _: True, tolerance=1e-12, most_steps=200, least_gain=least_gain
+        )
+        asked.append(valley.asked)
+        if least_gain == 1e-3:
+            assert cost == pytest.approx(9.0, rel=0.1)
+    assert asked[0] > asked[1] > asked[2]

@@ -1,0 +1,218 @@
+"""The free run of a polynomial by monomials of past outputs, whose factors the inputs give, and its sensitivities."""
+
+import numpy as np
+
+from estimation.arrays import Array, IntArray
+from estimation.identification.search.jit import compiled
+
+
+@compiled
+def run_factored(
+    share: Array,
+    parent: IntArray,
+    factor: IntArray,
+    lag: IntArray,
+    limits: Array,
+    ends: Array,
+    begin: int,
+    rub: Array,
+    out: Array,
+) -> int:
+    """Write the output from a sample on; return where it ran away, else -1.
+
+    Parameters
+    ----------
+    share : ndarray, shape (n, m)
+        What each monomial of past outputs is multiplied by; the first monomial is 1.
+    parent, factor : ndarray of int, shape (m,)
+        A monomial is an earlier one times a past output: the first values of the latter are as they are, the others
+        are held at their ends.
+    lag : ndarray of int, shape (l,)
+        Of the past outputs [samples].
+    limits : ndarray, shape (l, 2)
+        Ends at which they are held in products.
+    ends : ndarray, shape (2,)
+        Between which the output is held.
+    begin : int
+        First sample that is written.
+    rub : ndarray, shape (f,)
+        As `run_free` takes it.
+    out : ndarray, shape (n,)
+        Holds outputs before that sample; the others are written.
+    """
+    own = lag.size
+    past, made = np.zeros(2 * own), np.zeros(parent.size)
+    made[0] = 1.0
+    for t in range(begin, out.size):
+        for s in range(own):
+            past[s] = out[t - lag[s]]
+            past[own + s] = min(max(past[s], limits[s, 0]), limits[s, 1])
+        total = share[t, 0]
+        for j in range(1, parent.size):
+            made[j] = made[parent[j]] * past[factor[j]]
+            total += share[t, j] * made[j]
+        if not abs(total) < 1e3:
+            return t
+        if rub.size > 0:
+            stay = out[t - 1]
+            if rub.size > 2:
+                stay = rub[2]
+            if total - stay > rub[1]:
+                total -= rub[1]
+            elif stay - total > rub[0]:
+                total += rub[0]
+            else:
+                total = stay
+        out[t] = min(max(total, ends[0]), ends[1])
+    return -1
+
+
+@compiled
+def slopes_of(
+    share: Array,
+    parent: IntArray,
+    factor: IntArray,
+    lag: IntArray,
+    limits: Array,
+    ends: Array,
+    begin: int,
+    rub: Array,
+    out: Array,
+    monomials: Array,
+    slope: Array,
+) -> None:
+    """Write monomials of past outputs, and how each output depends on those before it.
+
+    Parameters
+    ----------
+    share : ndarray, shape (n, m)
+        As `run_factored` takes it, like all before ``out``.
+    parent, factor : ndarray of int, shape (m,)
+        Likewise.
+    lag : ndarray of int, shape (l,)
+        Likewise [samples].
+    limits : ndarray, shape (l, 2)
+        Likewise.
+    ends : ndarray, shape (2,)
+        Likewise.
+    begin : int
+        First sample that was run.
+    rub : ndarray, shape (f,)
+        As `run_free` takes it.
+    out : ndarray, shape (n,)
+        What `run_factored` has written.
+    monomials : ndarray, shape (n, m)
+        Written.
+    slope : ndarray, shape (n, k)
+        Written, as `run_free` does it.
+    """
+    own, count = lag.size, parent.size
+    past, adjoint, effect = np.zeros(2 * own), np.zeros(count), np.zeros(2 * own)
+    for t in range(begin, out.size):
+        for s in range(own):
+            past[s] = out[t - lag[s]]
+            past[own + s] = min(max(past[s], limits[s, 0]), limits[s, 1])
+        effect[:] = 0.0
+        monomials[t, 0] = 1.0
+        total = share[t, 0]
+        for j in range(1, count):
+            monomials[t, j] = monomials[t, parent[j]] * past[factor[j]]
+            total += share[t, j] * monomials[t, j]
+            adjoint[j] = share[t, j]
+        for i in range(1, count):
+            j = count - i
+            adjoint[parent[j]] += adjoint[j] * past[factor[j]]
+            effect[factor[j]] += adjoint[j] * monomials[t, parent[j]]
+        slope[t, :] = 0.0
+        for s in range(own):
+            slope[t, lag[s] - 1] = effect[s]
+            if limits[s, 0] <= past[s] and past[s] <= limits[s, 1]:
+                slope[t, lag[s] - 1] += effect[own + s]
+        if rub.size > 0:
+            stay = out[t - 1]
+            if rub.size > 2:
+                stay = rub[2]
+            side = 0.0
+            if total - stay > rub[1]:
+                total -= rub[1]
+                side = 1.0
+            elif stay - total > rub[0]:
+                total += rub[0]
+                side = -1.0
+            else:
+                total = stay
+                slope[t, :] = 0.0
+                if rub.size == 2:
+                    slope[t, 0] = 1.0
+            if total < ends[0] or total > ends[1]:
+                slope[t, :] = 0.0
+            slope[t, slope.shape[1] - 1] = side
+        elif total < ends[0] or total > ends[1]:
+            slope[t, :] = 0.0
+
+
+@compiled
+def write_rows(
+    monomials: Array,
+    inputs: Array,
+    place: IntArray,
+    column: IntArray,
+    slope: Array,
+    start: int,
+    begin: int,
+    n_rub: int,
+    first: int,
+    last: int,
+    rows: Array,
+) -> None:
+    """Write the free run's derivatives of some samples, what its past passes on included.
+
+    Parameters
+    ----------
+    monomials : ndarray, shape (n, m)
+        As `slopes_of` writes them.
+    inputs : ndarray, shape (n, i)
+        Monomials of inputs.
+    place, column : ndarray of int, shape (terms,)
+        Monomial of past outputs and monomial of inputs that each term is the product of.
+    slope : ndarray, shape (n, k)
+        As `slopes_of` writes it.
+    start : int
+        Column of the first of the log's first outputs.
+    begin, n_rub : int
+        First sample that was run, and number of the friction's values, which take the last columns.
+    first, last : int
+        Samples that are written: from, and up to without.
+    rows : ndarray, shape (l + r, p)
+        The first l rows hold the samples before; the next ones are written.
+    """
+    values, depth = rows.shape[1], slope.shape[1]
+    if n_rub > 0:
+        depth -= 1
+    # built apart from the rows before it, so that the sums below vectorise
+    now = np.zeros(values)
+    for t in range(first, last):
+        r = depth + t - first
+        now[:] = 0.0
+        if t < begin:
+            if t >= begin - depth:
+                now[start + t - begin + depth] = 1.0
+        else:
+            slips = 1.0
+            if n_rub > 0:
+                slips = abs(slope[t, depth])
+            for i in range(place.size):
+                now[i] = slips * monomials[t, place[i]] * inputs[t, column[i]]
+            if n_rub > 0:
+                if slope[t, depth] < 0.0:
+                    now[values - n_rub] = 1.0
+                elif slope[t, depth] > 0.0:
+                    now[values - n_rub + 1] = -1.0
+                elif n_rub > 2:
+                    now[values - 1] = 1.0
+            for k in range(depth):
+                gain = slope[t, k]
+                before = rows[r - 1 - k]
+                for j in range(values):
+                    now[j] += gain * before[j]
+        rows[r, :] = now

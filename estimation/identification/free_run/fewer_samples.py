@@ -1,0 +1,38 @@
+"""Linear models judged anew on fewer samples, where nonlinear ones are compared with them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from estimation.identification.free_run.choose_linear import Candidate, candidate
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.linear_fit import fit_coarsely
+
+
+def on_fewer(
+    linear: Sequence[Candidate], best: Candidate, part: Channels, fewer: Channels
+) -> tuple[Channels, list[Candidate], Candidate]:
+    """Return the data that nonlinear models are compared on, and linear ones judged there, the best one apart.
+
+    Parameters
+    ----------
+    linear : sequence of Candidate
+        Judged on the part.
+    best : Candidate
+        The one that was chosen of them.
+    part, fewer : Channels
+        Scaled: what linear models were judged on, and a section of no more samples.
+
+    Returns
+    -------
+    tuple of Channels, list of Candidate and Candidate
+        As they were where the section is the part. Doubts stay: whether a time constant is too long for the record is
+        told by the longer one.
+    """
+    if fewer.n_samples == part.n_samples:
+        return part, list(linear), best
+    judged = [
+        replace(candidate(fit_coarsely(one.form, fewer, [one.fit.f], bounded=one.fit.bounded), fewer), doubt=one.doubt)
+        for one in linear
+    ]
+    own = next(other for one, other in zip(linear, judged, strict=True) if one.fit is best.fit)
+    return fewer, judged, replace(own, doubt=best.doubt)
