@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from faults.conditions import find_condition as find_condition
     from faults.conditions import parameters_for as parameters_for
     from faults.conditions import severity as severity
-    from faults.diagnosis.diagnose import diagnose_clean as diagnose_clean
+    from faults.diagnosis.by_circuits import diagnose_clean as diagnose_clean
     from faults.diagnosis.diagnose import diagnose_log as diagnose_log
     from faults.diagnosis.rmse import score_mathematical as score_mathematical
     from faults.diaphragm_motor.diagnose import diagnose_motor as diagnose_motor

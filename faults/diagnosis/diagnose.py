@@ -14,7 +14,6 @@ from estimation.eha.estimate import estimated, explained, finding_of, refused
 from estimation.eha.explained import OUTSIDE, at_pump_speed, rig_set_right, set_right
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Finding, Outcome, Quantity
-from estimation.identification.model.linear_model import LinearModel
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.notes import RigCode
@@ -22,23 +21,19 @@ from faults.diagnosis.advice import advice_for, oil_advice
 from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
 from faults.diagnosis.beyond_nine.drift import over_drift
 from faults.diagnosis.beyond_nine.load import Loaded, under_load
-from faults.diagnosis.beyond_nine.sound_circuit import another_sound_circuit
-from faults.diagnosis.beyond_nine.wear import whatever_fault, whatever_the_pump_delivers
-from faults.diagnosis.calibration import Calibration, shipped_calibration
+from faults.diagnosis.beyond_nine.wear import whatever_the_pump_delivers
+from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuit_verdict import Diagnosis
-from faults.diagnosis.circuits.actuator import Actuator, actuator_of
+from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import LONGEST
-from faults.diagnosis.circuits.class_regions import how_near
-from faults.diagnosis.circuits.open_classes import circuits_left_open
-from faults.diagnosis.circuits.out_of_model import SOFT, reasons_against, sensors_disagree
-from faults.diagnosis.evidence import weigh
+from faults.diagnosis.circuits.out_of_model import SOFT
 from faults.diagnosis.failed_search import doubts_after
 from faults.diagnosis.models_verdict import models_verdict, ranked
 from faults.diagnosis.rmse import Scores, score_mathematical
-from faults.diagnosis.severity import healthy_severities, limits_of, severities, what_is_not_told, with_bulk_modulus
+from faults.diagnosis.severity import with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
 from faults.eha.bank import mathematical_bank
-from faults.notes import AgainstCode, ClassCode
+from faults.notes import ClassCode
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
 from plant.errors import LogError, RigError
@@ -288,70 +283,3 @@ def _without_class(found: Finding, log: CleanLog, scores: Scores, against: tuple
         advice=advice_for(log.record, {}, against, (), scores.channels),
         evidence=EhaEvidence(found.evidence, scores, None),
     )
-
-
-def diagnose_clean(
-    log: CleanLog,
-    actuator: Actuator,
-    library: Mapping[str, LinearModel] | None = None,
-    calibration: Calibration | None = None,
-) -> Diagnosis:
-    """Diagnose a log whose sensors have been looked at, by all evidences, without its estimate of bulk modulus.
-
-    Parameters
-    ----------
-    log : CleanLog
-        Motor speed, and position or velocity; differential pressure where it is logged.
-    actuator : Actuator
-        The healthy actuator.
-    library : Mapping[str, LinearModel], optional
-        Its transfer functions, by condition.
-    calibration : Calibration, optional
-        Fitted numbers; those shipped if not given.
-
-    Returns
-    -------
-    Diagnosis
-        What speaks for each class, and against all.
-
-    Raises
-    ------
-    LogError
-        If the log has neither position nor velocity, or is too short.
-    """
-    numbers = shipped_calibration() if calibration is None else calibration
-    found = _around(log, actuator, library, numbers)
-    if all(note.code is not AgainstCode.UNEXPLAINED for note in found.against):
-        return found
-    other = another_sound_circuit(found.scoreboard.blocks, found.scoreboard.fits, actuator)
-    return found if other is None else _around(log, other, library, numbers)
-
-
-def _around(
-    log: CleanLog, actuator: Actuator, library: Mapping[str, LinearModel] | None, numbers: Calibration
-) -> Diagnosis:
-    """Return the diagnosis of a log around one healthy circuit."""
-    board = weigh(log.record, actuator, library)
-    pressure = board.blocks.pressure is not None
-    region = how_near(board.fits, board.blocks, actuator)
-    against = (
-        *log.objections,
-        *board.against,
-        *sensors_disagree(board.window, board.blocks),
-        *reasons_against(board.blocks, board.fits, region, actuator),
-    )
-    probabilities = board.probabilities(numbers)
-    circuits = circuits_left_open(board.blocks, board.fits, actuator, probabilities)
-    severity = severities(board.fits, actuator, numbers.widths(pressure), circuits)
-    found = Diagnosis(
-        probabilities,
-        against,
-        severity,
-        dict(healthy_severities(actuator)),
-        dict(limits_of(actuator)),
-        tuple(what_is_not_told(board.fits, severity, pressure=pressure)),
-        board,
-    )
-    # a log that drifts is diagnosed again, where it does
-    drifts = board.drift is not None or board.blocks.course is not None
-    return found if drifts else whatever_fault(found, actuator, numbers)

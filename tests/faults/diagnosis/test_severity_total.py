@@ -10,8 +10,9 @@ import pytest
 from estimation.finding import Quantity
 from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuits.actuator import actuator_of
-from faults.diagnosis.diagnose import diagnose_clean, diagnose_log
+from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.severity import with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
 from plant.eha.doubts import PRESSURE_GAIN, Spread

@@ -15,10 +15,10 @@ from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine import drift
 from faults.diagnosis.beyond_nine.drift import over_drift, weighed
 from faults.diagnosis.beyond_nine.load import Loaded
+from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
-from faults.diagnosis.diagnose import diagnose_clean
 from faults.diagnosis.severity import severities_at
 from faults.diagnosis.severity_total import with_totals
 from faults.notes import AgainstCode

@@ -16,8 +16,9 @@ from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine import load
 from faults.diagnosis.beyond_nine.force_balance import Loads
 from faults.diagnosis.beyond_nine.load import Loaded, first_guesses, under_load
+from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuits.actuator import actuator_of
-from faults.diagnosis.diagnose import diagnose_clean, diagnose_log
+from faults.diagnosis.diagnose import diagnose_log
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive

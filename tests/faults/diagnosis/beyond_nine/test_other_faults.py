@@ -16,11 +16,11 @@ from faults.diagnosis.beyond_nine.other_faults import (
     largest_pressure,
     odds_of_wear,
 )
+from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.circuits.class_regions import fit_classes
-from faults.diagnosis.diagnose import diagnose_clean
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.model import EhaParameters

@@ -9,7 +9,7 @@ import pytest
 
 from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS
-from faults.diagnosis import diagnose
+from faults.diagnosis import by_circuits
 from faults.diagnosis.beyond_nine import other_faults, sound_circuit, wear
 from faults.diagnosis.beyond_nine.other_faults import Outside, faults_outside
 from faults.diagnosis.calibration import shipped_calibration
@@ -258,8 +258,8 @@ def test_what_lies_beside_the_nine_is_asked_for_faults_before_what_lasts_of_its_
 
 @pytest.mark.parametrize("near", [-1.0, -1e3])
 def test_a_diagnosis_asks_every_circuit_whether_a_log_is_outside(near: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(diagnose, "how_near", lambda *_: near)
-    monkeypatch.setattr(diagnose, "whatever_fault", lambda found, *_: found)
+    monkeypatch.setattr(by_circuits, "how_near", lambda *_: near)
+    monkeypatch.setattr(by_circuits, "whatever_fault", lambda found, *_: found)
     clean = clean_log(log().replace(**{PRESSURE: None}), PAPER)
-    codes = {note.code for note in diagnose.diagnose_clean(clean, ACTUATOR).against}
+    codes = {note.code for note in by_circuits.diagnose_clean(clean, ACTUATOR).against}
     assert bool(codes & {AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS}) == (near < -100.0)

@@ -9,10 +9,10 @@ from estimation.log_checks.clean import clean_log
 from experiments.open_benchmark.kinds import make
 from faults.diagnosis.beyond_nine import sound_circuit as subject
 from faults.diagnosis.beyond_nine.sound_circuit import WIDER, another_sound_circuit, sound_circuit
+from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuits.class_fit import nominal_runs
 from faults.diagnosis.circuits.class_regions import fit_classes
 from faults.diagnosis.circuits.out_of_model import unexplained
-from faults.diagnosis.diagnose import diagnose_clean
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from tests.faults.diagnosis.short_logs import ACTUATOR, blocks, classes

@@ -12,6 +12,7 @@ from benchmarks.watching.watching import CircuitStream
 from estimation.log_checks.clean import clean_log
 from experiments.open_benchmark.kinds import make
 from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.changes import onset
 from faults.diagnosis.changes.onset import (
     MOST_ALARMS,
@@ -28,7 +29,6 @@ from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
 from faults.diagnosis.circuits.class_regions import fit_classes
 from faults.diagnosis.circuits.out_of_model import unexplained
-from faults.diagnosis.diagnose import diagnose_clean
 from faults.eha.inject import abrupt
 from faults.notes import AgainstCode
 from faults.watch.events import Alarm, Event, Ready

@@ -12,13 +12,13 @@ from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine.drift import over_drift
 from faults.diagnosis.beyond_nine.load import Loaded
+from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.changes import warming
 from faults.diagnosis.changes.onset import last_part
 from faults.diagnosis.changes.warming import LEAST, Drift, course_of, drift_of, drifting, with_course
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import LONGEST, Blocks, blocks_of
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
-from faults.diagnosis.diagnose import diagnose_clean
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters

@@ -13,11 +13,11 @@ from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine import wear
 from faults.diagnosis.beyond_nine.other_faults import Outside
+from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.circuit_runs import coordinates_of
-from faults.diagnosis.diagnose import diagnose_clean
 from faults.diagnosis.evidence import EVIDENCES
 from faults.diagnosis.severity import severities_at
 from faults.notes import AgainstCode, ClassCode

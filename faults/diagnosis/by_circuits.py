@@ -1,0 +1,84 @@
+"""`diagnose_clean(log, actuator) -> Diagnosis`: what circuits say of a log, without its estimate of bulk modulus."""
+
+from collections.abc import Mapping
+
+from estimation.identification.model.linear_model import LinearModel
+from estimation.log_checks.clean import CleanLog
+from faults.diagnosis.beyond_nine.sound_circuit import another_sound_circuit
+from faults.diagnosis.beyond_nine.wear import whatever_fault
+from faults.diagnosis.calibration import Calibration, shipped_calibration
+from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.class_regions import how_near
+from faults.diagnosis.circuits.open_classes import circuits_left_open
+from faults.diagnosis.circuits.out_of_model import reasons_against, sensors_disagree
+from faults.diagnosis.evidence import weigh
+from faults.diagnosis.severity import healthy_severities, limits_of, severities, what_is_not_told
+from faults.notes import AgainstCode
+
+
+def diagnose_clean(
+    log: CleanLog,
+    actuator: Actuator,
+    library: Mapping[str, LinearModel] | None = None,
+    calibration: Calibration | None = None,
+) -> Diagnosis:
+    """Diagnose a log whose sensors have been looked at, by all evidences, without its estimate of bulk modulus.
+
+    Parameters
+    ----------
+    log : CleanLog
+        Motor speed, and position or velocity; differential pressure where it is logged.
+    actuator : Actuator
+        The healthy actuator.
+    library : Mapping[str, LinearModel], optional
+        Its transfer functions, by condition.
+    calibration : Calibration, optional
+        Fitted numbers; those shipped if not given.
+
+    Returns
+    -------
+    Diagnosis
+        What speaks for each class, and against all.
+
+    Raises
+    ------
+    LogError
+        If the log has neither position nor velocity, or is too short.
+    """
+    numbers = shipped_calibration() if calibration is None else calibration
+    found = _around(log, actuator, library, numbers)
+    if all(note.code is not AgainstCode.UNEXPLAINED for note in found.against):
+        return found
+    other = another_sound_circuit(found.scoreboard.blocks, found.scoreboard.fits, actuator)
+    return found if other is None else _around(log, other, library, numbers)
+
+
+def _around(
+    log: CleanLog, actuator: Actuator, library: Mapping[str, LinearModel] | None, numbers: Calibration
+) -> Diagnosis:
+    """Return the diagnosis of a log around one healthy circuit."""
+    board = weigh(log.record, actuator, library)
+    pressure = board.blocks.pressure is not None
+    region = how_near(board.fits, board.blocks, actuator)
+    against = (
+        *log.objections,
+        *board.against,
+        *sensors_disagree(board.window, board.blocks),
+        *reasons_against(board.blocks, board.fits, region, actuator),
+    )
+    probabilities = board.probabilities(numbers)
+    circuits = circuits_left_open(board.blocks, board.fits, actuator, probabilities)
+    severity = severities(board.fits, actuator, numbers.widths(pressure), circuits)
+    found = Diagnosis(
+        probabilities,
+        against,
+        severity,
+        dict(healthy_severities(actuator)),
+        dict(limits_of(actuator)),
+        tuple(what_is_not_told(board.fits, severity, pressure=pressure)),
+        board,
+    )
+    # a log that drifts is diagnosed again, where it does
+    drifts = board.drift is not None or board.blocks.course is not None
+    return found if drifts else whatever_fault(found, actuator, numbers)
