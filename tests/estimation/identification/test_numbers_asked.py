@@ -76,8 +76,8 @@ def watched(
         yield asked
 
 
-def options(*_: Any, tolerance: float, most_steps: int, slower: float = 3.0) -> list[float]:
-    return [tolerance, most_steps, slower]
+def options(*_: Any, tolerance: float, most_steps: int, slower: float = 3.0, least_gain: float = 0.0) -> list[float]:
+    return [tolerance, most_steps, slower, *([least_gain] if least_gain else [])]
 
 
 @NUMBERS.case()
