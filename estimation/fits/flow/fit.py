@@ -38,7 +38,7 @@ REPORTED = ("leakage_coefficient", "flow_bias")
 
 STRUCTURE = 2e-4
 """Relative standard deviation of bulk modulus from what the balance leaves out where no make-up valve may crack: in a
-log that the plain form does not explain, and with gaps in motor speed. Likeliest on 71 validation logs [fraction]."""
+log that the plain form does not explain. Likeliest on 71 validation logs [fraction]."""
 
 FILTERED = 1e-3
 """The same of a log whose pressure was filtered: the filter is fitted as a lag of first order. 16 training logs with a

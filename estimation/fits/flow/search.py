@@ -236,7 +236,7 @@ def _plain(one: _Rough) -> bool:
     Elsewhere valves that crack would take up what is strange and hide it: an encoder that was homed at the end stop,
     or a worn pump. Held chambers are the lumped plant's, which has no such valves.
     """
-    return not _held(one.problem) and not one.problem.log.gaps.size and explained(one.problem, one.point)
+    return not _held(one.problem) and explained(one.problem, one.point)
 
 
 def _completed(one: _Rough, log: GreyBoxLog, *, bent: bool) -> tuple[Problem, Array, tuple[Array, Array]]:

@@ -202,7 +202,7 @@ def free_runs() -> dict[str, Any]:
     told["polynomial"] = asked
     with (
         watched(hammerstein_fit, "levenberg", options) as asked,
-        watched(hammerstein_fit, "fit_linear", lambda *given: len(given[2])) as fits,
+        watched(hammerstein_fit, "fit_linear", lambda *given, **_: len(given[2])) as fits,
     ):
         hammerstein_fit.fit_hammerstein("dead-zone", Form(1, (1,), (1,)), channels(), [np.array([1.0, -0.8])])
     told["Hammerstein"] = [asked, fits]

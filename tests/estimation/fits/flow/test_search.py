@@ -12,6 +12,7 @@ from estimation.fits.greybox.fit import GreyBoxFit, roughly
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO
 from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import MASS_FLOW_FORM, STIFFNESS
 from experiments.open_benchmark.logger import PLAIN, Logger
 from experiments.open_benchmark.machine import Machine
@@ -67,6 +68,17 @@ def test_a_log_that_the_likeliest_guess_explains_is_fitted_as_by_a_search_from_e
         std = other.std["bulk_modulus"]
         assert one.values["bulk_modulus"] == pytest.approx(other.values["bulk_modulus"], abs=0.05 * std)
         assert one.std["bulk_modulus"] == pytest.approx(std, rel=0.01)
+
+
+def test_valves_that_crack_are_fitted_beside_missing_speeds() -> None:
+    """Else what they leave is laid to a cause that is not there: a drift of leakage, a blocked valve."""
+    record = recorded("normal")
+    speed = record["motor_speed_rad_s"].copy()
+    speed[int(np.argmax(np.abs(np.diff(speed))))] = np.nan
+    gapped = seen(record.replace(motor_speed_rad_s=speed))
+    assert gapped.gaps.size
+    likeliest = min(balanced(gapped, HEALTHY, STARTS), key=lambda fit: fit.cost)
+    assert set(CRACKS) <= likeliest.values.keys()
 
 
 def test_a_log_that_no_guess_explains_is_searched_from_every_start(tried: list[int]) -> None:
