@@ -149,7 +149,10 @@ class Log(Shown):
                 f"a part of at least {FEWEST_SAMPLES} samples is needed, {begin:g} s to {end:g} s has {count} of the "
                 f"log's, which is from {ends}"
             )
-        sparse = None if self._sparse is None else self._sparse.slice(*span)
+        sparse = self._sparse
+        if sparse is not None:  # it may begin earlier, where a channel begins late
+            ahead = round((self.record.start_time - sparse.start_time) / self.sample_time)
+            sparse = sparse.slice(first + ahead, last + 1 + ahead)
         kept: dict[str, Any] = {"sparse": sparse, "refusal": self._refusal, "name": self._name}
         return Log(self.record.slice(*span), self.rig, self.plant, self._said, **kept)
 
