@@ -116,4 +116,4 @@ def test_a_pressure_that_begins_late_shortens_no_log_whose_other_channels_are_re
     assert log.record.start_time == pytest.approx(0.7)
     part = log.between(1.0, 1.2)
     assert part.related.start_time == part.record.start_time == pytest.approx(1.0)
-    assert (part.related["position_m"] == part.record["position_m"]).all()
+    assert (part.related["velocity_m_s"] == part.record["velocity_m_s"]).all()
