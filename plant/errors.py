@@ -27,6 +27,13 @@ class NoSuchNameError(HydrostateError, AttributeError):
     """An attribute is asked for that is not there; the message has the nearest one."""
 
 
+class NoSuchEntryError(HydrostateError, KeyError):
+    """An entry of a table is asked for that is not there; the message has the nearest one."""
+
+    def __str__(self) -> str:
+        return Exception.__str__(self)  # a KeyError would put the sentence in quotation marks
+
+
 class LogError(HydrostateError):
     """A log file cannot be read or trusted."""
 

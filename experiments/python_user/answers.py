@@ -85,6 +85,15 @@ class Shown:
         raise NoSuchNameError(no_such(type(self).__name__, name, names))
 
 
+class Named(dict[str, Any]):
+    """What stands under names, which says what it has where one is misspelt."""
+
+    def __missing__(self, name: str) -> NoReturn:
+        from plant.errors import NoSuchEntryError
+
+        raise NoSuchEntryError(no_such("the answer", str(name), list(self)))
+
+
 class Answer(Shown):
     """What a log says, ready to be printed, drawn and passed on.
 
@@ -112,7 +121,8 @@ class Answer(Shown):
 
     def __getattr__(self, name: str) -> Any:
         if not name.startswith("_") and name in type(self.finding).__dataclass_fields__:
-            return getattr(self.finding, name)
+            found = getattr(self.finding, name)
+            return Named(found) if isinstance(found, Mapping) else found
         return super().__getattr__(name)
 
     def __dir__(self) -> list[str]:

@@ -3,6 +3,7 @@
 A rig is of any kind of actuator: its parameters are a frozen dataclass whose fields carry `SI` notes.
 """
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
@@ -155,12 +156,16 @@ def plant_of(path: str | Path) -> str | None:
 
 
 def _content(path: Path) -> dict[str, Any]:
+    text = ""
     try:
-        return tomllib.loads(small_file(path).decode("utf-8-sig"))
+        text = small_file(path).decode("utf-8-sig")
+        return tomllib.loads(text)
     except OSError as error:
         raise RigError(f"{path}: cannot be read as a rig file: {error.strerror or error}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise RigError(f"{path}: a rig file (TOML) is needed: {error}") from error
+        commas = re.search(r"^\s*(\w+)\s*=\s*([-+]?\d+,\d+)\s*(?:#|$)", text, re.MULTILINE)
+        hint = f"; {commas[1]} = {commas[2]} has a decimal comma, write a point" if commas else ""
+        raise RigError(f"{path}: a rig file (TOML) is needed: {error}{hint}") from error
 
 
 def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> Rig[Any]:

@@ -65,6 +65,9 @@ def test_an_answer_has_what_was_found_and_says_what_it_has_not(log: hs.Log) -> N
         _ = answer.outcom
     with pytest.raises(AttributeError):
         _ = answer._outcome
+    with pytest.raises(KeyError, match=r"^the answer has no 'bulk_moduls'; did you mean 'bulk_modulus'"):
+        _ = answer.quantities["bulk_moduls"]
+    assert answer.quantities.get("bulk_moduls") is None
 
 
 def test_errors_give_options_the_names_that_python_users_know(log: hs.Log) -> None:

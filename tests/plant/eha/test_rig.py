@@ -119,6 +119,10 @@ def test_every_parameter_refuses_text(tmp_path: Path, field: str) -> None:
         ("[columns]\nposition_m = 3", r"columns\.position_m must be a valid string, got 3"),
         ("[parameters", r"a rig file \(TOML\) is needed"),
         ("a = 1\na = 2", r"a rig file \(TOML\) is needed"),
+        (
+            "[parameters]\nmoving_mass = 20.0\npiston_area = 0,00152",
+            r"line 3.*; piston_area = 0,00152 has a decimal comma, write a point",
+        ),
     ],
 )
 def test_what_a_rig_cannot_hold_is_refused_with_file_and_field(tmp_path: Path, text: str, message: str) -> None:
