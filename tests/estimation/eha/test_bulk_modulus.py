@@ -69,8 +69,7 @@ def test_the_pressure_form_with_pressure_logged_converges_to_one_percent(drive: 
 
 @EVERY_CONDITION
 def test_the_pressure_form_without_pressure_converges_to_three_percent_on_steps(name: str) -> None:
-    log = without_pressure(bench_log("lumped", "steps", name, sample_time=SPARSE))
-    assert largest_error(log, name, "pressure") < 0.03
+    assert largest_error(without_pressure(bench_log("lumped", "steps", name)), name, "pressure") < 0.03
 
 
 @EVERY_CONDITION
