@@ -1,8 +1,11 @@
 """Files that a person wrote, rig and study files: regular and small, whatever the path names."""
 
 import errno
+import re
 import stat
+import tomllib
 from pathlib import Path
+from typing import Any
 
 LARGEST = 1 << 20
 """Bytes of the largest one that is read."""
@@ -29,3 +32,33 @@ def small_file(path: Path, most: int = LARGEST) -> bytes:
     if about.st_size > most:
         raise OSError(errno.EFBIG, f"it has more than {most / 2**20:g} MB")
     return path.read_bytes()
+
+
+def small_toml(path: Path) -> dict[str, Any]:
+    """Return the content of a small TOML file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    dict[str, Any]
+        By name.
+
+    Raises
+    ------
+    OSError
+        As of `small_file`.
+    ValueError
+        If it is no TOML; a number with a decimal comma is named.
+    """
+    text = ""
+    try:
+        text = small_file(path).decode("utf-8-sig")
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        commas = re.search(r"^\s*(\w+)\s*=\s*([-+]?\d+,\d+)\s*(?:#|$)", text, re.MULTILINE)
+        hint = f"; {commas[1]} = {commas[2]} has a decimal comma, write a point" if commas else ""
+        raise ValueError(f"{error}{hint}") from error

@@ -16,6 +16,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
+from typing import Any
 
 from estimation.finding import NORMAL_95, Quantity
 from estimation.fits.explaining.form_fit import FormFit
@@ -152,8 +153,8 @@ def wear_left_open(remarks: Sequence[Note]) -> float:
     float
         Standard deviation of the logarithm [dimensionless]; zero where the log tells, or a worn pump was found.
     """
-    said = [note.data["percent"] for note in remarks if note.code is RigCode.WEAR_NOT_EXCLUDED]
-    return 0.005 * float(said[0]) if said else 0.0
+    said = _said_of_wear(remarks)
+    return 0.005 * float(said["percent"]) if said else 0.0
 
 
 def delivery_left_open(remarks: Sequence[Note]) -> tuple[float, float] | None:
@@ -170,11 +171,16 @@ def delivery_left_open(remarks: Sequence[Note]) -> tuple[float, float] | None:
         Logarithm of the delivery over the displacement, and its standard deviation, with what is presumed of a pump
         [dimensionless]; None where the log tells, or a worn pump was found.
     """
-    for note in remarks:
-        if note.code is RigCode.WEAR_NOT_EXCLUDED:
-            width, less = float(note.data["half_width"]), float(note.data["percent"])
-            return 0.01 * (width - less), 0.005 * width
-    return None
+    said = _said_of_wear(remarks)
+    if said is None:
+        return None
+    width, less = float(said["half_width"]), float(said["percent"])
+    return 0.01 * (width - less), 0.005 * width
+
+
+def _said_of_wear(remarks: Sequence[Note]) -> Mapping[str, Any] | None:
+    """Return the figures of the note that wear is not excluded, None where there is none."""
+    return next((note.data for note in remarks if note.code is RigCode.WEAR_NOT_EXCLUDED), None)
 
 
 def with_wear(spreads: Mapping[str, Spread], remarks: Sequence[Note]) -> Mapping[str, Spread]:

@@ -1,6 +1,5 @@
 """The study file: which plants, conditions, drives, sensors, methods and seeds, or which logs, in TOML."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from importlib.resources import files
@@ -20,7 +19,7 @@ from plant.eha.drives import DRIVES
 from plant.eha.simulate import PLANTS
 from plant.errors import HydrostateError
 from plant.sensors.sensors import SENSORS
-from plant.small_file import small_file
+from plant.small_file import small_toml
 
 SHIPPED = "experiments.batch.studies"
 
@@ -212,10 +211,10 @@ def read_study(path: str | Path) -> Study:
     """
     path = study_path(path)
     try:
-        content = tomllib.loads(small_file(path).decode("utf-8-sig"))
+        content = small_toml(path)
     except OSError as error:
         raise StudyError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except ValueError as error:
         raise StudyError(f"{path}: a TOML file is needed: {error}") from error
     return parse_study(content, str(path))
 

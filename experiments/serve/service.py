@@ -204,9 +204,8 @@ class Service:
             rows = await asyncio.to_thread(lambda: list(self.store.diagnosed()))
             if not rows:
                 raise RefusedError(404, "no log was diagnosed yet")
-            page = self._page_of(revision) or self._begun(
-                revision, rows, repairs
-            )  # another request may have begun it meanwhile
+            # another request may have begun it meanwhile
+            page = self._page_of(revision) or self._begun(revision, rows, repairs)
         try:
             return await asyncio.shield(page)
         except RefusedError:

@@ -193,13 +193,9 @@ def rmse(measured: Array, predicted: Array) -> float:
     >>> rmse(np.array([1.0, np.nan, 3.0]), np.array([0.0, 5.0, 4.0]))
     1.0
     """
-    squares = (measured - predicted) ** 2
-    mean = float(np.mean(squares))
-    if math.isfinite(mean):  # nothing is missing, and nothing ran away
-        return math.sqrt(mean)
     if not np.all(np.isfinite(predicted)):
         return float("inf")
-    return math.sqrt(float(np.nanmean(squares)) if math.isnan(mean) else mean)
+    return _root_mean_square(measured - predicted)
 
 
 def _root_mean_square(values: Array) -> float:

@@ -3,8 +3,6 @@
 A rig is of any kind of actuator: its parameters are a frozen dataclass whose fields carry `SI` notes.
 """
 
-import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
@@ -19,7 +17,7 @@ from plant.eha.doubts import Spread, doubts_of, spreads_of
 from plant.eha.model import PAIRS, EhaParameters
 from plant.errors import RigError
 from plant.log.columns import check_columns
-from plant.small_file import small_file
+from plant.small_file import small_toml
 from plant.units import notes
 
 _EXAMPLES: Mapping[str, str] = {
@@ -156,16 +154,12 @@ def plant_of(path: str | Path) -> str | None:
 
 
 def _content(path: Path) -> dict[str, Any]:
-    text = ""
     try:
-        text = small_file(path).decode("utf-8-sig")
-        return tomllib.loads(text)
+        return small_toml(path)
     except OSError as error:
         raise RigError(f"{path}: cannot be read as a rig file: {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        commas = re.search(r"^\s*(\w+)\s*=\s*([-+]?\d+,\d+)\s*(?:#|$)", text, re.MULTILINE)
-        hint = f"; {commas[1]} = {commas[2]} has a decimal comma, write a point" if commas else ""
-        raise RigError(f"{path}: a rig file (TOML) is needed: {error}{hint}") from error
+    except ValueError as error:
+        raise RigError(f"{path}: a rig file (TOML) is needed: {error}") from error
 
 
 def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> Rig[Any]:

@@ -33,6 +33,13 @@ def test_a_file_that_no_person_wrote_is_refused_by_its_size(tmp_path: Path) -> N
         small_file(tmp_path / "large.toml", 100)
 
 
+def test_a_decimal_comma_is_named_in_rig_and_study_files(tmp_path: Path) -> None:
+    (path := tmp_path / "comma.toml").write_text("[parameters]\nmoving_mass = 20,5  # kg\n")
+    for read, error in ((read_rig, RigError), (read_study, StudyError)):
+        with pytest.raises(error, match=r"line 2.*; moving_mass = 20,5 has a decimal comma, write a point"):
+            read(path)
+
+
 @pytest.mark.parametrize("name", ["../up", "a/b", ".", "..", "a\x1b[2J", "a\\b", "", "x" * 200])
 def test_a_study_is_called_what_a_folder_may_be(name: str) -> None:
     content = {"name": name, "runs": [{"seeds": 1, "methods": [{"verb": "diagnose"}]}]}

@@ -45,10 +45,9 @@ def columns_of(form: "Form", u: Array) -> Array:
     ndarray, shape (n, n_b)
         One column a numerator coefficient.
     """
-    shifted: list[Array] = []
-    for index, (size, delay) in enumerate(zip(form.sizes, form.delays, strict=True)):
-        one = u[:, index]
-        for k in range(size):
-            lag = min(delay + k, one.size)
-            shifted.append(np.concatenate([np.full(lag, one[0]), one[: one.size - lag]]))
-    return np.column_stack(shifted) if shifted else np.zeros((u.shape[0], 0))
+    columns = [
+        shifted(one, delay + k, one[0])
+        for one, size, delay in zip(u.T, form.sizes, form.delays, strict=True)
+        for k in range(size)
+    ]
+    return np.column_stack(columns) if columns else np.zeros((u.shape[0], 0))
