@@ -7,6 +7,35 @@ from estimation.identification.search.jit import compiled
 
 
 @compiled
+def rubbed(total: float, before: float, rub: Array) -> tuple[float, float]:
+    """Return what friction leaves of an output, and which way it moves: 1 up, -1 down, 0 where friction holds it.
+
+    Parameters
+    ----------
+    total : float
+        What the terms give.
+    before : float
+        The output a sample before.
+    rub : ndarray, shape (f,)
+        What friction takes off the output below and above where it rests: at the third value, or of two where it was a
+        sample before; there it stays unless more than that moves it.
+
+    Returns
+    -------
+    tuple of float
+        The output [scaled], and its direction [dimensionless].
+    """
+    stay = before
+    if rub.size > 2:
+        stay = rub[2]
+    if total - stay > rub[1]:
+        return total - rub[1], 1.0
+    if stay - total > rub[0]:
+        return total + rub[0], -1.0
+    return stay, 0.0
+
+
+@compiled
 def run_factored(
     share: Array,
     parent: IntArray,
@@ -34,9 +63,9 @@ def run_factored(
     ends : ndarray, shape (2,)
         Between which the output is held.
     begin : int
-        First sample that is written.
+        First sample that is written; not less than the longest lag.
     rub : ndarray, shape (f,)
-        As `run_free` takes it.
+        As `rubbed` takes it; none where nothing rubs.
     out : ndarray, shape (n,)
         Holds outputs before that sample; the others are written.
     """
@@ -54,15 +83,7 @@ def run_factored(
         if not abs(total) < 1e3:
             return t
         if rub.size > 0:
-            stay = out[t - 1]
-            if rub.size > 2:
-                stay = rub[2]
-            if total - stay > rub[1]:
-                total -= rub[1]
-            elif stay - total > rub[0]:
-                total += rub[0]
-            else:
-                total = stay
+            total, _ = rubbed(total, out[t - 1], rub)
         out[t] = min(max(total, ends[0]), ends[1])
     return -1
 
@@ -98,13 +119,14 @@ def slopes_of(
     begin : int
         First sample that was run.
     rub : ndarray, shape (f,)
-        As `run_free` takes it.
+        Likewise.
     out : ndarray, shape (n,)
         What `run_factored` has written.
     monomials : ndarray, shape (n, m)
         Written.
     slope : ndarray, shape (n, k)
-        Written, as `run_free` does it.
+        Written: derivative of each output by the k before it; where the output rubs, by k - 1, and the last column is
+        the direction in which it moves, as `rubbed` returns it.
     """
     own, count = lag.size, parent.size
     past, adjoint, effect = np.zeros(2 * own), np.zeros(count), np.zeros(2 * own)
@@ -129,18 +151,8 @@ def slopes_of(
             if limits[s, 0] <= past[s] and past[s] <= limits[s, 1]:
                 slope[t, lag[s] - 1] += effect[own + s]
         if rub.size > 0:
-            stay = out[t - 1]
-            if rub.size > 2:
-                stay = rub[2]
-            side = 0.0
-            if total - stay > rub[1]:
-                total -= rub[1]
-                side = 1.0
-            elif stay - total > rub[0]:
-                total += rub[0]
-                side = -1.0
-            else:
-                total = stay
+            total, side = rubbed(total, out[t - 1], rub)
+            if side == 0.0:
                 slope[t, :] = 0.0
                 if rub.size == 2:
                     slope[t, 0] = 1.0

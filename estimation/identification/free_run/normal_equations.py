@@ -202,11 +202,35 @@ class NormalEquations:
             right += rows.T @ residual
         return gram, square, right
 
+    def start_slopes(self) -> Array:
+        """Return the last run's derivatives by the first outputs of its only log.
+
+        Returns
+        -------
+        ndarray, shape (n, lags)
+            One column a first output.
+        """
+        (begin,), (out,), n = self.runs.begins, self._outputs, self.runs.variables.n_start
+        slope = np.ascontiguousarray(self._slopes(0)[1][:, :n])
+        nothing, none, rows = np.empty((out.size, 0)), np.empty(0, dtype=np.int64), np.zeros((n + out.size, n))
+        # without terms and friction, rows hold what the first outputs pass on alone
+        write_rows(nothing, nothing, none, none, slope, 0, begin, 0, 0, out.size, rows)
+        return rows[n:]
+
     @property
     def n_values(self) -> int:
         """Values that the run depends on."""
         runs = self.runs
         return runs.terms.shape[0] + runs.variables.n_start * len(self.inputs) + runs.variables.n_friction
+
+    def _slopes(self, index: int) -> tuple[Array, Array]:
+        """Return monomials of past outputs, and how each output of a log depends on those before it."""
+        share, one, variables = self._shares[index], self.factors, self.runs.variables
+        monomials = np.zeros(share.shape)
+        slope = np.zeros((share.shape[0], variables.n_start + bool(variables.friction)))
+        at = (one.parent, one.factor, self.lag, self.limits, self.ends, self.runs.begins[index], self._rub)
+        slopes_of(share, *at, self._outputs[index], monomials, slope)
+        return monomials, slope
 
     def _stretches(self, left: Array) -> Iterator[tuple[Array, Array]]:
         """Yield derivatives and residuals of the samples that count, some at a time."""
@@ -214,11 +238,9 @@ class NormalEquations:
         n, n_rub, place = runs.variables.n_start, runs.variables.n_friction, 0
         length = max(STRETCH // p, 32)
         rows = np.zeros((n + length, p))
-        for index, (inputs, share, out) in enumerate(zip(self.inputs, self._shares, self._outputs, strict=True)):
+        for index, (inputs, out) in enumerate(zip(self.inputs, self._outputs, strict=True)):
             begin, size, start = runs.begins[index], out.size, runs.terms.shape[0] + index * n
-            monomials, slope = np.zeros(share.shape), np.zeros((size, n + bool(n_rub)))
-            at = (one.parent, one.factor, self.lag, self.limits, self.ends, begin, self._rub)
-            slopes_of(share, *at, out, monomials, slope)
+            monomials, slope = self._slopes(index)
             used, residual = runs.used[place : place + size], left[place : place + size]
             place += size
             rows[:n] = 0.0

@@ -10,6 +10,7 @@ from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels, Scaling
 from estimation.identification.free_run.fallback import Fallback
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
+from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs
 from estimation.identification.free_run.polynomial_variables import Variables, products
 
@@ -123,20 +124,20 @@ class PolynomialDynamics:
 
     def _refined(self, runs: Runs, y: Array, start: Array, steps: int) -> tuple[Array, float]:
         """Return the best run that refinements of first outputs lead to, and its squared error; infinite if none."""
-        known, k = runs.used, self.coefficients.size
+        known, equations = runs.used, NormalEquations(runs, runs.ends)
         best, cost = np.full(y.size, np.nan), np.inf
         for step in range(steps):
-            ran = runs.run(np.concatenate([self.coefficients, start, self.friction]))
+            ran = equations.outputs(np.concatenate([self.coefficients, start, self.friction]))
             if ran is None:
                 break
-            left = (y - ran[0])[known]
+            left = (y - ran)[known]
             now = float(left @ left)
             if not now < cost * (1.0 - 1e-6):
                 break
-            best, cost = ran[0], now
+            best, cost = ran, now
             if step + 1 == steps:  # nothing follows that slopes would lead
                 break
-            moved = runs.sensitivities(*ran, self.terms, starts=True)[known][:, k : k + start.size]
+            moved = equations.start_slopes()[known]
             if not np.isfinite(moved).all():
                 break
             start = start + np.linalg.lstsq(moved, left, rcond=None)[0]

@@ -1,6 +1,5 @@
 """Polynomial models: sums of products of lagged signals, fitted to their free run with exact sensitivities."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +8,7 @@ from estimation.arrays import Array, BoolArray, IntArray
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_fit import LinearFit
 from estimation.identification.free_run.normal_equations import NormalEquations
-from estimation.identification.free_run.polynomial_kernel import carry, run_free, write_products
-from estimation.identification.free_run.polynomial_variables import BEYOND, Variables, lagged_signals
+from estimation.identification.free_run.polynomial_variables import BEYOND, Variables
 from estimation.identification.search.levenberg import levenberg
 
 FARTHEST = 0.2
@@ -114,23 +112,8 @@ class Runs:
         ends = zip(self.data.y, self.begins, strict=True)
         return np.concatenate([first_values(y, begin)[begin - n :] for y, begin in ends]) if n else np.zeros(0)
 
-    def run(self, theta: Array) -> tuple[Array, list[Array]] | None:
-        """Return the outputs and their slopes by their own past, log by log; None where one runs away.
-
-        Parameters
-        ----------
-        theta : ndarray, shape (p,)
-            All values.
-
-        Returns
-        -------
-        tuple of ndarray and list of ndarray, or None
-            Shapes (n,), and (n, lags) of each log, a column more where the output rubs.
-        """
-        return self._run(theta, sloped=True)
-
     def outputs(self, theta: Array) -> Array | None:
-        """Return the outputs alone, which takes half the time of a run with slopes; None where one runs away.
+        """Return the outputs; None where one runs away.
 
         Parameters
         ----------
@@ -142,22 +125,7 @@ class Runs:
         ndarray, shape (n,), or None
             Of all logs, one after the other.
         """
-        ran = self._run(theta, sloped=False)
-        return None if ran is None else ran[0]
-
-    def _run(self, theta: Array, *, sloped: bool) -> tuple[Array, list[Array]] | None:
-        k, n = self.terms.shape[0], self.variables.n_start
-        outs, slopes = list[Array](), list[Array]()
-        ends = self.ends
-        for index, u in enumerate(self.data.u):
-            out, begin = self.begun(theta, index), self.begins[index]
-            slope = np.zeros((u.shape[0] if sloped else 0, n + bool(self.variables.friction)))
-            one, values, rub = self.variables, theta[:k].copy(), theta[theta.size - self.variables.n_friction :].copy()
-            if run_free(values, self.terms, one.source, one.lag, one.limits, ends, begin, u, out, slope, rub) >= 0:
-                return None
-            outs.append(out)
-            slopes.append(slope)
-        return np.concatenate(outs), slopes
+        return NormalEquations(self, self.ends).outputs(theta)
 
     @property
     def ends(self) -> Array:
@@ -185,46 +153,6 @@ class Runs:
         out[: begin - n] = first_values(y, begin - n)
         out[begin - n : begin] = theta[first : first + n]
         return out
-
-    def sensitivities(self, output: Array, slopes: Sequence[Array], terms: IntArray, *, starts: bool) -> Array:
-        """Return the derivative of the free run by coefficients of terms, and by the other values where wanted.
-
-        Parameters
-        ----------
-        output : ndarray, shape (n,)
-            As `run` returns it.
-        slopes : sequence of ndarray, shape (n, lags)
-            Likewise, one a log.
-        terms : ndarray of int, shape (k, d)
-            Variables that each term multiplies; -1 stands for 1.
-        starts : bool
-            Whether first outputs and values of the friction are wanted.
-
-        Returns
-        -------
-        ndarray, shape (n, k) or (n, k + lags * logs + friction)
-            One column a value.
-        """
-        n, rows = self.variables.n_start, list[Array]()
-        place, count, last = 0, terms.shape[0], terms.shape[0] + n * len(slopes)
-        for index, (u, slope) in enumerate(zip(self.data.u, slopes, strict=True)):
-            part, begin = output[place : place + u.shape[0]], self.begins[index]
-            place += u.shape[0]
-            direct = np.zeros((part.size, last + self.variables.n_friction if starts else count))
-            write_products(*lagged_signals(self.variables, u, part), terms, direct)
-            direct[:begin, :count] = 0.0
-            if starts:
-                direct[begin - n + np.arange(n), count + index * n + np.arange(n)] = 1.0
-            if self.variables.friction:
-                slips = slope[begin:, n]
-                direct[begin:, :count] *= np.abs(slips)[:, None]
-                if starts:
-                    direct[begin:, last] = slips < 0.0
-                    direct[begin:, last + 1] = -(slips > 0.0).astype(np.float64)
-                    direct[begin:, last + 2 :] = (slips == 0.0)[:, None]
-            carry(np.ascontiguousarray(slope[:, :n]), begin, direct)
-            rows.append(direct)
-        return np.concatenate(rows)
 
     def fit(self, theta: Array, steps: int, penalty: float = 0.0, least_gain: float = 0.0) -> PolynomialFit | None:
         """Return the minimum of the squared free-run error that is reached from given values, if they run at all.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.arrays import Array, IntArray
-from estimation.identification.free_run.polynomial_kernel import write_products
+from estimation.identification.search.jit import compiled
 
 BEYOND = 0.1
 """Share of its range by which a signal may leave it in a product before it is held [dimensionless]."""
@@ -89,6 +89,32 @@ def products(variables: Variables, terms: IntArray, u: Array, y: Array) -> Array
     out = np.empty((y.size, terms.shape[0]))
     write_products(*lagged_signals(variables, u, y), terms, out)
     return out
+
+
+@compiled
+def write_products(single: Array, held: Array, terms: IntArray, out: Array) -> None:
+    """Write the product of each term, row by row.
+
+    Parameters
+    ----------
+    single, held : ndarray, shape (n, v)
+        Variables as they are, for terms of one, and held at their ends, for products.
+    terms : ndarray of int, shape (k, 3)
+        As `products` takes them.
+    out : ndarray, shape (n, p)
+        Its first k columns are written.
+    """
+    for t in range(out.shape[0]):
+        for i in range(terms.shape[0]):
+            a, b, c = terms[i, 0], terms[i, 1], terms[i, 2]
+            if a < 0:
+                out[t, i] = 1.0
+            elif b < 0:
+                out[t, i] = single[t, a]
+            elif c < 0:
+                out[t, i] = held[t, a] * held[t, b]
+            else:
+                out[t, i] = held[t, a] * held[t, b] * held[t, c]
 
 
 def lagged_signals(variables: Variables, u: Array, y: Array) -> tuple[Array, Array]:

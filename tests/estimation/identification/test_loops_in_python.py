@@ -9,6 +9,7 @@ from estimation.arrays import Array
 from estimation.identification.free_run.data import channels_from, scaled
 from estimation.identification.free_run.input_nonlinearity import play
 from estimation.identification.free_run.linear_fit import Form, fit_linear
+from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_fit import Runs
 from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, one_more
 from estimation.identification.search.criterion import Structure
@@ -62,9 +63,11 @@ def polynomial() -> list[Array]:
     assert start is not None
     fit = one_more(start, candidate_terms(start.variables), data)
     assert fit is not None
-    ran = Runs(fit.variables, fit.terms, data).run(fit.theta)
+    runs = Runs(fit.variables, fit.terms, data)
+    equations = NormalEquations(runs, runs.ends)
+    ran = equations.outputs(fit.theta)
     assert ran is not None
-    return [fit.theta, *ran]
+    return [fit.theta, ran, equations.start_slopes(), *equations.sums(ran - runs.target)]
 
 
 def state_space() -> list[Array]:

@@ -117,17 +117,11 @@ def test_a_log_that_begins_in_motion_is_fitted_as_if_its_inputs_were_known_befor
     two = replace(data, u=(data.u[0],) * 2, y=(data.y[0], np.roll(data.y[0], 1)))
     runs = Runs(fit.variables, fit.terms, two)
     theta = np.concatenate([fit.coefficients, runs.start_values()])
-    ran = runs.run(theta)
+    ran = runs.outputs(theta)
     assert ran is not None
-    assert ran[0][:3] == pytest.approx(data.y[0][:3])
+    assert ran[:3] == pytest.approx(data.y[0][:3])
     assert not runs.used[:2].any()
     assert runs.used[2:500].all()
-    jacobian = runs.sensitivities(*ran, fit.terms, starts=True)
-    for k in range(theta.size):
-        step = 1e-6 * np.eye(theta.size)[k]
-        ends = [runs.run(theta + sign * step) for sign in (1.0, -1.0)]
-        moved = (ends[0][0] - ends[1][0]) / 2e-6  # type: ignore[index]
-        assert moved == pytest.approx(jacobian[:, k], abs=1e-5)
 
 
 def test_a_run_forgets_what_inputs_before_its_log_did() -> None:

@@ -1,5 +1,6 @@
-"""Normal equations of factored terms are those of the sensitivities that the general run has."""
+"""Runs of factored terms are those of the terms themselves, and their sums those of its derivatives."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -45,6 +46,48 @@ def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None
             monkeypatch.setattr(normal_equations, name, getattr(normal_equations, name).__wrapped__)
 
 
+def followed(runs: Runs, theta: Array, index: int, t: int, out: Array) -> tuple[float, float, Array]:
+    """Return the output that follows others, which way friction lets it move, and the product of each term."""
+    one, u = runs.variables, runs.data.u[index]
+    lagged = zip(one.source, one.lag, strict=True)
+    z = np.array([out[t - lag] if source == 0 else u[max(t - lag, 0), source - 1] for source, lag in lagged])
+    held = np.append(np.clip(z, one.limits[:, 0], one.limits[:, 1]), 1.0)
+    alone = (runs.terms[:, 0] >= 0) & (runs.terms[:, 1] < 0)
+    terms = np.where(alone, np.append(z, 1.0)[runs.terms[:, 0]], np.prod(held[runs.terms], axis=1))
+    total, moves = float(theta[: len(terms)] @ terms), 1.0
+    if one.friction:
+        below, above, *rest = theta[-one.n_friction :]
+        stay = rest[0] if rest else out[t - 1]
+        moves = float(total - stay > above) - float(stay - total > below)
+        total = total - above if moves > 0.0 else total + below if moves < 0.0 else stay
+    return float(np.clip(total, *runs.ends)), moves, terms
+
+
+def followed_freely(runs: Runs, theta: Array) -> tuple[Array, Array]:
+    """Return outputs and their derivatives by all values; at the ends the terms' own effect stays."""
+    k, n, n_rub, outs, rows = len(runs.terms), runs.variables.n_start, runs.variables.n_friction, [], []
+    for index, begin in enumerate(runs.begins):
+        out = runs.begun(theta, index)
+        moved = np.zeros((out.size, theta.size))
+        moved[begin - n + np.arange(n), k + index * n + np.arange(n)] = 1.0
+        for t in range(begin, out.size):
+            out[t], moves, terms = followed(runs, theta, index, t, out)
+            moved[t, :k] = terms * abs(moves)
+            if n_rub:
+                moved[t, -n_rub:] = [moves < 0.0, -float(moves > 0.0), moves == 0.0][:n_rub]
+            for lag in range(1, n + 1):
+                # a position that is held goes with the one before, if that is within the ends
+                slope = float(lag == 1 and n_rub == 2 and runs.ends[0] <= out[t - 1] <= runs.ends[1])
+                if moves:
+                    step = 1e-6 * (np.arange(out.size) == t - lag)
+                    up, down = (followed(runs, theta, index, t, out + sign * step)[0] for sign in (1.0, -1.0))
+                    slope = (up - down) / 2e-6
+                moved[t] += slope * moved[t - lag]
+        outs.append(out)
+        rows.append(moved)
+    return np.concatenate(outs), np.concatenate(rows)
+
+
 @pytest.mark.usefixtures("way")
 @RUBS
 def test_runs_and_sums_of_factored_terms_are_those_of_the_terms_themselves(
@@ -52,21 +95,35 @@ def test_runs_and_sums_of_factored_terms_are_those_of_the_terms_themselves(
 ) -> None:
     runs, theta = made(friction, rub)
     monkeypatch.setattr(normal_equations, "STRETCH", 40 * theta.size)  # stretches begin within logs and within gaps
-    ran = runs.run(theta)
-    assert ran is not None
-    assert np.isin(ran[0], runs.ends).any()
-    jacobian, left = runs.sensitivities(*ran, TERMS, starts=True)[runs.used], ran[0] - runs.target
+    ran, jacobian = followed_freely(runs, theta)
+    assert np.isin(ran, runs.ends).any()
+    jacobian, left = jacobian[runs.used], ran - runs.target
     equations = NormalEquations(runs, runs.ends)
-    assert equations.outputs(theta) == pytest.approx(ran[0], rel=1e-12, abs=1e-12)
+    assert equations.outputs(theta) == pytest.approx(ran, rel=1e-12, abs=1e-12)
     gram, right = equations.sums(left)
-    assert gram == pytest.approx(jacobian.T @ jacobian, rel=1e-9, abs=1e-9)
-    assert right == pytest.approx(jacobian.T @ left[runs.used], rel=1e-9, abs=1e-9)
+    assert gram == pytest.approx(jacobian.T @ jacobian, rel=1e-6, abs=1e-6)
+    assert right == pytest.approx(jacobian.T @ left[runs.used], rel=1e-6, abs=1e-6)
     others = slice(6, len(TERMS))
     beside, square, again = equations.sums_beside(left, others)
     kept = np.delete(np.arange(theta.size), np.arange(theta.size)[others])
     assert beside == pytest.approx(gram[kept], rel=1e-9, abs=1e-9)
     assert square == pytest.approx(np.diag(gram), rel=1e-9, abs=1e-9)
     assert again == pytest.approx(right, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.usefixtures("way")
+@RUBS
+def test_slopes_by_first_outputs_are_those_of_all_values(friction: str, rub: tuple[float, ...]) -> None:
+    both, theta = made(friction, rub)
+    k, data = len(TERMS), replace(both.data, u=both.data.u[:1], y=both.data.y[:1])
+    for early in (False, True):
+        runs = Runs(both.variables, TERMS, data, early=early)
+        values = np.concatenate([theta[:k], runs.start_values(), rub])
+        equations = NormalEquations(runs, runs.ends)
+        assert equations.outputs(values) is not None
+        wanted = followed_freely(runs, values)[1][:, k : k + 2]
+        assert np.abs(wanted[runs.begins[0] :]).max() > 0.1
+        assert equations.start_slopes() == pytest.approx(wanted, abs=1e-8)
 
 
 @pytest.mark.usefixtures("way")

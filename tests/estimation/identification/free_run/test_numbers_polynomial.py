@@ -27,6 +27,7 @@ from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.free_run.input_range import inputs_beyond
 from estimation.identification.free_run.linear_fit import Form, LinearFit, fit_linear
 from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, first_values
 from estimation.identification.free_run.polynomial_variables import products
@@ -81,21 +82,26 @@ def runs_of_products() -> dict[str, Any]:
     one = grown(0)
     with loops_in_python():
         runs = Runs(one.variables, TERMS, data(lost=True))
+        used = runs.used.copy()
         for name, scale in (("calm", 1.0), ("held at its ends", 1.6), ("runs away", 900.0)):
             theta = np.concatenate([scale * COEFFICIENTS, [0.3, -0.1, 0.2, 0.5]])
-            ran = runs.run(theta)
+            equations = NormalEquations(runs, runs.ends)
+            ran = equations.outputs(theta)
             if ran is None:
                 told[name] = None
                 continue
-            told[name] = [some(ran[0], 9), *(some(slope[:, k], 5) for slope in ran[1] for k in (0, 1))]
-            moved = runs.sensitivities(*ran, TERMS, starts=True)
+            slopes = [equations._slopes(index)[1] for index in range(len(LOGS))]
+            told[name] = [some(ran, 9), *(some(slope[:, k], 5) for slope in slopes for k in (0, 1))]
+            runs.used[:] = True
+            moved = np.concatenate([part.copy() for part, _ in equations._stretches(ran)])
             told[f"{name}, slopes"] = [some(column, 4) for column in moved.T]
+            runs.used[:] = used
         line = Runs(one.variables, TERMS[:4], data())
         far = np.concatenate([[500.0, 0.9, 0.0, 0.2], np.zeros(4)])
-        found = line.run(far)
-        told["a linear run is not held"] = None if found is None else some(found[0])
+        found = line.outputs(far)
+        told["a linear run is not held"] = None if found is None else some(found)
         told["runs away at last"] = [
-            line.run(np.concatenate([[size, 0.5, 0.0, 0.0], np.zeros(4)])) is None for size in (499.0, 501.0)
+            line.outputs(np.concatenate([[size, 0.5, 0.0, 0.0], np.zeros(4)])) is None for size in (499.0, 501.0)
         ]
         told["products"] = [some(p, 4) for p in products(one.variables, TERMS, 3.0 * data().u[0], 2.0 * data().y[0]).T]
         for most in (1, 2, 4):

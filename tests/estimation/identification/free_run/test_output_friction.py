@@ -11,13 +11,14 @@ import pytest
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels, channels_from, scaled
+from estimation.identification.free_run.factored_kernel import run_factored, slopes_of
 from estimation.identification.free_run.identify import Identified, identify_channels
 from estimation.identification.free_run.linear_fit import Form, fit_linear
 from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.output_friction import continued, fit_with_friction
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import Runs
-from estimation.identification.free_run.polynomial_kernel import run_free
 from plant.errors import HydrostateError
 
 FRICTION, STEP = 0.4, 0.02
@@ -54,15 +55,16 @@ def found(order: int | None = 1, delay: int | None = 1) -> Identified:
 @pytest.mark.parametrize("way", [lambda loop: loop, lambda loop: loop.__wrapped__], ids=["compiled", "Python"])
 @pytest.mark.parametrize("rub", [[0.1, 0.2], [0.1, 0.2, 0.05]], ids=["position", "velocity"])
 def test_friction_takes_a_level_off_and_holds_what_moves_less(way: Callable[[Any], Any], rub: list[float]) -> None:
-    u = np.random.default_rng(3).uniform(-1.0, 1.0, (80, 1))
-    terms, values = np.array([[0, -1, -1], [1, -1, -1]]), np.array([0.6, 0.5])
-    out, slope, limits = np.zeros(80), np.zeros((80, 2)), np.array([[-9.0, 9.0]] * 2)
-    ends = np.array([-9.0, 9.0])
-    source, lag = np.array([0, 1]), np.array([1, 1])
-    assert way(run_free)(values, terms, source, lag, limits, ends, 1, u, out, slope, np.array(rub)) == -1
+    u = np.random.default_rng(3).uniform(-1.0, 1.0, 80)
+    # of 1 and the output before: what the input gives, and 0.6
+    share, none = np.column_stack([0.5 * np.roll(u, 1), np.full(80, 0.6)]), np.zeros(2, dtype=np.int64)
+    given = share, none, none, np.array([1]), np.array([[-9.0, 9.0]]), np.array([-9.0, 9.0]), 1, np.array(rub)
+    out, slope = np.zeros(80), np.zeros((80, 2))
+    assert way(run_factored)(*given, out) == -1
+    way(slopes_of)(*given, out, np.zeros((80, 2)), slope)
     seen: set[int] = set()
     for t in range(1, 80):
-        free = 0.6 * out[t - 1] + 0.5 * u[t - 1, 0]
+        free = 0.6 * out[t - 1] + 0.5 * u[t - 1]
         rest = rub[2] if len(rub) == 3 else out[t - 1]
         moved = free - rest
         side = 1 if moved > 0.2 else -1 if moved < -0.1 else 0
@@ -80,18 +82,17 @@ def test_sensitivities_are_the_derivatives_of_a_run_that_sticks(friction: str) -
     size = fit.theta.size - fit.variables.n_friction
     fit = replace(fit, theta=np.concatenate([fit.theta[:size], np.array([0.012, 0.01, 0.0])[: fit.friction.size]]))
     runs = Runs(fit.variables, fit.terms, data)
-    ran = runs.run(fit.theta)
-    assert ran is not None
-    slips = ran[1][0][2:, -1]
-    assert set(slips.tolist()) == {-1.0, 0.0, 1.0}
-    jacobian = runs.sensitivities(*ran, fit.terms, starts=True)
-    assert jacobian.shape[1] == fit.theta.size
-    for k in range(fit.theta.size):
-        step = np.zeros(fit.theta.size)
-        step[k] = 1e-8
-        ends = [runs.run(fit.theta + sign * step) for sign in (1.0, -1.0)]
-        moved = (ends[0][0] - ends[1][0]) / 2e-8  # type: ignore[index]
-        assert moved == pytest.approx(jacobian[:, k], abs=1e-4 * max(1.0, float(np.abs(jacobian[:, k]).max())))
+    equations = NormalEquations(runs, runs.ends)
+    assert equations.outputs(fit.theta) is not None
+    assert {*equations._slopes(0)[1][2:, -1].tolist()} == {-1.0, 0.0, 1.0}
+    left = np.random.default_rng(4).normal(size=runs.target.size)
+    gram, right = equations.sums(left)
+    steps = 1e-8 * np.eye(fit.theta.size)
+    ends = [[runs.outputs(fit.theta + sign * step) for step in steps] for sign in (1.0, -1.0)]
+    jacobian = (np.array(ends[0]) - np.array(ends[1])).T[runs.used] / 2e-8
+    size = np.sqrt(np.diag(gram))
+    assert gram / np.outer(size, size) == pytest.approx(jacobian.T @ jacobian / np.outer(size, size), abs=1e-4)
+    assert right / size == pytest.approx(jacobian.T @ left[runs.used] / size, abs=1e-3)
 
 
 @pytest.mark.parametrize(

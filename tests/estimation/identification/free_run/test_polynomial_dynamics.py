@@ -8,8 +8,8 @@ from scipy.optimize import minimize_scalar
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Scaling
+from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_dynamics import SMOOTHED, START_STEPS, PolynomialDynamics
-from estimation.identification.free_run.polynomial_fit import Runs
 from estimation.identification.free_run.polynomial_variables import Variables
 
 U = np.random.default_rng(4).uniform(-1.0, 1.0, (60, 1))
@@ -47,13 +47,13 @@ def test_a_run_begins_with_the_output_that_suits_what_was_measured_best(square: 
 
 def test_the_search_of_a_start_ends_where_it_gains_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
-    real = Runs.run
+    real = NormalEquations.outputs
 
-    def counted(self: Runs, theta: Array) -> Any:
+    def counted(self: NormalEquations, theta: Array) -> Any:
         asked.append(1)
         return real(self, theta)
 
-    monkeypatch.setattr(Runs, "run", counted)
+    monkeypatch.setattr(NormalEquations, "outputs", counted)
     one = body()
     found = one.run(U, run_by_hand(0.7) + 0.1 * np.sin(np.arange(60.0)))
     # a linear start is found at once, and the next step gains nothing; smoothed ones are run once each

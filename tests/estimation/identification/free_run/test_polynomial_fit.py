@@ -20,7 +20,6 @@ from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.other_orders import is_wild
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import Runs
-from estimation.identification.free_run.polynomial_kernel import run_free, write_products
 from estimation.identification.free_run.polynomial_terms import (
     STEPS,
     TRIED,
@@ -28,7 +27,7 @@ from estimation.identification.free_run.polynomial_terms import (
     candidate_terms,
     one_more,
 )
-from estimation.identification.free_run.polynomial_variables import products
+from estimation.identification.free_run.polynomial_variables import products, write_products
 from estimation.identification.free_run.saved import load_models, save_models
 from plant.errors import HydrostateError
 
@@ -63,15 +62,15 @@ def test_sensitivities_are_the_derivatives_of_the_free_run() -> None:
     fit = one_more(start, candidate_terms(start.variables), data)
     assert fit is not None
     runs = Runs(fit.variables, fit.terms, data)
-    ran = runs.run(fit.theta)
-    assert ran is not None
-    jacobian = runs.sensitivities(*ran, fit.terms, starts=True)
-    for k in range(fit.theta.size):
-        step = np.zeros(fit.theta.size)
-        step[k] = 1e-6
-        ends = [runs.run(fit.theta + sign * step) for sign in (1.0, -1.0)]
-        moved = (ends[0][0] - ends[1][0]) / 2e-6  # type: ignore[index]
-        assert moved == pytest.approx(jacobian[:, k], abs=1e-5)
+    equations = NormalEquations(runs, runs.ends)
+    assert equations.outputs(fit.theta) is not None
+    left = np.random.default_rng(4).normal(size=runs.target.size)
+    gram, right = equations.sums(left)
+    steps = 1e-6 * np.eye(fit.theta.size)
+    ends = [[runs.outputs(fit.theta + sign * step) for step in steps] for sign in (1.0, -1.0)]
+    jacobian = (np.array(ends[0]) - np.array(ends[1])).T[runs.used] / 2e-6
+    assert gram == pytest.approx(jacobian.T @ jacobian, rel=1e-5, abs=1e-4)
+    assert right == pytest.approx(jacobian.T @ left[runs.used], rel=1e-5, abs=1e-4)
 
 
 def test_the_product_that_the_plant_has_is_the_first_one_added() -> None:
@@ -161,53 +160,10 @@ def test_pruning_takes_out_a_product_that_explains_nothing_and_keeps_the_plants_
     assert np.array_equal(_pruned(both, data).terms, own.terms)
 
 
-WAYS = pytest.mark.parametrize("way", [lambda loop: loop, lambda loop: loop.__wrapped__], ids=["compiled", "Python"])
-SOURCE, LAG = np.array([0, 0, 1]), np.array([1, 2, 1])
 TERMS = np.array([[-1, -1, -1], [0, -1, -1], [1, -1, -1], [2, -1, -1], [0, 1, -1], [0, 2, -1], [0, 0, 1], [1, 2, 2]])
-THETA = np.array([0.05, 0.9, -0.3, 0.4, 0.6, -0.5, -0.7, 0.8])
 
 
-def ran(way: Callable[[Any], Any], theta: Array, limit: float, ends: tuple[float, float]) -> tuple[int, Array, Array]:
-    rng = np.random.default_rng(3)
-    u, out, slope = rng.uniform(-1.0, 1.0, (60, 1)), np.zeros(60), np.zeros((60, 2))
-    out[:2] = 0.1, -0.2
-    limits = limit * np.array([[-1.0, 1.0]] * 3)
-    where = way(run_free)(theta, TERMS, SOURCE, LAG, limits, np.array(ends), 2, u, out, slope, np.empty(0))
-    return where, out, slope
-
-
-def next_output(theta: Array, limit: float, ends: tuple[float, float], y1: float, y2: float, u1: float) -> float:
-    """Return what follows two outputs and an input: single terms as they are, products of what is held in limits."""
-    h1, h2, hu = np.clip([y1, y2, u1], -limit, limit)
-    return float(np.clip(theta @ [1.0, y1, y2, u1, h1 * h2, h1 * hu, h1 * h1 * h2, h2 * hu * hu], *ends))
-
-
-@WAYS
-@pytest.mark.parametrize("limit", [10.0, 0.3])
-@pytest.mark.parametrize("ends", [(-10.0, 10.0), (-0.2, 0.25)])
-def test_a_free_run_holds_products_and_outputs_in_their_ranges(
-    way: Callable[[Any], Any], limit: float, ends: tuple[float, float]
-) -> None:
-    where, out, slope = ran(way, THETA, limit, ends)
-    u = np.random.default_rng(3).uniform(-1.0, 1.0, 60)
-    assert where == -1
-    for t in range(2, 60):
-        past = out[t - 1], out[t - 2], u[t - 1]
-        assert out[t] == pytest.approx(next_output(THETA, limit, ends, *past))
-        for k in range(2):
-            side = 1e-6 * np.eye(3)[k]
-            up, down = (next_output(THETA, limit, ends, *(np.array(past) + sign * side)) for sign in (1.0, -1.0))
-            assert slope[t, k] == pytest.approx((up - down) / 2e-6, abs=1e-6)
-
-
-@WAYS
-def test_a_run_that_grows_beyond_bounds_tells_where(way: Callable[[Any], Any]) -> None:
-    where, out, _ = ran(way, np.array([0.0, 3.0, *np.zeros(6)]), 10.0, (-np.inf, np.inf))
-    assert 2 < where < 20
-    assert abs(3.0 * out[where - 1]) >= 1e3
-
-
-@WAYS
+@pytest.mark.parametrize("way", [lambda loop: loop, lambda loop: loop.__wrapped__], ids=["compiled", "Python"])
 def test_products_are_of_single_signals_as_they_are_and_of_several_as_they_are_held(way: Callable[[Any], Any]) -> None:
     single = np.random.default_rng(4).normal(size=(9, 3))
     held, out = np.clip(single, -0.5, 0.5), np.full((9, TERMS.shape[0] + 2), 7.0)
@@ -250,7 +206,7 @@ def test_a_fit_that_runs_away_is_wild_takes_no_product_and_predicts_nothing() ->
     assert start is not None
     away = replace(start, theta=5.0 * start.theta)
     runs = Runs(away.variables, away.terms, data)
-    assert runs.run(away.theta) is None
+    assert runs.outputs(away.theta) is None
     assert runs.fit(away.theta, 10) is None
     assert one_more(away, candidate_terms(away.variables), data) is None
     assert is_wild(away, data)
