@@ -59,7 +59,6 @@ class FlowReading(NamedTuple):
 def filter_flow(
     record: Record,
     parameters: EhaParameters,
-    noise: Mapping[str, float] | None = None,
     variances: Mapping[str, float] | None = None,
     guess: float | None = None,
 ) -> FlowReading:
@@ -71,8 +70,6 @@ def filter_flow(
         The log, with motor speed, position and differential pressure.
     parameters : EhaParameters
         Geometry and pump are taken from it, and the first guesses' size.
-    noise : Mapping[str, float], optional
-        Process-noise densities of the chamber pressures by state name [Pa^2/s]; by default `drive_noise`.
     variances : Mapping[str, float], optional
         Measurement variances of its channels [SI squared]; read off the log if not given.
     guess : float, optional
@@ -93,12 +90,11 @@ def filter_flow(
     centre = parameters.bulk_modulus
     wanted = max(guess if guess is not None else centre, LEAST_MODULUS * centre)
     moduli = sorted({*(multiple * centre for multiple in MODULI), wanted})
-    density = drive_noise(record, parameters, variances)
-    random = {**dict.fromkeys(("pressure_a_pa", "pressure_b_pa"), density), **(noise or {})}
+    noise = dict.fromkeys(("pressure_a_pa", "pressure_b_pa"), drive_noise(record, parameters, variances))
     members: list[Member] = []
     for model, makeup in FORMS:
         anywhere = chamber_belief(parameters, load, centre, 1.0, 1.0, makeup)
-        task = filter_problem(model, anywhere, record, parameters, noise=random, variances=variances)
+        task = filter_problem(model, anywhere, record, parameters, noise=noise, variances=variances)
         for modulus, leakage, bias in product(moduli, LEAKAGES, BIASES):
             prior = model.to_filter(chamber_belief(parameters, load, modulus, leakage, bias, makeup))
             score = -0.5 * (np.log(modulus / wanted) / GUESS_SPREAD) ** 2

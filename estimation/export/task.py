@@ -36,7 +36,6 @@ def filter_task(
     form: str,
     *,
     start: float | None = None,
-    start_std: float = START_STD,
     states: tuple[str, ...] = (),
     tuned: bool = False,
 ) -> FilterProblem:
@@ -50,8 +49,8 @@ def filter_task(
         The actuator.
     form : str
         One of `EXPORTED_FORMS`.
-    start, start_std : float
-        First guess of bulk modulus, by default the actuator's, and its standard deviation [Pa].
+    start : float, optional
+        First guess of bulk modulus [Pa]; the actuator's if not given.
     states : tuple of str
         What is estimated beside bulk modulus, of `estimation.models.augment.AUGMENTABLE`.
     tuned : bool
@@ -67,10 +66,10 @@ def filter_task(
     require_known("form", form, EXPORTED_FORMS)
     model = EXPORTED_FORMS[form]
     model.require_drives(record)
-    if model is FLOW_FILTER or form in CHAMBER_FORMS:
-        return _by_flow(record, parameters, form, parameters.bulk_modulus if start is None else start)
     guess = parameters.bulk_modulus if start is None else start
-    belief, channels = first_belief(model, record, guess, start_std), available_channels(model, record)
+    if model is FLOW_FILTER or form in CHAMBER_FORMS:
+        return _by_flow(record, parameters, form, guess)
+    belief, channels = first_belief(model, record, guess, START_STD), available_channels(model, record)
     noise: Mapping[str, float] = {PRESSURE: PRESSURE_NOISE_LOGGED} if PRESSURE in channels else {}
     variances: Mapping[str, float] | None = None
     if tuned:

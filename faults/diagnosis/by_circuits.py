@@ -1,8 +1,5 @@
 """`diagnose_clean(log, actuator) -> Diagnosis`: what circuits say of a log, without its estimate of bulk modulus."""
 
-from collections.abc import Mapping
-
-from estimation.identification.model.linear_model import LinearModel
 from estimation.log_checks.clean import CleanLog
 from faults.diagnosis.beyond_nine.sound_circuit import another_sound_circuit
 from faults.diagnosis.beyond_nine.wear import whatever_fault
@@ -17,12 +14,7 @@ from faults.diagnosis.severity import healthy_severities, limits_of, severities,
 from faults.notes import AgainstCode
 
 
-def diagnose_clean(
-    log: CleanLog,
-    actuator: Actuator,
-    library: Mapping[str, LinearModel] | None = None,
-    calibration: Calibration | None = None,
-) -> Diagnosis:
+def diagnose_clean(log: CleanLog, actuator: Actuator, calibration: Calibration | None = None) -> Diagnosis:
     """Diagnose a log whose sensors have been looked at, by all evidences, without its estimate of bulk modulus.
 
     Parameters
@@ -31,8 +23,6 @@ def diagnose_clean(
         Motor speed, and position or velocity; differential pressure where it is logged.
     actuator : Actuator
         The healthy actuator.
-    library : Mapping[str, LinearModel], optional
-        Its transfer functions, by condition.
     calibration : Calibration, optional
         Fitted numbers; those shipped if not given.
 
@@ -47,18 +37,16 @@ def diagnose_clean(
         If the log has neither position nor velocity, or is too short.
     """
     numbers = shipped_calibration() if calibration is None else calibration
-    found = _around(log, actuator, library, numbers)
+    found = _around(log, actuator, numbers)
     if all(note.code is not AgainstCode.UNEXPLAINED for note in found.against):
         return found
     other = another_sound_circuit(found.scoreboard.blocks, found.scoreboard.fits, actuator)
-    return found if other is None else _around(log, other, library, numbers)
+    return found if other is None else _around(log, other, numbers)
 
 
-def _around(
-    log: CleanLog, actuator: Actuator, library: Mapping[str, LinearModel] | None, numbers: Calibration
-) -> Diagnosis:
+def _around(log: CleanLog, actuator: Actuator, numbers: Calibration) -> Diagnosis:
     """Return the diagnosis of a log around one healthy circuit."""
-    board = weigh(log.record, actuator, library)
+    board = weigh(log.record, actuator)
     pressure = board.blocks.pressure is not None
     region = how_near(board.fits, board.blocks, actuator)
     against = (

@@ -13,7 +13,7 @@ from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.experiments import Experiments, data_hash
 
 
-def linear_model(fit: LinearFit, data: Channels, by: Scaling, structure: str = "output-error") -> LinearModel:
+def linear_model(fit: LinearFit, data: Channels, by: Scaling) -> LinearModel:
     """Return a fit of one input with its covariance, the robust one where the residual is not white.
 
     Parameters
@@ -54,7 +54,7 @@ def linear_model(fit: LinearFit, data: Channels, by: Scaling, structure: str = "
         residual_std=float(np.sqrt(rss / max(n_used - fit.theta.size, 1))),
         n_samples=n_used,
         data_hash=data_hash(experiments, data.sample_time),
-        structure=structure,
+        structure="output-error",
         offset=level - float(b.sum() / fit.f.sum()) * float(by.u_mean[0]),
     )
     return _with_initial_state(found, output[: data.y[0].size] * by.y_std + by.y_mean, data.u[0][:, 0], by)
