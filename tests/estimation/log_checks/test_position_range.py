@@ -25,6 +25,7 @@ def test_the_samples_at_the_end_of_the_range_are_missing(ends: tuple[float, floa
     beyond = (ends[0] >= COURSE) | (ends[1] <= COURSE)
     np.testing.assert_array_equal(np.isnan(mended["position_m"]), beyond)
     assert (note.code, note.data["channel"], note.data["unit"]) == (SensorCode.SENSOR_CLIPPED, "position_m", "m")
+    assert note.data["percent"] == pytest.approx(100.0 * np.mean(beyond))
 
 
 def test_a_piston_that_rests_at_its_farthest_is_believed() -> None:
@@ -44,6 +45,31 @@ def test_an_encoder_that_freezes_at_its_farthest_is_left_to_the_check_of_frozen_
     assert without_position_beyond_range(record) == (record, ())
 
 
-def test_without_a_velocity_nothing_is_found() -> None:
-    record = log(np.clip(COURSE, -0.03, 0.03)).replace(velocity_m_s=None)
+def test_a_jump_of_twice_the_largest_step_is_no_end_of_a_range() -> None:
+    clipped = np.clip(COURSE, -1.0, 0.03)
+    step = float(np.abs(np.diff(COURSE)).max())
+    for jump, ends_there in ((0.2, True), (2.0, False)):
+        stays = np.where(clipped == 0.03, 0.03 + jump * step, clipped)
+        assert bool(without_position_beyond_range(log(stays))[1]) is ends_there
+
+
+def test_the_longest_stays_are_asked_for_motion_wherever_they_lie() -> None:
+    # in a slow first period the piston moves on; in five quick ones it rests at a stop
+    free = 0.05 * np.sin(2.0 * np.pi * np.interp(TIME, [0.0, 1.5, 4.0], [0.0, 1.0, 6.0]))
+    course = np.where(TIME < 1.5, free, np.minimum(free, 0.04))
+    mended, notes = without_position_beyond_range(log(np.minimum(course, 0.04), course))
+    assert len(notes) == 1
+    assert np.isnan(mended["position_m"][free > 0.0401]).all()
+
+
+@pytest.mark.parametrize("missing", ["position_m", "velocity_m_s"])
+def test_without_position_or_velocity_nothing_is_found(missing: str) -> None:
+    record = log(np.clip(COURSE, -0.03, 0.03)).replace(**{missing: None})
     assert without_position_beyond_range(record) == (record, ())
+
+
+def test_a_position_that_never_moves_or_is_hardly_there_is_left_to_other_checks() -> None:
+    still = log(np.zeros(4000))
+    assert without_position_beyond_range(still) == (still, ())
+    few = log(np.where(np.arange(4000) < 60, np.clip(COURSE, -1.0, 0.01), np.nan))
+    assert without_position_beyond_range(few) == (few, ())
