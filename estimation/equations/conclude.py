@@ -166,10 +166,8 @@ def fits_of(problem: Problem, theta: Array) -> list[float]:
     list of float
         One an output: 100 is perfect, 0 as good as its mean [percent].
     """
-    errors = np.concatenate(problem.residuals(theta), axis=1) * problem.noise[:, None]
-    seen = ~np.isnan(np.concatenate([part.measured for part in problem.parts], axis=1))
     typical = spread(problem.parts)
-    size = [float(np.sqrt(np.mean(row[kept] ** 2))) for row, kept in zip(errors, seen, strict=True)]
+    size = [float(np.sqrt(np.mean(row**2))) for row in problem.errors(theta)]
     return [
         100.0 * (1.0 - one / float(whole)) if whole > 0.0 else np.nan for one, whole in zip(size, typical, strict=True)
     ]

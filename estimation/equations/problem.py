@@ -194,6 +194,23 @@ class Problem:
         """
         return [self._misfit(found, part) for found, part in zip(self.predicted(theta), self.parts, strict=True)]
 
+    def errors(self, theta: Array) -> list[Array]:
+        """Return predicted less measured, in units of the outputs.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (unknowns,)
+            Coordinates [dimensionless].
+
+        Returns
+        -------
+        list of ndarray, shape (samples that are there,)
+            One array an output, over all logs.
+        """
+        errors = np.concatenate(self.residuals(theta), axis=1) * self.noise[:, None]
+        seen = ~np.isnan(np.concatenate([part.measured for part in self.parts], axis=1))
+        return [row[kept] for row, kept in zip(errors, seen, strict=True)]
+
     def slopes(self, theta: Array) -> Array:
         """Return the derivatives of the residuals.
 

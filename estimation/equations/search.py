@@ -247,13 +247,12 @@ def _finished(problem: Problem, theta: Array) -> tuple[Point, int]:
 
 def _shown(problem: Problem, theta: Array, typical: Array) -> Array:
     """Return the deviation of each output's residuals, degrees of freedom shared by samples [its unit]."""
-    errors = np.concatenate(problem.residuals(theta), axis=1) * problem.noise[:, None]
-    seen = ~np.isnan(np.concatenate([part.measured for part in problem.parts], axis=1))
-    free = max(1.0 - len(theta) / np.count_nonzero(seen), 0.1)
+    errors = problem.errors(theta)
+    free = max(1.0 - len(theta) / sum(map(len, errors)), 0.1)
     if problem.robust:
-        size = [NORMAL_MAD * float(np.median(np.abs(row[kept]))) for row, kept in zip(errors, seen, strict=True)]
+        size = [NORMAL_MAD * float(np.median(np.abs(row))) for row in errors]
     else:
-        size = [float(np.sqrt(np.mean(row[kept] ** 2) / free)) for row, kept in zip(errors, seen, strict=True)]
+        size = [float(np.sqrt(np.mean(row**2) / free)) for row in errors]
     return np.maximum(size, LEAST_NOISE * typical)
 
 

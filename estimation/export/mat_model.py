@@ -34,9 +34,7 @@ def model_in_mat(model: FreeRunModel, *, name: str) -> dict[str, bytes]:
     """
     from scipy.io import savemat
 
-    both = model.transfer_functions()
-    length = max(max(b.size, f.size) for b, f in both)
-    numerators, denominators = ([np.pad(x, (0, length - x.size)) for x in one] for one in zip(*both, strict=True))
+    numerators, denominators = model.padded_transfer_functions()
     held = BytesIO()
     savemat(
         cast(Any, held),

@@ -8,8 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from experiments.command.terminal import note
-from plant.errors import LogError
-from plant.log.stream.source import broker_of, broker_package
+from plant.log.stream.source import broker_of, broker_package, connect
 
 PATIENCE = 5.0
 """How long the last messages to a broker may take [s]."""
@@ -39,11 +38,7 @@ def published(address: str) -> Generator[Callable[[Mapping[str, Any]], None]]:
     host, port, topic = broker_of(address)
     mqtt, version = broker_package(address)
     client = mqtt.Client(version.VERSION2)
-    try:
-        client.connect(host, port)
-    except OSError as error:
-        raise LogError(f"no broker answers: {error.strerror or error}", address) from error
-    client.loop_start()
+    connect(client, host, port, address)
     waiting: deque[Any] = deque(maxlen=MOST_WAITING)
 
     def publish(entries: Mapping[str, Any]) -> None:

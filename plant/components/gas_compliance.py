@@ -1,7 +1,7 @@
 """Oil in a volume that a gas spring lets grow with pressure: an accumulator's port, or a wall that gives."""
 
-from plant.compiled.functions import Scalar, absolute, sqrt, where
-from plant.components.oil import ATMOSPHERE, NUCLEI
+from plant.compiled.functions import Scalar
+from plant.components.oil import ATMOSPHERE, NUCLEI, root_above_zero
 
 
 def compliant_oil_pressure(
@@ -44,6 +44,4 @@ def compliant_oil_pressure(
         - volume
         + compliance * (rest_pressure - vapour_pressure)
     )
-    root = sqrt(squeezed * squeezed + 4.0 * softness * gas)
-    outer = root + absolute(squeezed)
-    return vapour_pressure + where(squeezed > 0.0, outer / (2.0 * softness), 2.0 * gas / outer)
+    return vapour_pressure + root_above_zero(softness, squeezed, gas)

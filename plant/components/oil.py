@@ -53,9 +53,34 @@ def oil_pressure(
     gas = air * (ATMOSPHERE - vapour_pressure)
     softness = (1.0 - air) / bulk_modulus
     squeezed = (1.0 - air) + softness * (ATMOSPHERE - vapour_pressure) - volume / amount
+    return vapour_pressure + root_above_zero(softness, squeezed, gas)
+
+
+def root_above_zero(softness: Scalar, squeezed: Scalar, gas: Scalar) -> Scalar:
+    """Return the pressure above the vapour's at which ``softness p^2 - squeezed p = gas``, without cancellation.
+
+    Parameters
+    ----------
+    softness : float or Expression
+        What a pascal takes off the volume of oil, and adds to that of its walls [unit of volume/Pa], positive.
+    squeezed : float or Expression
+        By how much the oil without air is larger than its room at the vapour's pressure [unit of volume].
+    gas : float or Expression
+        Volume of the air times its pressure [unit of volume times Pa], positive.
+
+    Returns
+    -------
+    float or Expression
+        Pressure [Pa].
+
+    Examples
+    --------
+    >>> [float(root_above_zero(1.0, squeezed, 6.0)) for squeezed in (1.0, -1.0)]
+    [3.0, 2.0]
+    """
     root = sqrt(squeezed * squeezed + 4.0 * softness * gas)
     outer = root + absolute(squeezed)
-    return vapour_pressure + where(squeezed > 0.0, outer / (2.0 * softness), 2.0 * gas / outer)
+    return where(squeezed > 0.0, outer / (2.0 * softness), 2.0 * gas / outer)
 
 
 def specific_volume(pressure: Scalar, bulk_modulus: Scalar, air_fraction: Scalar, vapour_pressure: Scalar) -> Scalar:

@@ -221,13 +221,18 @@ class FreeRunModel:
         gains = [float(b.sum() / f.sum()) for b, f in self.transfer_functions()]
         return self.level - float(np.dot(gains, self.scaling.u_mean))
 
+    def padded_transfer_functions(self) -> tuple[list[Array], list[Array]]:
+        """Return numerators and denominators of a linear model, one an input, zeros behind all that are shorter."""
+        both = self.transfer_functions()
+        length = max(max(b.size, f.size) for b, f in both)
+        numerators, denominators = ([np.pad(x, (0, length - x.size)) for x in one] for one in zip(*both, strict=True))
+        return numerators, denominators
+
     def to_control(self) -> "control.TransferFunction":
         """Return a linear model as a python-control object, one column an input; its offset is left out."""
         import control
 
-        both = self.transfer_functions()
-        length = max(max(b.size, f.size) for b, f in both)
-        numerators, denominators = ([np.pad(x, (0, length - x.size)) for x in one] for one in zip(*both, strict=True))
+        numerators, denominators = self.padded_transfer_functions()
         return control.TransferFunction(
             [numerators], [denominators], self.sample_time, inputs=list(self.inputs), outputs=[self.output]
         )

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from estimation.arrays import Array, BoolArray, IntArray
-from estimation.identification.signals.local_polynomial import ComplexArray, FrequencyResponse
+from estimation.identification.signals.local_polynomial import ComplexArray, FrequencyResponse, without_gaps
 from plant.errors import HydrostateError
 
 REPEATS = 1e-4
@@ -225,11 +225,7 @@ def best_linear_approximation(
     HydrostateError
         If the input is not periodic, or fewer than two periods are left.
     """
-    inputs, outputs = (np.asarray(one, dtype=np.float64) for one in (u, y))
-    if inputs.ndim != 1 or inputs.shape != outputs.shape or not (np.isfinite(inputs) & np.isfinite(outputs)).all():
-        raise HydrostateError(
-            f"input and output of one length without gaps are needed, got shapes {inputs.shape} and {outputs.shape}"
-        )
+    inputs, outputs = without_gaps(u, y)
     length = find_period(inputs) if period is None else period
     if length is None:
         raise HydrostateError(

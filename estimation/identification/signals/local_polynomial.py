@@ -57,6 +57,32 @@ class FrequencyResponse:
         return np.sqrt(self.variance * float(fdtri(2, 2 * self.freedom, probability)))
 
 
+def without_gaps(u: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+    """Return input and output of one log as arrays.
+
+    Parameters
+    ----------
+    u, y : array_like, shape (n,)
+        Input and output [any unit].
+
+    Returns
+    -------
+    tuple of ndarray, shape (n,)
+        Both.
+
+    Raises
+    ------
+    HydrostateError
+        If their lengths differ, or a sample is missing.
+    """
+    inputs, outputs = (np.asarray(one, dtype=np.float64) for one in (u, y))
+    if inputs.ndim != 1 or inputs.shape != outputs.shape or not (np.isfinite(inputs) & np.isfinite(outputs)).all():
+        raise HydrostateError(
+            f"input and output of one length without gaps are needed, got shapes {inputs.shape} and {outputs.shape}"
+        )
+    return inputs, outputs
+
+
 def local_polynomial_response(u: ArrayLike, y: ArrayLike, sample_time: float) -> FrequencyResponse:
     """Return the frequency response of one log, whatever its input.
 
@@ -81,11 +107,7 @@ def local_polynomial_response(u: ArrayLike, y: ArrayLike, sample_time: float) ->
     HydrostateError
         If the signals do not match, have gaps, or are too short, or the input holds too few frequencies.
     """
-    inputs, outputs = (np.asarray(one, dtype=np.float64) for one in (u, y))
-    if inputs.ndim != 1 or inputs.shape != outputs.shape or not (np.isfinite(inputs) & np.isfinite(outputs)).all():
-        raise HydrostateError(
-            f"input and output of one length without gaps are needed, got shapes {inputs.shape} and {outputs.shape}"
-        )
+    inputs, outputs = without_gaps(u, y)
     span = 2 * HALF_WIDTH + 1
     spectra = [np.fft.rfft(one - one.mean())[1 : (len(one) + 1) // 2] / len(one) ** 0.5 for one in (inputs, outputs)]
     count = len(spectra[0])

@@ -161,13 +161,10 @@ def _descended(problem: Problem, start: Array, effort: Effort) -> StateSpaceFit:
 
 def _chart(problem: Problem, theta: Array, white: Array, effort: Effort) -> tuple[float, Array]:
     """Return the least weighted cost near some values, and where it is."""
-    basis, used = problem.directions(theta), problem.used.T
+    basis = problem.directions(theta)
 
     def at(moved: Array) -> tuple[float, Array, Array]:
-        outputs, slopes = problem.jacobian(theta + basis @ moved)
-        left = np.where(used, outputs - np.where(used, problem.y.T, 0.0), 0.0)
-        columns = np.where(used[:, :, None], slopes @ basis, 0.0)
-        left, columns = white @ left, np.tensordot(white, columns, axes=1)
+        left, columns = _whitened(problem, theta + basis @ moved, basis, white)
         flat = columns.reshape(-1, basis.shape[1])
         return float(np.sum(left**2)), flat.T @ flat, flat.T @ left.ravel()
 
@@ -178,6 +175,15 @@ def _chart(problem: Problem, theta: Array, white: Array, effort: Effort) -> tupl
     begin = np.zeros(basis.shape[1])
     cost, best = levenberg(at, begin, stable, tolerance=1e-2 * effort.gain, most_steps=effort.steps)
     return cost, theta + basis @ best
+
+
+def _whitened(problem: Problem, theta: Array, basis: Array, white: Array) -> tuple[Array, Array]:
+    """Return residuals and their slopes along some directions, zero where a sample is missing, mixed by a whitener."""
+    outputs, slopes = problem.jacobian(theta)
+    used = problem.used.T
+    left = np.where(used, outputs - np.where(used, problem.y.T, 0.0), 0.0)
+    columns = np.where(used[:, :, None], slopes @ basis, 0.0)
+    return white @ left, np.tensordot(white, columns, axes=1)
 
 
 def system_of(fit: StateSpaceFit, data: Joint, delays: tuple[int, ...]) -> StateSpace:
@@ -192,11 +198,8 @@ def system_of(fit: StateSpaceFit, data: Joint, delays: tuple[int, ...]) -> State
     """
     problem = Problem(fit.size, data)
     v, basis = problem.unpacked(fit.theta), problem.directions(fit.theta)
-    outputs, slopes = problem.jacobian(fit.theta)
-    used, white = problem.used.T, _whitener(problem, fit.noise)
-    left = np.where(used, outputs - np.where(used, problem.y.T, 0.0), 0.0)
-    columns = np.where(used[:, :, None], slopes @ basis, 0.0)
-    left, columns = white @ left, np.tensordot(white, columns, axes=1)
+    used = problem.used.T
+    left, columns = _whitened(problem, fit.theta, basis, _whitener(problem, fit.noise))
     bounds = [0, *(part.stop + o * len(problem.u) for o in range(fit.size.p) for part in data.slices)]
     flat = Experiments(np.zeros(left.size), left.ravel(), used.ravel(), np.array(bounds, dtype=np.int64))
     plain, robust, _ = covariances(columns.reshape(left.size, -1), left.ravel(), flat)

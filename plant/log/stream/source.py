@@ -162,6 +162,30 @@ def broker_package(address: str) -> tuple[Any, Any]:
     return mqtt, CallbackAPIVersion
 
 
+def connect(client: Any, host: str, port: int, address: str) -> None:
+    """Connect a client to its broker, and begin its loop.
+
+    Parameters
+    ----------
+    client : object
+        Paho's.
+    host, port : str and int
+        Of the broker.
+    address : str
+        The same as an error names it.
+
+    Raises
+    ------
+    LogError
+        If no broker answers there.
+    """
+    try:
+        client.connect(host, port)
+    except OSError as error:
+        raise LogError(f"no broker answers: {error.strerror or error}", address) from error
+    client.loop_start()
+
+
 def _ring(address: str, received: Received) -> Iterator[str]:
     received.what = "rows"
 
@@ -246,11 +270,7 @@ def _mqtt(host: str, port: int, topic: str, address: str, received: Received) ->
 
     client = mqtt.Client(version.VERSION2)
     client.on_connect, client.on_message = subscribe, take
-    try:
-        client.connect(host, port)
-    except OSError as error:
-        raise LogError(f"no broker answers: {error.strerror or error}", address) from error
-    client.loop_start()
+    connect(client, host, port, address)
     try:
         header = ""
         while text := waiting.get():
