@@ -55,10 +55,32 @@ def test_a_copy_in_place_of_rows_that_were_lost_leaves_them_missing() -> None:
         assert np.flatnonzero(np.isnan(clean.record[name])).tolist() == list(range(1600, 1700))
 
 
-def test_a_run_without_noise_that_repeats_is_no_copy() -> None:
-    wave = np.tile(np.round(np.sin(2.0 * np.pi * np.arange(500) / 500.0), 9).astype(np.float64), 3)
-    record = Record(1e-3, {SPEED: 100.0 * wave, POSITION: 0.01 * wave, PRESSURE: 1e6 * np.roll(wave, 90)})
+def without_noise(*phases: np.ndarray) -> Record:
+    """Return three channels that follow a phase [periods], the same to the last bit where it is the same."""
+    phase = 2.0 * np.pi * np.concatenate(phases)
+    return Record(
+        1e-3, {SPEED: 100.0 * np.cos(phase), POSITION: 0.01 * np.sin(phase), PRESSURE: 1e6 * np.sin(2 * phase)}
+    )
+
+
+PERIOD = np.arange(400.0) / 400.0
+BEFORE = -0.7 * np.linspace(1.0, 0.0, 2000, endpoint=False) ** 2
+"""Phase of a motion that never repeats."""
+
+
+@pytest.mark.parametrize("times", [2, 3, 12])
+def test_a_run_without_noise_that_repeats_is_no_copy(times: int) -> None:
+    record = without_noise(BEFORE, np.tile(PERIOD, times))
     assert without_rows_sent_twice(record) == (record, ())
+
+
+def test_a_packet_without_noise_that_came_again_is_found_by_its_step_back_also_at_the_end_of_the_log() -> None:
+    once = without_noise(BEFORE, PERIOD[:200])
+    order = np.arange(len(once))
+    for sent in (np.concatenate([order[:1550], order[1500:]]), np.concatenate([order, order[-50:]])):
+        found, (note,) = without_rows_sent_twice(at(once, sent))
+        assert (note.data["rows"], note.data["count"]) == (50, 1)
+        assert np.array_equal(found[POSITION], once[POSITION])
 
 
 def test_coarse_channels_at_rest_are_no_copies() -> None:
