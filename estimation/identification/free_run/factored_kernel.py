@@ -13,9 +13,9 @@ def rubbed(total: float, before: float, rub: Array) -> tuple[float, float]:
     Parameters
     ----------
     total : float
-        What the terms give.
+        What the terms give [scaled].
     before : float
-        The output a sample before.
+        The output a sample before [scaled].
     rub : ndarray, shape (f,)
         What friction takes off the output below and above where it rests: at the third value, or of two where it was a
         sample before; there it stays unless more than that moves it.

@@ -21,7 +21,9 @@ from tests.kernels import functions_of, on_memory, text_of
 
 
 @pytest.mark.parametrize("kept", [True, False])
-def test_one_filter(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, kept: bool) -> None:
+def test_one_filter_is_the_same_compiled_and_in_python(
+    linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, kept: bool
+) -> None:
     rng = np.random.default_rng(4)
     names = ("position_m", "velocity_m_s")
     seen = {name: np.where(rng.random(20) < 0.2, np.nan, rng.normal(size=20)) for name in names}

@@ -42,7 +42,9 @@ def assert_same(plain: Trace, compiled: Trace) -> None:
 
 
 @EVERY
-def test_the_smoother(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, every: int, kept: bool) -> None:
+def test_the_smoother_is_the_same_compiled_and_in_python(
+    linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, every: int, kept: bool
+) -> None:
     problem = task(linear, every, kept=kept)
     compiled = smoother.smoother(problem)
     given = problem.model, problem.channels, "none"
@@ -53,7 +55,9 @@ def test_the_smoother(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, eve
 
 
 @EVERY
-def test_the_iterated_smoother(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, every: int, kept: bool) -> None:
+def test_the_iterated_smoother_is_the_same_compiled_and_in_python(
+    linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, every: int, kept: bool
+) -> None:
     problem = replace(task(linear, every, kept=kept), robust="huber")
     compiled = iterated_smoother.iterated_smoother(problem)
     given = problem.model, problem.channels, "huber"
@@ -90,7 +94,7 @@ def bank(model: ProcessModel, every: int, *, kept: bool) -> tuple[Trace, np.ndar
 
 
 @EVERY
-def test_the_bank_of_interacting_models(
+def test_the_bank_of_interacting_models_is_the_same_compiled_and_in_python(
     linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, every: int, kept: bool
 ) -> None:
     (compiled, history), compile_imm = bank(linear, every, kept=kept), imm_loops.compile_imm
@@ -107,7 +111,9 @@ def test_the_bank_of_interacting_models(
 
 
 @EVERY
-def test_the_particle_filter(linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, every: int, kept: bool) -> None:
+def test_the_particle_filter_is_the_same_compiled_and_in_python(
+    linear: ProcessModel, monkeypatch: pytest.MonkeyPatch, every: int, kept: bool
+) -> None:
     problem = task(linear, every, kept=kept)
     problem = replace(problem, noise=problem.noise * [1.0, 0.0, 1.0])  # a state without noise of its own
     compiled = particle.particle_filter(problem, 20, np.random.default_rng(1))

@@ -20,7 +20,7 @@ MIXED: dict[str, Expression] = {
 
 
 @pytest.mark.parametrize("late", [(), ("x",), ("w", "x"), ("z",)])
-def test_values_stay(late: tuple[str, ...]) -> None:
+def test_the_order_of_sums_and_products_changes_no_value(late: tuple[str, ...]) -> None:
     made, _ = late_last(MIXED, {name: 10.0 * i for i, name in enumerate(late)})
     for values in np.random.default_rng(2).normal(size=(20, 4)).tolist():
         given = dict(zip("xyzw", values, strict=True))

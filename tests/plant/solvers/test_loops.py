@@ -47,7 +47,7 @@ def kernel_in_python(file: SimpleNamespace, *names: str, **others: Any) -> Any:
 
 
 @pytest.mark.parametrize("rows", [1, 40], ids=["constant", "changing"])
-def test_one_run(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_run_is_the_same_compiled_and_in_python(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
     given: Any = "damper", rk4_step(rates), 2, Damper
     run, width = compile_trajectory(*given), 2
     file = functions_of(text_of(monkeypatch, trajectory, lambda: compile_trajectory.__wrapped__(*given)))
@@ -75,7 +75,7 @@ def test_one_run(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_array_equal(run_alone(plain, *given), run(*given))
 
 
-def test_runs_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runs_side_by_side_are_the_same_compiled_and_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
     given: Any = "damper", rk4_step(rates), 2, Damper, 8
     run = compile_fixed_step(*given)
     text = text_of(monkeypatch, fixed_step_kernel, lambda: compile_fixed_step.__wrapped__(*given))
@@ -91,7 +91,7 @@ def test_runs_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
     ("lanes", "kept", "rows", "bulge"),
     [(1, 1, 1, STRAIGHT), (8, 8, 1, SAMPLES), (8, 3, 40, STRAIGHT), (8, 3, 40, MEANS)],
 )
-def test_steps_of_controlled_error(
+def test_steps_of_controlled_error_are_the_same_compiled_and_in_python(
     lanes: int, kept: int, rows: int, bulge: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model: Any = "damper", rates, 2, Damper, lanes

@@ -116,7 +116,7 @@ def test_a_log_that_neither_teeth_nor_an_offset_can_explain_is_fitted_once(
     assert bool(found.left) is (hopeless and not by_offset)
 
 
-def test_corrections_end() -> None:
+def test_corrections_end_after_so_many_rounds() -> None:
     fitted, asked = told(fit(500.0, shown(12, 200.0)), *(fit(300.0, shown(12, SETTLED + 0.1, 0.01)) for _ in range(9)))
     toothed(PLAIN, fitted, well)
     assert len(asked) == 1 + ROUNDS

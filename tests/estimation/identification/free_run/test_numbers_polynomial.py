@@ -97,8 +97,7 @@ def runs_of_products() -> dict[str, Any]:
             told[f"{name}, slopes"] = [some(column, 4) for column in moved.T]
             runs.used[:] = used
         line = Runs(one.variables, TERMS[:4], data())
-        far = np.concatenate([[500.0, 0.9, 0.0, 0.2], np.zeros(4)])
-        found = line.outputs(far)
+        found = line.outputs(np.concatenate([[500.0, 0.9, 0.0, 0.2], np.zeros(4)]))
         told["a linear run is not held"] = None if found is None else some(found)
         told["runs away at last"] = [
             line.outputs(np.concatenate([[size, 0.5, 0.0, 0.0], np.zeros(4)])) is None for size in (499.0, 501.0)

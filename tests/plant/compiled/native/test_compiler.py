@@ -43,7 +43,7 @@ def arithmetic(x: float, y: float, n: int, flag: bool) -> tuple[float, ...]:
 
 
 @pytest.mark.parametrize("given", [(0.3, -1.7, 3, True), (-2.5, 0.25, 4, False), (2.0, 2.0, -3, True)])
-def test_arithmetic(given: tuple[Any, ...]) -> None:
+def test_arithmetic_is_the_same_compiled_and_in_python(given: tuple[Any, ...]) -> None:
     assert compiled("x, y : float\nn : int\nflag : bool", arithmetic)(*given) == pytest.approx(
         arithmetic(*given), rel=4e-16
     )
@@ -139,7 +139,7 @@ def turning(z: NDArray[np.complex128], w: float) -> tuple[complex, float]:
     return total, total.real * total.imag
 
 
-def test_complex_numbers() -> None:
+def test_complex_numbers_are_the_same_compiled_and_in_python() -> None:
     z = np.exp(1j * np.arange(5.0)) * np.arange(1.0, 6.0)
     found, wanted = compiled("z : ndarray of complex, shape (n,)\nw : float", turning)(z, 0.3), turning(z, 0.3)
     assert found == pytest.approx(wanted, rel=1e-14)
