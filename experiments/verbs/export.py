@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from plant.eha.rig import Rig
     from plant.log.record import Record
 
+SAMPLE_TIME = 1e-4
+"""Of a plant, and of a simulated bench, unless told [s]."""
+
 commands = typer.Typer(help="Export a filter, a plant or a model: C99, FMU, MATLAB.", no_args_is_help=True)
 
 Folder: TypeAlias = Annotated[Path, option("DIR", "Folder for the files.", "--out", "-o")]
@@ -87,7 +90,7 @@ def c(
     require_positive("--sample-time", sample_time, "s")
     bench = load_rig(rig)
     if plant is not None:
-        files, about = _plant(bench, plant, 1e-4 if sample_time is None else sample_time, name, precision)
+        files, about = _plant(bench, plant, sample_time or SAMPLE_TIME, name, precision)
     else:
         record = _bench_log(log, bench, load_columns(columns), sample_time, no_pressure=no_pressure)
         files, about = _filter(bench, record, form, method, listed(states), name, precision, tune=tune)
@@ -123,7 +126,7 @@ def fmu(
     require_positive("--sample-time", sample_time, "s")
     bench = load_rig(rig)
     if plant is not None:
-        content = _plant_fmu(bench, plant, 1e-4 if sample_time is None else sample_time, name, fmi)
+        content = _plant_fmu(bench, plant, sample_time or SAMPLE_TIME, name, fmi)
     else:
         from estimation.export.fmu_filter import filter_fmu
         from estimation.export.task import filter_task
@@ -226,13 +229,10 @@ def _bench_log(
 ) -> "Record":
     """Return the log that a filter is made for, of a simulated bench where none is given."""
     if log is None:
-        record = _simulated_bench(bench, 1e-4 if sample_time is None else sample_time)
+        record = _simulated_bench(bench, sample_time or SAMPLE_TIME)
     else:
         record = noted(str(log), lambda: read_log(log, bench.columns, columns, sample_time=sample_time))
-    if not no_pressure:
-        return record
-    kept = {name: values for name, values in record.channels.items() if name != "differential_pressure_pa"}
-    return type(record)(record.sample_time, kept, record.metadata)
+    return record.replace(differential_pressure_pa=None) if no_pressure else record
 
 
 def _simulated_bench(bench: "Rig", sample_time: float) -> "Record":
