@@ -19,6 +19,8 @@ def test_a_channel_that_is_held_alone_is_missing_there_and_said(channel: str, ro
     found, (note,) = without_held_alone(given)
     assert note.code is SensorCode.HELD_ALONE
     assert note.data["channel"] == channel
+    assert note.data["seconds"] == pytest.approx((rows - 1) * given.sample_time)
+    assert note.data["begin_s"] == pytest.approx(given.time[701])
     assert np.flatnonzero(np.isnan(found[channel])).tolist() == list(range(701, 700 + rows))
     clean = clean_log(given, EhaParameters())
     assert note in clean.left_out
@@ -39,6 +41,20 @@ def test_what_clips_is_coarse_or_rests_again_is_not_held() -> None:
     assert unchanged(np.minimum(pressure, 0.3 * np.max(pressure)))
     assert unchanged(np.round(pressure, -6))
     assert unchanged(stands(stands(pressure, 300, 60), 900, 18))
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-5, 1e5])
+def test_noise_is_told_from_rounding_in_any_unit(unit: float) -> None:
+    noise = np.random.default_rng(3).normal(0.0, 1e-3, 1500)
+    motion = np.sin(6.0 * np.arange(1500) / 1500)
+    assert not unchanged(unit * stands(motion + noise, 700, 60))
+    assert unchanged(unit * stands(motion + 1e-4 * noise, 700, 60))
+
+
+def test_a_channel_that_is_held_for_more_than_a_fifth_of_a_log_is_left_to_other_checks() -> None:
+    n = len(LOG)
+    assert not unchanged(stands(LOG[PRESSURE], 300, int(0.19 * n)))
+    assert unchanged(stands(LOG[PRESSURE], 300, int(0.21 * n)))
 
 
 def test_a_drive_without_noise_that_rests_is_not_held() -> None:

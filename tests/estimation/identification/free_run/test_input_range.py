@@ -40,6 +40,20 @@ def test_an_input_that_leaves_the_range_is_named_with_how_far_and_how_often(mode
     assert note.data["share"] == pytest.approx(np.mean((u < low - far) | (u > high + far)))
 
 
+def test_ranges_lie_about_the_mean_of_the_fitted_input(model: FreeRunModel) -> None:
+    away = replace(model, scaling=replace(model.scaling, u_mean=model.scaling.u_mean + 3.0))
+
+    def shifted(factor: float) -> Channels:
+        one = driven(factor)
+        return replace(one, u=(one.u[0] + 3.0,))
+
+    assert inputs_beyond(away, shifted(1.0)) == []
+    (here,), (there,) = inputs_beyond(model, driven(2.0)), inputs_beyond(away, shifted(2.0))
+    assert there.data["share"] == here.data["share"]
+    for end in ("least", "greatest", "low", "high"):
+        assert there.data[end] == pytest.approx(here.data[end] + 3.0)
+
+
 def test_a_model_whose_products_hold_no_input_and_a_linear_one_have_no_range(model: FreeRunModel) -> None:
     assert isinstance(model.dynamics, PolynomialDynamics)
     variables = replace(model.dynamics.variables, source=np.zeros_like(model.dynamics.variables.source))
