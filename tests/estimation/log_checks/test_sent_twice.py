@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.log_checks.clean import clean_log
-from estimation.log_checks.sent_twice import FEWEST_ROWS, without_rows_sent_twice
+from estimation.log_checks.sent_twice import FEWEST_ROWS, _widened, without_rows_sent_twice
 from estimation.notes import SensorCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -81,6 +81,23 @@ def test_a_packet_without_noise_that_came_again_is_found_by_its_step_back_also_a
         found, (note,) = without_rows_sent_twice(at(once, sent))
         assert (note.data["rows"], note.data["count"]) == (50, 1)
         assert np.array_equal(found[POSITION], once[POSITION])
+
+
+@pytest.mark.parametrize(
+    ("rows", "known", "whole"),
+    [
+        ([7, 7, 1, 2, 3, 7, 7, 1, 2, 3, 9], (7, 10), (5, 10)),
+        ([1, 2, 3, 7, 7, 1, 2, 3, 7, 7, 9], (5, 8), (5, 10)),
+        ([1, 2, 3, 7, 7, 1, 2, 3, 7, 7], (5, 8), (5, 10)),
+        ([8, 7, 1, 2, 3, 7, 7, 1, 2, 3, 9], (7, 10), (6, 10)),
+        ([7] * 12, (6, 7), (5, 10)),
+    ],
+    ids=["rest before", "rest behind", "to the end", "another row before", "no longer than the distance"],
+)
+def test_a_copy_is_as_long_as_rows_repeat_rests_at_its_ends_too(
+    rows: list[int], known: tuple[int, int], whole: tuple[int, int]
+) -> None:
+    assert _widened(np.array(rows, dtype=np.uint64), *known, 5) == whole
 
 
 def test_coarse_channels_at_rest_are_no_copies() -> None:
