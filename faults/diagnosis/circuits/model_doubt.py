@@ -7,6 +7,7 @@ so does what it says of them, because the fit did not go that way (consider cova
 Statistical Orbit Determination, 2004, chapter 6). The file may also be right about all of them: both count, as likely
 as they make the log. What is left of a log that no sensor makes is a wrong model's error, which a longer log does not
 average away; that is counted here, once, and where it is. Where noise alone is left, that of a position does not last.
+An encoder's steps are no wrong model either: what they add to one block they take from the next.
 """
 
 from collections.abc import Mapping
@@ -16,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from faults.diagnosis.circuits.actuator import Actuator
-from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.circuit_runs import COLUMN, parameter_rows, predicted
+from faults.diagnosis.circuits.blocks import Blocks, root_mean_square
+from faults.diagnosis.circuits.circuit_runs import ALLOWED, COLUMN, parameter_rows, predicted
 from faults.diagnosis.circuits.class_fit import WEAK, PointFit
 from plant.arrays import Array
 
@@ -161,6 +162,54 @@ def lasting_power(left: Array) -> Array:
     return np.asarray(np.sum(np.nansum(parts, axis=1) ** 2, axis=0) / np.maximum(there, 1), dtype=np.float64)
 
 
+def power_left(fit: PointFit, blocks: Blocks) -> Array:
+    """Return the mean square of what a fit leaves of a log.
+
+    A search counts no residual as less than `class_fit.LEAST_SCALE` of the signal. Here that would be a wrong model's
+    error, of which a log may show that there is none: 10 kHz average the sensors' noise to a third of it.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    blocks : Blocks
+        Its log.
+
+    Returns
+    -------
+    ndarray, shape (outputs,)
+        Not below the noise, nor the error that runs of a circuit are allowed [m^2/s^2, Pa^2].
+    """
+    left = root_mean_square((blocks.outputs - fit.fitted)[blocks.first :])
+    return np.maximum(left, np.maximum(blocks.noise, ALLOWED["tolerance"] * blocks.sizes)) ** 2
+
+
+def noise_shown(left: Array, blocks: Blocks) -> Array:
+    """Return the power of the sensors' noise, a position's at least as large as residuals show it.
+
+    The steps of an encoder are known as the noise that they are while a piston moves over many of them from sample to
+    sample. Where it is slow, they do not average. Both give neighbouring blocks opposite errors, which a wrong model
+    does not: of differences of white noise the covariance of neighbours is minus half of the variance.
+
+    Parameters
+    ----------
+    left : ndarray, shape (n, outputs)
+        Residuals of the blocks that count [m/s, Pa]; NaN where unknown.
+    blocks : Blocks
+        Their log.
+
+    Returns
+    -------
+    ndarray, shape (outputs,)
+        Mean squares [m^2/s^2, Pa^2].
+    """
+    noise = blocks.noise**2
+    beside = left[1:, 0] * left[:-1, 0]
+    if blocks.differenced and np.any(known := np.isfinite(beside)):
+        noise[0] = max(noise[0], -2.0 * float(np.mean(beside[known])))
+    return noise
+
+
 def model_error(fit: PointFit, blocks: Blocks) -> Array:
     """Return the variance of what a fit leaves of a log that its sensors do not make.
 
@@ -179,9 +228,10 @@ def model_error(fit: PointFit, blocks: Blocks) -> Array:
     ndarray, shape (outputs,)
         Nothing where noise alone is left [m^2/s^2, Pa^2].
     """
-    noise, power = (NOISE_ALONE * blocks.noise) ** 2, fit.scales**2
-    lasting = (lasting_power((blocks.outputs - fit.fitted)[blocks.first :]) - noise) / AVERAGED
-    return np.asarray(np.clip(np.maximum(power - noise, lasting), 0.0, power), dtype=np.float64)
+    left, power = (blocks.outputs - fit.fitted)[blocks.first :], power_left(fit, blocks)
+    beyond = power - NOISE_ALONE**2 * noise_shown(left, blocks)
+    lasting = (lasting_power(left) - (NOISE_ALONE * blocks.noise) ** 2) / AVERAGED
+    return np.asarray(np.clip(np.maximum(beyond, lasting), 0.0, power), dtype=np.float64)
 
 
 def near_by(left: Array, seen: NDArray[np.bool_]) -> Array:
@@ -264,14 +314,14 @@ def doubt_of(
         Covariance, and the squares of the steps that prior and log ask for [dimensionless].
     """
     known, left = len(fit.coordinates), np.where(blocks.seen, (blocks.outputs - fit.fitted)[blocks.first :], 0.0)
-    lasts = model_error(fit, blocks) * blocks.counts / LOOKS
-    weight = np.sqrt(fit.scales**2 + lasts)
+    power, lasts = power_left(fit, blocks), model_error(fit, blocks) * blocks.counts / LOOKS
+    weight = np.sqrt(power + lasts)
     slopes = np.concatenate([fit.slopes * seen[:, None, None], seldom])[:, blocks.first :]
     slopes = np.where(blocks.seen, slopes / weight, 0.0)
-    errs = np.sqrt(fit.scales**2 + lasts * near_by(left, blocks.seen)) / weight
+    errs = np.sqrt(power + lasts * near_by(left, blocks.seen)) / weight
     told, erring = (part @ part.T for part in (one.reshape(len(slopes), -1) for one in (slopes, slopes * errs)))
     if blocks.differenced and not np.any(lasts):
-        erring = erring - taken_back(slopes[..., 0] * min(1.0, blocks.noise[0] / fit.scales[0]), blocks.seen[:, 0])
+        erring = erring - taken_back(slopes[..., 0] * (blocks.noise[0] / power[0] ** 0.5), blocks.seen[:, 0])
     prior = np.zeros((len(slopes), len(slopes)))
     prior[:known, :known] = np.linalg.inv(WEAK)
     prior[known:, known:] = np.diag(spreads**-2.0)

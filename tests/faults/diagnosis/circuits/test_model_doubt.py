@@ -9,7 +9,7 @@ from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COLUMN, COORDINATES, parameter_rows, predicted
-from faults.diagnosis.circuits.class_fit import WEAK, PointFit
+from faults.diagnosis.circuits.class_fit import WEAK, PointFit, least_scales
 from faults.diagnosis.circuits.model_doubt import (
     LOOKS,
     NOISE_ALONE,
@@ -38,11 +38,17 @@ def log(blocks: int) -> Blocks:
 def told(blocks: int, share: float = 0.0) -> tuple[PointFit, Blocks]:
     """Return a fit that leaves of each output a share that no sensor makes; each coordinate moves its own blocks."""
     one = log(blocks)
-    scales = NOISE / np.sqrt(1.0 - share)
     slopes = np.zeros((7, blocks, 2))
     for i in range(7):
         slopes[i, i::7] = NOISE
-    return PointFit(CENTRE[0], 0.0, np.eye(7), scales, one.outputs, slopes), one
+    return leaving(PointFit(CENTRE[0], 0.0, np.eye(7), NOISE, one.outputs, slopes), one, NOISE / np.sqrt(1.0 - share)), one
+
+
+def leaving(fit: PointFit, one: Blocks, size: np.ndarray) -> PointFit:
+    """Return a fit at its best that leaves residuals of a size, which do not last: each is up as often as down."""
+    block, which = np.divmod(np.arange(len(fit.fitted)) - one.first, 7)
+    up = np.where(np.isin(block % 4, [0, 3]), 1.0, -1.0) * (-1.0) ** which
+    return replace(fit, scales=size, fitted=one.outputs - up[:, None] * size)
 
 
 def nothing_seldom(blocks: int) -> np.ndarray:
@@ -76,14 +82,14 @@ def test_what_the_noise_is_not_known_to_is_no_wrong_model() -> None:
 @pytest.mark.parametrize("slope", [1.0, -1.0], ids=["the same in all blocks", "to and fro"])
 def test_what_a_position_adds_to_one_block_it_takes_from_the_next(slope: float) -> None:
     """As many draws of an encoder's noise say how far off a fit is."""
-    fit, one = told(410)
+    fit, one = told(430)
     slopes = np.zeros_like(fit.slopes)
-    slopes[0, :, 0] = 100.0 * NOISE[0] * slope ** np.arange(410)  # next to which the prior counts for little
-    lone, noise = replace(fit, slopes=slopes), np.random.default_rng(0).standard_normal((4000, 411)) / np.sqrt(2.0)
+    slopes[0, :, 0] = 100.0 * NOISE[0] * slope ** np.arange(430)  # next to which the prior counts for little
+    lone, noise = replace(fit, slopes=slopes), np.random.default_rng(0).standard_normal((4000, 431)) / np.sqrt(2.0)
     weight = slopes[0, one.first :, 0] / NOISE[0]
     drawn = np.var(np.diff(noise, axis=1)[:, one.first :] @ weight / np.sum(weight**2))
     white, differenced = (
-        doubt_of(lone, nothing_seldom(410), blocks, CENTRE, SURE, ALL, SPREADS)[0, 0]
+        doubt_of(lone, nothing_seldom(430), blocks, CENTRE, SURE, ALL, SPREADS)[0, 0]
         for blocks in (one, replace(one, differenced=True))
     )
     assert white == pytest.approx(1.0 / np.sum(weight**2), rel=0.02)
@@ -91,9 +97,38 @@ def test_what_a_position_adds_to_one_block_it_takes_from_the_next(slope: float) 
     assert differenced < 0.01 * white if slope > 0.0 else differenced > 1.9 * white
 
 
+def test_what_an_encoder_takes_back_is_no_wrong_model() -> None:
+    """Its steps do not average where a piston is slow, so that more is left than the noise."""
+    fit, one = told(2_010)
+    rng, encoder = np.random.default_rng(0), replace(one, differenced=True)
+    steps = 2.0 * np.diff(rng.standard_normal((2_011, 1)), axis=0) / np.sqrt(2.0)
+    as_steps, as_white = (
+        replace(fit, fitted=one.outputs - NOISE * np.hstack([velocity, rng.standard_normal((2_010, 1))]))
+        for velocity in (steps, 2.0 * rng.standard_normal((2_010, 1)))
+    )
+    assert model_error(as_steps, encoder)[0] == 0.0
+    assert model_error(as_white, encoder)[0] == pytest.approx((4.0 - NOISE_ALONE**2) * NOISE[0] ** 2, rel=0.1)
+    assert model_error(as_steps, one)[0] == pytest.approx(model_error(as_white, one)[0], rel=0.1)
+
+
+def test_a_fast_log_that_is_followed_to_its_noise_shows_no_wrong_model() -> None:
+    """A search counts no residual as less than a thousandth of the signal; noise averages to less."""
+    fit, one = told(14_010)
+    quiet = replace(one, noise=0.3 * NOISE)
+    followed = replace(leaving(fit, quiet, 0.3 * NOISE), scales=least_scales(quiet))
+    assert followed.scales[0] == pytest.approx(NOISE[0], rel=1e-3)
+    assert np.array_equal(model_error(followed, quiet), np.zeros(2))
+    sure, as_loud = (
+        doubt_of(each, nothing_seldom(14_010), blocks, CENTRE, SURE, ALL, SPREADS)[0, 0]
+        for each, blocks in ((followed, quiet), (fit, one))
+    )
+    assert sure == pytest.approx(0.3**2 * as_loud, rel=0.01)
+
+
 def test_beside_a_wrong_model_the_noise_of_a_position_is_white() -> None:
     fit, one = told(410, 0.5)
-    steady = replace(fit, slopes=fit.slopes + NOISE)
+    up = np.where(np.arange(410) // 2 % 2, 1.0, -1.0)[:, None]  # neighbours agree as often as not
+    steady = replace(fit, slopes=fit.slopes + NOISE, fitted=one.outputs - up * fit.scales)
     white, differenced = (
         doubt_of(steady, nothing_seldom(410), blocks, CENTRE, SURE, ALL, SPREADS)
         for blocks in (one, replace(one, differenced=True))
@@ -136,8 +171,8 @@ def test_a_wrong_model_errs_where_it_errs() -> None:
 
 def test_each_output_answers_for_its_own_error() -> None:
     fit, one = told(1_410)
-    velocity_off = replace(fit, scales=NOISE * [10.0, 1.0])
-    both_off = replace(fit, scales=NOISE * 10.0)
+    velocity_off = leaving(fit, one, NOISE * [10.0, 1.0])
+    both_off = leaving(fit, one, NOISE * 10.0)
     sure, less, least = (
         doubt_of(one_fit, nothing_seldom(1_410), one, CENTRE, SURE, ALL, SPREADS)[0, 0]
         for one_fit in (fit, velocity_off, both_off)
