@@ -2,6 +2,7 @@
 
 Without pressure a log is refused if the fit of motion leaves much of the motion. Its search may have failed, though: a
 circuit that follows the log has values for all that the motion form leaves open, and with these it follows the log too.
+Nor does it speak against a piston that hardly moves: how that yields on its seals no model describes to the last digit.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,9 +13,10 @@ from estimation.fits.motion.values import share_at
 from estimation.log_checks.clean import CleanLog
 from estimation.notes import EstimateCode
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
+from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COLUMN, parameter_rows
 from faults.diagnosis.circuits.class_fit import PointFit
-from faults.diagnosis.circuits.out_of_model import UNEXPLAINED
+from faults.diagnosis.circuits.out_of_model import UNEXPLAINED, yielding_velocity
 from faults.diagnosis.circuits.rivals import doubts_left
 from faults.diagnosis.evidence import Scoreboard
 from plant.eha.model import EhaParameters
@@ -61,16 +63,25 @@ def doubts_after(
     -------
     tuple of Note
         Those of `faults.diagnosis.circuits.rivals.doubts_left`; none that rest on a fit of motion whose search
-        failed, if the motion form leaves no more at the circuit's values than a circuit may.
+        failed, if the motion form leaves no more at the circuit's values than a circuit may, or of a piston that hardly
+        moves and that the circuit follows to what seals yield.
     """
     left = doubts_left(doubts, board.blocks, board.fits.best)
     large = next((note for note in left if note.code is EstimateCode.POSITION_RESIDUALS_LARGE), None)
     if large is None or estimate.form != "motion":
         return left
-    values = values_of(board.fits.best, actuator_of(healthy))
-    share = share_at(log.record, healthy, values, log.variances["motor_speed_rad_s"])
-    failed = share <= min(UNEXPLAINED[0], LESS * float(large.data["motion_percent"]) / 100.0)
-    return tuple(note for note in left if note.code not in NOT_THE_LOGS) if failed else left
+    actuator, best = actuator_of(healthy), board.fits.best
+    if not _yields(board.blocks, best, actuator):
+        share = share_at(log.record, healthy, values_of(best, actuator), log.variances["motor_speed_rad_s"])
+        if not share <= min(UNEXPLAINED[0], LESS * float(large.data["motion_percent"]) / 100.0):
+            return left
+    return tuple(note for note in left if note.code not in NOT_THE_LOGS)
+
+
+def _yields(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
+    """Return whether a piston hardly moves, and a circuit follows it to what seals yield."""
+    yielding = yielding_velocity(blocks, actuator)
+    return float(fit.scales[0]) <= yielding and UNEXPLAINED[0] * float(blocks.sizes[0]) <= yielding
 
 
 def values_of(fit: PointFit, actuator: Actuator) -> Mapping[str, float]:

@@ -36,8 +36,11 @@ UNEXPLAINED_LONGER = 0.06
 
 YIELDING = 0.015
 """Share of the velocity at which the pump's whole flow would move the piston, root mean square, that may be left in any
-case where pressure is followed [dimensionless]: a piston that hardly moves yields on its seals, which no circuit
-describes to the last digit."""
+case [dimensionless]: a piston that hardly moves yields on its seals, which no circuit describes to the last digit."""
+
+HALF_POWER = math.sqrt(0.5)
+"""Share of velocity, root mean square, beyond which a circuit explains less than half of its power [dimensionless]:
+where pressure is not followed either, it says nothing of the log."""
 
 STICKS = math.exp(SEALS)
 """How far seals may yield, over the rig's presliding displacement [dimensionless]: a standard deviation more, 54 um."""
@@ -169,9 +172,7 @@ def unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Not
         None where a circuit follows the log.
     """
     shares = fits.best.scales / np.maximum(blocks.sizes, np.finfo(float).tiny)
-    pump = actuator.circuit.pump_displacement / actuator.circuit.piston_area
-    yielding = YIELDING * pump * float(np.sqrt(np.mean(blocks.speed**2)))
-    least = np.array([0.0] if blocks.pressure is None else [yielding, 0.0])
+    least = np.array([yielding_velocity(blocks, actuator), 0.0])[: len(shares)]
     heard = fits.best.scales > np.maximum(2.0 * blocks.noise, least)
     if blocks.pressure is not None:
         heard[0] &= _left_longer(blocks, fits.best) > UNEXPLAINED_LONGER * blocks.sizes[0]
@@ -181,6 +182,27 @@ def unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Not
         for name, share, limit, loud in zip(names, shares, UNEXPLAINED, heard, strict=False)
         if share > limit and loud
     ]
+
+
+def yielding_velocity(blocks: Blocks, actuator: Actuator) -> float:
+    """Return the velocity that a piston which yields on its seals may have beside a circuit's.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    float
+        `YIELDING` of the velocity at which the pump's whole flow would move the piston, root mean square [m/s]; without
+        pressure no more than `HALF_POWER` of the piston's own.
+    """
+    pump = actuator.circuit.pump_displacement / actuator.circuit.piston_area
+    yielding = YIELDING * pump * float(np.sqrt(np.mean(blocks.speed**2)))
+    return yielding if blocks.pressure is not None else min(yielding, HALF_POWER * float(blocks.sizes[0]))
 
 
 def sticks_and_slips(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:

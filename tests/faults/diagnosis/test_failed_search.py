@@ -1,5 +1,6 @@
 """A fit of motion whose search failed speaks against no log that the motion form follows at the circuit's values."""
 
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -27,10 +28,18 @@ LAWS = EstimateCode.FRICTION_LAWS_DISAGREE.note(least_pa=1e8, most_pa=2e8)
 FROZE = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.0, begin_s=0.0, length_s=1.0)
 
 
-def left(monkeypatch: pytest.MonkeyPatch, share: float, form: str = "motion") -> tuple[Any, ...]:
-    """Return what is left of three doubts, where the circuit's values leave a share of the motion."""
+def left(
+    monkeypatch: pytest.MonkeyPatch, share: float, form: str = "motion", noises: float = 1.0, pump: float = 0.0
+) -> tuple[Any, ...]:
+    """Return what is left of three doubts, where the circuit's values leave a share of the motion.
+
+    The circuit leaves so many times the sensors' noise of a velocity that is a hundred times as large. The pump's whole
+    flow would move the piston ``pump`` times as fast as it moves.
+    """
     one = log(pressure=False)
-    fits = cast("Any", type("Fits", (), {"best": leaving(1.0, 1.0, one)}))
+    per_speed = PAPER.pump_displacement / PAPER.piston_area
+    one = replace(one, speed=np.full_like(one.speed, pump * float(one.sizes[0]) / per_speed))
+    fits = cast("Any", type("Fits", (), {"best": leaving(noises, 1.0, one)}))
     board = Scoreboard({}, one, fits, Record(1e-3, {"motor_speed_rad_s": np.zeros(2)}), None)
     estimate = BulkModulusEstimate(
         Outcome.MISMATCH, None, None, 1.0, Gate(False, (FAR, LAWS)), form, ("position_m",), {}, {}
@@ -55,6 +64,15 @@ def test_however_badly_it_failed_no_more_is_left_than_a_circuit_may(monkeypatch:
 
 def test_a_fit_with_pressure_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     assert left(monkeypatch, 0.0, "flow") == (FAR, LAWS, FROZE)
+
+
+@pytest.mark.parametrize(
+    ("pump", "noises", "kept"), [(7.0, 40.0, True), (10.0, 10.0, False), (10.0, 20.0, True), (40.0, 40.0, False)]
+)
+def test_a_piston_that_hardly_moves_is_followed_by_a_circuit_alone(
+    monkeypatch: pytest.MonkeyPatch, pump: float, noises: float, *, kept: bool
+) -> None:
+    assert left(monkeypatch, np.inf, noises=noises, pump=pump) == ((FAR, LAWS, FROZE) if kept else (FROZE,))
 
 
 def test_a_circuit_has_values_for_what_the_motion_form_leaves_open() -> None:

@@ -19,7 +19,6 @@ from faults.diagnosis.circuits.out_of_model import (
     SOFT,
     STICKS,
     UNEXPLAINED,
-    YIELDING,
     reasons_against,
     sensors_disagree,
 )
@@ -137,19 +136,6 @@ def test_an_oil_is_another_only_where_the_log_knows_how_stiff_it_is(known: float
     fits = replace(fitted(log, point), information=np.diag([1e4, 1e4, 1e4, 1e4, 1e4, known**-2, 1e4]))
     found = reasons_against(log, fits, 0.0, ACTUATOR)
     assert (AgainstCode.OIL_SOFT in [note.code for note in found]) == said
-
-
-def test_a_piston_that_only_yields_on_its_seals_need_not_be_followed_to_the_last_digit() -> None:
-    place = ACTUATOR.conditions[0]
-    log, pump = healthy(), ACTUATOR.circuit.pump_displacement / ACTUATOR.circuit.piston_area
-    whole = pump * float(np.sqrt(np.mean(log.speed**2)))
-    alternating = np.where(np.arange(len(log.velocity)) % 100 < 50, 1.0, -1.0)
-    for share, said in ((0.7 * YIELDING, False), (1.5 * YIELDING, True)):
-        creeping = replace(log, velocity=1e-6 + share * whole * alternating)
-        fits = replace(fitted(log, place).best, fitted=np.column_stack([0.0 * log.velocity, log.pressure]))
-        fits = replace(fits, scales=scales_of(creeping, fits.fitted))
-        found = reasons_against(creeping, replace(fitted(log, place), best=fits), 0.0, ACTUATOR)
-        assert (AgainstCode.UNEXPLAINED in [note.code for note in found]) == said
 
 
 def slipping(late: int, far: float = 1.0, *, pressure: bool = True) -> bool:
