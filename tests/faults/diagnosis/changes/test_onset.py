@@ -38,6 +38,7 @@ from plant.eha.model import EhaParameters
 from plant.eha.parameter_path import ParameterPath
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
+from plant.notes import Note
 from plant.sensors.sensors import RIG
 
 HEALTHY = EhaParameters()
@@ -159,6 +160,23 @@ def test_a_quiet_end_is_no_last_condition_where_no_circuit_follows_what_came_bef
 
 def alarm(since: float) -> Alarm:
     return Alarm(since + 1.0, "flow", since, (since, since), 9.0, 5.0)
+
+
+def test_without_pressure_what_no_circuit_follows_after_a_change_began_at_no_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    record = short_log("major_friction")
+    said = [AgainstCode.UNEXPLAINED.note(percent=20.0, channel="velocity")]
+
+    def nothing_follows_the_rest(blocks: Blocks, *_: object) -> list[Note]:
+        return said if blocks.earlier is not None else []
+
+    monkeypatch.setattr(onset, "unexplained", nothing_follows_the_rest)
+    for logged, dated in ((record.replace(differential_pressure_pa=None), False), (record, True)):
+        blocks = blocks_of(logged)
+        two = parted(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
+        assert two is not None
+        assert (find_onset(blocks, two, ACTUATOR) is not None) == dated
 
 
 def test_of_a_long_log_the_stretches_about_the_last_alarms_are_looked_at_until_one_holds_a_change(

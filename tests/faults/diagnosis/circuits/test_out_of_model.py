@@ -19,6 +19,7 @@ from faults.diagnosis.circuits.out_of_model import (
     SOFT,
     STICKS,
     UNEXPLAINED,
+    YIELDING,
     reasons_against,
     sensors_disagree,
 )
@@ -186,7 +187,7 @@ def test_a_piston_may_stick_and_slip_at_other_times_if_it_goes_as_far_and_pressu
     assert jumping(1e-4, pressure=False)
 
 
-def test_without_pressure_a_misfit_of_velocity_counts_however_small_and_so_does_one_that_lasts() -> None:
+def test_without_pressure_a_circuit_that_explains_nothing_is_accused_and_a_misfit_that_lasts_counts() -> None:
     place = ACTUATOR.conditions[0]
     log, pump = healthy(), ACTUATOR.circuit.pump_displacement / ACTUATOR.circuit.piston_area
     left = 0.5 * YIELDING * pump * float(np.sqrt(np.mean(log.speed**2)))

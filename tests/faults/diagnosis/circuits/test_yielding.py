@@ -21,7 +21,7 @@ def creeping_is_unexplained(share: float, followed: float, *, pressure: bool) ->
     whole = pump * float(np.sqrt(np.mean(log.speed**2)))
     there = np.arange(len(log.velocity))
     left, motion = (np.where(there % period < period // 2, 1.0, -1.0) for period in (100, 400))
-    run = np.column_stack([followed * share * whole * motion, log.pressure])[:, : 1 + pressure]
+    run = np.column_stack([followed * share * whole * motion, log.outputs[:, 1]])[:, : 1 + pressure]
     creeping = replace(log, velocity=run[:, 0] + share * whole * left, noise=NOISE[: 1 + pressure])
     creeping = creeping if pressure else replace(creeping, pressure=None)
     near = fitted(log, place)
