@@ -105,7 +105,14 @@ class AdviceCode(Code):
     FIND_AIR = "bleed the circuit and find where air gets in: rod seal, fittings, bladder of the accumulator"
     BLEED = (
         "bulk modulus is {percent:.0f} % below that of the healthy actuator: bleed the circuit and find where air gets "
-        "in, or correct chamber_volume in the rig file"
+        "in; if there is no air, correct chamber_volume in the rig file to {volume:.3g} m^3"
+    )
+    CORRECT_VOLUME = (
+        "correct chamber_volume in the rig file from {written:.3g} to {volume:.3g} m^3, then diagnose this log again"
+    )
+    CORRECT_VOLUME_OR_OIL = (
+        "bulk modulus is {ratio:.2g} times that in the rig file: correct chamber_volume there from {written:.3g} to "
+        "{volume:.3g} m^3, or bulk_modulus if the actuator has stiffer oil, then diagnose this log again"
     )
     FIT_DOUBTED = "the model does not follow this log: check units, signs and the rig file first"
     LOG_PRESSURE = "log differential pressure: leakage and friction are then known several times better"

@@ -8,6 +8,7 @@ from estimation.finding import Quantity
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
 from faults.notes import AdviceCode, AgainstCode, ClassCode
+from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
 
@@ -117,9 +118,11 @@ def advice_for(
 
 
 def oil_advice(
-    severity: Mapping[str, Quantity], healthy: Mapping[str, float], limits: Mapping[str, float]
+    severity: Mapping[str, Quantity], healthy: Mapping[str, float], limits: Mapping[str, float], volume: float
 ) -> tuple[Note, ...]:
     """Return what to do about oil that is softer than its limit, whatever the condition.
+
+    A log determines bulk modulus over volume alone, so a volume that the rig file gives too small looks alike.
 
     Parameters
     ----------
@@ -127,6 +130,8 @@ def oil_advice(
         How bad it is, by the names of `faults.diagnosis.severity.UNITS`.
     healthy, limits : Mapping[str, float]
         The same of the healthy actuator, and where it stops being sound [each in the same unit].
+    volume : float
+        Chamber volume for which bulk modulus was estimated [m^3].
 
     Returns
     -------
@@ -136,7 +141,33 @@ def oil_advice(
     modulus, sound = severity["bulk_modulus"], healthy["bulk_modulus"]
     if modulus.value is None or modulus.ci95 is None or modulus.ci95[1] >= limits["bulk_modulus"]:
         return ()
-    return (AdviceCode.BLEED.note(percent=100.0 * (1.0 - modulus.value / sound)),)
+    percent = 100.0 * (1.0 - modulus.value / sound)
+    return (AdviceCode.BLEED.note(percent=percent, volume=volume * sound / modulus.value),)
+
+
+def volume_advice(strange: Iterable[Note], healthy: EhaParameters, written: EhaParameters) -> tuple[Note, ...]:
+    """Return which chamber volume the rig file should have, where it contradicts the log.
+
+    Parameters
+    ----------
+    strange : iterable of Note
+        What is strange about rig, oil and logger.
+    healthy, written : EhaParameters
+        The healthy actuator, corrected by what explains the log, and as the rig file has it.
+
+    Returns
+    -------
+    tuple of Note
+        None where the volume may be right: soft oil has its own advice.
+    """
+    for note in strange:
+        if note.code == RigCode.VOLUME_DIFFERS:
+            return (AdviceCode.CORRECT_VOLUME.note(volume=healthy.chamber_volume, written=written.chamber_volume),)
+        if note.code == RigCode.OIL_STIFFER:
+            ratio = float(note.data["ratio"])
+            volume = healthy.chamber_volume / ratio
+            return (AdviceCode.CORRECT_VOLUME_OR_OIL.note(volume=volume, written=written.chamber_volume, ratio=ratio),)
+    return ()
 
 
 def _mended(doubts: list[Note]) -> tuple[Note, ...]:

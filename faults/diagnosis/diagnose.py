@@ -17,7 +17,7 @@ from estimation.finding import Finding, Outcome, Quantity
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.notes import RigCode
-from faults.diagnosis.advice import advice_for, oil_advice
+from faults.diagnosis.advice import advice_for, oil_advice, volume_advice
 from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
 from faults.diagnosis.beyond_nine.drift import over_drift
 from faults.diagnosis.beyond_nine.load import Loaded, under_load
@@ -30,7 +30,7 @@ from faults.diagnosis.circuits.out_of_model import SOFT
 from faults.diagnosis.failed_search import doubts_after
 from faults.diagnosis.models_verdict import models_verdict, ranked
 from faults.diagnosis.rmse import Scores, score_mathematical
-from faults.diagnosis.severity import with_bulk_modulus
+from faults.diagnosis.severity import healthy_severities, limits_of, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
 from faults.eha.bank import mathematical_bank
 from faults.notes import ClassCode
@@ -116,6 +116,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
         without = _without_class(found, log, scores, distinct((*case.doubts, *verdict.against)))
         said = ClassCode.NO_CIRCUIT if isinstance(error, RigError) else ClassCode.NO_PROBABILITIES
         return replace(without, notes=(*found.notes, said.note(reason=error.message)))
+    diagnosis = _from_the_rigs_oil(diagnosis, case.healthy)
     found = replace(found, notes=(*found.notes, *named), evidence=EhaEvidence(estimate, scores, diagnosis))
     left = doubts_after(case.doubts, estimate, log, around, diagnosis.scoreboard)
     against = distinct((*left, *diagnosis.against))
@@ -128,12 +129,14 @@ class _Case(NamedTuple):
     """A log and its rig, set right by what explains the log.
 
     Circuits are fitted around ``rig``, which has the oil that was measured where that is no kin of the file's.
-    Severities count from ``healthy``. What is ``strange`` is noted of rig, oil and logger.
+    Severities count from ``healthy``. What is ``strange`` is noted of rig, oil and logger. ``written`` is what the rig
+    file says.
     """
 
     log: CleanLog
     rig: Rig
     healthy: EhaParameters
+    written: EhaParameters
     estimate: BulkModulusEstimate
     strange: tuple[Note, ...]
 
@@ -145,7 +148,8 @@ class _Case(NamedTuple):
 
 
 def _set_right(log: CleanLog, rig: Rig, estimate: BulkModulusEstimate) -> _Case:
-    strange = explained(estimate, rig.parameters)
+    written = rig.parameters
+    strange = explained(estimate, written)
     log = at_pump_speed(log, estimate.turning)
     if estimate.explanation is not None:
         log = set_right(log, estimate.explanation)
@@ -154,7 +158,7 @@ def _set_right(log: CleanLog, rig: Rig, estimate: BulkModulusEstimate) -> _Case:
     if (other := _another_oil(estimate, healthy)) is not None:
         strange = (*strange, other)
         rig = replace(rig, parameters=replace(healthy, bulk_modulus=estimate.value))
-    return _Case(log, rig, healthy, estimate, strange)
+    return _Case(log, rig, healthy, written, estimate, strange)
 
 
 def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tuple[Note, ...]) -> Finding:
@@ -164,7 +168,8 @@ def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tupl
         notes = (*notes, ClassCode.END_STOP.note(reach_mm=1e3 * stop))
     severity = _severities(diagnosis, case.estimate, case.healthy, case.rig, pressure=PRESSURE in found.channels)
     known = case.estimate.gate.passed and not against
-    oil = oil_advice(severity, diagnosis.healthy, diagnosis.limits) if known else ()
+    oil = oil_advice(severity, diagnosis.healthy, diagnosis.limits, case.healthy.chamber_volume) if known else ()
+    volume = volume_advice(case.strange, case.healthy, case.written)
     further = advice_for(case.log.record, diagnosis.probabilities, against, diagnosis.not_told, found.channels)
     return replace(
         found,
@@ -177,8 +182,21 @@ def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tupl
         healthy=diagnosis.healthy,
         not_told=(*diagnosis.not_told, *found.not_told),
         since=board.onset,
-        advice=(*oil, *further),
+        advice=(*oil, *volume, *further),
     )
+
+
+def _from_the_rigs_oil(diagnosis: Diagnosis, healthy: EhaParameters) -> Diagnosis:
+    """Return a diagnosis whose bulk modulus counts from the rig's oil, also where circuits are fitted around another.
+
+    Else oil that is half as stiff as the rig's would be compared with itself, and be within its limit.
+    """
+    if diagnosis.healthy["bulk_modulus"] == healthy.bulk_modulus:
+        return diagnosis
+    sound = actuator_of(healthy)
+    of_oil = {"bulk_modulus": healthy_severities(sound)["bulk_modulus"]}
+    limit = {"bulk_modulus": limits_of(sound)["bulk_modulus"]}
+    return replace(diagnosis, healthy={**diagnosis.healthy, **of_oil}, limits={**diagnosis.limits, **limit})
 
 
 class _Plain(NamedTuple):

@@ -1,12 +1,14 @@
 """Advice is computed from what a log holds: what it holds already is not asked for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from estimation.finding import Quantity
 from estimation.notes import EstimateCode, RigCode, SensorCode
 from faults.conditions import CONDITIONS
-from faults.diagnosis.advice import advice_for, oil_advice, speeds_held
+from faults.diagnosis.advice import advice_for, oil_advice, speeds_held, volume_advice
 from faults.notes import AdviceCode, AgainstCode, ClassCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -198,6 +200,19 @@ def test_soft_oil_is_to_be_bled_where_its_interval_lies_below_the_limit(
     ends: tuple[float, float] | None, percent: float | None
 ) -> None:
     modulus = Quantity(None, "Pa") if ends is None else Quantity(0.5 * sum(ends), "Pa", ends)
-    said = oil_advice({"bulk_modulus": modulus}, {"bulk_modulus": 2e8}, {"bulk_modulus": 1.6e8})
+    said = oil_advice({"bulk_modulus": modulus}, {"bulk_modulus": 2e8}, {"bulk_modulus": 1.6e8}, 1e-3)
     assert codes(said) == ([] if percent is None else [AdviceCode.BLEED])
     assert [note.data["percent"] for note in said] == ([] if percent is None else [pytest.approx(percent)])
+    volumes = [] if modulus.value is None or percent is None else [pytest.approx(1e-3 * 2e8 / modulus.value)]
+    assert [note.data["volume"] for note in said] == volumes  # for which the log would give the bulk modulus of the rig
+
+
+def test_a_chamber_volume_that_contradicts_the_log_is_to_be_corrected_to_its_value() -> None:
+    true, written = replace(HEALTHY, chamber_volume=5.4e-4), replace(HEALTHY, chamber_volume=1.08e-3)
+    (explained,) = volume_advice([RigCode.VOLUME_DIFFERS.note(percent=50.0, half_width=5.0)], true, written)
+    assert str(explained) == (
+        "correct chamber_volume in the rig file from 0.00108 to 0.00054 m^3, then diagnose this log again"
+    )
+    (stiff,) = volume_advice([RigCode.OIL_STIFFER.note(ratio=2.0)], written, written)
+    assert "correct chamber_volume there from 0.00108 to 0.00054 m^3, or bulk_modulus" in str(stiff)
+    assert volume_advice([RigCode.OIL_SOFTER.note(ratio=0.5)], written, written) == ()  # it may be air

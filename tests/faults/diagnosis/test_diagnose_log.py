@@ -177,3 +177,13 @@ def test_nominal_models_of_a_log_that_is_set_right_are_run_anew() -> None:
     of_another = partial(pytest.fail, "these are of another log")
     begun = diagnose._Plain(came, HEALTHY, None, of_another)  # pyright: ignore[reportPrivateUsage]
     assert begun.scores_of(replace(came), HEALTHY).by_condition == plain().evidence.scores.by_condition
+
+
+@pytest.mark.parametrize(("share", "advised"), [(0.5, AdviceCode.BLEED), (2.0, AdviceCode.CORRECT_VOLUME_OR_OIL)])
+def test_oil_that_is_no_kin_of_the_rigs_is_compared_with_the_rigs(share: float, advised: AdviceCode) -> None:
+    rig = Rig("another volume", replace(HEALTHY, chamber_volume=share * HEALTHY.chamber_volume))
+    found = diagnose_log(log(), rig)
+    assert found.healthy["bulk_modulus"] == pytest.approx(HEALTHY.bulk_modulus)
+    assert found.evidence.diagnosis.limits["bulk_modulus"] == pytest.approx(0.8 * HEALTHY.bulk_modulus)
+    (said,) = [one for one in found.advice if one.code == advised]
+    assert said.data["volume"] == pytest.approx(HEALTHY.chamber_volume, rel=0.02)
