@@ -70,15 +70,15 @@ class ChannelCode(Code):
 
     CHANNEL_REVERSED = (
         "{channel} has the wrong sign: compared with {against}, its correlation is {correlation:.2f}; give the column "
-        "with a minus before its unit (--columns CHANNEL=NAME:-UNIT, or NAME:-UNIT in the rig file)"
+        "with a minus before its unit (NAME:-UNIT under [columns] in the rig file, or --columns CHANNEL=NAME:-UNIT)"
     )
     CHANNELS_SWAPPED = (
         "{channel} and {other} are swapped: the slope of the second is the first (correlation {correlation:.2f}); "
-        "correct the names of the columns (--columns CHANNEL=NAME)"
+        "correct the names of the columns (under [columns] in the rig file, or --columns CHANNEL=NAME)"
     )
     CHANNEL_UNIT = (
         "{channel}: the values are {factor:.3g} times what {against} would give, which looks like {slip}; give the "
-        "column's unit (--columns CHANNEL=NAME:UNIT)"
+        "column's unit (NAME:UNIT under [columns] in the rig file, or --columns CHANNEL=NAME:UNIT)"
     )
     UNIT_CHANGES = (
         "{channel}: from {begin_s:.3g} s on, noise is about {factor:.3g} times what it was, as when the column's unit "

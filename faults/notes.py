@@ -95,7 +95,10 @@ class AdviceCode(Code):
     """What to do or to measure next."""
 
     CHECK_SENSOR = "check the sensor and the wiring of {channels}, then log again"
-    MEND_COLUMNS = "correct the sign, unit or name of {channels} with --columns, then read the same log again"
+    MEND_COLUMNS = (
+        "correct the sign, unit or name of {channels} under [columns] in the rig file, or with --columns, then read "
+        "the same log again"
+    )
     CHECK_LOGGER = "check the logger and its wiring, then log again while the motor turns and the piston moves"
     CHECK_RIG = "compare rig file and actuator (geometry, pump, relief, healthy leakage and friction), then log again"
     STOP_LEAKAGE = "stop, and check pump and piston seal before the next run: leakage grew during this log"
@@ -118,8 +121,8 @@ class AdviceCode(Code):
     LOG_PRESSURE = "log differential pressure: leakage and friction are then known several times better"
     MOVE_PISTON = "use steps that move the piston: this log cannot show friction"
     MORE_SPEEDS = (
-        "hold two or more motor speeds (hydrostate simulate --drive steps shows how): this log holds {speeds}, too few "
-        "to separate leakage from flow bias (a constant loss of the pump)"
+        "hold two or more motor speeds, each for half a second: this log holds {speeds}, too few to separate leakage "
+        "from flow bias (a constant loss of the pump)"
     )
     LOG_LONGER = (
         "log 10 s or more of steps at several speeds: this log of {duration_s:.3g} s leaves more than one condition "

@@ -72,7 +72,8 @@ def class_row(found: Finding) -> dict[str, Any]:
         against = json.dumps([{"code": str(one.code), "data": dict(one.data)} for one in found.against])
         return {"outcome": "mismatch", "reason": said, "trusted": False, "against": against, **severities}
     if margin < TOLD_APART:
-        said = f"no class: under this drive {best} and {second} move alike; drive the actuator, at best with steps"
+        both = f"{in_words(best)} and {in_words(second)}"
+        said = f"no class: under this drive {both} look alike; drive the actuator with steps"
         return {"outcome": "not_observable", "reason": said, "margin": margin}
     row = {"outcome": "ok", "found_condition": best, "runner_up": second, "margin": margin, "trusted": True}
     return {**row, **severities}

@@ -15,8 +15,11 @@ from experiments.page.frames import Tables
 from experiments.page.names_shown import SHOWN
 from experiments.page.numbers import MISSING, decimals_of, fixed, number, pretty_unit, shop_unit
 from experiments.page.render import render_page
-from experiments.page.tables import Cell, Column, decimals
+from experiments.page.tables import Cell, Column, decimals, right, spaced
 from experiments.page.words import in_words
+
+MOST_TIMES = 1000.0
+"""Ratio of two probabilities beyond which its digits mean nothing [dimensionless]."""
 
 
 def _or_dash(value: Any) -> str:
@@ -38,6 +41,13 @@ def _amount(one: Mapping[str, Any]) -> str:
         return f"{fixed(scale * one['value'], decimals_of(*ends))} {pretty_unit(unit)}"
     told = f"{number(scale * one['value'])} {pretty_unit(unit).removeprefix('1')}"
     return f"{told} ({number(ends[0])} to {number(ends[1])})" if len(ends) == 2 else told
+
+
+def _times(margin: float | None) -> Cell:
+    """Return how many times as probable something is, its digits up to `MOST_TIMES`."""
+    if margin is None or not margin > MOST_TIMES:
+        return right(number(margin, 3))
+    return right(f"over {MOST_TIMES:.0f}")
 
 
 _text = partial(Column, words=_or_dash)
@@ -72,10 +82,10 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
     "logs": (
         _text("file", "log"),
         _text("verb", "asked"),
-        _text("outcome"),
+        Column("outcome", words=lambda value: spaced(_or_dash(value))),
         _condition("found_condition", "class"),
         _condition("runner_up", "runner-up"),
-        Column("margin", "times as probable as runner-up", digits=3),
+        Column("margin", "times as probable as runner-up", words=_times),
         Column("bulk_modulus_pa"),
         Column("bulk_modulus_std_pa", "std", digits=2),
         Column("quantities", "found", words=_quantities),

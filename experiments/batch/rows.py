@@ -6,7 +6,7 @@ rows at the end; what came of a case is written to its place.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import pyarrow as pa
 
@@ -60,6 +60,20 @@ FOUND = tuple(name for name in SCHEMA.names[SCHEMA.names.index("outcome") :] if 
 """Columns of what came of a case; those before them, and the truth, say what it is."""
 
 
+class Failure(NamedTuple):
+    """A case that failed.
+
+    Parameters
+    ----------
+    series, verb, reason : str
+        The log's file, or what was simulated; what was asked of it; and why it failed.
+    """
+
+    series: str
+    verb: str
+    reason: str
+
+
 class Rows:
     """The rows of a task while its cases are run, each known by its place in the task."""
 
@@ -98,17 +112,11 @@ class Rows:
         told = " ".join(_said(reason).split())
         self.put(places, {"outcome": ["failed"] * len(places), "reason": [told] * len(places)})
 
-    def failures(self) -> tuple[tuple[str, str], ...]:
-        """Return each case that failed.
-
-        Returns
-        -------
-        tuple of pairs of str
-            The case in words, and the reason.
-        """
+    def failures(self) -> tuple[Failure, ...]:
+        """Return each case that failed."""
         outcomes, reasons = self._found["outcome"], self._found["reason"]
         places = (place for place, outcome in enumerate(outcomes) if outcome == "failed")
-        return tuple((self._in_words(place), str(reasons[place])) for place in places)
+        return tuple(Failure(self._in_words(one), self._works[one].verb, str(reasons[one])) for one in places)
 
     def table(self) -> pa.Table:
         """Return the rows as a table of the store.
@@ -132,12 +140,12 @@ class Rows:
         return pa.table(columns, schema=SCHEMA)
 
     def _in_words(self, place: int) -> str:
-        """Return what a case is called in a sentence: the log's file, or what was simulated; and what was done."""
-        series, verb = self._series[self._series_of[place]], self._works[place].verb
+        """Return what a case's series is called in a sentence: the log's file, or what was simulated."""
+        series = self._series[self._series_of[place]]
         if series.get("file"):
-            return f"{series['file']} ({verb})"
+            return str(series["file"])
         condition = series["condition"] or f"severity {series['leakage_severity']:g}, {series['friction_severity']:g}"
-        return f"{series['plant']} {series['drive']} {condition} seed {series['seed']} ({verb})"
+        return f"{series['plant']} {series['drive']} {condition} seed {series['seed']}"
 
 
 def error_percent(value: float | None, truth: float | None) -> float | None:

@@ -2,7 +2,7 @@
 
 import signal
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -14,6 +14,7 @@ from experiments.command.terminal import note
 if TYPE_CHECKING:
     from experiments.batch.cases import Plan
     from experiments.batch.part_store import PartStore
+    from experiments.batch.rows import Failure
     from experiments.batch.runner import Tally
     from experiments.batch.work import Part
 
@@ -141,10 +142,10 @@ def _shown(total: int, before: int) -> "Generator[Callable[[int, Part], None]]":
 
     def advance(count: int, part: "Part") -> None:
         nonlocal named, spoken
-        for case, reason in part.failures:
+        for said in in_sentences(part.failures):
             named += 1
             if named <= MOST_NAMED:
-                note(f"{case}: {reason}")
+                note(said)
             elif named == MOST_NAMED + 1:
                 note("more cases failed; the report names all")
         pace.done += count
@@ -155,6 +156,26 @@ def _shown(total: int, before: int) -> "Generator[Callable[[int, Part], None]]":
 
     with bar:
         yield advance
+
+
+def in_sentences(failures: "Sequence[Failure]") -> list[str]:
+    """Return what is said of cases that failed: a log that failed for one reason is named once, with all its verbs.
+
+    Parameters
+    ----------
+    failures : sequence of Failure
+        Of one part.
+
+    Examples
+    --------
+    >>> from experiments.batch.rows import Failure
+    >>> in_sentences([Failure("a.csv", verb, "it is empty") for verb in ("diagnose", "estimate")])
+    ['a.csv (diagnose, estimate): it is empty']
+    """
+    verbs: dict[tuple[str, str], dict[str, None]] = {}
+    for one in failures:
+        verbs.setdefault((one.series, one.reason), {})[one.verb] = None
+    return [f"{series} ({', '.join(each)}): {reason}" for (series, reason), each in verbs.items()]
 
 
 class Pace:

@@ -34,7 +34,7 @@ from experiments.batch.cases import Task
 from experiments.batch.diagnosis import diagnosed
 from experiments.batch.lanes import Lanes, Waiting, write_filtered
 from experiments.batch.other_actuators import found_of, simulated_run
-from experiments.batch.rows import NIS, TRUTH, Row, Rows, error_percent
+from experiments.batch.rows import NIS, TRUTH, Failure, Row, Rows, error_percent
 from experiments.batch.series import Log, Series, Simulated, Work, content_of
 from experiments.command.logs import caught, read_log
 from experiments.running.random_streams import stream
@@ -43,7 +43,7 @@ from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
 from plant.eha.simulate import PLANTS, simulate
-from plant.errors import LogError, LogWarning
+from plant.errors import HydrostateError, LogError, LogWarning
 from plant.log.record import Record
 from plant.sensors.sensors import SENSORS, measure, noise_variances
 
@@ -70,12 +70,12 @@ class Part:
     ----------
     content : bytes
         A Parquet file with one row a case, in the task's order.
-    failures : tuple of pairs of str
-        Case in words, and reason, of each case that failed.
+    failures : tuple of Failure
+        Of each case that failed.
     """
 
     content: bytes
-    failures: tuple[tuple[str, str], ...]
+    failures: tuple[Failure, ...]
 
 
 def run_task(task: Task) -> Part:
@@ -94,7 +94,7 @@ def run_task(task: Task) -> Part:
         try:
             prepared = replace(_prepared(series, task), usual=sum(map(_is_usual, works)))
         except Exception as error:  # whatever a series brings up must not cost the others their results
-            rows.fail(places, error)
+            rows.fail(places, _told_of(series, error))
             continue
         rows.describe(number, prepared.entries)
         if prepared.warnings:
@@ -103,11 +103,18 @@ def run_task(task: Task) -> Part:
             try:
                 _run(place, prepared, work, rows, lanes)
             except Exception as error:  # as above
-                rows.fail([place], error)
+                rows.fail([place], _told_of(series, error))
     lanes.finish()
     part = _as_part(rows)
     _freeze_loaded()
     return part
+
+
+def _told_of(series: Series, error: Exception) -> str | Exception:
+    """Return why a series failed, without the path of its log: the row names the log already."""
+    if isinstance(series, Log) and isinstance(error, HydrostateError) and error.source == series.path:
+        return error.message
+    return error
 
 
 @cache

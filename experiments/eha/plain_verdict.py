@@ -158,10 +158,22 @@ def sureness(result: Mapping[str, Any]) -> str:
         if _named(result):
             return f"This is none of the nine conditions, so do not rely on the numbers below: {reasons}."
         return f"Do not rely on anything on this page: {reasons}."
-    return " ".join(one for one in (_how_sure(result), _cost(result), _since(result)) if one)
+    return " ".join(one for one in (how_sure(result), _cost(result), _since(result)) if one)
 
 
-def _how_sure(result: Mapping[str, Any]) -> str:
+def how_sure(result: Mapping[str, Any]) -> str:
+    """Return how sure the verdict is, in one sentence.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of a diagnosis with probabilities that is not unknown.
+
+    Examples
+    --------
+    >>> how_sure({"condition": "normal", "notes": [], "probabilities": {"normal": 0.9, "minor_leakage": 0.1}})
+    'This is probable (90 %).'
+    """
     told = {name: level for name, level in _levels(result).items() if level is not None}
     share = sum(
         one

@@ -28,12 +28,11 @@ from experiments.serve.limits import (
     Guard,
     RefusedError,
     receive_file,
-    refusal_page,
     require_size,
-    wants_page,
 )
 from experiments.serve.metrics import PROMETHEUS_TEXT, exposition
 from experiments.serve.pages import home_page, live_page, policy_of, policy_of_file
+from experiments.serve.refusals import POLICY, refusal_page, wants_page
 from experiments.serve.service import Service
 from experiments.serve.settings import Settings
 from experiments.serve.store import Kept
@@ -149,7 +148,8 @@ def methods_at(app: FastAPI, scope: Scope) -> list[str]:
 def _answer_errors(app: FastAPI) -> None:
     def answered(request: Request, status: int, detail: str, headers: Mapping[str, str] | None = None) -> Response:
         if wants_page(request.method, request.url.path, request.headers.get("accept", "")):
-            return HTMLResponse(refusal_page(detail), status, headers)
+            policy = {"Content-Security-Policy": POLICY}
+            return HTMLResponse(refusal_page(detail), status, {**(headers or {}), **policy})
         return JSONResponse({"detail": detail}, status, headers)
 
     async def refused(request: Request, error: Exception) -> Response:

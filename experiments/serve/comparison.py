@@ -225,13 +225,13 @@ def plain_words(result: Mapping[str, Any]) -> str:
     result : Mapping
         Entries of the JSON contract.
     """
-    from experiments.eha.plain_verdict import verdict
+    from experiments.eha.plain_verdict import how_sure, verdict
     from faults.conditions import CONDITIONS
 
     if result.get("condition") not in CONDITIONS or not result.get("probabilities"):
         return ""
     said = verdict(result)
-    return said if result["unknown"] else f"{said} Probability {percent_text(max(result['probabilities'].values()))} %."
+    return said if result["unknown"] else f"{said} {how_sure(result)}"
 
 
 def _title(changed: Sequence[Mapping[str, Any]], comparable: bool) -> str:
@@ -249,6 +249,6 @@ def _title(changed: Sequence[Mapping[str, Any]], comparable: bool) -> str:
         ]
         if named:
             before = f"{', '.join(named[:-1])} and " if len(named) > 1 else ""
-            found.append(f"{words} {before}{named[-1]}")
-    more = ", and other differences" if len(changed) > MOST_NAMED else ""
-    return f"The second log has {'; '.join(found)}{more}."
+            found.append(f"{before}{named[-1]} {'are' if before else 'is'} {words}")
+    more = "; more has changed" if len(changed) > MOST_NAMED else ""
+    return f"In the second log, {'; '.join(found)}{more}."

@@ -2,7 +2,6 @@
 
 import asyncio
 import hmac
-import html
 import json
 import os
 import shutil
@@ -13,6 +12,7 @@ from urllib.parse import parse_qs
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from experiments.serve.refusals import POLICY, refusal_page, wants_page
 from experiments.serve.settings import MB, Settings, is_loopback
 
 MOST_REQUESTS = 256
@@ -134,28 +134,6 @@ class Guard:
         return None
 
 
-def wants_page(method: str, path: str, accept: str) -> bool:
-    """Return whether a refusal is read by a person: a browser asks for a page, a program says what it accepts.
-
-    Examples
-    --------
-    >>> wants_page("GET", "/fleet", "text/html,*/*;q=0.8"), wants_page("GET", "/fleet", "*/*")
-    (True, False)
-    """
-    return method == "GET" and "text/html" in accept and not path.startswith("/api/")
-
-
-def refusal_page(detail: str) -> str:
-    """Return the page that says why there is no other."""
-    said = html.escape(f"{detail[:1].upper()}{detail[1:].rstrip('.')}.")
-    return (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>Hydrostate: not shown</title>'
-        '<meta name="viewport" content="width=device-width"><meta name="color-scheme" content="light dark"></head>'
-        f'<body><main><h1>This page cannot be shown.</h1><p>{said}</p><p><a href="/">All logs</a></p></main></body>'
-        "</html>\n"
-    )
-
-
 def _same(given: str, token: str) -> bool:
     return hmac.compare_digest(given.encode("utf-8", "replace"), token.encode())
 
@@ -213,6 +191,7 @@ class _Exchange:
         body = (refusal_page(detail) if page else json.dumps({"detail": detail})).encode()
         kind = b"text/html; charset=utf-8" if page else b"application/json"
         about = [(b"content-type", kind), (b"content-length", str(len(body)).encode())]
+        about += [(b"content-security-policy", POLICY.encode())] if page else []
         await self.send({"type": "http.response.start", "status": status, "headers": [*about, *headers]})
         await self.send({"type": "http.response.body", "body": body})
 

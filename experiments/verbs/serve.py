@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from experiments.command.options import Columns, Plant, RigFile, argument, load_actuator, load_columns, option
-from experiments.command.terminal import emit
+from experiments.command.terminal import emit, note
 from plant.errors import HydrostateError
 
 FOLDER = Path("hydrostate-server")
@@ -97,6 +97,8 @@ def serve(
         streams=_streams(watch or []),
         false_alarms=false_alarms,
     )
+    elsewhere = "; to keep them elsewhere: hydrostate serve FOLDER" if folder == FOLDER else ""
+    note(f"logs, pages and results are kept in {folder.resolve()}{elsewhere}")
     run_server(settings, emit)
 
 

@@ -45,7 +45,10 @@ class LogCode(Code):
     )
     END_LEFT_OUT = "lines left out after row {taken}, the last row of data: {count}"
     COLUMNS_ABSENT = "the rig file names columns that the log does not have: {columns}"
-    COLUMN_OVERLOOKED = "column {column!r} was not used, but it may be {channel}; if it is, add --columns '{option}'"
+    COLUMN_OVERLOOKED = (
+        "column {column!r} was not used, but it may be {channel}; if it is, name it under [columns] in the rig file, "
+        "or add --columns '{option}'"
+    )
     CHAMBER_ALONE = "{channel} was not used: differential pressure also needs {other}"
     METADATA_UNREADABLE = "the log's metadata are not a valid {wanted} and were ignored"
     SAMPLE_TIME_SHORT = (

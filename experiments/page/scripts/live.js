@@ -4,7 +4,7 @@
 (() => {
   const KEPT = 2400; // gauges that are kept, as the server does
   const DRAWN = 500; // time between two drawings [ms]
-  const HEIGHT = 140; // of a chart [px]
+  const HEIGHT = 160; // of a chart [px]
   const UNITS = {
     _rad_s: ["rpm", 30 / Math.PI],
     _m_s: ["mm/s", 1e3],
@@ -18,7 +18,7 @@
   const state = document.querySelector(".live-state");
   const alarms = document.querySelector(".alarms tbody");
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-  const digits = (value) => (value === null || value === undefined ? "–" : Number(value.toPrecision(4)).toString());
+  const digits = (value) => (value === null || value === undefined ? "–" : Number(value.toPrecision(4)).toString().replace("-", "−"));
   const charts = new Map();
   let points = [];
   let dirty = false;
@@ -33,8 +33,12 @@
   function unitOf(channel) {
     const ending = Object.keys(UNITS).sort((a, b) => b.length - a.length).find((one) => channel.endsWith(one));
     const [unit, factor] = ending ? UNITS[ending] : ["", 1];
-    return { words: (ending ? channel.slice(0, -ending.length) : channel).replaceAll("_", " "), unit, factor };
+    const words = (ending ? channel.slice(0, -ending.length) : channel).replaceAll("_", " ");
+    return { words: words.replace(/ [ab]$/, (chamber) => chamber.toUpperCase()), unit, factor };
   }
+
+  const BALANCES = { loss: "lost flow" }; // the others are a balance of what they are called after
+  const balanceWords = (balance) => BALANCES[balance] ?? `${balance} balance`;
 
   const share = (point, balance) => {
     const [score, threshold] = [point.scores[balance], point.thresholds[balance]];
@@ -71,11 +75,12 @@
     const tiles = Object.keys(point.values).map((channel) => {
       const { words, unit, factor } = unitOf(channel);
       const ends = [point.low[channel], point.high[channel]].map((one) => (one === undefined ? "–" : digits(factor * one)));
-      return tile(words, digits(point.values[channel] === null ? null : factor * point.values[channel]), unit, `${ends[0]} to ${ends[1]}`);
+      return tile(words, digits(point.values[channel] === null ? null : factor * point.values[channel]), unit, `last quarter second: ${ends[0]} to ${ends[1]}`);
     });
     for (const balance of Object.keys(point.scores)) {
       const part = share(point, balance);
-      tiles.push(tile(`${balance} balance, share of an alarm`, part === null ? "learning" : digits(part), part === null ? "" : "%", "100 % raises one"));
+      const [value, unit] = part === null ? ["learning", ""] : [digits(Math.round(part)), "%"];
+      tiles.push(tile(`${balanceWords(balance)}: how close to an alarm`, value, unit, "an alarm is raised at 100 %"));
     }
     tiles.push(tile("rows", String(point.rows), "", `${point.gaps} gaps, ${point.left_out} left out, ${digits(point.time_s)} s`));
     gauges.replaceChildren(...tiles);
@@ -96,7 +101,7 @@
         legend: { show: false },
         cursor: { show: false },
         scales: { x: { time: false }, y: two ? {} : share },
-        axes: [{ ...axis, space: 60 }, { ...axis, size: 64 }],
+        axes: [{ ...axis, space: 60, label: "time of the stream [s]", labelSize: 18, labelFont: "12px sans-serif" }, { ...axis, size: 64, values: (_, ticks) => ticks.map(digits) }],
         series: two ? [{}, line, line] : [{}, line],
         bands: two ? [{ series: [2, 1], fill: `${css("blue")}44` }] : [],
       },
@@ -120,7 +125,9 @@
       chart(words, unit, true).setData([times, ...ends]);
     }
     for (const balance of Object.keys(last.scores)) {
-      chart(`${balance} balance, share of an alarm`, "%", false).setData([times, points.map((one) => share(one, balance))]);
+      const shares = points.map((one) => share(one, balance));
+      if (shares.every((one) => one === null)) continue; // it is learnt still
+      chart(`${balanceWords(balance)}: how close to an alarm`, "%", false).setData([times, shares]);
     }
     document.documentElement.classList.add("live-drawn");
   }

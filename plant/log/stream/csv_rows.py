@@ -5,6 +5,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain, islice, pairwise
 from statistics import median
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,9 @@ AT_ONCE = 5.0
 
 BEHIND = 1e-6
 """Least step in time, as a share of the time between samples, that counts as forward [fraction]."""
+
+_Placed: TypeAlias = tuple[int, NDArray[np.float64]]
+"""A row with its place below the header."""
 
 
 class CsvStream:
@@ -95,7 +99,7 @@ class CsvStream:
         self.cut = False
         """Whether the stream ended within a row, or without its line's end; that row is left out."""
         rows = self._rows()
-        first = list(islice(rows, FIRST_ROWS))
+        first = self._without_strange_start(list(islice(rows, FIRST_ROWS)))
         if len(first) < 2:
             said = f", and {self.left_out} that were garbage; {self.first_left_out}" if self.left_out else ""
             raise LogError(
@@ -144,6 +148,17 @@ class CsvStream:
                 waiting, gap = [], False
         if waiting:
             yield last, np.array(waiting), gap
+
+    def _without_strange_start(self, first: list[_Placed]) -> list[_Placed]:
+        """Return the first rows from one on that most of the others follow: a time far ahead would end the stream."""
+        while len(first) > 2:
+            (place, begin), *others = first
+            if 2 * sum(row[0] > begin[0] for _, row in others) >= len(others):
+                break
+            said = f"{TIME} must increase from row to row, but {begin[0]:g} s in row {place + 1} is ahead of later rows"
+            self._leave_out(LogError(said, self._source))
+            first = others
+        return first
 
     def _in_order(self) -> Iterator[NDArray[np.float64]]:
         """Yield the rows whose time increases; a jump ahead is believed if the next row does not go back before it."""

@@ -8,6 +8,7 @@ import pytest
 from benchmarks.diagnosis.population import OUT_OF_MODEL, TEST, draw_logs
 from estimation.notes import SensorCode
 from experiments.batch.diagnosis import class_row, diagnosed
+from experiments.page.condition_names import in_words
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.diagnose import diagnose_log
 from plant.eha.drives import make_drive
@@ -77,7 +78,7 @@ def test_conditions_that_move_alike_are_no_class() -> None:
     row = class_row(alike)
     assert row["outcome"] == "not_observable"
     assert row["margin"] == pytest.approx(0.5001 / 0.4999)
-    assert f"{best} and {second} move alike" in row["reason"]
+    assert f"{in_words(best)} and {in_words(second)} look alike" in row["reason"]
     assert "found_condition" not in row
     apart = class_row(replace(alike, probabilities={**alike.probabilities, best: 0.51, second: 0.49}))
     assert (apart["outcome"], apart["found_condition"]) == ("ok", best)

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from experiments.batch import run_on_terminal
+from experiments.batch.rows import Failure
 from experiments.batch.runner import sources
 from experiments.batch.study_file import parse_study
 from experiments.verbs import batch
@@ -57,12 +58,19 @@ def test_nothing_is_said_of_the_same_software_or_of_a_new_store(old: Any, said: 
 
 
 def test_only_the_first_failures_are_named(said: list[str]) -> None:
-    failures = [(f"case {k}", "no log") for k in range(run_on_terminal.MOST_NAMED + 3)]
+    failures = [Failure(f"case {k}", "filter", "no log") for k in range(run_on_terminal.MOST_NAMED + 3)]
     with run_on_terminal._shown(len(failures), 0) as advance:
         advance(len(failures), SimpleNamespace(failures=failures))  # type: ignore[arg-type]
     named = [one for one in said if one.startswith("case ")]
-    assert named == [f"case {k}: no log" for k in range(run_on_terminal.MOST_NAMED)]
+    assert named == [f"case {k} (filter): no log" for k in range(run_on_terminal.MOST_NAMED)]
     assert said.count("more cases failed; the report names all") == 1
+
+
+def test_a_log_that_cannot_be_read_is_named_once_with_all_that_was_asked_of_it(said: list[str]) -> None:
+    failures = [Failure("a.csv", verb, "it is empty") for verb in ("diagnose", "estimate", "estimate")]
+    with run_on_terminal._shown(4, 0) as advance:
+        advance(4, SimpleNamespace(failures=[*failures, Failure("b.csv", "estimate", "no time")]))  # type: ignore[arg-type]
+    assert said == ["a.csv (diagnose, estimate): it is empty", "b.csv (estimate): no time"]
 
 
 def test_pace_counts_only_what_this_run_did(monkeypatch: pytest.MonkeyPatch) -> None:

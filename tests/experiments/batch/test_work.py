@@ -61,7 +61,7 @@ def test_a_series_that_cannot_be_run_is_rows_with_their_reason() -> None:
     outcomes = table_of(part)["outcome"].to_pylist()
     assert outcomes == ["ok"] * 3 + ["failed"] * 3
     assert len(part.failures) == 3
-    assert "drive must be one of sine" in part.failures[0][1]
+    assert "drive must be one of sine" in part.failures[0].reason
 
 
 def test_a_log_that_cannot_be_read_is_a_row_and_the_others_are_diagnosed(tmp_path: Path) -> None:
@@ -78,6 +78,7 @@ def test_a_log_that_cannot_be_read_is_a_row_and_the_others_are_diagnosed(tmp_pat
     assert [row["outcome"] for row in rows] == ["mismatch", "failed", "failed", "failed"]
     assert "in none of the nine conditions" in rows[0]["reason"]
     assert "the file is empty" in rows[2]["reason"]
+    assert not any(str(tmp_path) in row["reason"] for row in rows)  # the row names its log
     assert "there is no such file" in rows[3]["reason"]
 
 
@@ -87,8 +88,8 @@ def test_a_log_that_changes_after_the_study_began_is_not_taken_for_what_it_was(t
     logs = [{"glob": "*.csv", "methods": [{"verb": "diagnose"}]}]
     plan = plan_study(parse_study({"name": "logs", "logs": logs}, "logs.toml"), tmp_path)
     (tmp_path / "a.csv").write_text(text.replace("1,0", "2,0"), encoding="utf-8")
-    ((_, reason),) = run_task(Task(plan.rig, plan.groups)).failures
-    assert "was changed after the study began" in reason
+    (failure,) = run_task(Task(plan.rig, plan.groups)).failures
+    assert "was changed after the study began" in failure.reason
 
 
 def test_drives_that_are_drawn_once_hold_nothing_random() -> None:
@@ -225,6 +226,5 @@ def test_cases_of_a_worker_that_ended_are_failed_rows_with_their_keys() -> None:
     rows = table_of(part).to_pylist()
     assert [row["key"] for row in rows] == list(plan.keys)
     assert {(row["outcome"], row["reason"]) for row in rows} == {("failed", "the worker ended")}
-    words = [said for said, _ in part.failures]
-    assert words[0] == "reduced sine normal seed 0 (filter)"
-    assert len(words) == len(rows)
+    assert part.failures[0] == ("reduced sine normal seed 0", "filter", "the worker ended")
+    assert len(part.failures) == len(rows)

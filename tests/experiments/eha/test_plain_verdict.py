@@ -74,7 +74,7 @@ def test_a_fault_that_has_a_name_comes_before_its_size() -> None:
 
 
 def test_soft_oil_is_in_the_verdict_and_leaves_something_to_repair() -> None:
-    soft = {"notes": [AdviceCode.BLEED.note(percent=27.0).to_dict()]}
+    soft = {"notes": [AdviceCode.BLEED.note(percent=27.0, volume=1.5e-3).to_dict()]}
     assert "softer than its limit; leakage and friction are normal" in verdict(said_of("normal", **soft))
     assert verdict(said_of("minor_leakage", **soft)).endswith("; its oil is softer than its limit.")
     assert what_to_do(said_of("normal", **soft)) == ["Log again."]

@@ -204,7 +204,7 @@ def test_two_logs_are_compared_and_the_fleet_has_both(served: Served, monkeypatc
     assert (row["difference"], row["changed"]) == (2.0, True)
     assert row["interval"] == pytest.approx(interval_95(2.0, 0.1 * 2**0.5))
     page = client.get("/compare", params={"first": pair[0], "second": pair[1]}).text
-    assert "The second log has higher leakage." in page
+    assert "In the second log, leakage is higher." in page
     assert "<b>_2" not in page
     fleet = client.get("/fleet")
     assert "1 of 2 actuators is past a limit." in fleet.text

@@ -46,7 +46,7 @@ def test_the_page_of_two_logs_shows_readers_units_and_no_tag_of_a_name() -> None
     bulk = {"value": 2.0e8, "std": 1e6, "ci95": [1.98e8, 2.02e8]}
     first = {"file": "<img src=x>.csv", "message": "one", "bulk_modulus_pa": bulk, "probabilities": {"normal": 0.9}}
     page = compare_view(first, {**first, "file": "b.csv", "bulk_modulus_pa": {**bulk, "value": 1.5e8}})
-    assert "The second log has lower bulk modulus." in page
+    assert "In the second log, bulk modulus is lower." in page
     assert "200.0 (198.0 to 202.0)" in page
     assert "bulk modulus [MPa]" in page
     assert "<img src=x>" not in page
@@ -76,7 +76,7 @@ def test_the_title_says_what_the_second_log_has_more_of_and_less() -> None:
     first = {"file": "a", "message": "so", "quantities": {n: {"value": 1.0, "std": 0.01, "unit": ""} for n in "abc"}}
     values = {"a": 2.0, "b": 0.5, "c": 0.2}
     second = {**first, "quantities": {name: {"value": one, "std": 0.01, "unit": ""} for name, one in values.items()}}
-    assert "<h1>The second log has higher a; lower b and c.</h1>" in compare_view(first, second)
+    assert "<h1>In the second log, a is higher; b and c are lower.</h1>" in compare_view(first, second)
 
 
 def test_a_comparison_leads_to_both_logs_back_and_the_other_way_round() -> None:
@@ -97,7 +97,7 @@ def test_a_diagnosis_is_told_in_the_words_of_its_page_and_an_unknown_one_with_a_
         "reasons": [],
     }
     shares = {"minor_leakage": 0.97, "normal": 0.03}
-    said = "The actuator leaks inside more than it should (minor leakage); friction is normal. Probability 97.0 %."
+    said = "The actuator leaks inside more than it should (minor leakage); friction is normal. This is probable (97 %)."
     assert plain_words({**leaks, "probabilities": shares}) == said
     assert plain_words({"condition": None, "message": "no"}) == plain_words({"message": "2 GPa"}) == ""
     doubtful = {**leaks, "unknown": True, "probabilities": shares}

@@ -37,6 +37,17 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     assert "file: a folder is needed, got a file" in refused(tmp_path / "file", "--port", "0")
 
 
+@pytest.mark.parametrize("named", [True, False])
+def test_the_folder_that_keeps_everything_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: bool) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("experiments.serve.server.run_server", lambda *_: None)
+    done = CliRunner().invoke(app, ["serve", *(["kept"] if named else [])])
+    assert done.exit_code == 0, done.output
+    folder = tmp_path / ("kept" if named else "hydrostate-server")
+    assert f"logs, pages and results are kept in {folder}" in done.stderr.replace("\n", "")
+    assert ("hydrostate serve FOLDER" in done.stderr) is not named
+
+
 def test_a_missing_package_is_named_with_what_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "experiments.serve.server", None)  # as where what it imports is missing
     assert "pip install 'hydrostate[serve]'" in refused()

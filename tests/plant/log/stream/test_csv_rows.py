@@ -115,6 +115,26 @@ def test_a_time_that_lost_its_point_is_no_gap() -> None:
     assert (len(samples), gap, stream.left_out) == (201, False, 1)
 
 
+@pytest.mark.parametrize("count", [1, 3])
+def test_first_rows_whose_time_is_far_ahead_do_not_end_the_stream(count: int) -> None:
+    ahead = [f"{5_000_000 + k},1,2\n" for k in range(count)]
+    stream = CsvStream([HEADER, *ahead, *_rows(100)], source="bench")
+    ((last, samples, gap),) = stream.samples(1000)
+    assert (stream.start_time, stream.left_out, last, len(samples), gap) == (
+        0.0,
+        count,
+        pytest.approx(0.099),
+        100,
+        False,
+    )
+    assert "5000 s in row 1 is ahead of later rows" in stream.first_left_out
+
+
+def test_a_clock_that_runs_backwards_from_the_start_is_refused() -> None:
+    with pytest.raises(LogError, match="must increase from row to row"):
+        CsvStream([HEADER, *reversed(_rows(100))], source="bench")
+
+
 def test_a_stream_of_something_else_says_what_came() -> None:
     with pytest.raises(LogError, match=r"at least two rows .* got 0, and 3 that were garbage; every row must"):
         CsvStream([HEADER, "a\n", "b\n", "c\n"], source="bench")

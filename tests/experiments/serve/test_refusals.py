@@ -1,0 +1,35 @@
+"""A person who is refused a page reads why, in light and in dark, on a page that may do nothing else."""
+
+from typing import Any
+
+import pytest
+
+from experiments.serve.refusals import POLICY, refusal_page
+from tests.experiments.serve.conftest import Served
+
+BROWSER = {"accept": "text/html,*/*;q=0.8"}
+
+
+def test_what_a_request_brought_is_no_markup() -> None:
+    page = refusal_page("there is no <script>alert(1)</script>.")
+    assert "<script" not in page
+    assert "There is no &lt;script&gt;" in page
+
+
+@pytest.mark.parametrize("path", ["/nothing", "/logs/0000000000000000", "/live/press"])
+def test_a_browser_is_refused_by_a_page_with_its_own_style_alone(served: Served, path: str) -> None:
+    answer = served().get(path, headers=BROWSER)
+    assert answer.status_code == 404
+    assert answer.headers["content-security-policy"] == POLICY
+    assert "<style>" in answer.text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_refusal_can_be_read_in_light_and_in_dark(browser: Any, scheme: str) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
+    page = browser.new_page(viewport={"width": 390, "height": 800}, color_scheme=scheme)
+    page.set_content(refusal_page("there is no log 0000000000000000"))
+    found = axe.Axe().run(page).response["violations"]
+    assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
+    page.close()
