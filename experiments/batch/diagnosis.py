@@ -12,6 +12,7 @@ from estimation.notes import ChannelCode, SensorCode
 from experiments.log_pages.entries import quantity_entry
 from experiments.page.condition_names import in_words
 from faults.diagnosis.diagnose import diagnose_log
+from faults.diagnosis.severity import not_determined
 from faults.notes import ClassCode
 from plant.eha.rig import Rig
 from plant.errors import LogWarning
@@ -80,12 +81,13 @@ def class_row(found: Finding) -> dict[str, Any]:
 
 
 def _severities(found: Finding) -> dict[str, Any]:
-    """Return how bad it is, each severity with that of the healthy actuator and its limit."""
+    """Return how bad it is, each severity that the log tells, with that of the healthy actuator and its limit."""
     healthy, limits = found.healthy, found.evidence.diagnosis.limits
+    unseen = not_determined([note.code for note in found.not_told])
     return {
         name: {**quantity_entry(one), "healthy": float(healthy[name]), "limit": limits.get(name)}
         for name, one in found.severities.items()
-        if one.value is None or math.isfinite(one.value)
+        if name not in unseen and (one.value is None or math.isfinite(one.value))
     }
 
 

@@ -6,6 +6,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from experiments.nine_conditions.convergence import MEGA
 from experiments.nine_conditions.estimates import draw_intervals
 from experiments.page.style import (
     BESIDE_CONDITIONS,
@@ -45,11 +46,11 @@ def draw_bulk_modulus(tables: Mapping[str, pd.DataFrame]) -> Figure:
         rows = estimates[estimates["form"] == form]
         first = rows.iloc[0]
         pressure = "dp logged" if first["pressure_logged"] else "dp not logged"
-        axis.set(title=f"{form} form, {first['drive']}, {pressure}", xlabel="effective bulk modulus [1e8 Pa]")
+        axis.set(title=f"{form} form, {first['drive']}, {pressure}", xlabel="effective bulk modulus [MPa]")
         _estimates_of(axis, rows, heights, FORM_COLOURS[form])
-        truth = float(first["truth_pa"]) / 1e8
+        truth = float(first["truth_pa"]) / MEGA
         axis.axvline(truth, color=BLACK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=0)
-        ends = rows[["value_pa", "ci95_low_pa", "ci95_high_pa", "truth_pa"]] / 1e8
+        ends = rows[["value_pa", "ci95_low_pa", "ci95_high_pa", "truth_pa"]] / MEGA
         low, high = max(0.0, float(ends.min().min())), min(2.0 * truth, float(ends.max().max()))
         axis.set(xlim=(low - 0.05 * (high - low), high + 0.05 * (high - low)))
         axis.locator_params(axis="x", nbins=5)

@@ -10,13 +10,14 @@ from experiments.eha.plain_verdict import of_another_size, sureness, verdict, wh
 from experiments.eha.verdict_words import SHOWN, amount, library_sentence
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.page.charts import Charts
-from experiments.page.numbers import percent_text
+from experiments.page.numbers import MINUS, percent_text
 from experiments.page.panels import Curve, Mark, Panel
 from experiments.page.render import render_page
 from experiments.page.sentences import sentence
 from experiments.page.severity_rows import severity_rows
 from experiments.page.words import in_words
 from faults.diagnosis.circuits.blocks import blocks_of
+from faults.diagnosis.severity import not_determined
 
 if TYPE_CHECKING:
     from estimation.finding import Finding
@@ -38,6 +39,8 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         Entries of the diagnosis, and ``file``.
     """
     name = Path(result["file"]).name
+    unseen = not_determined([note.code for note in found.not_told])
+    told = {name: one for name, one in found.severities.items() if name not in unseen}
     shares = sorted(found.probabilities.items(), key=lambda item: -item[1])
     facts = {
         "result": result,
@@ -57,9 +60,11 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
             (in_words(condition), 100.0 * share, percent_text(share), share < LEAST_SHARE)
             for condition, share in shares
         ],
-        "rows": severity_rows(found.severities, found.healthy, found.evidence.diagnosis.limits, SHOWN),
-        "amounts": {name: amount(one) for name, one in result["severity"].items()},
-        "not_determined": [SHOWN[name] for name, one in found.severities.items() if one.value is None],
+        "rows": severity_rows(told, found.healthy, found.evidence.diagnosis.limits, SHOWN),
+        "amounts": {name: amount(one).replace("-", MINUS) for name, one in result["severity"].items()},
+        "not_determined": [
+            SHOWN[name] for name, one in found.severities.items() if one.value is None or name in unseen
+        ],
         "changed": found.since is not None,
         "charts": {
             "fit": fit_charts(found, Path(name).stem),

@@ -64,7 +64,7 @@ class Outlook:
         if len(self.logs) - self.trend.begin < FEWEST:
             return "too few logs"
         if self.left is None and self.alarm:  # the last log alone may lie within it
-            return "past the limit, by its trend"
+            return "the trend is past the limit"
         if self.left is None:
             return "growing" if self.trend.certain else "no certain growth"
         low, middle, high = self.left

@@ -18,6 +18,13 @@ if TYPE_CHECKING:
     from estimation.finding import Finding, Quantity
     from plant.log.record import Record
 
+ACTUATORS = {
+    "eha": "electro-hydrostatic actuator",
+    "piezo-stack": "piezo-stack actuator",
+    "diaphragm-motor": "diaphragm motor",
+}
+"""Kinds of actuator in words."""
+
 LEAST_SHARE = 0.001
 """Probability below which a condition is not listed [probability]."""
 
@@ -30,7 +37,6 @@ COLUMNS = {
         "value",
         Column("interval", "95 % interval"),
         Column("total", "with rig error"),
-        "unit",
     ),
     "probabilities": ("condition", Column("percent", "probability", "%")),
 }
@@ -55,7 +61,7 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
         "result": result,
         "file": file,
         "title": _title(found),
-        "actuator": found.actuator,
+        "actuator": ACTUATORS.get(found.actuator, found.actuator),
         "message": sentence(message),
         "to_do": to_do,
         "doubts": [
@@ -106,11 +112,10 @@ def _title(found: "Finding") -> str:
 def _row(name: str, one: "Quantity") -> dict[str, str]:
     scale, unit = shop_unit(one.unit)
     return {
-        "quantity": name.replace("_", " "),
+        "quantity": f"{name.replace('_', ' ')}{f' [{_whole(pretty_unit(unit))}]' if unit != '1' else ''}",
         "value": _whole(number(None if one.value is None else scale * one.value)),
         "interval": _ends(one.ci95, scale),
         "total": _ends(one.ci95_total, scale),
-        "unit": _whole(pretty_unit(unit)),
     }
 
 

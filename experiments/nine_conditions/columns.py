@@ -27,11 +27,11 @@ from experiments.page.tables import Cell, Column, Columns, Row, as_given, decima
 from experiments.page.words import CONDITION, in_words
 from experiments.running.study import versions
 
-TENTH_GIGA_PASCAL = 1e-8
-"""From Pa to 1e8 Pa."""
+MEGAPASCAL = 1e-6
+"""From Pa to MPa."""
 
 
-SCALAR_UNITS: Mapping[str, tuple[str, float]] = {"1": ("%", 100.0), "Hz": ("Hz", 1.0), "Pa": ("Pa", 1.0)}
+SCALAR_UNITS: Mapping[str, tuple[str, float]] = {"1": ("%", 100.0), "Hz": ("Hz", 1.0), "Pa": ("MPa", 1e-6)}
 """How a scalar is shown, by its SI unit."""
 
 SETTING_UNITS: Mapping[str, str] = {
@@ -91,7 +91,7 @@ def filterpy_by_experiment(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def _beside_filterpy(entry: Row) -> Cell:
-    ours, its = (number(TENTH_GIGA_PASCAL * entry[name], 5) for name in ("ours_pa", "filterpy_pa"))
+    ours, its = (number(MEGAPASCAL * entry[name], 5) for name in ("ours_pa", "filterpy_pa"))
     apart = f"{entry['verdict']}, {number(entry['largest_difference'], 1)}"
     return Cell(f"{ours}; {its} ({apart})", "good" if entry["verdict"] == "equal" else "bad")
 
@@ -103,7 +103,7 @@ def _estimate(rows: pd.DataFrame, key: Experiment) -> Cell:
         outcome = spaced(str(rows["outcome"].iloc[0]))
         return Cell(f"{outcome} (bound {number(bound, 2)} %)" if math.isfinite(bound) else outcome, "none")
     digits = 4 if key.form in {"pressure", "flow"} or key.plant == "reduced" else 2
-    low, high = (number(TENTH_GIGA_PASCAL * value, digits) for value in (values.min(), values.max()))
+    low, high = (number(MEGAPASCAL * value, digits) for value in (values.min(), values.max()))
     worst = number(float(rows["error_percent"].astype(float).abs().max()), 2)
     spread = low if low == high else f"{low} to {high}"
     return Cell(f"{spread}, {worst} %", "" if bool(rows["gate_passed"].all()) else "bad")
@@ -189,14 +189,14 @@ COLUMNS: Mapping[str, Columns] = {
         Column("recovered", "conditions recovered", of_row=_recovered),
         Column("passed", "gate passes", "estimates", of_row=_of_estimates("passed")),
         Column("covered", "interval holds the truth", "estimates", of_row=_of_estimates("covered")),
-        Column("mean_pa", "mean estimate", "1e8 Pa", TENTH_GIGA_PASCAL),
+        Column("mean_pa", "mean estimate"),
         Column("worst_error_percent", digits=2),
         Column("wanted_percent", "error allowed", digits=1),
         Column("unobservable", "conditions not observable", words=lambda names: right(str(len(names)))),
         Column("missed", "conditions missed", words=lambda names: "; ".join(names) or "none"),
     ),
-    "filterpy by experiment": (CONDITION, lambda name: Column(name, name, "1e8 Pa: ours; filterpy")),
-    "estimates by condition": (CONDITION, lambda name: Column(name, name, "1e8 Pa, worst error")),
+    "filterpy by experiment": (CONDITION, lambda name: Column(name, name, "MPa: ours; filterpy")),
+    "estimates by condition": (CONDITION, lambda name: Column(name, name, "MPa, worst error")),
     "models": (
         Column("condition", words=lambda name: Cell(name, "name")),
         Column("source", "model", words=lambda source: Cell(source, "name")),

@@ -14,14 +14,14 @@ from experiments.page.drawing import say
 from experiments.page.style import BLACK, BLUE, SKY, VERMILION, Margins, panels
 from experiments.page.words import in_words
 
-GIGA_TENTH = 1e8
-"""Bulk modulus is drawn in units of this many pascal, as in Figure 11."""
+MEGA = 1e6
+"""Bulk modulus is drawn in megapascal, as the text and the tables have it; Figure 11 has 1e8 Pa."""
 
 GUESS_COLOURS = LinearSegmentedColormap.from_list("guesses", [BLUE, SKY, VERMILION])
 """From the lowest first guess to the highest."""
 
-TOP = 6.0
-"""Upper end of the axis [1e8 Pa]; Figure 11 ends at 5."""
+TOP = 600.0
+"""Upper end of the axis [MPa]; Figure 11 ends at 500."""
 
 
 TITLES: Mapping[Experiment, str] = {
@@ -59,20 +59,20 @@ def draw_convergence(shown: Experiment, curves: pd.DataFrame, truth_pa: float) -
         axis.set(title=in_words(str(condition)))
     _time_axis(axes[0], first_tick, last)
     figure.supxlabel(f"time [s], logarithmic after the first {1e3 * first_tick:g} ms", fontsize=9, y=0.01)
-    figure.supylabel("effective bulk modulus [1e8 Pa]", fontsize=9, x=0.005)
-    truth = truth_pa / GIGA_TENTH
-    say(axes[0], f"truth {truth:.2f}", (last, truth), (0, 4), ha="right")
+    figure.supylabel("effective bulk modulus [MPa]", fontsize=9, x=0.005)
+    truth = truth_pa / MEGA
+    say(axes[0], f"truth {truth:.0f}", (last, truth), (0, 4), ha="right")
     say(axes[0], "first guesses", (0.0, TOP), (6, -6), va="top", fontsize=8)
     return figure
 
 
 def _panel(axis: Axes, rows: pd.DataFrame, colours: Mapping[float, object], truth_pa: float) -> None:
     for guess, curve in rows.groupby("start_pa", sort=True):
-        value = curve["bulk_modulus_pa"] / GIGA_TENTH
+        value = curve["bulk_modulus_pa"] / MEGA
         colour = colours[float(str(guess))]
         axis.plot(curve["time_s"], value, color=colour, linewidth=1.2)
         axis.plot(curve["time_s"].iloc[:1], value.iloc[:1], "o", color=colour, markersize=4, clip_on=False, zorder=5)
-    axis.axhline(truth_pa / GIGA_TENTH, color=BLACK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=4)
+    axis.axhline(truth_pa / MEGA, color=BLACK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=4)
 
 
 def _time_axis(axis: Axes, first_tick: float, last: float) -> None:

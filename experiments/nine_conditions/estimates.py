@@ -6,7 +6,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.nine_conditions.convergence import GIGA_TENTH
+from experiments.nine_conditions.convergence import MEGA
 from experiments.nine_conditions.findings import by_experiment, experiment_in_words
 from experiments.page.drawing import say
 from experiments.page.style import (
@@ -57,15 +57,15 @@ def draw_estimates(estimates: pd.DataFrame, truth_pa: float) -> Figure:
 
 
 def _experiment(axis: Axes, rows: pd.DataFrame, heights: Mapping[str, float], truth_pa: float) -> None:
-    truth = truth_pa / GIGA_TENTH
+    truth = truth_pa / MEGA
     low, high = truth * (1.0 - NARROW), truth * (1.0 + NARROW)
     axis.axvspan(truth * 0.99, truth * 1.01, color="#eef4f8", zorder=0)
     axis.axvline(truth, color=BLACK, linewidth=1.0, linestyle=(0, (4, 3)))
-    axis.set(xlim=(low, high), xlabel="effective bulk modulus [1e8 Pa]")
+    axis.set(xlim=(low, high), xlabel="effective bulk modulus [MPa]")
     for condition, found in rows.groupby("condition", sort=False):
         height = heights[str(condition)]
         values = found.dropna(subset=["value_pa"])
-        inside = values[(values["value_pa"] / GIGA_TENTH).between(low, high)]
+        inside = values[(values["value_pa"] / MEGA).between(low, high)]
         if len(values) == 0:
             _say(axis, height, truth, str(found["outcome"].iloc[0]).replace("_", " "))
         elif len(inside) == 0:
@@ -80,7 +80,7 @@ def draw_intervals(axis: Axes, rows: pd.DataFrame, height: float, size: float, c
     Parameters
     ----------
     axis : Axes
-        Where; across, bulk modulus [1e8 Pa].
+        Where; across, bulk modulus [MPa].
     height : float
         The middle of their marks [count].
     size : float
@@ -89,8 +89,8 @@ def draw_intervals(axis: Axes, rows: pd.DataFrame, height: float, size: float, c
         From an estimate's row to its colour.
     """
     for offset, row in zip(spread_out(len(rows), 0.5), rows.to_dict("records"), strict=True):
-        centre = row["value_pa"] / GIGA_TENTH
-        reach = 0.5 * (row["ci95_high_pa"] - row["ci95_low_pa"]) / GIGA_TENTH
+        centre = row["value_pa"] / MEGA
+        reach = 0.5 * (row["ci95_high_pa"] - row["ci95_low_pa"]) / MEGA
         axis.errorbar(centre, height + offset, xerr=reach, fmt="o", markersize=size, linewidth=0.9, color=colour(row))
 
 
@@ -123,16 +123,16 @@ def draw_forms(estimates: pd.DataFrame, truth_pa: float) -> Figure:
     title = "Where two filters settle on a plant that sticks, driven by the 10 Hz sine"
     figure, (axis,) = panels(title, 1, 1, 3.9, BESIDE_CONDITIONS)
     heights = condition_rows(axis, list(dict.fromkeys(sine["condition"])))
-    truth = truth_pa / GIGA_TENTH
+    truth = truth_pa / MEGA
     places = ((0.0, 8, "left"), (truth, -8, "right"))
     for (rows, colour, words), (x, shift, side) in zip(shown, places, strict=True):
         for condition, found in rows.groupby("condition", sort=False):
             level = [heights[str(condition)] + offset for offset in spread_out(len(found), 0.4)]
-            axis.plot(found["filter_settled_at_pa"] / GIGA_TENTH, level, "o", markersize=4, color=colour, alpha=0.8)
+            axis.plot(found["filter_settled_at_pa"] / MEGA, level, "o", markersize=4, color=colour, alpha=0.8)
         look = {"color": colour, "ha": side, "fontweight": "bold", "annotation_clip": False}
         say(axis, words, (x, len(heights) - 0.45), (shift, 0), **look)
     axis.axvline(truth, color=BLACK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=0)
-    say(axis, f"truth {truth:.2f}", (truth, -0.5), (5, 0), va="bottom")
+    say(axis, f"truth {truth:.0f}", (truth, -0.5), (5, 0), va="bottom")
     axis.set(ylim=(-0.6, len(heights) - 0.1), xlim=(-0.04, 1.2 * truth))
-    axis.set(xlabel="where the filter settles: mean over the last 20 % [1e8 Pa]")
+    axis.set(xlabel="where the filter settles: mean over the last 20 % [MPa]")
     return figure

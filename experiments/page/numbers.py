@@ -1,6 +1,7 @@
 """Numbers as a reader wants them: sensible digits, exponents in threes, raised units."""
 
 import math
+from collections.abc import Mapping
 
 MISSING = "\N{EN DASH}"
 """What stands where there is no number."""
@@ -11,6 +12,13 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 PLAIN_FROM, PLAIN_TO = 1e-3, 1e5
 """Between these magnitudes a number is written without an exponent."""
+
+SHOP_UNITS: Mapping[str, tuple[float, str]] = {
+    "Pa": (1e-6, "MPa"),
+    "m^3/s": (6e4, "L/min"),
+    "m^3/(s Pa)": (6e9, "L/(min bar)"),
+}
+"""Units of SI that no gauge of a shop has: factor to another, and that."""
 
 
 def number(value: float | None, digits: int = 4) -> str:
@@ -135,10 +143,10 @@ def shop_unit(unit: str) -> tuple[float, str]:
 
     Examples
     --------
-    >>> shop_unit("Pa"), shop_unit("L/min")
-    ((1e-06, 'MPa'), (1.0, 'L/min'))
+    >>> shop_unit("Pa"), shop_unit("L/min"), shop_unit("m^3/s")
+    ((1e-06, 'MPa'), (1.0, 'L/min'), (60000.0, 'L/min'))
     """
-    return (1e-6, "MPa") if unit == "Pa" else (1.0, unit)
+    return SHOP_UNITS.get(unit, (1.0, unit))
 
 
 def pretty_unit(unit: str) -> str:

@@ -12,6 +12,7 @@ from experiments.page.errata import linked, linked_errata
 from experiments.page.figure_files import image_of
 from experiments.page.numbers import exact, number
 from experiments.page.scripting import with_scripts
+from experiments.page.sentences import rig_in_words
 from experiments.page.tables import Columns, html_table
 
 _HEADING = re.compile(r'<section id="([^"]+)"[^>]*>\s*<h2>([^:<]*)')
@@ -69,7 +70,7 @@ def _templates() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"linked": linked, "number": number, "exact": exact}
+    environment.filters |= {"linked": linked, "rig_in_words": rig_in_words, "number": number, "exact": exact}
     return environment
 
 

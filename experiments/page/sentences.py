@@ -5,6 +5,22 @@ from typing import Any
 
 from plant.log.notes import LogCode
 
+PAPER_RIG = "paper"
+"""Name of the rig without a rig file, and of a rig file until its owner gives another."""
+
+
+def rig_in_words(name: str) -> str:
+    """Return which actuator a log was compared with.
+
+    Examples
+    --------
+    >>> rig_in_words("bench 7"), rig_in_words("paper")
+    ('rig bench 7', "the paper's actuator assumed (no rig file, or one still named paper)")
+    """
+    if name == PAPER_RIG:
+        return f"the paper's actuator assumed (no rig file, or one still named {name})"
+    return f"rig {name}"
+
 
 def sentence(said: str) -> str:
     """Return a clause as a sentence; the name of a channel stays as it is spelt.

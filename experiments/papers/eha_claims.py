@@ -233,7 +233,7 @@ def _as_printed(rows: pd.DataFrame) -> Ours:
     settled = rows["settled_pa"].dropna()
     said = f"finite from {len(settled)} of {len(rows)} first guesses"
     if len(settled):
-        said += f", ends at {settled.min():.3g} to {settled.max():.3g} Pa"
+        said += f", ends at {1e-6 * settled.min():.3g} to {1e-6 * settled.max():.3g} MPa"
     off = (settled / RIG.bulk_modulus - 1.0).abs().max()
     return Ours(100.0 * float(off) if len(settled) == len(rows) else None, said=said)
 
@@ -242,7 +242,7 @@ def _settled(rows: pd.DataFrame) -> Ours:
     value = float(rows["filter_settled_at_pa"].mean())
     spread = NORMAL_95 * float(rows["filter_std_pa"].mean())
     covered = (rows["filter_settled_at_pa"] - RIG.bulk_modulus).abs() <= NORMAL_95 * rows["filter_std_pa"]
-    said = f"{_gate(rows)}; 95 % interval ± {1e-8 * spread:.2g}e8 Pa holds 2.07e8 Pa in {covered.sum()} of {len(rows)}"
+    said = f"{_gate(rows)}; 95 % interval ± {1e-6 * spread:.2g} MPa holds 207 MPa in {covered.sum()} of {len(rows)}"
     return Ours(value, said=said)
 
 

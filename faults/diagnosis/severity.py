@@ -1,6 +1,6 @@
 """How bad is it? A fitted circuit in the units of a shop, each number with a 95 % interval."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cache, lru_cache
 from typing import Any
 
@@ -34,6 +34,9 @@ BLIND = 0.9
 VAGUE = 3.0
 """Ratio of relative widths from which a combination is known and its parts are not [dimensionless]."""
 
+
+OF_FRICTION = frozenset({"velocity_lost", "added_friction", "pressure_rise"})
+"""Severities that hang on friction."""
 
 UNITS: Mapping[str, str] = {
     "leakage_flow": "L/min",
@@ -275,16 +278,39 @@ def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure
     known, believed = np.sqrt(np.diag(fits.covariance)), np.sqrt(np.diag(WEAK))
     blind = {name for name, k, b in zip(COORDINATES, known, believed, strict=True) if k > BLIND * b}
     said: list[Note] = []
-    if "friction_rated" in blind and "friction_rest" in blind:
+    unseen = "friction_rated" in blind and "friction_rest" in blind
+    if unseen:
         said.append(ClassCode.FRICTION_NOT_VISIBLE.note())
     if "bulk_modulus" in blind:
         said.append(ClassCode.BULK_MODULUS_NOT_VISIBLE.note())
     flow, speed = found["leakage_flow"], found["velocity_lost"]
+    lost = [] if unseen else _velocity_lost(speed)  # which hangs on friction too
     if not pressure:
-        said += [ClassCode.ONE_SCALE.note(), *_velocity_lost(speed)]
+        said += [ClassCode.ONE_SCALE.note(), *lost]
     elif _width(flow) > VAGUE * _extent(speed) / 100.0 and _width(flow) > 0.3:
-        said += [ClassCode.LEAKAGE_AND_BIAS_ALIKE.note(), *_velocity_lost(speed)]
+        said += [ClassCode.LEAKAGE_AND_BIAS_ALIKE.note(), *lost]
     return said
+
+
+def not_determined(codes: Collection[object]) -> frozenset[str]:
+    """Return the severities of which a log says nothing: their values are those of a first belief.
+
+    Parameters
+    ----------
+    codes : collection of Code or str
+        Of what the log does not tell.
+
+    Returns
+    -------
+    frozenset[str]
+        Names of `UNITS`.
+
+    Examples
+    --------
+    >>> sorted(not_determined(["friction_not_visible"])), sorted(not_determined(["one_scale"]))
+    (['added_friction', 'pressure_rise', 'velocity_lost'], [])
+    """
+    return OF_FRICTION if str(ClassCode.FRICTION_NOT_VISIBLE) in map(str, codes) else frozenset()
 
 
 def _velocity_lost(speed: Quantity) -> list[Note]:

@@ -42,6 +42,7 @@
     const head = element("tr", { role: "row" });
     const body = element("tbody", { role: "rowgroup" });
     const table = element("table", { class: "fleet", role: "table" }, element("caption", {}, holder.dataset.caption), element("thead", { role: "rowgroup" }, head), body);
+    const more = element("p", { class: "place more-rows" });
     const view = element("div", { class: "window", tabindex: "0", role: "region", "aria-label": holder.dataset.caption }, table);
 
     function key(row, column) {
@@ -93,6 +94,10 @@
       const shown = order.slice(first, last).map((row, i) => {
         return element("tr", { role: "row", "aria-rowindex": String(first + i + 2) }, ...cells(rows[row], links[row]));
       });
+      const seen = Math.min(order.length, Math.floor((view.scrollTop + view.clientHeight - table.tHead.offsetTop - table.tHead.offsetHeight) / rowHeight()));
+      const below = order.length - Math.max(seen, 0);
+      view.classList.toggle("more", below > 0);
+      more.textContent = below > 0 ? `${below} more ${below === 1 ? "row" : "rows"} below: scroll in the table.` : "";
       body.replaceChildren(...(first > 0 ? [spacer(first)] : []), ...shown, ...(last < order.length ? [spacer(order.length - last)] : []));
     }
 
@@ -116,7 +121,7 @@
     const filters = element("div", { class: "tools" },
       element("label", { for: "fleet-words" }, "Show rows with"), words,
       element("label", { for: "fleet-state" }, "in state"), state);
-    holder.querySelector(".still").before(element("div", { class: "live" }, filters, count, view));
+    holder.querySelector(".still").before(element("div", { class: "live" }, filters, count, view, more));
     holder.classList.add("is-live");
     narrow.addEventListener("change", draw);
     new ResizeObserver(draw).observe(view);

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from experiments.batch.pages import _or_dash, _quantities, one_row_a_log, render_batch_report
+from experiments.batch.pages import _or_dash, _quantities, _times, one_row_a_log, render_batch_report
 from experiments.batch.rows import SCHEMA
 from experiments.batch.summary import frame_of, summary_tables
 from experiments.page.numbers import MISSING
@@ -64,6 +64,10 @@ def test_a_log_that_was_asked_two_questions_has_one_row() -> None:
     assert made["bulk_modulus_pa"].tolist()[0] == 2e8
     assert made["bulk_modulus_pa"].tolist()[2:4] == [1e8, 3e8]  # two methods of one verb stay apart
     assert made["reason"].tolist()[1] == "no columns"
+
+
+def test_a_ratio_of_probabilities_has_no_digits_beyond_a_thousand() -> None:
+    assert [_times(one).text for one in (None, 1.0, 113.2, 1.13e5)] == [MISSING, "1.00", "113", "over 1000"]
 
 
 def test_the_report_says_first_how_many_cases_failed() -> None:

@@ -1,5 +1,6 @@
 """The page on one log."""
 
+import json
 import re
 from dataclasses import replace
 
@@ -7,10 +8,13 @@ import numpy as np
 import pytest
 
 from estimation.finding import Finding
+from experiments.batch.diagnosis import class_row
 from experiments.eha.diagnosis_page import diagnosis_page
 from experiments.eha.entries import diagnosis_entries
+from experiments.eha.verdict_words import verdict_lines
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.diagnose import diagnose_log
+from faults.notes import ClassCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
@@ -64,6 +68,28 @@ def test_severities_of_a_log_that_no_fit_explains_are_marked_as_not_reliable(
     assert "None of the nine conditions fits the log." in unknown
     assert len(re.findall("<input[^>]* data-doubted>", unknown)) == unknown.count('class="limit"') > 0
     assert not re.search("<input[^>]* data-doubted>", page)
+
+
+def test_severities_of_which_the_log_says_nothing_are_in_no_state(diagnosed: tuple[Finding, Record]) -> None:
+    found, log = diagnosed
+    unseen = replace(found, not_told=(ClassCode.FRICTION_NOT_VISIBLE.note(),))
+    page = diagnosis_page({"file": "run.csv", "rig": "bench 7", **diagnosis_entries(unseen)}, unseen, log)
+    assert re.findall('<input class="limit"[^>]*name="([a-z_]+)"', page) == [
+        "leakage_flow",
+        "bulk_modulus",
+        "entrained_air",
+    ]
+    assert "The log does not determine: velocity lost, friction added at rated speed, pressure rise." in page
+    said = verdict_lines({"file": "run.csv", **diagnosis_entries(unseen)})
+    assert "  friction  friction added at rated speed not determined; pressure rise not determined" in said
+    assert set(json.loads(class_row(unseen)["quantities"])) == {"leakage_flow", "bulk_modulus", "entrained_air"}
+
+
+def test_a_page_says_with_which_actuator_a_log_was_compared(page: str, diagnosed: tuple[Finding, Record]) -> None:
+    assert "diagnosis of run.csv, the paper&#39;s actuator assumed (no rig file" in page
+    found, log = diagnosed
+    named = diagnosis_page({"file": "run.csv", "rig": "bench 7", **diagnosis_entries(found)}, found, log)
+    assert "diagnosis of run.csv, rig bench 7<" in named
 
 
 def test_what_other_faults_take_from_the_nine_is_said(diagnosed: tuple[Finding, Record]) -> None:

@@ -67,7 +67,7 @@ def test_an_alarm_without_certain_growth_says_that_the_trend_is_past_the_limit()
     assert (row.last.state, row.state) == ("open", "alarm")
     assert row.outlook is not None
     assert not row.outlook.trend.certain
-    assert row.outlook.words == "past the limit, by its trend"
+    assert row.outlook.words == "the trend is past the limit"
 
 
 def test_logs_without_a_verdict_play_no_part() -> None:

@@ -1,5 +1,6 @@
 """The page of a fleet, and that it works in a browser."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -190,6 +191,18 @@ def test_ten_thousand_rows_sort_and_filter_with_few_in_the_page(page: Any) -> No
 def test_the_last_row_is_reached_by_scrolling(page: Any) -> None:
     page.evaluate("document.querySelector('.window').scrollTop = 1e9")
     page.wait_for_selector(f'.window tr[aria-rowindex="{ROWS + 1}"]')
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [390, 768, 1280])
+def test_a_table_says_how_many_rows_are_below_and_at_the_last_one_none(page: Any, width: int) -> None:
+    from playwright.sync_api import expect  # which not every developer has
+
+    page.set_viewport_size({"width": width, "height": 800})
+    more = page.locator(".more-rows")
+    expect(more).to_have_text(re.compile(r"^\d{4} more rows below: scroll in the table\.$"))
+    page.evaluate("document.querySelector('.window').scrollTop = 1e9")
+    expect(more).to_have_text("")
 
 
 @pytest.mark.slow

@@ -64,7 +64,9 @@ def test_a_condition_that_the_gate_doubts_is_said_with_the_doubt() -> None:
 
 def test_bulk_modulus_is_given_in_mpa_and_no_number_breaks_before_its_power_of_ten() -> None:
     row = _row("bulk_modulus", Quantity.normal(2.07e8, 1e6, "Pa"))
-    assert (row["value"], row["interval"], row["unit"]) == ("207.0", "205.0 to 209.0", "MPa")
+    assert (row["quantity"], row["value"], row["interval"]) == ("bulk modulus [MPa]", "207.0", "205.0 to 209.0")
     leak = _row("leakage_coefficient", Quantity.normal(2.5e-11, 1e-13, "m^3/(s Pa)"))
-    assert " " not in leak["value"] + leak["unit"]
-    assert leak["interval"].split(" ")[1] == "to"
+    assert (leak["quantity"], leak["value"]) == ("leakage coefficient [L/(min\N{NO-BREAK SPACE}bar)]", "0.1500")
+    small = _row("spring", Quantity.normal(2.5e-11, 1e-13, "m/N"))
+    assert " " not in small["value"]
+    assert small["interval"].split(" ")[1] == "to"

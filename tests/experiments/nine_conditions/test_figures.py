@@ -66,7 +66,7 @@ def test_convergence_shows_every_first_guess_in_every_condition(drawn: dict[str,
     assert "minor leakage + major friction" in titles
     starts = set(SMALL.starts)
     for axis in figure.axes:
-        firsts = {1e8 * float(np.asarray(line.get_ydata())[0]) for line in axis.lines if len(line.get_xdata()) > 2}
+        firsts = {1e6 * float(np.asarray(line.get_ydata())[0]) for line in axis.lines if len(line.get_xdata()) > 2}
         assert firsts == starts
 
 
@@ -82,7 +82,7 @@ def test_convergence_is_of_the_experiment_that_its_title_names(study: Found) -> 
         & (curves["pressure_logged"] == OURS.pressure_logged)
         & (curves["condition"] == "normal")
     ]
-    lasts = {round(value / 1e8, 9) for value in rows.groupby("start_pa")["bulk_modulus_pa"].last()}
+    lasts = {round(value / 1e6, 7) for value in rows.groupby("start_pa")["bulk_modulus_pa"].last()}
     assert round(float(np.asarray(line.get_ydata())[-1]), 9) in lasts
 
 

@@ -32,14 +32,27 @@ def test_figures_can_be_read_on_a_phone(browser: Any, pages: dict[str, Path], na
     page.close()
 
 
-def test_no_column_of_a_log_is_out_of_sight_on_a_phone(browser: Any, pages: dict[str, Path]) -> None:
-    page = browser.new_page(viewport={"width": 390, "height": 800})
+@pytest.mark.parametrize("width", [390, 768])
+def test_no_column_of_a_log_is_out_of_sight(browser: Any, pages: dict[str, Path], width: int) -> None:
+    page = browser.new_page(viewport={"width": width, "height": 800})
     page.goto(pages["inspect"].as_uri())
     cells = page.locator("#columns td")
     boxes = [one.bounding_box() for one in cells.all() if one.is_visible()]
     assert len(boxes) > 20
-    assert max(box["x"] + box["width"] for box in boxes) <= 390
+    assert max(box["x"] + box["width"] for box in boxes) <= width
     assert page.locator('#columns td[data-head="sure [%]"]').count() > 4
+    page.close()
+
+
+def test_a_wide_table_shows_on_a_phone_that_it_goes_on_and_keeps_its_first_column(
+    browser: Any, pages: dict[str, Path]
+) -> None:
+    page = browser.new_page(viewport={"width": 390, "height": 800})
+    page.goto(pages["study"].as_uri())
+    wide = page.locator(".scroll:not(:has(.cards))").first
+    assert "gradient" in wide.evaluate("one => getComputedStyle(one).backgroundImage")
+    wide.evaluate("one => { one.scrollLeft = 60 }")
+    assert wide.locator("tbody tr >> nth=0 >> :is(td, th) >> nth=0").bounding_box()["x"] >= 0.0
     page.close()
 
 

@@ -15,6 +15,7 @@ import pytest
 from benchmarks.server.hostile_client import MIX, server_errors
 from benchmarks.server.server_process import Server
 from benchmarks.server.server_trials import attack, feeding, kill, settled, stream
+from experiments.page.numbers import MINUS
 
 pytestmark = pytest.mark.slow
 
@@ -235,9 +236,31 @@ def test_the_live_view_shows_gauges_and_what_the_watch_tells(opened: Any) -> Non
 
     page = opened("live")
     assert page.locator(".gauges li").count() == 7
-    assert page.locator(".histories canvas").count() == 6
+    assert page.locator(".histories canvas").count() >= 3  # a channel each; a balance has one once it is learnt
     assert page.locator(".alarms tbody tr").first.is_visible()
     told = page.locator(".gauges strong").last
     rows = told.inner_text()
     expect(told).not_to_have_text(rows, timeout=PATIENCE)
     assert int(told.inner_text()) > int(rows)
+
+
+def test_a_negative_gauge_has_a_minus_and_a_balance_that_is_learnt_no_empty_chart(opened: Any) -> None:
+    gauge = {"time_s": 1.0, "rows": 9, "gaps": 0, "left_out": 0, "number": 1}
+    channels = {"values": {"pressure_a_pa": -2.5e5}, "low": {"pressure_a_pa": -3e5}, "high": {"pressure_a_pa": 1e5}}
+    learnt = {"scores": {"flow": 0.0, "loss": 1.0}, "thresholds": {"flow": None, "loss": 4.0}}
+    told = {"name": "bench", "state": "learning", "message": "learning", "gauges": None, "events": []}
+    body = f"event: history\ndata: {json.dumps({**told, 'history': [{**gauge, **channels, **learnt}] * 2})}\n\n"
+    page = opened("live")
+    page.route("**/events", lambda route: route.fulfill(content_type="text/event-stream", body=body))
+    page.reload()
+    page.wait_for_selector("html.live-drawn", state="attached")
+    tiles = page.locator(".gauges li").all_inner_texts()
+    assert tiles[0].split("\n") == [f"{MINUS}2.5 bar", "pressure A", f"last quarter second: {MINUS}3 to 1"]
+    assert [tile.split("\n")[:2] for tile in tiles[1:3]] == [
+        ["learning", "flow balance: how close to an alarm"],
+        ["25 %", "lost flow: how close to an alarm"],
+    ]
+    assert page.locator(".histories figcaption").all_inner_texts() == [
+        "pressure A [bar]",
+        "lost flow: how close to an alarm [%]",
+    ]
