@@ -116,8 +116,8 @@ class Guard:
         if self._loopback and _host_name(host) not in self._names:
             raise RefusedError(421, f"this server answers for localhost alone, the request is for {host[:80]!r}")
         if scope["method"] not in ("GET", "HEAD", "OPTIONS"):
-            origin = headers.get(b"origin")
-            foreign = origin is not None and origin.decode("latin-1").lower().partition("://")[2] != host
+            origins = [value for name, value in scope["headers"] if name.lower() == b"origin"]
+            foreign = any(one.decode("latin-1").lower().partition("://")[2] != host for one in origins)
             if foreign or headers.get(b"sec-fetch-site", b"none") not in (b"none", b"same-origin"):
                 raise RefusedError(403, "a page of another site may not change anything here")
         if self._token is None:

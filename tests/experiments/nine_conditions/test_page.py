@@ -103,7 +103,12 @@ def test_transfer_functions_stand_beside_the_published_ones(page: str, study: Fo
 def test_scalars_stand_beside_the_published_ones_with_their_notes(page: str, study: Found) -> None:
     for row in study.tables["scalars"].to_dict("records"):
         assert row["note"].split(" (errata")[0].replace("'", "&#39;") in page
-    assert number(float(study.tables["scalars"]["ours"].iloc[0])) in page
+    first = study.tables["scalars"].iloc[0]
+    assert first["unit"] == "Pa"
+    assert f'<td class="number">{number(1e-6 * float(first["ours"]))}</td><td>MPa</td>' in page
+    assert (
+        "1e8" not in page.split("<h2>Errata</h2>")[0].split("<main>")[1]
+    )  # one unit of bulk modulus, in text and tables
 
 
 def test_estimates_are_those_of_the_table(page: str, study: Found) -> None:

@@ -148,6 +148,13 @@ def test_no_more_logs_come_in_at_once_than_may_and_no_more_views_are_open(
     assert "0 views are open, close one" in answers[1].text
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_one_foreign_origin_among_several_is_foreign(served: Served, turned: bool) -> None:
+    origins = ["http://127.0.0.1", "http://evil.example"]
+    headers = [("origin", one) for one in (reversed(origins) if turned else origins)]
+    assert served().post("/api/logs?name=a", content=b"a", headers=headers).status_code == 403
+
+
 @pytest.mark.parametrize("settings", [{"largest": 1000}, {"room": 1000}])
 def test_a_body_that_is_too_large_is_refused_while_it_comes(
     served: Served, tmp_path: Path, settings: dict[str, int]
