@@ -114,8 +114,8 @@ class AdviceCode(Code):
         "correct chamber_volume in the rig file from {written:.3g} to {volume:.3g} m^3, then diagnose this log again"
     )
     CORRECT_VOLUME_OR_OIL = (
-        "bulk modulus is {ratio:.2g} times that in the rig file: correct chamber_volume there from {written:.3g} to "
-        "{volume:.3g} m^3, or bulk_modulus if the actuator has stiffer oil, then diagnose this log again"
+        "bulk modulus is {ratio:.2g} times that in the rig file: if the oil is stiffer, enter its bulk_modulus there, "
+        "else correct chamber_volume from {written:.3g} to {volume:.3g} m^3; then diagnose this log again"
     )
     FIT_DOUBTED = "the model does not follow this log: check units, signs and the rig file first"
     LOG_PRESSURE = "log differential pressure: leakage and friction are then known several times better"

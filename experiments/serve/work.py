@@ -13,6 +13,7 @@ from experiments.command.log_verb import page_of
 from experiments.command.logs import caught, overheard, read_log, with_remarks
 from experiments.command.options import load_actuator
 from experiments.command.terminal import clauses, unexpected
+from experiments.page.sentences import sentence
 from experiments.serve.comparison import plain_words
 from experiments.serve.process import bind_to_server
 from plant.atomic import replacing
@@ -128,7 +129,8 @@ def work_on(task: Task) -> Worked:
         except Exception as error:  # whatever a log brings up is told to whoever sent it
             worked = _failed(task, blank, unexpected(error))
     result = plain({"file": task.name, **with_remarks(worked.result, said)})
-    return Worked(_without_path(result, task), plain(worked.entries), worked.said or plain_words(result))
+    said = worked.said or plain_words(result) or sentence(str(result.get("message") or ""))
+    return Worked(_without_path(result, task), plain(worked.entries), _without_path(said, task))
 
 
 def _found(task: Task) -> Worked:

@@ -196,6 +196,7 @@ def _begun(
     else:
         watch.interrupt()
         note(f"{source}: warning: the stream does not continue at {watch.last:g} s, so learning starts again")
+        watch.clock_reads(start)  # else the watch would tell the time of the stream before
     return watch, travelled
 
 

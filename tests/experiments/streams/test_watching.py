@@ -160,6 +160,7 @@ def test_a_stream_that_goes_on_elsewhere_is_learnt_again_and_that_is_said(
         capsys.readouterr()
         events, _ = watched(rows(start, 5.0, share=0.6, seed=1), state)
         assert ("alarm" in named(events)) is follows
+        assert events[0]["time_s"] == pytest.approx(start, abs=1.0)
         assert ("the stream does not continue at 70 s" in capsys.readouterr().err) is not follows
 
 

@@ -214,5 +214,5 @@ def test_a_chamber_volume_that_contradicts_the_log_is_to_be_corrected_to_its_val
         "correct chamber_volume in the rig file from 0.00108 to 0.00054 m^3, then diagnose this log again"
     )
     (stiff,) = volume_advice([RigCode.OIL_STIFFER.note(ratio=2.0)], written, written)
-    assert "correct chamber_volume there from 0.00108 to 0.00054 m^3, or bulk_modulus" in str(stiff)
+    assert "else correct chamber_volume from 0.00108 to 0.00054 m^3; then" in str(stiff)
     assert volume_advice([RigCode.OIL_SOFTER.note(ratio=0.5)], written, written) == ()  # it may be air
