@@ -94,7 +94,8 @@ class Charts:
         head = Markup("").join(Markup('<th scope="col">{}</th>').format(one) for one in _SUMMARY)
         made = Markup(
             "<details><summary>The range of each curve, as a table</summary>"
-            '<div class="scroll" tabindex="0" role="region" aria-label="Ranges of the curves"><table><caption>Range of each curve.</caption><thead><tr>{}</tr>'
+            '<div class="scroll" tabindex="0" role="region" aria-label="Ranges of the curves"><table>'
+            "<caption>Range of each curve.</caption><thead><tr>{}</tr>"
             "</thead><tbody>{}</tbody></table></div></details>"
         )
         return made.format(head, Markup("\n").join(rows))
