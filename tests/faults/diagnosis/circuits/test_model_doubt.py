@@ -41,7 +41,9 @@ def told(blocks: int, share: float = 0.0) -> tuple[PointFit, Blocks]:
     slopes = np.zeros((7, blocks, 2))
     for i in range(7):
         slopes[i, i::7] = NOISE
-    return leaving(PointFit(CENTRE[0], 0.0, np.eye(7), NOISE, one.outputs, slopes), one, NOISE / np.sqrt(1.0 - share)), one
+    return leaving(
+        PointFit(CENTRE[0], 0.0, np.eye(7), NOISE, one.outputs, slopes), one, NOISE / np.sqrt(1.0 - share)
+    ), one
 
 
 def leaving(fit: PointFit, one: Blocks, size: np.ndarray) -> PointFit:
