@@ -138,7 +138,7 @@ def toothed(
     plain = Toothed(guessed, fitted(asked_for_teeth(guessed)))
     if not _hopeful(plain.fits, largest):
         return plain._replace(left=_left(plain))
-    shifted = _shifted(log, plain, fitted)
+    shifted = _shifted(log, plain, fitted, largest)
     if offset:
         plain, shifted = shifted or plain, None
         plain = plain._replace(remarks=_told_offset(plain.log.speed_offset, plain.best.speed_offset.std))
@@ -180,8 +180,11 @@ def _hopeful(fits: Sequence[GreyBoxFit], largest: float) -> bool:
     return False
 
 
-def _shifted(log: GreyBoxLog, plain: Toothed, fitted: Fitted) -> Toothed | None:
-    """Return the fits of a log without what its speed is off by; None where residuals ask for none, or for much."""
+def _shifted(log: GreyBoxLog, plain: Toothed, fitted: Fitted, largest: float) -> Toothed | None:
+    """Return the fits of a log without what its speed is off by; None where residuals ask for none, or for much.
+
+    It ends where that leaves a log unexplained, and neither teeth nor more of an offset may explain the rest.
+    """
     found, offset, wanted = plain, plain.log.speed_offset, OFFSET_SETTLED if plain.log.speed_offset else OFFSET_WORTH
     for _ in range(ROUNDS):
         likely = min(found.fits, key=lambda fit: fit.cost - fit.speed_offset.gain)  # each has an offset of its own
@@ -194,6 +197,8 @@ def _shifted(log: GreyBoxLog, plain: Toothed, fitted: Fitted) -> Toothed | None:
         held = with_teeth(replace(log, counts=COUNTS), (), offset)
         found = Toothed(held, fitted(held))
         if shown.gain > OFFSET_WORTH and found.best.cost > likely.cost - KEPT * shown.gain:
+            return None
+        if not _hopeful(found.fits, largest + CHANCE * (2.0 / len(log.drives)) ** 0.5):
             return None
     return None if found is plain else found
 

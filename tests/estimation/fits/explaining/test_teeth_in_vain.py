@@ -1,5 +1,7 @@
 """Teeth that make a fit worse are not corrected further."""
 
+from dataclasses import replace
+
 from estimation.fits.explaining.toothed import toothed
 from tests.estimation.fits.explaining.test_toothed import PLAIN, fit, shown, told, well
 
@@ -9,4 +11,14 @@ def test_teeth_that_explain_a_log_worse_at_once_are_none() -> None:
     found = toothed(PLAIN, fitted, well)
     assert len(asked) == 2
     assert found.fits[0].cost == 500.0
+    assert not found.remarks
+
+
+def test_an_offset_that_leaves_a_log_unexplained_and_promises_nothing_more_is_none() -> None:
+    first = replace(fit(5000.0, off=(0.3, 900.0)), chi_square=(12.0,))
+    second = replace(fit(4000.0, off=(0.01, 3.0)), chi_square=(9.0,))
+    fitted, asked = told(first, second, fit(100.0))
+    found = toothed(PLAIN, fitted, well, largest=1.2)
+    assert len(asked) == 2
+    assert found.fits[0].cost == 5000.0
     assert not found.remarks
