@@ -26,6 +26,7 @@ from estimation.fits.explaining.wide_log import (
     widened,
 )
 from estimation.fits.explaining.wide_problem import freed, own_starts
+from estimation.fits.explaining.within_reach import within_reach
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
@@ -102,8 +103,9 @@ def explain(
         first, second = finished[0], finished[1] if len(finished) > 1 else None
         pairs = _paired(wide, first, starts[0], accepted)
         near = left_by(wide, first.cost) < NEARLY or (pairs and _explained(pairs[0], accepted))
-        if second and near and second.cost <= NEARLY_AS_GOOD * first.cost:
-            pairs += _paired(wide, second, starts[0], accepted)
+        as_good = second and second.cost <= NEARLY_AS_GOOD * first.cost and not _same(first, second)
+        if second and near and as_good:
+            pairs += _paired(wide, second, starts[0], accepted, rival=True)
         finished = _distinct([first, *pairs])
     best = finished[0]
     if not best.fits:
@@ -144,7 +146,7 @@ def _alone(
     begun += [[*screened(log, (one,), starts, every=every)] for one in likely[1:]]
     ended = settled_each(log, begun, spared=spared)
     if others and every > 1 and left_by(log, ended[0].cost) > DEFERRED:
-        known = ended[0].cost
+        known, others = ended[0].cost, within_reach(log, ended[0], others)
         more = settled_each(log, nearing(log, others, starts, hopeful(starts, begun), known, every), known, spared)
         first, second = sorted((ended, more), key=lambda each: each[0].cost)
         finished = led_on(log, first, spared=spared)
@@ -152,7 +154,7 @@ def _alone(
     finished = led_on(log, ended, spared=spared)
     if not others or _explained(finished[0], accepted):
         return finished
-    known = finished[0].cost
+    known, others = finished[0].cost, within_reach(log, finished[0], others)
     tried = _promising_enough(others, gains, plain - NEARLY_AS_GOOD * known) if faint else others
     if not tried:
         return finished
@@ -165,24 +167,35 @@ def _promising_enough(asked: Sequence[Hypothesis], gains: Mapping[str, float], n
     return [one for one in asked if one.far or one.beside or TRUSTED * gains[one.name] >= needed]
 
 
-def _paired(log: GreyBoxLog, first: Tried, plain: Mapping[str, float], accepted: Accepted) -> list[Tried]:
+def _paired(
+    log: GreyBoxLog, first: Tried, plain: Mapping[str, float], accepted: Accepted, *, rival: bool = False
+) -> list[Tried]:
     """Return what explains a log together with a hypothesis that does not alone, and better; the best first.
 
     What slopes promise most is tried first, and all else where that does not explain the log: slopes are taken where
     the first hypothesis has gone to take up what the second one does. The best of it is fitted to the end in any case.
+    Beside a ``rival`` of the best, nothing is tried where all hypotheses together do not explain the log.
     """
     late = delayed(log, first.delays)
     taken = {one.name for one in first.together}
     asked = [one for one in HYPOTHESES if one.name not in taken]
-    likely, others, gains = promising(late, first.together, first.values, asked)
+    reached = within_reach(log, first, asked)
+    if rival and len(reached) < len(asked):
+        return []
+    likely, others, gains = promising(late, first.together, first.values, reached)
     begun = [_begun_again(log, first), {**plain, **own_starts(log, first.together[-1])[0]}]
     left = left_by(log, first.cost)
     spared = Spared(skipping(log, left), left, begun)
-    faint, useful = spared.every == 1 and len(log.drives) >= FEW, first.cost - WORTH
+    long, useful = len(log.drives) >= FEW, first.cost - WORTH
+    faint = long and spared.every == 1
+    if long:  # none is told that does not explain the log
+        useful = min(useful, (REACHED if len(reached) < len(asked) else NEARLY) * first.cost / left)
     far, rest = [one for one in others if one.far], [one for one in others if not one.far]
     near = [*likely, *far]
-    nearer = (screened(late, (*first.together, one), begun, every=spared.every) for one in (likely if faint else near))
-    pairs = likeliest(late, nearer, first.cost, spared, useful)
+    nearer = [
+        [*screened(late, (*first.together, one), begun, every=spared.every)] for one in (likely if faint else near)
+    ]
+    pairs = likeliest(late, nearer, first.cost, spared, useful) if nearer else []
     if faint and not (pairs and _explained(pairs[0], accepted) and left_by(log, pairs[0].cost) < NOISE):
         wanted = NEARLY * min(one.cost for one in (first, *pairs[:1]))
         distant = [[*screened(late, (*first.together, one), begun, wanted, spared.every)] for one in far]
@@ -190,10 +203,10 @@ def _paired(log: GreyBoxLog, first: Tried, plain: Mapping[str, float], accepted:
         pairs = ranked([*pairs, *likeliest(late, distant, wanted / NEARLY, spared, useful)]) if distant else pairs
     if not pairs or not _explained(pairs[0], accepted):
         known = min(one.cost for one in (first, *pairs[:1]))
-        if faint:  # none is told that does not explain the log
+        if faint:
             needed = first.cost - min(NEARLY_AS_GOOD * known, REACHED * first.cost / left)
             rest = _promising_enough(rest, gains, max(WORTH, needed))
-        wanted = NEARLY_AS_GOOD * known
+        wanted, begun = NEARLY_AS_GOOD * known, hopeful(begun, nearer) if long and nearer else begun
         more = [screened(late, (*first.together, one), begun, wanted, spared.every) for one in rest]
         if more:
             pairs = ranked([*pairs, *likeliest(late, more, known, spared, useful)])
@@ -221,6 +234,12 @@ def _by_itself(log: GreyBoxLog, tried: Tried, accepted: Accepted) -> bool:
     if tried.together != (DELIVERY,):
         return True
     return promised_beside(log, tried.together, tried.values, VOLUME).gain < BESIDE
+
+
+def _same(one: Tried, other: Tried) -> bool:
+    """Return whether two sets of hypotheses free the same, and came to one place: a speed that is late, or early."""
+    free, others = ({name for each in tried.together for name in each.free} for tried in (one, other))
+    return free == others and not apart(one, other)
 
 
 def _begun_again(log: GreyBoxLog, first: Tried) -> Mapping[str, float]:

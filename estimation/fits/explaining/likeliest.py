@@ -172,7 +172,8 @@ def apart(one: Tried, other: Tried) -> bool:
     bool
         Whether they did.
     """
-    unlike = len(one.point.theta) != len(other.point.theta) or one.delays != other.delays
+    ours, theirs = ({name: delay for name, delay in tried.delays.items() if delay} for tried in (one, other))
+    unlike = len(one.point.theta) != len(other.point.theta) or ours != theirs
     if unlike or abs(one.cost - other.cost) > LITTLE * one.cost:
         return True
     step = other.point.theta - one.point.theta

@@ -1,5 +1,6 @@
 """What is tried by itself, and in pairs, where little is left of a long log, or much."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -25,6 +26,11 @@ def tried(cost: float, place: float = 0.0, together: Any = ()) -> Tried:
 
 
 LIKELY, FAR, SOME, NONE = hypothesis("likely"), hypothesis("far", far=True), hypothesis("some"), hypothesis("none")
+
+
+@pytest.fixture(autouse=True)
+def reached(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(explain, "within_reach", lambda _, __, asked: asked)
 
 
 @pytest.mark.parametrize(("every", "asked"), [(1, "far some"), (2, "far some none")])
@@ -79,7 +85,7 @@ def test_beside_what_leaves_little_no_pair_is_tried_that_cannot_explain_the_log(
 
     def screened(_: Any, together: Any, *__: Any, **___: Any) -> Any:
         asked.append(together[-1].name)
-        return [tried(990.0 if together[-1] is LIKELY else 9e3, together=together)]
+        return [tried(990.0 if together[-1] is LIKELY else 9e3, together=together)] * 2
 
     # the first leaves 1.8 times the noise of 1000, a pair that explains it at most 1.5
     gains = {"some": 301.0 / explain.TRUSTED, "none": 299.0 / explain.TRUSTED}
@@ -94,6 +100,59 @@ def test_beside_what_leaves_little_no_pair_is_tried_that_cannot_explain_the_log(
     first = tried(1800.0, together=(hypothesis("first"),))
     explain._paired(LONG, first, {}, lambda _: False)  # pyright: ignore[reportPrivateUsage]
     assert asked == ["likely", "far", "some"]
+
+
+@pytest.mark.parametrize(("every", "left"), [(1, 1.8), (2, 1.8), (2, 9.0)])
+def test_what_is_out_of_reach_is_not_tried_alone(every: int, left: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+
+    def nearing(_: Any, given: Any, *__: Any) -> Any:
+        told.extend(one.name for one in given)
+        return [[tried(900.0)]]
+
+    monkeypatch.setattr(explain, "within_reach", lambda _, __, asked: [one for one in asked if one.far])
+    monkeypatch.setattr(explain, "screened", lambda *_, **__: [tried(800.0)])
+    monkeypatch.setattr(explain, "nearing", nearing)
+    monkeypatch.setattr(explain, "settled_each", lambda *_, **__: [tried(800.0)])
+    monkeypatch.setattr(explain, "led_on", lambda *_, **__: [tried(800.0)])
+    monkeypatch.setattr(explain, "likeliest", lambda *_, **__: [])
+    monkeypatch.setattr(explain, "left_by", lambda *_: left)
+    gains = {"far": 0.0, "some": 900.0}
+    spared = Spared(every, left, [{}])
+    explain._alone(LONG, 1000.0, ([LIKELY], [FAR, SOME], gains), spared, lambda _: False)  # pyright: ignore[reportPrivateUsage]
+    assert told == ["far"]
+
+
+@pytest.mark.parametrize(("rival", "asked"), [(False, ["far"]), (True, [])])
+def test_beside_a_rival_nothing_is_tried_that_is_out_of_reach(
+    rival: bool, asked: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: list[str] = []
+    monkeypatch.setattr(explain, "within_reach", lambda _, __, asked: [one for one in asked if one.far][:1])
+    monkeypatch.setattr(explain, "delayed", lambda log, _: log)
+    monkeypatch.setattr(explain, "promising", lambda *_: ([], [FAR], {}))
+    monkeypatch.setattr(explain, "own_starts", lambda *_: [{}])
+    monkeypatch.setattr(explain, "_begun_again", lambda *_: {})
+    monkeypatch.setattr(explain, "skipping", lambda *_: 1)
+    monkeypatch.setattr(explain, "left_by", lambda _, cost: cost / 1000.0)
+
+    def screened(_: Any, together: Any, *__: Any, **___: Any) -> Any:
+        given.append(together[-1].name)
+        return [tried(9e3, together=together)]
+
+    monkeypatch.setattr(explain, "screened", screened)
+    first = tried(1800.0, together=(hypothesis("first"),))
+    assert not explain._paired(LONG, first, {}, lambda _: False, rival=rival)  # pyright: ignore[reportPrivateUsage]
+    assert given == asked
+
+
+def test_a_speed_that_is_late_and_one_that_is_early_are_one_where_they_came_to_one_place() -> None:
+    late, early = (Hypothesis(name, ("speed_lag",)) for name in ("speed_late", "speed_early"))
+    one = tried(800.0, together=(late,))
+    again = replace(tried(800.0, 0.1, together=(early,)), delays={"motor_speed_rad_s": 0.0})
+    assert explain._same(one, again)  # pyright: ignore[reportPrivateUsage]
+    assert not explain._same(one, replace(again, delays={"motor_speed_rad_s": -1e-3}))  # pyright: ignore[reportPrivateUsage]
+    assert not explain._same(one, replace(again, together=(OFFSET,)))  # pyright: ignore[reportPrivateUsage]
 
 
 @pytest.mark.parametrize(

@@ -188,11 +188,11 @@ def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
     def tried(cost: float, *together: str) -> Any:
         point, fit = Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), made_fit(cost, 2e8, 1e5, chi=chi)
         fit = replace(fit, std=dict.fromkeys(fit.values, 1.0))
-        return _Made(tuple(SimpleNamespace(name=name) for name in together), point, {}, {}, {}, (fit,))  # pyright: ignore[reportArgumentType]
+        return _Made(tuple(SimpleNamespace(name=name, free=(name,)) for name in together), point, {}, {}, {}, (fit,))  # pyright: ignore[reportArgumentType]
 
     asked: list[str] = []
 
-    def paired(_: Any, first: Any, *__: Any) -> Any:
+    def paired(_: Any, first: Any, *__: Any, **___: Any) -> Any:
         asked.append(first.together[0].name)
         own = [tried(50.0, "relief", "late")] if asked[-1] == "relief" else [tried(48.0, "worn", "late")]
         return [*own, tried(51.0, *(["relief", "worn"] if asked[-1] == "relief" else ["worn", "relief"]))]
