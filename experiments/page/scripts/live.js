@@ -4,7 +4,7 @@
 (() => {
   const KEPT = 2400; // gauges that are kept, as the server does
   const DRAWN = 500; // time between two drawings [ms]
-  const HEIGHT = 160; // of a chart [px]
+  const HEIGHT = 190; // of a chart [px]
   const UNITS = {
     _rad_s: ["rpm", 30 / Math.PI],
     _m_s: ["mm/s", 1e3],

@@ -244,6 +244,19 @@ def test_the_live_view_shows_gauges_and_what_the_watch_tells(opened: Any) -> Non
     assert int(told.inner_text()) > int(rows)
 
 
+def test_many_events_leave_the_charts_in_sight(opened: Any) -> None:
+    alarm = {"event": "alarm", "time_s": 9.0, "received": 1.7e9, "message": "the flow balance changed"}
+    told = {"name": "bench", "state": "watching", "message": "", "gauges": None, "history": [], "events": [alarm] * 200}
+    page = opened("live")
+    body = f"event: history\ndata: {json.dumps(told)}\n\n"
+    page.route("**/events", lambda route: route.fulfill(content_type="text/event-stream", body=body))
+    page.reload()
+    page.locator(".alarms tbody tr").nth(199).wait_for(state="attached")
+    box = page.locator(".events")
+    assert box.bounding_box()["height"] < 400.0
+    assert box.evaluate("one => one.scrollHeight > one.clientHeight")
+
+
 def test_a_negative_gauge_has_a_minus_and_a_balance_that_is_learnt_no_empty_chart(opened: Any) -> None:
     gauge = {"time_s": 1.0, "rows": 9, "gaps": 0, "left_out": 0, "number": 1}
     channels = {"values": {"pressure_a_pa": -2.5e5}, "low": {"pressure_a_pa": -3e5}, "high": {"pressure_a_pa": 1e5}}
