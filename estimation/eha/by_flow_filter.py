@@ -90,7 +90,9 @@ def filter_flow(
     centre = parameters.bulk_modulus
     wanted = max(guess if guess is not None else centre, LEAST_MODULUS * centre)
     moduli = sorted({*(multiple * centre for multiple in MODULI), wanted})
-    noise = dict.fromkeys(("pressure_a_pa", "pressure_b_pa"), drive_noise(record, parameters, variances))
+    noise: Mapping[str, float] = dict.fromkeys(
+        ("pressure_a_pa", "pressure_b_pa"), drive_noise(record, parameters, variances)
+    )
     members: list[Member] = []
     for model, makeup in FORMS:
         anywhere = chamber_belief(parameters, load, centre, 1.0, 1.0, makeup)

@@ -13,9 +13,9 @@ def rubbed(total: float, before: float, rub: Array) -> tuple[float, float]:
     Parameters
     ----------
     total : float
-        What the terms give [scaled].
+        What the terms give [dimensionless].
     before : float
-        The output a sample before [scaled].
+        The output a sample before [dimensionless].
     rub : ndarray, shape (f,)
         What friction takes off the output below and above where it rests: at the third value, or of two where it was a
         sample before; there it stays unless more than that moves it.
@@ -23,7 +23,7 @@ def rubbed(total: float, before: float, rub: Array) -> tuple[float, float]:
     Returns
     -------
     tuple of float
-        The output [scaled], and its direction [dimensionless].
+        The output [dimensionless], and its direction [dimensionless].
     """
     stay = before
     if rub.size > 2:
