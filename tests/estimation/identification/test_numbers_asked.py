@@ -26,6 +26,7 @@ from estimation.identification.free_run import (
 )
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.linear_fit import Form, LinearFit
+from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_fit import Runs
 from estimation.identification.search import pole_search
 from estimation.identification.search.criterion import Structure
@@ -207,7 +208,7 @@ def free_runs() -> dict[str, Any]:
         hammerstein_fit.fit_hammerstein("dead-zone", Form(1, (1,), (1,)), channels(), [np.array([1.0, -0.8])])
     told["Hammerstein"] = [asked, fits]
     runs = Runs(begun.variables, begun.terms, channels())
-    with watched(Runs, "run", lambda *_: 0) as asked:
+    with watched(NormalEquations, "outputs", lambda *_: 0) as asked:
         runs.fit(begun.theta, 5)
     told["runs"] = len(asked)
     return told
