@@ -156,7 +156,7 @@ def _answers(inputs: Array, b: Array, f: Array, delay: int) -> Array:
     padded = np.concatenate([np.repeat(inputs[:1], delay + b.size, axis=0), inputs])
     for row, column in zip(rows, padded.T, strict=True):
         row[:] = np.convolve(column, b)[b.size : b.size + row.size]
-    decay_rows(f, rows, float(b.sum()) * inputs[0], np.zeros(f.size))
+    decay_rows(f, rows, float(b.sum()) * inputs[0])
     return rows.T
 
 

@@ -10,26 +10,22 @@ if TYPE_CHECKING:
     from estimation.identification.free_run.linear_fit import Form
 
 
-def shifted(series: Array, lag: int, before: float) -> Array:
-    """Return a series some samples later, a level in front of it.
+def lay_shifted(column: Array, series: Array, lag: int, before: float) -> None:
+    """Put a series into a column some samples later, a level in front of it.
 
     Parameters
     ----------
+    column : ndarray, shape (n,)
+        Receives it.
     series : ndarray, shape (n,)
         Any.
     lag : int
         By how many samples.
     before : float
         The level [any unit].
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        In the series' unit.
     """
-    out = np.full(series.size, before)
-    out[lag:] = series[: max(series.size - lag, 0)]
-    return out
+    column[:lag] = before
+    column[lag:] = series[: max(series.size - lag, 0)]
 
 
 def columns_of(form: "Form", u: Array) -> Array:
@@ -45,9 +41,9 @@ def columns_of(form: "Form", u: Array) -> Array:
     ndarray, shape (n, n_b)
         One column a numerator coefficient.
     """
-    columns = [
-        shifted(one, delay + k, one[0])
-        for one, size, delay in zip(u.T, form.sizes, form.delays, strict=True)
-        for k in range(size)
-    ]
-    return np.column_stack(columns) if columns else np.zeros((u.shape[0], 0))
+    columns, place = np.empty((u.shape[0], form.n_b), order="F"), 0
+    for one, size, delay in zip(u.T, form.sizes, form.delays, strict=True):
+        for k in range(size):
+            lay_shifted(columns[:, place + k], one, delay + k, float(one[0]))
+        place += size
+    return columns

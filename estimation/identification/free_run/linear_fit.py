@@ -8,9 +8,9 @@ import numpy as np
 from estimation.arrays import Array, BoolArray
 from estimation.identification.fit.output_error import minimise
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.lagged_columns import columns_of, shifted
+from estimation.identification.free_run.lagged_columns import columns_of, lay_shifted
 from estimation.identification.free_run.least_squares import Counted, least_squares
-from estimation.identification.free_run.linear_kernel import decay_rows, settles
+from estimation.identification.free_run.linear_kernel import decay_rows, longest_pole, settles
 from estimation.identification.search.criterion import Structure, polynomial, stabilised
 from estimation.identification.search.descent import stable
 from estimation.identification.search.experiments import Experiments
@@ -114,23 +114,30 @@ class Problem:
         ndarray, shape (n, n_b + 1 + order * logs)
             Numerators, offset, initial states of each log.
         """
-        form, n_b, n = self.form, self.form.n_b, self.form.order
-        out = np.zeros((self.y.size, n_b + 1 + n * len(self.data.y)), order="F")
-        out[:, n_b] = 1.0
+        out = np.zeros((self.y.size, self.form.n_b + 1 + self.form.order * len(self.data.y)), order="F")
+        self._lay_linear(f, out, self.form.n_b)
+        return out
+
+    def _lay_linear(self, f: Array, out: Array, offset: int) -> None:
+        """Put the linear columns where they belong: numerators first, the offset and initial states from a column on.
+
+        Where initial states have no part is left as it is: zero.
+        """
+        form, n = self.form, self.form.order
+        out[:, offset] = 1.0
         for index, u in enumerate(self.data.u):
             first, last = int(self.bounds[index]), int(self.bounds[index + 1])
             # an input that stood at its first value before the log: lags are shifts, filtered or not
             rows, levels = np.zeros((u.shape[1] + 1, last - first)), np.zeros(u.shape[1] + 1)
             rows[:-1], levels[:-1], rows[-1, 0] = u.T, u[0], 1.0
-            decay_rows(f, rows, levels, np.zeros(n + 1))
+            decay_rows(f, rows, levels)
             place = 0
             for answer, level, size, delay in zip(rows, levels / float(f.sum()), form.sizes, form.delays, strict=False):
                 for k in range(size):
-                    out[first:last, place + k] = shifted(answer, delay + k, level)
+                    lay_shifted(out[first:last, place + k], answer, delay + k, level)
                 place += size
             for k in range(n):
-                out[first + k : last, n_b + 1 + index * n + k] = rows[-1, : last - first - k]
-        return out
+                out[first + k : last, offset + 1 + index * n + k] = rows[-1, : last - first - k]
 
     def first_columns(self, index: int) -> Array:
         """Return the lagged inputs before a log: every lag stands at the first value."""
@@ -166,22 +173,24 @@ class Problem:
         tuple of ndarray, shapes (n,) and (n, p)
             Output and derivatives, scaled.
         """
+        jacobian = np.zeros((self.y.size, theta.size), order="F")
+        return self._lay(theta, jacobian), jacobian
+
+    def _lay(self, theta: Array, jacobian: Array) -> Array:
+        """Return the output; its derivatives go into an array that was zero, or has been laid out by this before."""
         n_b, n = self.form.n_b, self.form.order
         f = np.concatenate([[1.0], theta[n_b : n_b + n]])
-        linear = self.linear_columns(f)
-        values = np.concatenate([theta[:n_b], theta[n_b + n :]])
-        output = linear @ values
-        jacobian = np.empty((self.y.size, theta.size), order="F")
-        jacobian[:, :n_b], jacobian[:, n_b + n :] = linear[:, :n_b], linear[:, n_b:]
+        self._lay_linear(f, jacobian, n_b + n)
+        output = jacobian[:, :n_b] @ theta[:n_b] + jacobian[:, n_b + n :] @ theta[n_b + n :]
         for index, first in enumerate(self.bounds[:-1]):
             part = slice(int(first), int(self.bounds[index + 1]))
             # before the log the input stood at its first value, and so did what it drives
             before = float(self.first_columns(index) @ theta[:n_b]) / float(f.sum())
-            moved = (output[part] - theta[n_b + n])[None, :]
-            decay_rows(f, moved, np.array([before]), np.zeros(n + 1))
+            moved = -(output[part] - theta[n_b + n])[None, :]
+            decay_rows(f, moved, np.array([-before]))
             for k in range(1, n + 1):
-                jacobian[part, n_b + k - 1] = -shifted(moved[0], k, before / float(f.sum()))
-        return output, jacobian
+                lay_shifted(jacobian[part, n_b + k - 1], moved[0], k, -before / float(f.sum()))
+        return output
 
     def descend(self, theta: Array, *, bounded: bool = False, least_gain: float = 0.0) -> LinearFit:
         """Return the minimum that one start leads to.
@@ -196,39 +205,28 @@ class Problem:
             As `levenberg` takes it [dimensionless].
         """
         n_b, n = self.form.n_b, self.form.order
+        jacobian = np.zeros((self.y.size, theta.size), order="F")
 
         def at(values: Array) -> tuple[float, Array, Array]:
-            output, jacobian = self.jacobian(values)
-            left = output - self.y
+            left = self._lay(values, jacobian) - self.y
             return self.counted.square(left), *self.counted.normal_equations(jacobian, left)
 
         # poles within a circle are those of the polynomial stretched by its radius within the unit circle
-        stretched = longest_pole(self.data.longest) ** -np.arange(1.0, n + 1.0) if bounded else np.ones(n)
+        stretched = longest_pole(self.data.longest) ** -np.arange(1.0, n + 1.0)
+
+        def acceptable(values: Array) -> bool:
+            f = values[n_b : n_b + n]
+            return settles(f) and (not bounded or bool(stable(f * stretched)))
+
         cost, best = levenberg(
             at,
             theta,
-            lambda values: settles(values[n_b : n_b + n]) and bool(stable(values[n_b : n_b + n] * stretched)),
+            acceptable,
             tolerance=TOLERANCE,
             most_steps=MOST_STEPS,
             least_gain=least_gain,
         )
         return LinearFit(self.form, best, cost, bounded)
-
-
-def longest_pole(n_samples: int) -> float:
-    """Return the pole whose time constant is a record's length.
-
-    Parameters
-    ----------
-    n_samples : int
-        Of the record.
-
-    Returns
-    -------
-    float
-        Distance from the origin [dimensionless].
-    """
-    return float(np.exp(-1.0 / n_samples))
 
 
 def fit_linear(
@@ -307,7 +305,7 @@ def _steiglitz_mcbride(problem: Problem) -> list[Array]:
             known = np.isfinite(y)
             whole = np.where(known, y, np.interp(np.arange(y.size), np.flatnonzero(known), y[known]))
             series = np.vstack([columns.T, np.ones(y.size), whole])
-            decay_rows(f, series, np.zeros(series.shape[0]), np.zeros(n + 1))
+            decay_rows(f, series, np.zeros(series.shape[0]))
             out = series[-1]
             past = np.column_stack([np.concatenate([np.zeros(k), out[:-k]]) for k in range(1, n + 1)])
             near = np.convolve(~known, np.ones(n + 1))[: y.size] == 0.0

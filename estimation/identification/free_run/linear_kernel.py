@@ -8,8 +8,11 @@ from estimation.identification.search.jit import compiled
 
 
 @compiled
-def decay_rows(f: Array, rows: Array, levels: Array, state: Array) -> None:
+def decay_rows(f: Array, rows: Array, levels: Array) -> None:
     """Put every row through ``1/F``, in place.
+
+    A sample waits for the one before it, so two rows go side by side, and of the sum only the product with the latest
+    output comes last.
 
     Parameters
     ----------
@@ -19,23 +22,44 @@ def decay_rows(f: Array, rows: Array, levels: Array, state: Array) -> None:
         One series a row.
     levels : ndarray, shape (r,)
         What each stood at before its first sample.
-    state : ndarray, shape (k,)
-        Room for the filter's state.
     """
     order = f.size - 1
+    count, n = rows.shape
+    if order == 0 or n == 0:
+        return
     total = 0.0
     for i in range(f.size):
         total += f[i]
-    for r in range(rows.shape[0]):
-        level = levels[r] / total
-        state[order] = 0.0
-        for i in range(order - 1, -1, -1):
-            state[i] = state[i + 1] - level * f[i + 1]
-        for t in range(rows.shape[1]):
-            out = state[0] + rows[r, t]
-            for i in range(order):
-                state[i] = state[i + 1] - out * f[i + 1]
-            rows[r, t] = out
+    head = min(order, n)
+    for r in range(count):
+        before = levels[r] / total
+        for t in range(head):
+            value = rows[r, t]
+            for i in range(1, order + 1):
+                value -= f[i] * (rows[r, t - i] if t >= i else before)
+            rows[r, t] = value
+    nearest = f[1]
+    for pair in range(count // 2):
+        r = 2 * pair
+        last, other = rows[r, head - 1], rows[r + 1, head - 1]
+        for t in range(head, n):
+            far, away = rows[r, t], rows[r + 1, t]
+            for i in range(2, order + 1):
+                far -= f[i] * rows[r, t - i]
+                away -= f[i] * rows[r + 1, t - i]
+            last = far - nearest * last
+            other = away - nearest * other
+            rows[r, t] = last
+            rows[r + 1, t] = other
+    if count % 2 == 1:
+        r = count - 1
+        last = rows[r, head - 1]
+        for t in range(head, n):
+            far = rows[r, t]
+            for i in range(2, order + 1):
+                far -= f[i] * rows[r, t - i]
+            last = far - nearest * last
+            rows[r, t] = last
 
 
 def settles(coefficients: Array) -> bool:
@@ -61,3 +85,19 @@ def settles(coefficients: Array) -> bool:
     whole = np.concatenate([[1.0], coefficients])
     # NumPy sums eight values or more in another order than the loop above
     return bool(stable(coefficients)) and min(float(whole.sum()), sum(whole.tolist())) > 0.0
+
+
+def longest_pole(n_samples: int) -> float:
+    """Return the pole whose time constant is a record's length.
+
+    Parameters
+    ----------
+    n_samples : int
+        Of the record.
+
+    Returns
+    -------
+    float
+        Distance from the origin [dimensionless].
+    """
+    return float(np.exp(-1.0 / n_samples))

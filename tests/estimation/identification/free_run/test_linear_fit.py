@@ -11,7 +11,7 @@ from estimation.identification.free_run.choose_linear import _forms, candidate, 
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import Form, Problem, fit_linear
-from estimation.identification.free_run.linear_kernel import settles
+from estimation.identification.free_run.linear_kernel import decay_rows, settles
 from estimation.identification.free_run.other_structures import adopt
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
@@ -34,6 +34,19 @@ def plant(u: Array, seed: int, noise: float = 0.02, offset: float = 5.0) -> Arra
 def one_log(n: int = 600, seed: int = 1) -> Channels:
     u = 3.0 + steps(n, seed)
     return channels_from([u[:, None]], [plant(u, seed + 100)], 0.1, ["valve"], "level")
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 5])
+@pytest.mark.parametrize(("rows", "n"), [(1, 40), (2, 40), (5, 40), (3, 4), (2, 1), (0, 9), (2, 0)])
+def test_rows_side_by_side_are_filtered_as_each_alone_from_its_level(order: int, rows: int, n: int) -> None:
+    f = np.atleast_1d(np.poly([0.9, 0.8, -0.3, 0.5, 0.2][:order]))
+    rng = np.random.default_rng(order)
+    series, levels = rng.normal(size=(rows, n)), rng.normal(size=rows)
+    ran = series.copy()
+    decay_rows(f, ran, levels)
+    rest = np.repeat(levels[:, None], 600, axis=1)  # long enough that the level has brought about what it does
+    alone = [filtered([1.0], f, np.concatenate([a, b]))[600:] for a, b in zip(rest, series, strict=True)]
+    assert ran == pytest.approx(np.array(alone).reshape(ran.shape), rel=1e-9, abs=1e-9)
 
 
 def test_a_denominator_whose_sum_rounding_swallows_is_not_run() -> None:

@@ -39,7 +39,7 @@ def problems() -> dict[str, Any]:
     told: dict[str, Any] = {}
     with loops_in_python():
         rows = U[:50].T.copy()
-        decay_rows(np.array([1.0, -1.4, 0.6]), rows, np.array([0.5, -0.2]), np.zeros(3))
+        decay_rows(np.array([1.0, -1.4, 0.6]), rows, np.array([0.5, -0.2]))
         told["decayed"] = [some(one, 7) for one in rows]
         for name, form in FORMS.items():
             problem = Problem(form, data(len(form.sizes), lost=True))
