@@ -4,6 +4,7 @@ Noise never repeats a row of several channels digit by digit, and rest repeats o
 stretch of rows that each stand in few places, at one distance in time, was sent again.
 """
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -32,7 +33,12 @@ JUMP = 3.0
 drive repeats, none does."""
 
 
-def without_rows_sent_twice(record: Record) -> tuple[Record, tuple[Note, ...]]:
+FEWEST_ANY, DISTINCT = 10, 0.8
+"""Rows of a copy at least where nobody knows what the columns are [count], and the share of them that differ in a noisy
+one [fraction]: two coarse columns repeat a few rows by chance, and a plant at rest repeats its level."""
+
+
+def without_rows_sent_twice(record: Record, columns: Sequence[str] | None = None) -> tuple[Record, tuple[Note, ...]]:
     """Return a log without rows that its logger wrote again behind others.
 
     Where a channel goes on behind the copy as if no time had passed, the copy is cut out and the clock closed up.
@@ -42,6 +48,9 @@ def without_rows_sent_twice(record: Record) -> tuple[Record, tuple[Note, ...]]:
     ----------
     record : Record
         The log.
+    columns : sequence of str, optional
+        Two columns or more of which nothing is known; one of them must be noisy where rows come again. The channels of
+        an actuator unless told.
 
     Returns
     -------
@@ -56,27 +65,27 @@ def without_rows_sent_twice(record: Record) -> tuple[Record, tuple[Note, ...]]:
     >>> len(without_rows_sent_twice(Record(1e-3, dict(zip(names, sent, strict=True))))[0])
     200
     """
-    asked = [name for name in MEASURED if name in record]
-    if len(asked) < FEWEST_CHANNELS:
+    asked = [name for name in columns or MEASURED if name in record]
+    if len(asked) < (FEWEST_CHANNELS if columns is None else 2):
         return record, ()
-    copies = _copies(np.stack([record[name] for name in asked]))
+    copies = _copies(np.stack([record[name] for name in asked]), known=columns is None)
     if not len(copies[0]):
         return record, ()
     copied = np.zeros(len(record), dtype=np.bool_)
     for first, behind in zip(*copies, strict=True):
         copied[first:behind] = True
-    shown = [record[name] for name in asked if name != SPEED]
+    shown = [record[name] for name in asked if name != SPEED or columns is not None]
     time_passed = sum(_time_passed(values, *copies) for values in shown) > 0.0
     data = {"rows": int(np.count_nonzero(copied)), "count": len(copies[0])}
-    notes = (SensorCode.SENT_TWICE.note(channel=SPEED if SPEED in record else asked[0], **data),)
+    notes = (SensorCode.SENT_TWICE.note(channel=SPEED if SPEED in asked else asked[0], **data),)
     if time_passed:
         return record.replace(**{name: np.where(copied, np.nan, record[name]) for name in asked}), notes
     kept = {name: record[name][~copied] for name in record}
     return Record(record.sample_time, kept, record.metadata, record.start_time), notes
 
 
-def _copies(rows: Array) -> tuple[IntArray, IntArray]:
-    """Return the first row of each copy, and the one behind its last; rows of shape (channels, n)."""
+def _copies(rows: Array, *, known: bool) -> tuple[IntArray, IntArray]:
+    """Return the first row of each copy, and the one behind its last; rows of shape (channels, n), of known meaning."""
     bits = np.ascontiguousarray(rows).view(np.uint64)
     keys = np.zeros(rows.shape[1], dtype=np.uint64)
     for one in bits:
@@ -96,8 +105,12 @@ def _copies(rows: Array) -> tuple[IntArray, IntArray]:
     found = [(a, b) for a, b in _one_lag(again, lag) if b - a >= FEWEST_ROWS and b - a <= MOST_PLACES * lag[a]]
     whole = [_widened(keys, a, b, int(lag[a])) for a, b in found]
     least = LEAST_NOISE * np.array([np.ptp(one[np.isfinite(one)]) for one in rows])
-    jumped = sum(_goes_back(rows, a, b) or _has_noise(rows[:, a:b], least) for a, b in whole)
-    if not whole or 2 * jumped < len(whole):
+    if known:
+        jumped = sum(_goes_back(rows, a, b) or _has_noise(rows[:, a:b], least) for a, b in whole)
+        whole = whole if 2 * jumped >= len(whole) else []
+    else:
+        whole = [(a, b) for a, b in whole if _never_by_chance(rows[:, a:b], least)]
+    if not whole:
         return none, none
     first, behind = np.array(whole, dtype=np.int64).T
     return first, behind
@@ -131,6 +144,13 @@ def _goes_back(rows: Array, first: int, behind: int) -> bool:
 def _has_noise(rows: Array, least: Array) -> bool:
     """Return whether two channels of a copy are noisy."""
     return sum(is_noisy(one, size) for one, size in zip(rows, least.tolist(), strict=True)) >= 2
+
+
+def _never_by_chance(rows: Array, least: Array) -> bool:
+    """Return whether a copy is long enough, and a column of it is noisy in steps that are fine."""
+    n = rows.shape[1]
+    noisy = (is_noisy(one, size) and np.unique(one).size >= DISTINCT * n for one, size in zip(rows, least, strict=True))
+    return n >= FEWEST_ANY and any(noisy)
 
 
 def _time_passed(values: Array, first: IntArray, behind: IntArray) -> float:

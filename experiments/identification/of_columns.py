@@ -11,7 +11,7 @@ from experiments.command.options import require_positive
 from experiments.command.output_paths import own_paths
 from experiments.command.terminal import table
 from experiments.identification.entries import column_entries
-from experiments.identification.simulate_model import quality_of, record_of, warn_of_range, write_simulated
+from experiments.identification.simulate_model import quality_of, record_of, write_simulated
 from plant.errors import HydrostateError, require_known
 
 if TYPE_CHECKING:
@@ -119,7 +119,6 @@ def _answer(
     test = None
     if tests:
         held = channels_of(tests, fit.inputs, output, found.model.sample_time, split=True)
-        warn_of_range(found.model, held)
         test = {"files": [str(one) for one in fit.validate], **quality_of(found.model, held)}
     if not (fit.figure or fit.simulated or fit.response):
         return {**BLANK, **column_entries(found), "test": test, "frequency_response": None}

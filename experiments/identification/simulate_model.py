@@ -50,7 +50,6 @@ def simulate_model(logs: Sequence[Path], path: Path, fit: "ColumnFit", *, as_jso
                 )
             record = record_of(log, (*inputs, outputs[index]), fit.sample_time, assumed=model.sample_time)
             data = channels_of([record], inputs, outputs[index], model.sample_time)
-            warn_of_range(model, data)
             quality = quality_of(model, channels_of([record], inputs, outputs[index], model.sample_time, split=True))
             results.append({"inputs": list(inputs), "output": outputs[index], "structure": model.structure, **quality})
             if log in simulated:
@@ -99,24 +98,34 @@ def record_of(log: Path, wanted: Sequence[str], sample_time: float | None, *, as
     ------
     LogError
         If it cannot be read, or lacks one of them.
+
+    Warns
+    -----
+    LogWarning
+        If rows were left out because the logger wrote them a second time.
     """
+    from estimation.identification.free_run.from_records import sent_once
     from plant.log.any_columns import read_any
     from plant.log.clock.uniform import MOST_MISSING_TO_RELATE
 
-    return read_any(log, wanted, sample_time=sample_time, most_missing=MOST_MISSING_TO_RELATE, assumed=assumed)
+    record = read_any(log, wanted, sample_time=sample_time, most_missing=MOST_MISSING_TO_RELATE, assumed=assumed)
+    return sent_once(record, wanted)
 
 
 def quality_of(model: "FreeRunModel", data: "Channels") -> dict[str, Any]:
-    """Return how well a model follows its outputs, by the names of the JSON contract."""
-    return vars(model.quality(data.u, data.y))
+    """Return how well a model follows its outputs, by the names of the JSON contract.
 
-
-def warn_of_range(model: "FreeRunModel", data: "Channels") -> None:
-    """Warn of inputs that lie beyond those that a polynomial model was fitted to, or do not determine it."""
+    Warns
+    -----
+    LogWarning
+        If inputs lie beyond those that a polynomial model was fitted to, or do not determine it.
+    """
     from estimation.identification.free_run.input_range import doubts_about_inputs
 
-    for note in doubts_about_inputs(model, data):
+    quality, judged = model.judged_quality(data.u, data.y)
+    for note in doubts_about_inputs(model, data, judged):
         warnings.warn(LogWarning(note), stacklevel=2)
+    return vars(quality)
 
 
 def _simulated_screen(results: Sequence[Result]) -> "Iterable[RenderableType]":

@@ -132,8 +132,9 @@ class Relation(Shown):
             if (record := _record_of(log, one.sample_time)) is None:
                 refuse(f"a Log, a Record or a table with the channels is needed, got {type(log).__name__}")
             part = _channels(one, record, split=True)
-            _warn_of_inputs(one, part)
-            rows[one.output] = vars(one.quality(part.u, part.y))
+            quality, judged = one.judged_quality(part.u, part.y)
+            _warn_of_inputs(one, part, judged)
+            rows[one.output] = vars(quality)
         return pd.DataFrame.from_dict(rows, orient="index")
 
     def to_control(self) -> "TransferFunction | StateSpace":
@@ -254,6 +255,7 @@ def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: 
     options : Mapping[str, Any]
         As `identify_outputs` takes them, ``sample_time`` of the model [s], and ``reference``: what drives a loop.
     """
+    from estimation.identification.free_run.from_records import sent_once
     from estimation.identification.two_stage import identify_columns
     from experiments.identification.entries import column_entries
 
@@ -262,7 +264,8 @@ def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: 
     columns = [names_of(name, one) for name, one in given.items()]
     sources, targets, references = columns
     sample_time = asked.pop("sample_time", None)
+    once = [sent_once(one, [*sources, *targets, *references]) for one in records]
     found, data = identify_columns(
-        records, sources, targets, references=references, sample_time=sample_time, options=asked
+        once, sources, targets, references=references, sample_time=sample_time, options=asked
     )
     return Relation([one.model for one in found], [column_entries(one) for one in found], data)

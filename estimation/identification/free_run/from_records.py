@@ -10,6 +10,7 @@ from estimation.identification.free_run.data import FEWEST, Channels, channels_f
 from estimation.identification.notes import IdentificationCode
 from estimation.identification.signals.preprocess import resample
 from estimation.log_checks.bridging import bridged, gaps
+from estimation.log_checks.sent_twice import without_rows_sent_twice
 from estimation.stretches import stretches
 from plant.arrays import Array
 from plant.errors import HydrostateError, LogWarning
@@ -125,6 +126,32 @@ def channels_to_run(record: Record, inputs: Sequence[str], output: str, sample_t
         columns.append(_on_clock(bridged(record[name]), record.sample_time, wanted))
     u = np.column_stack(columns)
     return Channels(tuple(inputs), output, wanted, (u,), (np.full(len(u), np.nan),))
+
+
+def sent_once(record: Record, names: Sequence[str]) -> Record:
+    """Return a log without rows that its logger wrote a second time, whatever its columns are.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    names : sequence of str
+        Columns that are used.
+
+    Returns
+    -------
+    Record
+        The log itself where there are none.
+
+    Warns
+    -----
+    LogWarning
+        If there are such rows.
+    """
+    found, notes = without_rows_sent_twice(record, list(dict.fromkeys(names)))
+    for note in notes:
+        warnings.warn(LogWarning(note), stacklevel=2)
+    return found
 
 
 def pieces(record: Record, inputs: Sequence[str]) -> list[Record]:

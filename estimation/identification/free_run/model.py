@@ -161,10 +161,29 @@ class FreeRunModel:
         y : sequence of ndarray, shape (n,)
             Output of each log; NaN where missing.
         """
+        return self.judged_quality(u, y)[0]
+
+    def judged_quality(
+        self, u: Sequence[Array], y: Sequence[Array]
+    ) -> tuple[FreeRunQuality, list[tuple[float, float]]]:
+        """Return how well the model follows logs, and what tells whether a linear model stands in, from the same runs.
+
+        Parameters
+        ----------
+        u, y : sequence of ndarray
+            As `quality` takes them.
+
+        Returns
+        -------
+        tuple of FreeRunQuality and list of tuple of float
+            How well, and what `judged_run` tells of each log; empty for models that have no other to stand in.
+        """
         measured = np.concatenate(y)
-        free = np.concatenate([self.simulate(one_u, one_y) for one_u, one_y in zip(u, y, strict=True)])
+        runs = [self.judged_run(one_u, one_y) for one_u, one_y in zip(u, y, strict=True)]
+        free = np.concatenate([run for run, _ in runs])
         ahead = np.concatenate([self.predict(one_u, one_y) for one_u, one_y in zip(u, y, strict=True)])
-        return FreeRunQuality(*_fit(measured, free, running=True), *_fit(measured, ahead, running=False))
+        quality = FreeRunQuality(*_fit(measured, free, running=True), *_fit(measured, ahead, running=False))
+        return quality, [errors for _, errors in runs if errors is not None]
 
     def _scaled(self, u: ArrayLike, y: ArrayLike | None) -> tuple[Array, Array]:
         try:

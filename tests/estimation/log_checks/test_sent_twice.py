@@ -104,3 +104,38 @@ def test_coarse_channels_at_rest_are_no_copies() -> None:
     rng = np.random.default_rng(2)
     record = Record(1e-3, {name: rng.integers(0, 3, 4000).astype(np.float64) for name in (SPEED, POSITION, PRESSURE)})
     assert without_rows_sent_twice(record) == (record, ())
+
+
+def relation(noise: float, decimals: int, seed: int = 0) -> Record:
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 200), 10)
+    y = np.zeros(u.size)
+    for t in range(1, u.size):
+        y[t] = 0.8 * y[t - 1] + 0.2 * u[t - 1]
+    return Record(0.1, {"u": u, "y": np.round(y + noise * rng.normal(size=u.size), decimals)})
+
+
+def again(record: Record) -> Record:
+    order = np.arange(len(record))
+    return at(record, np.concatenate([order[:900], order[880:]]))
+
+
+def test_of_an_input_without_noise_and_one_output_a_copy_is_cut_out() -> None:
+    record = relation(0.02, 6)
+    found, (note,) = without_rows_sent_twice(again(record), ["u", "y"])
+    assert note.data["rows"] == 20
+    assert np.array_equal(found["y"], record["y"])
+    sent = again(record)
+    assert without_rows_sent_twice(sent) == (sent, ())  # they are no channels of an actuator
+
+
+@pytest.mark.parametrize(("noise", "decimals"), [(0.02, 6), (0.0, 6), (0.02, 2), (0.02, 1), (0.3, 0)])
+def test_two_columns_that_are_written_once_have_no_copies(noise: float, decimals: int) -> None:
+    for seed in range(5):
+        record = relation(noise, decimals, seed)
+        assert without_rows_sent_twice(record, ["u", "y"]) == (record, ())
+
+
+def test_a_plant_without_noise_that_repeats_is_no_copy() -> None:
+    sent = again(relation(0.0, 6))
+    assert without_rows_sent_twice(sent, ["u", "y"]) == (sent, ())

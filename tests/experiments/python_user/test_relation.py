@@ -192,4 +192,18 @@ def test_a_linear_model_that_stands_in_is_told(monkeypatch: pytest.MonkeyPatch) 
         with pytest.warns(LogWarning, match="linear") as said:
             found.simulate(given)
         assert {one.message.note.code for one in said} == {"linear_stands_in"}
-    assert len(told) == 2  # the fits without a block are run once for the result and the warning
+    with pytest.warns(LogWarning, match="linear"):
+        found.validate(bent(1, 1.0))
+    assert len(told) == 3  # the fits without a block are run once for the result and the warning
+
+
+def test_rows_that_a_logger_wrote_twice_are_told_and_left_out() -> None:
+    once = bent(1, 1.0)
+    rows = np.concatenate([np.arange(300), np.arange(280, len(once))])
+    sent = Record(T, {name: once[name][rows] for name in once})
+    options = {"order": 1, "delay": 1}
+    with pytest.warns(LogWarning, match="20 rows a second time"):
+        found = identified([sent], "valve", "heat", options)
+    assert np.array_equal(
+        found.models[0].dynamics.theta, identified([once], "valve", "heat", options).models[0].dynamics.theta
+    )
