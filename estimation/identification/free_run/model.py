@@ -170,8 +170,10 @@ class FreeRunModel:
 
         Parameters
         ----------
-        u, y : sequence of ndarray
-            As `quality` takes them.
+        u : sequence of ndarray, shape (n, m)
+            Inputs of each log.
+        y : sequence of ndarray, shape (n,)
+            Output of each log; NaN where missing.
 
         Returns
         -------

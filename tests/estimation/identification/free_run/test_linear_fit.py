@@ -39,7 +39,7 @@ def one_log(n: int = 600, seed: int = 1) -> Channels:
 @pytest.mark.parametrize("order", [0, 1, 2, 5])
 @pytest.mark.parametrize(("rows", "n"), [(1, 40), (2, 40), (5, 40), (3, 4), (2, 1), (0, 9), (2, 0)])
 def test_rows_side_by_side_are_filtered_as_each_alone_from_its_level(order: int, rows: int, n: int) -> None:
-    f = np.atleast_1d(np.poly([0.9, 0.8, -0.3, 0.5, 0.2][:order]))
+    f = np.atleast_1d(np.poly([0.9, 0.8, -0.3, 0.5, 0.2][:order])).astype(np.float64)
     rng = np.random.default_rng(order)
     series, levels = rng.normal(size=(rows, n)), rng.normal(size=rows)
     ran = series.copy()
