@@ -13,6 +13,9 @@ CANCELS = 4.0
 NEAR = 0.5
 """And closer than this share of the pole's distance from zero frequency."""
 
+COINCIDE = 1e-8
+"""Distance of a zero from a pole, over the pole's modulus, within which rounding does not tell them apart."""
+
 
 @dataclass(frozen=True)
 class Cancellation:
@@ -126,7 +129,8 @@ def cancellations(
             apart = complex(pole) - complex(zero)
             distance = np.array([apart.real, apart.imag])
             spread = both @ covariance @ both.T
-            away = _deviations(distance, spread)
+            # on one another the Jacobian is singular, and what its covariance says of them is rounding
+            away = 0.0 if abs(apart) <= COINCIDE * abs(pole) else _deviations(distance, spread)
             # a zero far away that is hardly determined is uncertain, but cancels nothing
             near = abs(pole - zero) < NEAR * abs(pole - at_rest)
             if near and away < CANCELS and zero.imag >= 0.0:
