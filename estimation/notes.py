@@ -304,6 +304,10 @@ class RigCode(Code):
         "root of pressure), as through a worn edge or a scratch; the fit includes this, and leakage is given at that "
         "pressure"
     )
+    PUMP_COMPRESSES = (
+        "the pump loses {share:.2g} ± {half_width:.2g} times what the oil that it delivers is compressed by: it is "
+        "filled at the pressure of its inlet; the fit includes this"
+    )
     CHECKS_CRACK = (
         "on average the make-up valves open {crack_pa:.3g} ± {half_width_pa:.2g} Pa below the accumulator pressure in "
         "the rig file; that of chamber {side} opens {later_pa:.3g} ± {later_half_width_pa:.2g} Pa lower than the other"

@@ -188,6 +188,11 @@ def _turbulent(found: Explanation, _: EhaParameters) -> Note:
     return RigCode.LEAKAGE_TURBULENT.note(percent=100.0 * value, half_width=half_width, at_pa=TURBULENT_AT)
 
 
+def _compresses(found: Explanation, _: EhaParameters) -> Note:
+    value, half_width = found.values["pump_compression"][0], _half_width(found, "pump_compression")
+    return RigCode.PUMP_COMPRESSES.note(share=value, half_width=half_width)
+
+
 def _blocked(found: Explanation, _: EhaParameters) -> Note:
     return RigCode.MAKEUP_BLOCKED.note(side="B" if found.values["makeup_share_b"][0] < 1.0 else "A")
 
@@ -223,6 +228,7 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "leakage_rise": growth_note,
     "leakage_step": step_note,
     "leakage_turbulent": _turbulent,
+    "pump_compresses": _compresses,
     "makeup_blocked": _blocked,
     "makeup_bends": _bends,
     "checks_crack": _crack,

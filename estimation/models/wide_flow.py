@@ -75,6 +75,7 @@ class WideFlowParameters(FlowParameters):
     step_at: float = si(0.5, "1", "middle of that step, in lengths of the log", "fitted")
     step_width: float = si(0.05, "1", "how long it takes, in lengths of the log", "fitted")
     leakage_turbulent: float = si(0.0, "1", "share of leakage at 5 bar that goes with the root of pressure", "fitted")
+    pump_compression: float = si(0.0, "1", "pumped oil lost to its compression, over dp / beta of it", "fitted")
     crack_pressure: float = si(0.0, "Pa", "drop at which the make-up valves crack, on average of the two", "fitted")
     crack_difference: float = si(0.0, "Pa", "drop at which valve A cracks over that of valve B", "fitted")
     makeup_share_b: float = si(1.0, "1", "conductance of valve B over that of A", "fitted")
@@ -118,10 +119,11 @@ def _rates(
     x = read + p.position_lag * rate + 0.5 * p.position_play * side
     next_x = next_read + p.position_lag * next_rate + 0.5 * p.position_play * next_side
     velocity, position = (next_x - x) / step, x + share * (next_x - x) - p.position_zero
-    pumped = delivered_flow(speeds, _ahead(p), step, share)
+    delivered = delivered_flow(speeds, _ahead(p), step, share)
     area_1, area_2 = piston_areas(p)
     volume_1, volume_2 = chamber_volumes(position, p)
     dp = p1 - p2
+    pumped = delivered * compressed(where(delivered > 0.0, dp, -dp) / p.bulk_modulus, p.pump_compression)
     elapsed = begun + share * (next_begun - begun)
     grown = grown_leakage(elapsed, p.leakage_growth, p.leakage_bend, p.leakage_rise)
     grown = grown * stepped_leakage(elapsed, p.leakage_before, p.step_at, p.step_width)
@@ -232,6 +234,28 @@ def turbulent_leakage(dp: Scalar, share: Scalar) -> Scalar:
     return 1.0 + share * (sqrt(TURBULENT_AT / above) - 1.0)
 
 
+def compressed(squeezed: Scalar, share: Scalar) -> Scalar:
+    """Return what a pump delivers over its displacement, as the volume at its outlet: it fills at its inlet's pressure.
+
+    A pump that delivers all that it draws loses the compression of that oil (a share of 1), and that of the oil that
+    stays in its teeth (more). A share of 0 counts its displacement at the outlet (Ivantysyn and Ivantysynova,
+    Hydrostatic Pumps and Motors, 2001, section 4.2).
+
+    Parameters
+    ----------
+    squeezed : float, ndarray or Expression
+        Rise of pressure through the pump over bulk modulus [dimensionless].
+    share : float or Expression
+        Oil that it compresses over what it delivers [dimensionless].
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Dimensionless.
+    """
+    return 1.0 - share * squeezed
+
+
 def _at_rest(p: SimpleNamespace) -> tuple[Scalar, ...]:
     held, supply = p.start_pressure, p.accumulator_pressure + p.start_level
     return supply + maximum(held, 0.0), supply + maximum(-held, 0.0), -p.pressure_offset, p.accumulator_pressure
@@ -283,6 +307,7 @@ LINEAR = {
     "leakage_before": 1.0,
     "step_at": 0.1,
     "leakage_turbulent": 0.1,
+    "pump_compression": 1.0,
     "crack_pressure": 1e4,
     "crack_difference": 1e4,
     **dict.fromkeys(CRACKS, USUAL_CRACK),

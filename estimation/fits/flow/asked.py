@@ -48,7 +48,7 @@ TOO_WIDE = 20.0
 ALWAYS_ASKED = (DELIVERY, ENCODER_ZERO, *MAY_HIDE)
 """What a log that the plain form explains is asked all the same, where the slopes promise a gain: each may hide."""
 
-MOST_ASKED = 50_000
+MOST_ASKED = 70_000
 """A longer log is not asked what is strange about it: the answer takes minutes [samples]."""
 
 

@@ -39,6 +39,29 @@ def samples_a_block(sample_time: float, length: float) -> int:
     return max(1, round(length / sample_time))
 
 
+def odd_block(sample_time: float) -> int:
+    """Return how many samples make a block of about `SHORTEST_SAMPLE`, an odd count: it has a sample in its middle.
+
+    Parameters
+    ----------
+    sample_time : float
+        Seconds between samples [s].
+
+    Returns
+    -------
+    int
+        Samples a block.
+
+    Examples
+    --------
+    >>> [odd_block(sample_time) for sample_time in (1e-4, 2e-4, 5e-4)]
+    [5, 3, 1]
+    """
+    wanted = SHORTEST_SAMPLE / sample_time
+    below = max(1, 2 * int((wanted + 1.0) / 2.0) - 1)
+    return below if wanted * wanted < below * (below + 2) else below + 2
+
+
 def block_means(values: Array, block: int) -> Array:
     """Return means over whole blocks; one is missing where any of its samples is.
 
@@ -82,8 +105,7 @@ def averaged(log: GreyBoxLog, longest_step: float) -> GreyBoxLog:
     GreyBoxLog
         The log, at the longer sample time.
     """
-    block = samples_a_block(log.sample_time, SHORTEST_SAMPLE)
-    block -= 1 - block % 2  # an odd count has a sample in its middle
+    block = odd_block(log.sample_time)
     begun = block // 2 + 1
     if block == 1 or log.gaps.size or len(log.drives) < begun + block:
         return log

@@ -33,6 +33,15 @@ def test_a_fit_that_leaves_more_than_the_noise_of_sensors_is_asked_for_all_that_
         assert asked_of(plain, PAPER, sound, sound, loaded=False, moving=False) == ((), remarks)
 
 
+def test_a_minute_at_1_khz_is_asked_and_two_are_not() -> None:
+    """A sound log of a minute was refused: the pump's oil was compressed, and nothing was asked."""
+    short, sound = seen(log(0.2)), made_fit(400.0, 2e8, 1e5)
+    for samples, wanted in ((60_000, True), (120_000, False)):
+        long = replace(short, drives=np.zeros((samples, short.drives.shape[1])))
+        asked, _ = asked_of(long, PAPER, sound, sound, loaded=True, moving=False)
+        assert bool(asked) == wanted
+
+
 def test_a_worn_pump_that_is_asked_for_stays_open_until_it_is_found() -> None:
     """The plain form is told where the search ends short of it."""
     sound = made_fit(400.0, 2e8, 1e5)

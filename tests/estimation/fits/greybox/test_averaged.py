@@ -42,6 +42,12 @@ def test_straight_lines_stay_where_they_are_and_noise_shrinks() -> None:
     assert set(log.steps) == {2}
 
 
+def test_a_log_at_5_khz_is_averaged_by_threes() -> None:
+    """An even count has no sample in its middle. Such a log stayed as it was: 20 s of it were asked nothing."""
+    log = averaged(replace(fast(), sample_time=2e-4), 1.0)
+    assert log.sample_time == pytest.approx(6e-4)
+
+
 def test_a_block_with_a_sample_missing_is_missing() -> None:
     log = fast()
     log.measured[50] = np.nan

@@ -1,0 +1,58 @@
+"""A pump that is filled at its inlet delivers less at its outlet: bulk modulus is right, and it is named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.eha.explained import notes_of
+from estimation.fits.flow.fit import fit_flow
+from estimation.log_checks.clean import clean_log
+from estimation.models.wide_flow import compressed
+from estimation.notes import RigCode
+from experiments.open_benchmark.draws import course_of, draw_plain
+from experiments.open_benchmark.run import run
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+RIG = EhaParameters()
+SHARE = 3.0
+"""Oil that the pump compresses over what it delivers: as much again stays in its teeth, and once more."""
+
+
+def filled_at_its_inlet() -> tuple[Record, float]:
+    """Return six seconds of an actuator of other equations, and its bulk modulus [Pa].
+
+    Its own pump delivers its displacement at the outlet. One that is filled at the inlet turns faster for that, by the
+    oil's compression.
+    """
+    drawing, driving, logging = np.random.default_rng(5).spawn(3)
+    drawn = draw_plain("major_friction", "steps", drawing).with_machine(bulk_modulus=6e7)
+    setup = replace(drawn, duration=6.0)
+    table = setup.logger.log(run(setup.machine, course_of(setup, driving)), logging)
+    channels = {name: table[name].to_numpy() for name in table.columns if name != "time_s"}
+    speed, beta = channels["motor_speed_rad_s"], setup.machine.bulk_modulus
+    squeezed = np.sign(speed) * channels["differential_pressure_pa"] / beta
+    return Record(setup.logger.sample_time, {**channels, "motor_speed_rad_s": speed / (1.0 - SHARE * squeezed)}), beta
+
+
+def test_a_pump_that_fills_at_its_inlet_is_named_and_leaves_bulk_modulus_right() -> None:
+    record, modulus = filled_at_its_inlet()
+    log = clean_log(record, RIG)
+    fit = fit_flow(log.record, RIG, RIG.bulk_modulus, {}, log.variances)
+    found = fit.explanation
+    assert found is not None
+    assert not fit.reasons
+    (value, std), (share, share_std) = fit.parameters["bulk_modulus"], found.values["pump_compression"]
+    assert abs(value - modulus) < 3.0 * std
+    assert std < 0.01 * modulus
+    assert abs(share - SHARE) < max(3.0 * share_std, 0.1)
+    (note,) = (note for note in notes_of(found, RIG) if note.code is RigCode.PUMP_COMPRESSES)
+    assert note.data["share"] == pytest.approx(share)
+
+
+def test_a_pump_loses_the_compression_of_its_oil_and_of_what_stays_in_its_teeth() -> None:
+    assert compressed(0.02, 1.0) == pytest.approx(0.98)
+    assert compressed(0.02, 1.5) == pytest.approx(0.97)
+    assert compressed(-0.02, 1.0) == pytest.approx(1.02)
+    assert compressed(0.02, 0.0) == 1.0
