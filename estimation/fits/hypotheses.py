@@ -258,7 +258,7 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "air_softness": (0.0, 1e5),
     "air_onset": (0.0, 1.0),
     "air_width": (1e-3, 0.3),
-    "leakage_growth": (-2.0, 2.0),
+    "leakage_growth": (-4.0, 4.0),
     "crack_pressure": (-1e5, 2e5),
     "crack_difference": (-5e4, 5e4),
     BEND: (0.0, 1e-3),

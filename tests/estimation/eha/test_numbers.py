@@ -63,6 +63,7 @@ VALUES: dict[str, tuple[float, float]] = {
     "leakage_growth": (0.4, 0.05),
     "leakage_rise": (0.1, 0.05),
     "leakage_turbulent": (0.3, 0.05),
+    "pump_compression": (1.1, 0.1),
 }
 
 

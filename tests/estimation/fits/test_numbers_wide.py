@@ -111,7 +111,7 @@ def what_is_asked_of_a_log() -> dict[str, Any]:
         with all_promise(Promise(gain, 0.0, 0.05)):
             asked, _ = asked_of(base, PAPER, fit, fit if likeliest else sound, loaded=False, moving=True)
         told[f"in motion: {gain:g}, {fed:g}, {chi:g}, {likeliest}"] = [one.name for one in asked]
-    lengths = (np.zeros((count, 2)) for count in (50000, 50001))
+    lengths = (np.zeros((count, 2)) for count in (70000, 70001))
     told["of long logs under load"] = [
         [one.name for one in asked_of(replace(base, drives=drives), PAPER, sound, sound, loaded=True, moving=False)[0]]
         for drives in lengths

@@ -17,9 +17,10 @@ from estimation.fits.explaining.wide_problem import (
 )
 from estimation.fits.greybox import freed_problem
 from estimation.fits.greybox.log import greybox_log
-from estimation.fits.hypotheses import BEGUN, ENCODER_ZERO, HYPOTHESES, OFFSET_AT_REST, Hypothesis
+from estimation.fits.hypotheses import BEGUN, ENCODER_ZERO, HYPOTHESES, LIMITS, OFFSET_AT_REST, Hypothesis
 from estimation.models.flow import FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
+from estimation.models.wide_flow import grown_leakage
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from tests.estimation.fits.short_logs import PAPER, at_one_speed, lost_in_bias, seen, wide
@@ -38,6 +39,18 @@ def test_every_search_of_a_log_with_a_dead_pressure_sensor_begins_at_a_number(on
     known = dict.fromkeys(model.unknowns, 1.0)
     for start in own_starts(log, one):
         assert np.all(np.isfinite(model.theta({**known, **start})))
+
+
+@pytest.mark.parametrize("factor", [2.0, 10.0, 1e6])
+def test_leakage_that_grows_with_time_squared_is_within_bounds(factor: float) -> None:
+    """It begins flat. Growth was held to twice its value halfway, and logs with such a leak were refused."""
+    halfway, elapsed = 1.0 + 0.25 * (factor - 1.0), np.linspace(0.0, 1.0, 5)
+    of_halfway = (factor - 1.0) / halfway  # both in time and in its square, each from halfway
+    for name in ("leakage_growth", "leakage_bend"):
+        least, most = LIMITS[name]
+        assert least <= of_halfway <= most
+    grown = halfway * grown_leakage(elapsed, of_halfway, of_halfway, 0.0)
+    np.testing.assert_allclose(grown, 1.0 + (factor - 1.0) * elapsed**2, rtol=1e-9, atol=1e-9 * factor)
 
 
 def test_an_encoder_is_first_taken_to_read_zero_in_mid_travel() -> None:
