@@ -4,6 +4,7 @@ Time increases. The slope of position is velocity, and follows the pump. Differe
 other's, and has the sign of the motion, since friction has. A unit that no file gives is guessed by the usual size.
 """
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -27,8 +28,9 @@ PORTS, VOLTAGE = ("pressure_a_pa", "pressure_b_pa"), "motor_voltage_v"
 BLOCKS = 300
 """Blocks that a log is averaged over [count]."""
 
-SURE, FOLLOWS, WEAKLY = 0.95, 0.7, 0.3
-"""Correlations of a slope with what it is, of what follows, and of a pressure with the motion."""
+SURE, FOLLOWS, WEAKLY, ALIKE = 0.95, 0.7, 0.3, 0.999
+"""Correlations of a slope with what it is, of what follows, of a pressure with the motion, and of two columns that are
+one."""
 
 CLOCK, STILL, SLOPE, RUNNER_UP, DIFFERENCE, TREND = 4.0, -3.0, 4.0, 2.5, 5.0, 1.5
 """What is said by: a clock, a column that stays the same, a slope, what follows it less well, a difference of two
@@ -44,6 +46,9 @@ CANDIDATES: Mapping[str, Sequence[str]] = {
     VOLTAGE: ("V", "mV"),
 }
 """Units that are tried where a file gives none, the usual ones first."""
+
+MOST_PRESSURES = 100
+"""Columns that are tried in threes for a difference, those that are likest a pressure first [count]; judged."""
 
 LEAST_SHARE = 0.1
 """How much each of two columns must move for a third to be their difference [fraction of what that moves]; judged."""
@@ -100,7 +105,7 @@ def guess_channels(
     with np.errstate(over="ignore", invalid="ignore"):  # columns may hold anything
         _by_clock(points, columns, why)
         time = max(points.get(TIME, {}), key=lambda place: points[TIME][place], default=None)
-        means = _means({place: one for place, one in columns.items() if place != time and one.dtype.kind != "M"})
+        means = _means(_of_one_length(columns, time))
         _by_motion(points, means, why)
         _by_pressure(points, means, why)
         found = [one for one in guessed(points, headings) if one.sure >= 0.05]
@@ -123,6 +128,14 @@ def _by_clock(points: dict[str, dict[int, float]], columns: Mapping[int, Any], w
             _add(points, TIME, place, 2.0 * STILL)
         elif _add(points, TIME, place, CLOCK):
             why.setdefault((TIME, place), []).append(GuessCode.INCREASES.note(step=facts.step))
+
+
+def _of_one_length(columns: Mapping[int, Any], time: int | None) -> dict[int, Any]:
+    """Return the columns of numbers as long as the time, or as most are: only rows of one moment are compared."""
+    lengths = Counter(map(len, columns.values()))
+    wanted = max(lengths, key=lambda one: lengths[one], default=0) if time is None else len(columns[time])
+    chosen = ((place, one) for place, one in columns.items() if place != time and one.dtype.kind != "M")
+    return {place: one for place, one in chosen if len(one) == wanted}
 
 
 def _means(columns: Mapping[int, Any]) -> dict[int, Array]:
@@ -158,10 +171,13 @@ def _middle(values: Array) -> Array:
 def _by_motion(points: dict[str, dict[int, float]], means: Mapping[int, Array], why: dict[Any, list[Note]]) -> None:
     """Find the column whose slope others are: position, of which velocity is the slope and the pump's speed follows."""
     followers: dict[int, list[tuple[float, int]]] = {}
+    places = np.array(list(means), dtype=np.int64)
+    middles = _unit_rows(np.array([_middle(one) for one in means.values()])) if means else np.empty((0, 0))
     for place in points.get(POSITION, {}).keys() & means.keys():
-        slope = np.diff(means[place])
-        like = [(_alike(slope, _middle(means[other])), other) for other in means if other != place]
-        followers[place] = sorted((one for one in like if abs(one[0]) > FOLLOWS), key=lambda one: -abs(one[0]))
+        like = middles @ _unit_rows(np.diff(means[place])[None])[0]
+        near = np.flatnonzero((np.abs(like) > FOLLOWS) & (places != place))
+        near = near[np.argsort(-np.abs(like[near]), kind="stable")]
+        followers[place] = [(float(like[one]), int(places[one])) for one in near]
     sure = {place: found for place, found in followers.items() if found and abs(found[0][0]) > SURE}
     for place, found in sure.items():
         first, second = found[0], found[1] if len(found) > 1 else None
@@ -182,13 +198,14 @@ def _by_pressure(points: dict[str, dict[int, float]], means: Mapping[int, Array]
     """Find pressures: one that is the difference of two others, or goes with the pump."""
     pressed = [place for place in points.get(PRESSURE, {}) if place in means]
     pump = max(points.get(SPEED, {}), key=lambda place: points[SPEED][place], default=None)
+    likest = sorted(sorted(pressed, key=lambda place: -points[PRESSURE][place])[:MOST_PRESSURES])
+    differences = _differences(np.array([means[place] for place in likest])) if len(likest) > 2 else []
     for place in pressed:
-        for one in pressed:
-            for other in pressed:
-                if len({place, one, other}) == 3 and one < other and _is_difference(means, place, one, other):
-                    points[PRESSURE][place] += DIFFERENCE
-                    note = GuessCode.IS_DIFFERENCE.note(one=one + 1, other=other + 1)
-                    why.setdefault((PRESSURE, place), []).append(note)
+        for minuend, one, other in differences:
+            if likest[minuend] == place:
+                points[PRESSURE][place] += DIFFERENCE
+                note = GuessCode.IS_DIFFERENCE.note(one=likest[one] + 1, other=likest[other] + 1)
+                why.setdefault((PRESSURE, place), []).append(note)
         if pump in means and pump is not None and place != pump:
             correlation = _alike(means[place], means[pump])
             if abs(correlation) > WEAKLY:
@@ -203,16 +220,40 @@ def _with_motion(place: int, correlation: float) -> Note:
     return code.note(column=place + 1, correlation=correlation)
 
 
-def _is_difference(means: Mapping[int, Array], place: int, one: int, other: int) -> bool:
-    """Return whether a column is the difference of two others, each at a scale of its own."""
-    basis = np.stack([means[one], means[other], np.ones(len(means[one]))], axis=1)
-    if len(basis) < 10 or abs(_alike(means[one], means[other])) > 0.999:
-        return False
-    solution, *_ = np.linalg.lstsq(basis, means[place], rcond=None)
-    size = np.std(means[place])
-    left = means[place] - basis @ solution
-    shares = np.abs(solution[:2]) * np.std(basis[:, :2], axis=0)  # a column that is like one of two is no difference
-    return bool(np.std(left) < 0.02 * size and solution[0] * solution[1] < 0.0 and shares.min() > LEAST_SHARE * size)
+def _differences(means: Array) -> list[tuple[int, int, int]]:
+    """Return the rows that are the difference of two others, each at a scale of its own, as (row, one, other).
+
+    The least-squares fit of every row by every two others follows from all covariances.
+    """
+    if means.shape[1] < 10:
+        return []
+    centred = means - means.mean(axis=1, keepdims=True)
+    covariance = centred @ centred.T / means.shape[1]
+    own = np.diag(covariance)
+    first, second = np.triu_indices(len(means), k=1)
+    determinant = own[first] * own[second] - covariance[first, second] ** 2
+    apart = determinant > (1.0 - ALIKE**2) * own[first] * own[second]
+    first, second, determinant = first[apart], second[apart], determinant[apart]
+    found: list[tuple[int, int, int]] = []
+    for row in range(len(means)):
+        by_first, by_second = covariance[row, first], covariance[row, second]
+        between = covariance[first, second]
+        one = (by_first * own[second] - by_second * between) / determinant
+        other = (by_second * own[first] - by_first * between) / determinant
+        left = own[row] - one * by_first - other * by_second
+        # a column that is like one of two is no difference
+        shares = np.minimum(one**2 * own[first], other**2 * own[second])
+        fits = (left < 0.02**2 * own[row]) & (one * other < 0.0) & (shares > LEAST_SHARE**2 * own[row])
+        fits &= (first != row) & (second != row)
+        found += [(row, int(first[place]), int(second[place])) for place in np.flatnonzero(fits)]
+    return found
+
+
+def _unit_rows(rows: Array) -> Array:
+    """Return rows without their means, at a size of one; those that stay the same are zero."""
+    centred = rows - rows.mean(axis=1, keepdims=True)
+    size = np.linalg.norm(centred, axis=1, keepdims=True)
+    return np.divide(centred, size, out=np.zeros_like(centred), where=size > 0.0)
 
 
 def _with_units(

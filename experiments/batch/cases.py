@@ -8,6 +8,7 @@ from functools import cache, cached_property, partial
 from glob import glob, has_magic
 from importlib.metadata import version
 from itertools import product
+from math import prod
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -27,6 +28,9 @@ RESULTS_VERSION = 2
 
 TASK_SECONDS = 2.0
 """About how long a worker is given work for at a time [s]: what a crash can cost, and what a part holds."""
+
+MOST_SERIES = 1_000_000
+"""Series of one `[[runs]]`, all of which are listed before the first is run [count]."""
 
 MOST_CASES = 2048
 
@@ -158,16 +162,26 @@ def plan_study(study: Study, folder: Path) -> Plan:
     Raises
     ------
     StudyError
-        If a glob finds no log.
+        If a glob finds no log, or there are more than a million series.
     RigError
         If the rig file is not usable.
     """
+    for place, one in enumerate(study.runs):
+        if (count := _count(one)) > MOST_SERIES:
+            raise StudyError(f"runs[{place}] must be at most {MOST_SERIES:,} series, got up to {count:,}: lower seeds")
     kind = actuator(study.plant)
     rig = kind.read_rig(folder / study.rig if study.rig else None)
     listed = _simulated if kind.name == DEFAULT else partial(simulated_of, kind)
     series = [*map(listed, study.runs), *(_logs(one, place, folder) for place, one in enumerate(study.logs))]
     works = [_works(one.methods, one.starts_pa) for one in (*study.runs, *study.logs)]
     return Plan(study, rig, tuple(zip(map(tuple, series), works, strict=True)))
+
+
+def _count(runs: Runs) -> int:
+    """Return how many series runs are at most, before any is listed."""
+    named = len(runs.conditions) if runs.conditions is not None else 0 if runs.severities else len(CONDITIONS)
+    each = prod(max(1, len(some)) for some in (runs.plants, runs.drives, runs.sensors))
+    return each * (named + len(runs.severities)) * runs.seed_count
 
 
 @cache

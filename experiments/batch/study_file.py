@@ -28,6 +28,13 @@ NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Severity = Annotated[float, Field(ge=0.0, le=HIGHEST_SEVERITY)]
 
 
+MOST_SEEDS = 1_000_000
+"""Seeds of one `[[runs]]` [count]."""
+
+SHOWN = 120
+"""Characters that an error shows of an entry [count]."""
+
+
 class StudyError(HydrostateError):
     """A study file is not usable."""
 
@@ -115,7 +122,7 @@ class Runs(_Table):
     sensors: tuple[str, ...] = ("bench",)
     conditions: tuple[str, ...] | None = None
     severities: tuple[tuple[Severity, Severity], ...] = ()
-    seeds: Annotated[int, Field(ge=1)] | tuple[Annotated[int, Field(ge=0)], ...] = 1
+    seeds: Annotated[int, Field(ge=1, le=MOST_SEEDS)] | tuple[Annotated[int, Field(ge=0)], ...] = 1
     starts_pa: tuple[NotNegative, ...] = ()
     duration_s: Positive = 10.0
     sample_time_s: Positive = 1e-4
@@ -139,6 +146,11 @@ class Runs(_Table):
         if not self.duration_s / self.sample_time_s >= 10.0:
             raise ValueError(f"at least 10 samples long, got {self.duration_s:g} s at {self.sample_time_s:g} s")
         return self
+
+    @property
+    def seed_count(self) -> int:
+        """How many seeds there are [count]."""
+        return self.seeds if isinstance(self.seeds, int) else len(self.seeds)
 
     @property
     def seed_list(self) -> tuple[int, ...]:
@@ -293,7 +305,7 @@ def _sentence(error: Any) -> str:
             return f"{where or 'the file'} must {'have' if wanted.startswith('at least one [[') else 'be'} {wanted}"
         case _:
             wanted = str(error["msg"]).removeprefix("Input should be ").removeprefix("Value should ")
-            return f"{where} must be {wanted}, got {error['input']!r}"
+            return f"{where} must be {wanted}, got {repr(error['input'])[:SHOWN]}"
 
 
 def _nearest(place: Sequence[str | int]) -> str:

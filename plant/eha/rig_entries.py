@@ -74,4 +74,4 @@ def wrong_kinds() -> Generator[None]:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         wanted = first["msg"].removeprefix("Input should be ")
-        raise RigError(f"{where} must be {wanted}, got {first['input']!r}") from error
+        raise RigError(f"{where} must be {wanted}, got {repr(first['input'])[:120]}") from error

@@ -190,6 +190,7 @@ def _own(position: int, heading: Heading, channel: str, source: str) -> Column:
         unit = re.sub(r"([A-Za-z])([234])(?![0-9])", r"\1^\2", suffix.replace("_per_", "/").replace("_", "/"))
     if unit is None:
         return Column(position, name, channel)
+    _require_one_unit(heading, channel, source)
     factor, offset = _conversion(unit, channel, name, source)
     if name == channel and (factor, offset) != (1.0, 0.0):
         raise LogError(
@@ -215,10 +216,25 @@ def _foreign(headings: Sequence[Heading], channel: str, spec: str, source: str) 
             f"column {name[:80]!r} is needed once for {channel}, the log has it {len(positions)} times", source
         )
     heading = headings[positions[0]]
+    if unit is None:
+        _require_one_unit(heading, channel, source)
     logged, unit = (None, heading.unit) if unit is None else (heading.unit, unit)
     if unit is None or channel.startswith(TRUTH):
         return Column(positions[0], heading.name, channel)
     return Column(positions[0], heading.name, channel, *_conversion(unit, channel, heading.name, source, logged))
+
+
+def _require_one_unit(heading: Heading, channel: str, source: str) -> None:
+    """Refuse a column whose name has another unit in brackets than the file gives beside it."""
+    said, named = heading.said, Heading(heading.name).unit
+    if said is None or named is None or said == named or not converts(named, UNITS.get(channel, named)):
+        return
+    if _conversion(said, channel, heading.name, source) != _conversion(named, channel, heading.name, source):
+        raise LogError(
+            f"column {heading.name[:80]!r} says {named} by its name and {said} beside it, wanted one; "
+            f"name the right one as {channel}=NAME:UNIT",
+            source,
+        )
 
 
 def _name_and_unit(spec: str) -> tuple[str, str | None]:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from plant.unit_text import plain_unit
 
@@ -29,17 +30,17 @@ class Heading:
     said: str | None = None
     stamped: bool = False
 
-    @property
+    @cached_property
     def unit(self) -> str | None:
         """Unit of the column as the file gives it, or None."""
         return self.said if self.said is not None else _split(self.name)[1]
 
-    @property
+    @cached_property
     def bare(self) -> str:
         """The name without its unit."""
         return _split(self.name)[0]
 
-    @property
+    @cached_property
     def stem(self) -> str:
         """The bare name in lower case, its words joined by underscores."""
         parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", self.bare)

@@ -116,12 +116,25 @@ def inspect_table(table: Table) -> TableFacts:
     return TableFacts(table, rows, tuple(columns))
 
 
+EXCEL = (36526.0, 73051.0)
+"""Days that Excel counts at the turn of this century and the next."""
+
+LONGEST_LOG = 1.0
+"""How much a column of Excel's days grows within a log at most [d]: a speed or a pressure of as many does not."""
+
+
 def _unit_since_1970(values: Array) -> str | None:
-    """Return the unit in which all of a column is a time since 1970, of this half of the century; None for others."""
+    """Return the unit in which a column is a time since 1970, or since 1900 as Excel counts; None for others."""
     there = values[np.isfinite(values)]
     if not len(there):
         return None
     low, high = float(there.min()), float(there.max())
+    if (
+        EXCEL[0] < low <= high < min(EXCEL[1], low + LONGEST_LOG)
+        and len(there) > 2
+        and bool((np.diff(there) > 0.0).all())
+    ):
+        return "d"
     fits = (unit for unit, least in (("ms", 1e12), ("us", 1e15), ("ns", 1e18)) if least < low <= high < 3.0 * least)
     return next(fits, None)
 

@@ -1,5 +1,6 @@
 """`Table`: a log file, open, with one clock: what its columns are called, and a way to read some of them."""
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -13,6 +14,13 @@ from plant.log.headings import Heading
 
 Read: TypeAlias = Callable[[Sequence[Column]], dict[Column, Array]]
 """From columns to their values as logged; a column of the truth that holds no numbers is left out."""
+
+
+MOST_VALUES = 120_000_000
+"""Values that are held of all columns of a table at once: 1 GB [count]."""
+
+FEW = 8
+"""Columns that are held whatever their length: files are bounded [count]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +76,7 @@ class Table:
         columns = [Column(place, one.name, f"{TRUTH}{place}") for place, one in enumerate(self.headings)]
         if time is not None:
             columns[time.position] = time
+        self._require_room(columns)
         try:
             found = self.read(columns)
         except LogError:
@@ -83,6 +92,28 @@ class Table:
             if time is not None:
                 found = self.read(list(found))
         return {column.position: values for column, values in found.items()}
+
+    def _require_room(self, columns: Sequence[Column]) -> None:
+        """Refuse what is too much for all columns to be held at once, before all of them are."""
+        if len(columns) <= FEW:
+            return
+        first = next((values for column in columns if (values := self._tried(column)) is not None), None)
+        if first is not None and len(first) * len(columns) > MOST_VALUES:
+            raise NoMemoryError(
+                f"all {len(columns)} columns of {len(first):,} rows are more than is looked at at once "
+                f"({MOST_VALUES:,} values); leave columns or rows out of it",
+                self.source,
+            )
+
+    def _tried(self, column: Column) -> Array | None:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # what is to be said is said when all are read
+                return self.read([column]).get(column)
+        except NoMemoryError:
+            raise
+        except LogError:
+            return None
 
 
 def table_of(

@@ -41,11 +41,16 @@ KINDS: Mapping[str, str] = {
 """What writes each, of `tests.log_formats`."""
 
 
+def small_log(rows: int = N) -> pd.DataFrame:
+    """Return a log of a sine at 1 kHz."""
+    time = 1e-3 * np.arange(rows)
+    wave = np.sin(200.0 * time)
+    return pd.DataFrame(dict(zip(SI, (time, 90.0 * wave, 1e-3 * (1.0 - wave), 0.03 * wave, 3e5 * wave), strict=True)))
+
+
 def seeds(folder: Path) -> dict[str, tuple[str, bytes]]:
     """Return the name and the content of a log of every kind."""
-    time = 1e-3 * np.arange(N)
-    wave = np.sin(200.0 * time)
-    log = pd.DataFrame(dict(zip(SI, (time, 90.0 * wave, 1e-3 * (1.0 - wave), 0.03 * wave, 3e5 * wave), strict=True)))
+    log = small_log()
     made: dict[str, tuple[str, bytes]] = {}
     for kind, name in KINDS.items():
         path: Path = getattr(written if hasattr(written, name) else more_written, name)(log, folder)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.fuzz import files, texts
+from tests.fuzz import columns_held, files, spellings, texts
 from tests.fuzz.guard import limited
 from tests.fuzz.mutations import CELLS, mutated
 from tests.fuzz.seeds import KINDS
@@ -26,6 +26,14 @@ def test_a_few_mutated_files_and_texts_end_in_a_record_or_a_sentence() -> None:
     assert texts.run(15, 0, first=1_000_000) == []
 
 
+def test_a_few_spellings_of_one_log_are_that_log_or_refused() -> None:
+    assert spellings.run(12, first=1_000_000) == []
+
+
+def test_a_few_files_of_columns_that_are_no_plain_numbers_end_in_a_record_or_a_sentence() -> None:
+    assert columns_held.run(8, first=1_000_000) == []
+
+
 @pytest.mark.slow
 def test_many_mutated_files_end_in_a_record_or_a_sentence() -> None:
     assert files.run(1600) == []
@@ -34,3 +42,13 @@ def test_many_mutated_files_end_in_a_record_or_a_sentence() -> None:
 @pytest.mark.slow
 def test_many_mutated_texts_and_streams_end_in_one_sentence() -> None:
     assert texts.run(600, 100) == []
+
+
+@pytest.mark.slow
+def test_no_spelling_of_one_log_is_read_as_another() -> None:
+    assert spellings.run(400) == []
+
+
+@pytest.mark.slow
+def test_many_files_of_columns_that_are_no_plain_numbers_end_in_a_record_or_a_sentence() -> None:
+    assert columns_held.run(300) == []

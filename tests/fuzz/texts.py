@@ -27,7 +27,15 @@ TOML = tuple(
     for one in (
         *("nan", "inf", "-inf", "1e308", "-1e-320", "true", "[]", "{}", '""', "[[runs]]", "[parameters]", "=", "1e999"),
         *("1979-05-27", '"../up"', '"\\u001b[2J"', '"m*9**9**9"', '"POS:m±1"', "9" * 400, "[" * 200, '"""', "'", "#"),
-        *("name = 1\n", "seeds = 99999999999999\n", "seeds = -1\n", "sample_time = 0.0\n", "duration = 1e300\n", "\0"),
+        *(
+            "name = 1\n",
+            "seeds = 99999999999999\n",
+            "seeds = 99999999\n",
+            "seeds = -1\n",
+            "sample_time = 0.0\n",
+            "duration = 1e300\n",
+            "\0",
+        ),
     )
 )
 COLUMNS = b"time_s=T:ms,position_m=POS, MM:mm,motor_speed_rad_s=Motor speed [rpm]:U/min,velocity_m_s=V"

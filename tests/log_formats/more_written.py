@@ -155,6 +155,29 @@ def json_split(log: pd.DataFrame, folder: Path) -> Path:
     return text(folder / "log.json", json.dumps([list(SI), *log.to_numpy().tolist()]))
 
 
+def days_of_excel(log: pd.DataFrame, folder: Path) -> Path:
+    made = benched(log)
+    made.insert(0, "Time", (46082.5 + log["time_s"] / 86400.0).map("{:.14f}".format))
+    return text(folder / "days.csv", csv(made.drop(columns=ENGLISH[0])))
+
+
+def dates_of_matlab(log: pd.DataFrame, folder: Path) -> Path:
+    made = benched(log).drop(columns=ENGLISH[0])
+    made.insert(0, "Time", (NOON + pd.to_timedelta(log["time_s"], unit="s")).dt.strftime("%d-%b-%Y %H:%M:%S.%f"))
+    return text(folder / "timetable.txt", csv(made))
+
+
+def swedish(log: pd.DataFrame, folder: Path) -> Path:
+    return text(folder / "svensk.csv", csv(benched(log), sep=";", decimal=",").replace("-", "\u2212"))
+
+
+def half_days(log: pd.DataFrame, folder: Path) -> Path:
+    begun = pd.Timestamp("2026-03-01 12:59:59")
+    made = benched(log).drop(columns=ENGLISH[0])
+    made.insert(0, "Time", (begun + pd.to_timedelta(log["time_s"], unit="s")).dt.strftime("%I:%M:%S.%f"))
+    return text(folder / "clock.csv", csv(made))
+
+
 def pickled(log: pd.DataFrame, folder: Path) -> Path:
     (folder / "log.pkl").write_bytes(pickle.dumps({name: log[name].to_numpy() for name in SI}))
     return folder / "log.pkl"
@@ -185,6 +208,10 @@ MORE: Mapping[str, Way] = {
     "JSON, an object a row": Way(json_rows),
     "JSON, a list a column": Way(json_columns),
     "JSON, names and lists": Way(json_split),
+    "days as Excel counts them": Way(days_of_excel, inspected=True),
+    "dates of a MATLAB timetable": Way(dates_of_matlab),
+    "Swedish minus": Way(swedish),
+    "a clock of twelve hours": Way(half_days),
     "pickle": Way(pickled, refused="a pickle may run any program .* save the log as"),
     "OpenDocument": Way(open_document, refused="OpenDocument .* save it as"),
 }

@@ -15,14 +15,22 @@ Stamps = NDArray[np.datetime64]
 
 _CLOCK = r"(?P<h>\d{1,2}):(?P<m>\d{2})(?::(?P<s>\d{2})(?:[.,:](?P<f>\d{1,12}))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
 _ZONE = r"\s*(?P<zone>Z|UTC|GMT|[A-Z]{3,4}|[-+]\d{2}(?::?\d{2})?)?(?:\[[\w/+-]{1,40}\])?"
-_PATTERNS = tuple(
-    re.compile(rf"{day}{clock}{_ZONE}")
-    for day, clock in (
-        (r"(?P<Y>\d{4})[-/.](?P<M>\d{1,2})[-/.](?P<D>\d{1,2})", rf"(?:(?:\s*[T,_]\s*|\s+){_CLOCK})?"),
-        (r"(?P<D>\d{1,2})\.(?P<M>\d{1,2})\.(?P<Y>\d{4}|\d{2})", rf"(?:[ T,_]\s*){_CLOCK}"),
-        (r"(?P<one>\d{1,2})[/-](?P<two>\d{1,2})[/-](?P<Y>\d{4}|\d{2})", rf"(?:[ T,_]\s*){_CLOCK}"),
-        ("", _CLOCK),
-    )
+_MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+_COMPACT = r"T(?P<h>\d{2})(?P<m>\d{2})(?P<s>\d{2})(?:[.,](?P<f>\d{1,12}))?(?P<half>)"
+_AFTER_DAY = rf"(?:[ T,_]\s*){_CLOCK}"
+_EITHER = re.compile(rf"(?P<one>\d{{1,2}})[/-](?P<two>\d{{1,2}})[/-](?P<Y>\d{{4}}|\d{{2}}){_AFTER_DAY}{_ZONE}")
+_PATTERNS = (
+    *(
+        re.compile(rf"{day}{clock}{_ZONE}")
+        for day, clock in (
+            (r"(?P<Y>\d{4})[-/.](?P<M>\d{1,2})[-/.](?P<D>\d{1,2})", rf"(?:(?:\s*[T,_]\s*|\s+){_CLOCK})?"),
+            (r"(?P<D>\d{1,2})\.(?P<M>\d{1,2})\.(?P<Y>\d{4}|\d{2})", _AFTER_DAY),
+            (rf"(?P<D>\d{{1,2}})[- ](?P<word>{'|'.join(_MONTHS)})[- ](?P<Y>\d{{4}})", _AFTER_DAY),
+            (r"(?P<Y>\d{4})(?P<M>\d{2})(?P<D>\d{2})", _COMPACT),
+        )
+    ),
+    _EITHER,
+    re.compile(rf"{_CLOCK}{_ZONE}"),
 )
 _MINUTES = re.compile(r"(?P<m>\d{1,3}):(?P<s>\d{2})[.,](?P<f>\d{1,12})")
 _DAY, _SECOND = 86_400_000_000_000, 1_000_000_000
@@ -118,7 +126,7 @@ def _offset(zone: str) -> int:
 
 def _months_first(cells: Sequence[str]) -> bool:
     """Return whether 3/4/2026 is in March: American, unless a first number is no month."""
-    found = (_PATTERNS[2].fullmatch(cell.strip()) for cell in cells)
+    found = (_EITHER.fullmatch(cell.strip()) for cell in cells)
     return not any(one and int(one["one"]) > 12 for one in found)
 
 
@@ -156,7 +164,8 @@ def _day(part: "dict[str, Any]", *, months_first: bool) -> int:
         return 0
     year = int(part["Y"])
     year += 2000 if year < 100 else 0
-    month, day = part.get("M"), part.get("D")
+    word = part.get("word")
+    month, day = part.get("M") if word is None else _MONTHS.index(word) + 1, part.get("D")
     if month is None or day is None:
         month, day = (part["one"], part["two"]) if months_first else (part["two"], part["one"])
     found = (date(year, int(month), int(day)) - _EPOCH) // timedelta(days=1)

@@ -51,7 +51,7 @@ def number(text: str) -> float:
         raise ValueError(cell)
     if _FORTRAN.fullmatch(cell):
         cell = cell.upper().replace("D", "E")
-    return float(cell)
+    return float(cell.replace("\u2212", "-") if "\u2212" in cell else cell)  # as .NET writes a minus in Swedish
 
 
 def numbers(values: NDArray[Any], name: str, source: str) -> Array:

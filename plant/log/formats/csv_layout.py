@@ -14,6 +14,7 @@ from plant.log.clock.stamps import is_stamp
 from plant.log.formats.cells import MISSING
 from plant.log.formats.layouts_seen import remember, remembered
 from plant.log.formats.packed import opened
+from plant.log.formats.thousands import require_ungrouped
 from plant.log.headings import Heading, is_unit, unit_or_none
 
 LOOKED_AT = 1 << 18
@@ -30,7 +31,7 @@ MOST_ZEROS = 0.02
 [fraction]."""
 
 DELIMITERS = (",", ";", "\t", "|", BLANKS)
-_NUMBER = re.compile(r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][-+]?\d+)?")
+_NUMBER = re.compile(r"[-+\u2212]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][-+]?\d+)?")
 COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
 """How a line of comment begins."""
 
@@ -101,6 +102,7 @@ def layout_of(path: Path) -> Layout:
     with opened(path) as file:
         start = file.read(LOOKED_AT)
     if (known := remembered(start, LINES)) is not None:
+        _require_ungrouped_rows(start, known, str(path))
         return known
     encoding = _encoding(start, str(path))
     text = start.decode(encoding, errors="replace").removeprefix("\ufeff")
@@ -110,6 +112,12 @@ def layout_of(path: Path) -> Layout:
     layout = layout_of_lines(lines, encoding, str(path))
     remember(start, LINES, layout)
     return layout
+
+
+def _require_ungrouped_rows(start: bytes, layout: Layout, source: str) -> None:
+    lines = start.decode("latin-1").split("\n", LINES)[layout.skipped : LINES]
+    rows = [cells for line in lines if len(cells := line.strip("\r").split(",")) == len(layout.headings)]
+    require_ungrouped(rows, [one.name for one in layout.headings], source)
 
 
 def _encoding(start: bytes, source: str) -> str:
@@ -167,7 +175,9 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
     block = max((_block(lines, one) for one in tried), key=lambda one: one.score)
     if not block.score or _header_parts_at_commas(lines, block):
         return _by_header(lines, encoding)
-    return block.layout(lines, encoding)
+    made = block.layout(lines, encoding)
+    require_ungrouped([row for _, row in block.rows], [one.name for one in made.headings], source)
+    return made
 
 
 def _of_labview(lines: Sequence[str], encoding: str, source: str) -> Layout | None:

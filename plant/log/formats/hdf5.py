@@ -33,7 +33,7 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
         If h5py is not installed, or there is no vector of numbers.
     """
     h5py = library("h5py", "HDF5 and MAT 7.3", str(path))
-    most = most_unpacked(path.stat().st_size)
+    most = left = most_unpacked(path.stat().st_size)
     groups: dict[str, dict[str, Any]] = defaultdict(dict)
     units: dict[str, dict[str, str | None]] = defaultdict(dict)
     texts: dict[str, str] = {}
@@ -48,7 +48,12 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
                 if leaf == METADATA:
                     texts[group] = _text(one, most, str(path))
                 continue
-            for column, values in _columns(one, leaf, most, str(path)).items():
+            if not _holds_numbers(one):
+                continue
+            left -= one.size * one.dtype.itemsize
+            if left < 0:
+                raise too_large(str(path), most)
+            for column, values in _columns(one, leaf).items():
                 groups[group][column] = values
                 units[group][column] = next((said for key in UNITS if (said := _attribute(one, key))), None)
     if STRUCT in groups and STRUCT in texts:
@@ -61,14 +66,13 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
     )
 
 
-def _columns(one: Any, leaf: str, most: int, source: str) -> dict[str, Any]:
-    """Return the columns that a data set holds, none where it holds no numbers."""
-    kind = one.dtype
-    if one.shape is None or not one.size > 0 or (kind.kind not in "fiub" and kind.names is None):
-        return {}
-    if one.size * kind.itemsize > most:
-        raise too_large(source, most)
-    values = np.asarray(one[()])
+def _holds_numbers(one: Any) -> bool:
+    return one.shape is not None and one.size > 0 and (one.dtype.kind in "fiub" or one.dtype.names is not None)
+
+
+def _columns(one: Any, leaf: str) -> dict[str, Any]:
+    """Return the columns that a data set of numbers holds."""
+    kind, values = one.dtype, np.asarray(one[()])
     if kind.names is not None:
         if values.ndim != 1:
             return {}

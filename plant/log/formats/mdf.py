@@ -7,6 +7,8 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from plant.errors import HydrostateError, LogError
 from plant.log.formats.extras import library
 from plant.log.formats.packed import most_unpacked, too_large
@@ -59,9 +61,10 @@ def _tables(asammdf: Any, path: Path) -> tuple[Table, ...]:
             for place, channel in enumerate(group.channels):
                 if place == master:
                     continue
-                signal = file.get(group=number, index=place, raw=False)
+                # by itself it leaves invalid samples out, of each channel others
+                signal = file.get(group=number, index=place, raw=False, ignore_invalidation_bits=True)
                 columns.setdefault("time", signal.timestamps)
-                columns.setdefault(_last(channel.name), signal.samples)
+                columns.setdefault(_last(channel.name), _valid(signal))
                 units.setdefault(_last(channel.name), signal.unit or None)
             if columns:
                 label = str(getattr(group.channel_group, "acq_name", "") or f"group {number}")
@@ -69,6 +72,14 @@ def _tables(asammdf: Any, path: Path) -> tuple[Table, ...]:
     if not made:
         raise LogError("it holds no channel", str(path))
     return tuple(made)
+
+
+def _valid(signal: Any) -> Any:
+    """Return the samples of a channel, NaN where the logger called them invalid."""
+    samples, invalid = signal.samples, signal.invalidation_bits
+    if invalid is None or samples.dtype.kind not in "fiub" or samples.shape != np.shape(invalid):
+        return samples
+    return np.where(invalid, np.nan, samples)
 
 
 def _require_within(group: Any, source: str) -> None:

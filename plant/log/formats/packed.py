@@ -10,7 +10,7 @@ from plant.errors import LogError
 
 GZIP, ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
 
-ALWAYS = 256 << 20
+ALWAYS = 128 << 20
 """Bytes that any packed file may unpack to."""
 
 MOST_TIMES = 50

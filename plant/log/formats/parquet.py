@@ -1,6 +1,7 @@
 """Parquet and Feather logs, both of Arrow's tables."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -18,6 +19,9 @@ from plant.log.headings import Heading
 from plant.log.table import Table
 
 SCHEMA_KEY = b"hydrostate"
+
+MANY = 200
+"""Columns that are read one by one, and so many at a time of a wider file [count]."""
 
 
 def open_parquet(path: Path) -> Table:
@@ -37,7 +41,30 @@ def open_parquet(path: Path) -> Table:
     if 8 * file.metadata.num_rows > most:
         raise too_large(str(path), most)
     schema = file.schema_arrow
-    return _table(path, schema, lambda place: file.read([schema.names[place]]).column(0))
+    table = _table(path, schema, lambda place: file.read([schema.names[place]]).column(0))
+    if len(schema.names) <= MANY:
+        return table
+
+    def read(chosen: Sequence[Column]) -> dict[Column, Array]:
+        return table.read(chosen) if len(chosen) <= MANY else _in_parts(path, file, chosen)
+
+    return replace(table, read=read)
+
+
+def _in_parts(path: Path, file: Any, chosen: Sequence[Column]) -> dict[Column, Array]:
+    """Return very many columns, some at a time: each reading of the file looks at the names of all."""
+    names, out = file.schema_arrow.names, dict[Column, Array]()
+    for first in range(0, len(chosen), MANY):
+        part = chosen[first : first + MANY]
+        held = file.read(list(dict.fromkeys(names[column.position] for column in part)))
+        out |= each_read(
+            part, lambda column, held=held: _values(_first(held, names[column.position]), column, str(path))
+        )
+    return out
+
+
+def _first(table: Any, name: str) -> Any:
+    return table.column(table.schema.get_all_field_indices(name)[0])
 
 
 def open_feather(path: Path) -> Table:

@@ -17,6 +17,9 @@ from plant.log.formats.extras import library
 from plant.log.formats.packed import most_unpacked, too_large
 from plant.log.table import Table
 
+LONGEST_ROW = 8 << 20
+"""Bytes of a row: a sheet has 16,384 columns, and a row is held as a whole before its first cell is seen."""
+
 MOST_CELLS = 40_000_000
 """Cells of the largest workbook that is read; a sheet has 1,048,576 rows."""
 
@@ -69,14 +72,18 @@ def _bounded(path: Path) -> None:
             if len(lengths) < 4:
                 raise BadZipFile("it ends too early")
             file.seek(int.from_bytes(lengths[:2], "little") + int.from_bytes(lengths[2:], "little"), 1)
-            machine, packed = zlib.decompressobj(-15), one.compress_size
+            machine, packed, row = zlib.decompressobj(-15), one.compress_size, 0
             while one.compress_type and packed > 0 and (part := file.read(min(_BLOCK, packed))):
                 packed -= len(part)
                 while part:
-                    left -= len(machine.decompress(part, _BLOCK))
+                    text = machine.decompress(part, _BLOCK)
+                    left -= len(text)
+                    row = len(text) - ended if (ended := text.rfind(b"row")) >= 0 else row + len(text)
                     part = machine.unconsumed_tail
                     if left < 0:
                         raise too_large(str(path), most)
+                    if row > LONGEST_ROW and one.filename.startswith("xl/worksheets/"):
+                        raise LogError(f"a row of {one.filename} is longer than any of a sheet", str(path))
 
 
 def _cells(sheet: Any, source: str) -> Cells:

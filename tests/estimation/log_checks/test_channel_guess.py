@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from estimation.log_checks.channel_guess import ChannelGuess, _alike, guess_channels
+from estimation.log_checks.channel_guess import ChannelGuess, _alike, _differences, guess_channels
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
@@ -162,3 +162,19 @@ def test_the_unit_is_the_first_in_which_a_channel_has_a_usual_size(name: str, si
     )
     assert found.guess.unit == unit
     assert "unit_guessed" in told(found)
+
+
+def test_columns_of_other_lengths_are_left_alone(record: Record) -> None:
+    columns = dict(enumerate([record.time, *record.channels.values(), np.arange(900.0)]))
+    headings = [Heading(name) for name in ("time_s", *record.channels, "other")]
+    found = {one.guess.channel: one.guess.place for one in guess_channels(headings, columns, HEALTHY)}
+    assert found["velocity_m_s"] == headings.index(Heading("velocity_m_s"))
+
+
+def test_the_difference_of_two_columns_is_found_among_hundreds_without_units() -> None:
+    noise = np.random.default_rng(2).standard_normal((130, 600))
+    noise[120] = 2.0 * noise[7] - 3.0 * noise[40]
+    assert _differences(noise[[7, 40, 120]]) == [(1, 0, 2), (2, 0, 1)]
+    columns = dict(enumerate([1e-3 * np.arange(600), *noise]))
+    headings = [Heading("time_s"), *(Heading(f"p{place}") for place in range(len(noise)))]
+    assert guess_channels(headings, columns, HEALTHY)  # in a tenth of a second: every three of them took minutes

@@ -115,14 +115,12 @@ def limits_of_guesses() -> dict[str, Any]:
         "difference, by a large share": pressed(0.0, 0.0, -7.0),
         "sum": pressed(0.0, 0.0, 1.0),
         "ports alike": edge(
-            lambda one: g._is_difference(  # pyright: ignore[reportPrivateUsage]
-                {0: way, 1: way + one * other, 2: one * other}, 2, 0, 1
-            ),
+            lambda one: (2, 0, 1) in g._differences(np.array([way, way + one * other, one * other])),  # pyright: ignore[reportPrivateUsage]
             1e-3,
             0.5,
         ),
         "ports of nine and ten": [
-            g._is_difference({k: one[:count] for k, one in enumerate(alike_ports)}, 2, 1, 0)  # pyright: ignore[reportPrivateUsage]
+            (2, 0, 1) in g._differences(np.array(alike_ports)[:, :count])  # pyright: ignore[reportPrivateUsage]
             for count in (9, 10, 15, 200)
         ],
         "clock": clock(t),

@@ -79,3 +79,9 @@ def test_a_log_whose_name_is_no_text_is_refused_by_its_name(tmp_path: Path) -> N
     content = {"name": "s", "logs": [{"glob": "*.csv", "methods": [{"verb": "diagnose"}]}]}
     with pytest.raises(StudyError, match=r"must be UTF-8, rename '.*l\\udcf6g.csv'"):
         plan_study(parse_study(content, "s"), tmp_path)
+
+
+def test_more_series_than_can_be_listed_are_refused_before_they_are() -> None:
+    study = parse_study({"name": "s", "runs": [{"seeds": 1_000_000, "methods": [DIAGNOSE]}]}, "s.toml")
+    with pytest.raises(StudyError, match=r"runs\[0\] must be at most 1,000,000 series, got up to 9,000,000"):
+        plan_study(study, Path())

@@ -23,6 +23,7 @@ def changed(**changes: Any) -> dict[str, Any]:
         (changed(drives=["sin"]), "runs[0].drives must be one of sine, prbs, steps, chirp, multisine, got 'sin'"),
         (changed(plants=[]), "runs[0].plants must be one or more of reduced, lumped, circuit, got none"),
         (changed(seeds=0), "runs[0].seeds must be greater than or equal to 1, got 0"),
+        (changed(seeds=10**8), "runs[0].seeds must be less than or equal to 1000000, got 100000000"),
         (changed(seeds=[1, -2]), "runs[0].seeds[1] must be greater than or equal to 0, got -2"),
         (changed(starts_pa=[1e8, -1.0]), "runs[0].starts_pa[1] must be greater than or equal to 0, got -1.0"),
         (changed(duration_s="long"), "runs[0].duration_s must be a valid number"),
@@ -55,3 +56,9 @@ def test_a_file_that_is_no_toml_or_not_there_is_named(tmp_path: Path) -> None:
         with pytest.raises(StudyError, match=said) as caught:
             read_study(tmp_path / name)
         assert str(tmp_path / name) in str(caught.value)
+
+
+def test_an_error_shows_the_beginning_of_a_long_entry() -> None:
+    with pytest.raises(StudyError) as caught:
+        parse_study(changed(duration_s="a" * 9000), "small.toml")
+    assert len(str(caught.value)) < 300

@@ -179,3 +179,26 @@ def test_an_mdf_whose_records_are_not_what_they_say_is_refused_before_it_is_copi
     struct.pack_into("<I", content, place, written)
     path.write_bytes(content)
     refused(path, said)
+
+
+def test_many_vectors_that_unpack_to_little_each_are_refused_for_their_sum(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    h5py = pytest.importorskip("h5py")
+    monkeypatch.setattr("plant.log.formats.packed.ALWAYS", 1 << 20)
+    with h5py.File(tmp_path / "bomb.h5", "w") as file:
+        for place in range(60):
+            file.create_dataset(f"c{place}", data=np.zeros(100_000), compression="gzip")
+    with pytest.raises(LogError, match="unpacks to more than"):
+        read_record(tmp_path / "bomb.h5")
+
+
+def test_a_row_of_a_sheet_that_is_longer_than_any_is_refused_before_it_is_held(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("plant.log.formats.xlsx.LONGEST_ROW", 1 << 16)
+    with ZipFile(tmp_path / "bomb.xlsx", "w", ZIP_DEFLATED) as file:
+        file.writestr("xl/workbook.xml", "<workbook/>")
+        file.writestr("xl/worksheets/sheet1.xml", f"<sheetData><row>{'<c><v>1</v></c>' * 100_000}</row></sheetData>")
+    with pytest.raises(LogError, match="longer than any of a sheet"):
+        read_record(tmp_path / "bomb.xlsx")

@@ -2,6 +2,7 @@ import pytest
 
 from plant.errors import HydrostateError, LogError, RigError
 from plant.log.columns import know_channels, parse_columns, resolve_columns
+from plant.log.headings import Heading
 
 
 def channels(*names: str, **mapping: str) -> dict[str, str]:
@@ -128,3 +129,13 @@ def test_a_command_line_column_of_another_shape_is_refused(texts: list[str], mes
 def test_a_channel_is_known_in_one_unit_which_its_name_ends_in(units: dict[str, str]) -> None:
     with pytest.raises(HydrostateError, match=r"must end in .* and be known in no other unit"):
         know_channels(units)
+
+
+@pytest.mark.parametrize("mapping", [None, {"position_m": "Position [mm]"}])
+def test_two_units_of_one_column_are_refused_and_a_mapping_settles_it(mapping: dict[str, str] | None) -> None:
+    headings = [Heading("time_s"), Heading("Position [mm]", "um")]
+    with pytest.raises(LogError, match="says mm by its name and um beside it, wanted one"):
+        resolve_columns(headings, mapping, "a.csv")
+    found = resolve_columns(headings, {"position_m": "Position [mm]:um"}, "a.csv")
+    assert {one.channel: one.factor for one in found}["position_m"] == pytest.approx(1e-6)
+    assert resolve_columns([Heading("Position [mm]", "mm")], None, "a.csv")[0].factor == pytest.approx(1e-3)

@@ -57,3 +57,10 @@ def test_repeats_and_steps_back_are_counted() -> None:
 )
 def test_what_is_no_clock_has_no_facts(stamps: np.ndarray) -> None:
     assert clock_facts(stamps) is None
+
+
+def test_days_as_excel_counts_them_are_told_by_their_size_and_their_steps() -> None:
+    days = 46082.5 + 1e-3 * np.arange(50) / 86400.0
+    speeds = 46082.5 + np.sin(np.arange(50.0))
+    facts = inspect_table(table_of("log.csv", {"Time": days, "speed": speeds}))
+    assert [one.heading.unit for one in facts.columns] == ["d", None]

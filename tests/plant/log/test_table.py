@@ -1,9 +1,13 @@
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from plant.errors import NoMemoryError
+from plant.log import table as tables
 from plant.log.formats.detect import open_tables
+from plant.log.table import table_of
 
 
 def test_a_column_that_memory_does_not_hold_is_not_taken_for_a_column_of_text(
@@ -20,3 +24,18 @@ def test_a_column_that_memory_does_not_hold_is_not_taken_for_a_column_of_text(
     monkeypatch.setattr("plant.log.formats.csv._read_fast", full)
     with pytest.raises(NoMemoryError, match=r"run\.csv: reading it as csv needs more memory than there is"):
         table.numbers()
+
+
+def test_more_values_than_are_held_at_once_are_refused_before_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tables, "MOST_VALUES", 1000)
+    monkeypatch.setattr(tables, "FEW", 3)
+    read: list[int] = []
+
+    def values(place: int) -> np.ndarray:
+        read.append(place)
+        return np.zeros(300)
+
+    wide = table_of("wide.h5", {f"c{place}": partial(values, place) for place in range(4)})
+    with pytest.raises(NoMemoryError, match="all 4 columns of 300 rows are more than is looked at at once"):
+        wide.numbers()
+    assert read == [0]

@@ -42,3 +42,7 @@ def test_one_text_in_a_hundred_cells_is_missing_with_a_note() -> None:
 def test_a_table_is_no_column() -> None:
     with pytest.raises(LogError, match=r"one-dimensional, got shape \(2, 2\)"):
         numbers(np.eye(2), "speed", "a.csv")
+
+
+def test_a_minus_as_swedish_programs_write_it_is_one() -> None:
+    assert number("\u22121.5e\u22123") == -1.5e-3

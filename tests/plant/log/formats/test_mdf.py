@@ -78,3 +78,21 @@ def test_what_is_no_mdf_is_refused_in_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "log.mf4").write_bytes(b"MDF     4.10" + bytes(200))
     with pytest.raises(LogError, match="cannot be read as mdf"):
         open_mdf(tmp_path / "log.mf4")
+
+
+def test_a_sample_that_the_logger_calls_invalid_is_missing_and_moves_no_other(tmp_path: Path) -> None:
+    from asammdf import MDF, Signal
+
+    time, marks = 1e-3 * np.arange(50), np.arange(50)
+    signals = [
+        Signal(marks.astype(float), time, name=name, invalidation_bits=marks % 10 == lost)
+        for name, lost in (("speed", 3), ("position", 7))
+    ]
+    with MDF(version="4.10") as file:
+        file.append(signals)
+        file.save(tmp_path / "log.mf4", overwrite=True)
+    (table,) = open_mdf(tmp_path / "log.mf4")
+    found = table.numbers()
+    for place, lost in ((1, 3), (2, 7)):
+        assert table.headings[place].name in ("speed", "position")
+        np.testing.assert_array_equal(found[place], np.where(marks % 10 == lost, np.nan, marks))

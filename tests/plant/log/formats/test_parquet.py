@@ -74,3 +74,15 @@ def test_a_column_that_holds_nothing_is_missing_and_yes_and_no_are_numbers(tmp_p
     values = table.numbers()
     assert np.isnan(values[0]).all()
     np.testing.assert_array_equal(values[1], [1.0, np.nan, 0.0])
+
+
+def test_a_table_of_very_many_columns_is_read_some_at_a_time_and_each_is_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(parquet, "MANY", 3)
+    wide = {f"c{place}": np.arange(4.0) + 10.0 * place for place in range(8)}
+    pq.write_table(pa.table(wide), tmp_path / "wide.parquet")
+    found = open_parquet(tmp_path / "wide.parquet").numbers()
+    assert {place: values.tolist() for place, values in found.items()} == {
+        place: values.tolist() for place, values in enumerate(wide.values())
+    }
