@@ -14,6 +14,7 @@ from estimation.log_checks.hum import without_hum
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
 from estimation.log_checks.outliers import without_gross_outliers
 from estimation.log_checks.position_range import without_position_beyond_range
+from estimation.log_checks.sample_time import require_fast_enough
 from estimation.log_checks.sensor_check import sensor_objections, without_saturated
 from estimation.log_checks.sent_twice import without_rows_sent_twice
 from estimation.log_checks.unit_change import unit_changes
@@ -92,7 +93,13 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     -------
     CleanLog
         The log to fit, and what was found.
+
+    Raises
+    ------
+    LogError
+        If samples are more than a tenth of a second apart.
     """
+    require_fast_enough(record.sample_time)
     sampled, held = without_held(record)
     sent_once, twice = without_rows_sent_twice(sampled)
     whole, dropouts = without_dropouts(sent_once)

@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from estimation.arrays import Array
+from estimation.log_checks.sample_time import ROUNDING, too_far_apart
 from estimation.models.gaussian import Gaussian
 from plant.compiled.functions import Scalar
 from plant.errors import HydrostateError, LogError
@@ -21,6 +22,9 @@ from plant.solvers.steps import Parameters
 OPENING = "opening_"
 """What a drive is called, before a state's name, that holds the variance that a sample adds to the state beside the
 process noise, in the filter's units [dimensionless]: see `estimation.log_checks.bridging`."""
+
+MOST_SUBSTEPS = 1000
+"""Steps of a model that a sample may need: a filter of slower samples would take forever, and its model has settled."""
 
 Opening: TypeAlias = Callable[[Any, Mapping[str, Array], float], tuple[Array, Mapping[str, float]]]
 """``opening(parameters, unknown, sample time [s])``: with the variance of what each drive did within gaps (of position,
@@ -108,7 +112,14 @@ class ProcessModel:
         -------
         int
             At least 1.
+
+        Raises
+        ------
+        LogError
+            If they are more than `MOST_SUBSTEPS`.
         """
+        if sample_time > (1.0 + ROUNDING) * (slowest := MOST_SUBSTEPS * self.longest_step):
+            raise LogError(too_far_apart(sample_time, slowest))
         return steps_a_sample(sample_time, self.longest_step)
 
     @property

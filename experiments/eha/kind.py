@@ -171,10 +171,12 @@ def _identified(parameters: EhaParameters, seed: int) -> "Mapping[str, LinearMod
 def _diagnosed(
     record: "Record", rig: "Rig[Any]", asked: "tuple[bool, Linear]", kept: "dict[Any, Any] | None" = None
 ) -> "Finding":
+    from estimation.log_checks.sample_time import require_fast_enough
     from faults.diagnosis.diagnose import diagnose_log
     from faults.diagnosis.rmse import score_transfer_functions
     from plant.spare_processors import begun
 
+    require_fast_enough(record.sample_time)  # before the transfer functions take the log to their own sample time
     no_pressure, linear = asked
     if no_pressure:
         record = record.replace(**{PRESSURE: None})
