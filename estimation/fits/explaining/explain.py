@@ -146,7 +146,7 @@ def _alone(
     begun += [[*screened(log, (one,), starts, every=every)] for one in likely[1:]]
     ended = settled_each(log, begun, spared=spared)
     if others and every > 1 and left_by(log, ended[0].cost) > DEFERRED:
-        known, others = ended[0].cost, within_reach(log, ended[0], others)
+        known = ended[0].cost
         more = settled_each(log, nearing(log, others, starts, hopeful(starts, begun), known, every), known, spared)
         first, second = sorted((ended, more), key=lambda each: each[0].cost)
         finished = led_on(log, first, spared=spared)
@@ -154,7 +154,7 @@ def _alone(
     finished = led_on(log, ended, spared=spared)
     if not others or _explained(finished[0], accepted):
         return finished
-    known, others = finished[0].cost, within_reach(log, finished[0], others)
+    known = finished[0].cost
     tried = _promising_enough(others, gains, plain - NEARLY_AS_GOOD * known) if faint else others
     if not tried:
         return finished

@@ -1,4 +1,4 @@
-"""`within_reach(log, tried, asked)`: which hypotheses may still explain a log beside what is known, alone or in a pair.
+"""`within_reach(log, tried, asked)`: which hypotheses may explain a log together with the best one.
 
 All of them together hold each pair. So where even all of them together leave far more than noise, no pair of those that
 slopes lead to explains the log.
@@ -32,7 +32,7 @@ MUCH = 0.2
 
 
 def within_reach(log: GreyBoxLog, tried: Tried, asked: Sequence[Hypothesis]) -> Sequence[Hypothesis]:
-    """Return the hypotheses that may explain a log beside what was tried, or in its place.
+    """Return the hypotheses that may explain a log together with what was tried.
 
     Those of which slopes say nothing always may, and those whose search begins far from their absence. A delay is more
     than the lag that is fitted together with the rest, so a late channel may where its lag is long. All may where much
