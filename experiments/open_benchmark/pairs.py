@@ -39,13 +39,20 @@ def pair_of(first: Kind, second: Kind) -> Kind:
     return Kind(
         f"{first.name}{BOTH}{second.name}",
         f"{first.strange}; {second.strange}",
-        lambda setup, rng: second.draw(first.draw(setup, rng), rng),
+        lambda setup, rng: _both(first, second, setup, rng),
         _accepted(first.accept, second.accept),
         rf"\A(?s:{''.join(patterns)})" if patterns else "",
         first.drives if first.drives != tuple(OPEN) else second.drives,
         _shared(first, second),
         first.severity and second.severity,
     )
+
+
+def _both(first: Kind, second: Kind, setup: Setup, rng: np.random.Generator) -> Setup:
+    """Return what both kinds make of a plain log; one that draws another actuator is drawn first, as it begins anew."""
+    for kind in (first, second) if "travel" not in touched(second) else (second, first):
+        setup = kind.draw(setup, rng)
+    return setup
 
 
 def collide(first: Kind, second: Kind) -> bool:
