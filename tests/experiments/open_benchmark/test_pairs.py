@@ -25,6 +25,14 @@ def test_both_are_in_the_log_of_a_pair() -> None:
     assert made.log.equals(make("pressure_1_bar_off+worn_pump", "training", 2).log)
 
 
+@pytest.mark.usefixtures("_short")
+@pytest.mark.parametrize("pair", ["speed_in_rpm+big_actuator", "big_actuator+speed_in_rpm"])
+def test_a_kind_that_draws_another_actuator_keeps_the_other_kind(pair: str) -> None:
+    made = make(pair, "training", 15)
+    assert made.setup.logger.sensors["motor_speed_rad_s"].gain == pytest.approx(60.0 / (2.0 * np.pi))
+    assert made.setup.rig["piston_area"] == pytest.approx(3.0 * 1.52e-3)
+
+
 @pytest.mark.parametrize(
     ("pair", "accept"),
     [

@@ -102,25 +102,26 @@ def test_beside_what_leaves_little_no_pair_is_tried_that_cannot_explain_the_log(
     assert asked == ["likely", "far", "some"]
 
 
-@pytest.mark.parametrize(("every", "left"), [(1, 1.8), (2, 1.8), (2, 9.0)])
-def test_what_is_out_of_reach_is_not_tried_alone(every: int, left: float, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("left", "asked"), [(1.1, ["far"]), (1.04, [])])
+def test_where_a_cause_explains_a_log_but_leaves_more_than_noise_what_slopes_do_not_see_is_tried_too(
+    left: float, asked: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     told: list[str] = []
 
     def nearing(_: Any, given: Any, *__: Any) -> Any:
         told.extend(one.name for one in given)
-        return [[tried(900.0)]]
+        return [[tried(700.0)]]
 
-    monkeypatch.setattr(explain, "within_reach", lambda _, __, asked: [one for one in asked if one.far])
     monkeypatch.setattr(explain, "screened", lambda *_, **__: [tried(800.0)])
     monkeypatch.setattr(explain, "nearing", nearing)
     monkeypatch.setattr(explain, "settled_each", lambda *_, **__: [tried(800.0)])
-    monkeypatch.setattr(explain, "led_on", lambda *_, **__: [tried(800.0)])
-    monkeypatch.setattr(explain, "likeliest", lambda *_, **__: [])
+    monkeypatch.setattr(explain, "led_on", lambda *_, **__: [replace(tried(800.0), fits=(LONG,))])
+    monkeypatch.setattr(explain, "likeliest", lambda *_, **__: [tried(700.0)])
     monkeypatch.setattr(explain, "left_by", lambda *_: left)
     gains = {"far": 0.0, "some": 900.0}
-    spared = Spared(every, left, [{}])
-    explain._alone(LONG, 1000.0, ([LIKELY], [FAR, SOME], gains), spared, lambda _: False)  # pyright: ignore[reportPrivateUsage]
-    assert told == ["far"]
+    found = explain._alone(LONG, 1000.0, ([LIKELY], [FAR, SOME], gains), Spared(1, left, [{}]), lambda _: True)  # pyright: ignore[reportPrivateUsage]
+    assert told == asked
+    assert [one.cost for one in found] == ([700.0, 800.0] if asked else [800.0])
 
 
 @pytest.mark.parametrize(("rival", "asked"), [(False, ["far"]), (True, [])])
