@@ -162,7 +162,12 @@ def lasting_power(left: Array) -> Array:
     return np.asarray(np.sum(np.nansum(parts, axis=1) ** 2, axis=0) / np.maximum(there, 1), dtype=np.float64)
 
 
-def power_left(fit: PointFit, blocks: Blocks) -> Array:
+def left_of(fit: PointFit, blocks: Blocks) -> Array:
+    """Return what a fit leaves of the blocks that count, shape (n, outputs) [m/s, Pa]; NaN where unknown."""
+    return (blocks.outputs - fit.fitted)[blocks.first :]
+
+
+def power_left(left: Array, blocks: Blocks) -> Array:
     """Return the mean square of what a fit leaves of a log.
 
     A search counts no residual as less than `class_fit.LEAST_SCALE` of the signal. Here that would be a wrong model's
@@ -170,18 +175,17 @@ def power_left(fit: PointFit, blocks: Blocks) -> Array:
 
     Parameters
     ----------
-    fit : PointFit
-        The fit.
+    left : ndarray, shape (n, outputs)
+        As `left_of` returns it.
     blocks : Blocks
-        Its log.
+        The log.
 
     Returns
     -------
     ndarray, shape (outputs,)
         Not below the noise, nor the error that runs of a circuit are allowed [m^2/s^2, Pa^2].
     """
-    left = root_mean_square((blocks.outputs - fit.fitted)[blocks.first :])
-    return np.maximum(left, np.maximum(blocks.noise, ALLOWED["tolerance"] * blocks.sizes)) ** 2
+    return np.maximum(root_mean_square(left), np.maximum(blocks.noise, ALLOWED["tolerance"] * blocks.sizes)) ** 2
 
 
 def noise_shown(left: Array, blocks: Blocks) -> Array:
@@ -194,9 +198,9 @@ def noise_shown(left: Array, blocks: Blocks) -> Array:
     Parameters
     ----------
     left : ndarray, shape (n, outputs)
-        Residuals of the blocks that count [m/s, Pa]; NaN where unknown.
+        Likewise.
     blocks : Blocks
-        Their log.
+        The log.
 
     Returns
     -------
@@ -210,7 +214,7 @@ def noise_shown(left: Array, blocks: Blocks) -> Array:
     return noise
 
 
-def model_error(fit: PointFit, blocks: Blocks) -> Array:
+def model_error(left: Array, blocks: Blocks) -> Array:
     """Return the variance of what a fit leaves of a log that its sensors do not make.
 
     It is what is left beyond the noise as far as that is known, in the blocks or in their averages: an error that
@@ -218,17 +222,17 @@ def model_error(fit: PointFit, blocks: Blocks) -> Array:
 
     Parameters
     ----------
-    fit : PointFit
-        The fit.
+    left : ndarray, shape (n, outputs)
+        As `left_of` returns it.
     blocks : Blocks
-        Its log.
+        The log.
 
     Returns
     -------
     ndarray, shape (outputs,)
         Nothing where noise alone is left [m^2/s^2, Pa^2].
     """
-    left, power = (blocks.outputs - fit.fitted)[blocks.first :], power_left(fit, blocks)
+    power = power_left(left, blocks)
     beyond = power - NOISE_ALONE**2 * noise_shown(left, blocks)
     lasting = (lasting_power(left) - (NOISE_ALONE * blocks.noise) ** 2) / AVERAGED
     return np.asarray(np.clip(np.maximum(beyond, lasting), 0.0, power), dtype=np.float64)
@@ -313,19 +317,20 @@ def doubt_of(
     ndarray, shape (7, 7)
         Covariance, and the squares of the steps that prior and log ask for [dimensionless].
     """
-    known, left = len(fit.coordinates), np.where(blocks.seen, (blocks.outputs - fit.fitted)[blocks.first :], 0.0)
-    power, lasts = power_left(fit, blocks), model_error(fit, blocks) * blocks.counts / LOOKS
+    known, left = len(fit.coordinates), left_of(fit, blocks)
+    there = np.where(blocks.seen, left, 0.0)
+    power, lasts = power_left(left, blocks), model_error(left, blocks) * blocks.counts / LOOKS
     weight = np.sqrt(power + lasts)
     slopes = np.concatenate([fit.slopes * seen[:, None, None], seldom])[:, blocks.first :]
     slopes = np.where(blocks.seen, slopes / weight, 0.0)
-    errs = np.sqrt(power + lasts * near_by(left, blocks.seen)) / weight
+    errs = np.sqrt(power + lasts * near_by(there, blocks.seen)) / weight
     told, erring = (part @ part.T for part in (one.reshape(len(slopes), -1) for one in (slopes, slopes * errs)))
     if blocks.differenced and not np.any(lasts):
         erring = erring - taken_back(slopes[..., 0] * (blocks.noise[0] / power[0] ** 0.5), blocks.seen[:, 0])
     prior = np.zeros((len(slopes), len(slopes)))
     prior[:known, :known] = np.linalg.inv(WEAK)
     prior[known:, known:] = np.diag(spreads**-2.0)
-    pulls = (slopes.reshape(len(slopes), -1) @ (left / weight).ravel())[:, None]
+    pulls = (slopes.reshape(len(slopes), -1) @ (there / weight).ravel())[:, None]
     pulls = pulls + prior[:, :known] @ (centres - fit.coordinates).T
     whole = np.arange(len(slopes))
     right = np.delete(whole, slice(known, known + len(SELDOM_KNOWN)))  # a force on the rod is open in any case

@@ -16,6 +16,7 @@ from faults.diagnosis.circuits.model_doubt import (
     RIGHT,
     SELDOM_KNOWN,
     doubt_of,
+    left_of,
     model_error,
     near_by,
     seldom_known_slopes,
@@ -55,6 +56,10 @@ def leaving(fit: PointFit, one: Blocks, size: np.ndarray) -> PointFit:
 
 def nothing_seldom(blocks: int) -> np.ndarray:
     return np.zeros((len(SELDOM_KNOWN), blocks, 2))
+
+
+def wrong(fit: PointFit, blocks: Blocks) -> np.ndarray:
+    return model_error(left_of(fit, blocks), blocks)
 
 
 def variances(blocks: int, share: float = 0.0) -> np.ndarray:
@@ -108,9 +113,9 @@ def test_what_an_encoder_takes_back_is_no_wrong_model() -> None:
         replace(fit, fitted=one.outputs - NOISE * np.hstack([velocity, rng.standard_normal((2_010, 1))]))
         for velocity in (steps, 2.0 * rng.standard_normal((2_010, 1)))
     )
-    assert model_error(as_steps, encoder)[0] == 0.0
-    assert model_error(as_white, encoder)[0] == pytest.approx((4.0 - NOISE_ALONE**2) * NOISE[0] ** 2, rel=0.1)
-    assert model_error(as_steps, one)[0] == pytest.approx(model_error(as_white, one)[0], rel=0.1)
+    assert wrong(as_steps, encoder)[0] == 0.0
+    assert wrong(as_white, encoder)[0] == pytest.approx((4.0 - NOISE_ALONE**2) * NOISE[0] ** 2, rel=0.1)
+    assert wrong(as_steps, one)[0] == pytest.approx(wrong(as_white, one)[0], rel=0.1)
 
 
 def test_a_fast_log_that_is_followed_to_its_noise_shows_no_wrong_model() -> None:
@@ -119,7 +124,7 @@ def test_a_fast_log_that_is_followed_to_its_noise_shows_no_wrong_model() -> None
     quiet = replace(one, noise=0.3 * NOISE)
     followed = replace(leaving(fit, quiet, 0.3 * NOISE), scales=least_scales(quiet))
     assert followed.scales[0] == pytest.approx(NOISE[0], rel=1e-3)
-    assert np.array_equal(model_error(followed, quiet), np.zeros(2))
+    assert np.array_equal(wrong(followed, quiet), np.zeros(2))
     sure, as_loud = (
         doubt_of(each, nothing_seldom(14_010), blocks, CENTRE, SURE, ALL, SPREADS)[0, 0]
         for each, blocks in ((followed, quiet), (fit, one))
@@ -144,8 +149,8 @@ def test_an_error_that_lasts_is_seen_where_noise_hides_it_in_a_block() -> None:
     noise -= np.mean(noise[one.first :], axis=0)
     hidden = np.where(np.arange(14_010) // 100 % 2, 0.4, -0.4)[:, None] * NOISE
     alone, lasting = (replace(fit, fitted=one.outputs - left) for left in (noise, noise + hidden))
-    assert np.array_equal(model_error(alone, one), np.zeros(2))
-    assert model_error(lasting, one) == pytest.approx((0.4 * NOISE) ** 2, rel=0.2)
+    assert np.array_equal(wrong(alone, one), np.zeros(2))
+    assert wrong(lasting, one) == pytest.approx((0.4 * NOISE) ** 2, rel=0.2)
     wide, narrow = (
         doubt_of(each, nothing_seldom(14_010), one, CENTRE, SURE, ALL, SPREADS) for each in (lasting, alone)
     )
