@@ -48,6 +48,8 @@ class Kind:
         Conditions of the logs, in turn.
     severity : bool
         Whether the severities of the condition are those of the log, where its condition is a right verdict.
+    draws_anew : bool
+        Whether ``draw`` draws another machine, and keeps of the plain setup its condition and drive alone.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Kind:
     drives: tuple[str, ...] = tuple(OPEN)
     conditions: tuple[str, ...] = tuple(CONDITIONS)
     severity: bool = True
+    draws_anew: bool = False
 
     def accepted(self, condition: str) -> tuple[str, ...]:
         """Return the verdicts that are right for a log in this condition."""

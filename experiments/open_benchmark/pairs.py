@@ -49,8 +49,8 @@ def pair_of(first: Kind, second: Kind) -> Kind:
 
 
 def _both(first: Kind, second: Kind, setup: Setup, rng: np.random.Generator) -> Setup:
-    """Return what both kinds make of a plain log; one that draws another actuator is drawn first, as it begins anew."""
-    for kind in (first, second) if "travel" not in touched(second) else (second, first):
+    """Return what both kinds make of a plain log; one that draws another machine comes first, to keep the other."""
+    for kind in (second, first) if second.draws_anew else (first, second):
         setup = kind.draw(setup, rng)
     return setup
 

@@ -67,7 +67,7 @@ def _single_rod(setup: Setup, _: np.random.Generator) -> Setup:
 
 
 RIGS = (
-    Kind("big_actuator", "area, mass, volume x3, pump x4; the rig file says so", _big),
+    Kind("big_actuator", "area, mass, volume x3, pump x4; the rig file says so", _big, draws_anew=True),
     Kind("stiff_oil", "bulk modulus 0.7e9 to 1.5e9, rig file unedited", _oil(0.7e9, 1.5e9)),
     Kind("soft_oil", "bulk modulus 4e7 to 6e7, rig file unedited", _oil(4e7, 6e7), MAYBE),
     Kind(
