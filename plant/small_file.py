@@ -10,6 +10,9 @@ from typing import Any
 LARGEST = 1 << 20
 """Bytes of the largest one that is read."""
 
+SHOWN = 120
+"""Characters that an error shows of an entry [count]."""
+
 
 def small_file(path: Path, most: int = LARGEST) -> bytes:
     """Return the content of a small regular file; a pipe would wait for ever, and a device has no end.
@@ -62,3 +65,24 @@ def small_toml(path: Path) -> dict[str, Any]:
         commas = re.search(r"^\s*(\w+)\s*=\s*([-+]?\d+,\d+)\s*(?:#|$)", text, re.MULTILINE)
         hint = f"; {commas[1]} = {commas[2]} has a decimal comma, write a point" if commas else ""
         raise ValueError(f"{error}{hint}") from error
+
+
+def shown(entry: object) -> str:
+    """Return an entry of a file as an error shows it: as it would be written, and not all of a long one.
+
+    Parameters
+    ----------
+    entry : object
+        Any.
+
+    Returns
+    -------
+    str
+        At most `SHOWN` characters.
+
+    Examples
+    --------
+    >>> shown("x"), len(shown("x" * 5000))
+    ("'x'", 120)
+    """
+    return repr(entry)[:SHOWN]

@@ -19,7 +19,7 @@ from plant.eha.drives import DRIVES
 from plant.eha.simulate import PLANTS
 from plant.errors import HydrostateError
 from plant.sensors.sensors import SENSORS
-from plant.small_file import small_toml
+from plant.small_file import shown, small_toml
 
 SHIPPED = "experiments.batch.studies"
 
@@ -30,9 +30,6 @@ Severity = Annotated[float, Field(ge=0.0, le=HIGHEST_SEVERITY)]
 
 MOST_SEEDS = 1_000_000
 """Seeds of one `[[runs]]` [count]."""
-
-SHOWN = 120
-"""Characters that an error shows of an entry [count]."""
 
 
 class StudyError(HydrostateError):
@@ -305,7 +302,7 @@ def _sentence(error: Any) -> str:
             return f"{where or 'the file'} must {'have' if wanted.startswith('at least one [[') else 'be'} {wanted}"
         case _:
             wanted = str(error["msg"]).removeprefix("Input should be ").removeprefix("Value should ")
-            return f"{where} must be {wanted}, got {repr(error['input'])[:SHOWN]}"
+            return f"{where} must be {wanted}, got {shown(error['input'])}"
 
 
 def _nearest(place: Sequence[str | int]) -> str:

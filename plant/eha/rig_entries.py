@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from plant.errors import RigError
+from plant.small_file import shown
 
 Strict = Annotated[float, Field(strict=True)]
 
@@ -74,4 +75,4 @@ def wrong_kinds() -> Generator[None]:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         wanted = first["msg"].removeprefix("Input should be ")
-        raise RigError(f"{where} must be {wanted}, got {repr(first['input'])[:120]}") from error
+        raise RigError(f"{where} must be {wanted}, got {shown(first['input'])}") from error
