@@ -22,16 +22,16 @@ from experiments.nine_conditions.findings import (
 from experiments.nine_conditions.settings import StudySettings
 from experiments.nine_conditions.transfer_functions import COEFFICIENTS
 from experiments.page.frames import Rows, Tables, tabled
-from experiments.page.numbers import MINUS, MISSING, exact, fixed, number, pretty_unit
+from experiments.page.numbers import MINUS, MISSING, exact, fixed, number, pretty_unit, shop_unit
 from experiments.page.tables import Cell, Column, Columns, Row, as_given, decimals, right, spaced
 from experiments.page.words import CONDITION, in_words
 from experiments.running.study import versions
 
-MEGAPASCAL = 1e-6
+MEGAPASCAL, _ = shop_unit("Pa")
 """From Pa to MPa."""
 
 
-SCALAR_UNITS: Mapping[str, tuple[str, float]] = {"1": ("%", 100.0), "Hz": ("Hz", 1.0), "Pa": ("MPa", 1e-6)}
+SCALAR_UNITS: Mapping[str, tuple[str, float]] = {"1": ("%", 100.0), "Hz": ("Hz", 1.0), "Pa": ("MPa", MEGAPASCAL)}
 """How a scalar is shown, by its SI unit."""
 
 SETTING_UNITS: Mapping[str, str] = {
