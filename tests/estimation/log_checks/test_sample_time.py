@@ -1,15 +1,11 @@
 """Samples that are too far apart are refused in words; fits and filters took forever over them."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from estimation.eha.online import Asked, begun
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.sample_time import SLOWEST
-from experiments.cli import app
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
 from plant.log.record import Record
@@ -38,14 +34,3 @@ def test_a_log_at_the_limit_is_looked_at_though_its_stamps_are_rounded() -> None
 def test_a_filter_of_such_a_stream_does_not_begin(form: str) -> None:
     with pytest.raises(LogError, match="samples are 1 s apart"):
         begun(Asked(EhaParameters(), form, "ekf"), slow(1.0))
-
-
-def test_a_verb_refuses_such_a_log_before_anything_is_computed_of_it(tmp_path: Path) -> None:
-    """The transfer functions would take each of its samples to ten million of theirs."""
-    path = tmp_path / "run.csv"
-    record = slow(1e4)
-    rows = np.column_stack([record.time, *record.channels.values()])
-    np.savetxt(path, rows, delimiter=",", header=",".join(["time_s", *record.channels]), comments="")
-    for verb in ("estimate", "diagnose"):
-        done = CliRunner().invoke(app, [verb, str(path)])
-        assert (done.exit_code, done.output.count("must be at most 0.1 s")) == (2, 1)

@@ -5,9 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import faults.eha.bank
 from estimation.eha.estimate import estimate_log
+from experiments.cli import app
 from experiments.eha.kind import EHA
 from experiments.published.library import read_library
 from plant.eha.drives import sine
@@ -85,3 +87,13 @@ def test_the_rig_s_leakage_is_said_to_be_taken_as_known_unless_a_condition_is_na
     assert "leakage and friction were taken to be those of the rig 'mine'" in said
     for change in ({"condition": "normal"}, {"form": "flow"}, {"form": None}):
         assert list(remarks([{**told, **change}])) == []
+
+
+def test_a_verb_refuses_samples_that_are_far_apart_before_anything_is_computed_of_them(tmp_path: Path) -> None:
+    """The transfer functions would take each of its samples to ten million of theirs."""
+    path, speed = tmp_path / "run.csv", 90.0 * np.sin(np.arange(40.0) / 9.0)
+    rows = np.column_stack([1e4 * np.arange(40.0), speed, 1e-5 * np.cumsum(speed)])
+    np.savetxt(path, rows, delimiter=",", header="time_s,motor_speed_rad_s,position_m", comments="")
+    for verb in ("estimate", "diagnose"):
+        done = CliRunner().invoke(app, [verb, str(path)])
+        assert (done.exit_code, done.output.count("must be at most 0.1 s")) == (2, 1)
