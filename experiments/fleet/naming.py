@@ -1,4 +1,4 @@
-"""Which actuator a log is of, and when it was taken: by a pattern of file names, or by a table."""
+"""Which actuator a log is of, and when it was taken: by a pattern of file names, by a table, or by dates in names."""
 
 import csv
 import re
@@ -9,8 +9,20 @@ from pathlib import Path
 
 from plant.errors import HydrostateError
 
+STAMP = re.compile(
+    r"(?P<year>(?:19|20)\d\d)(?P<between>[-_.]?)(?P<month>0[1-9]|1[0-2])(?P=between)(?P<day>0[1-9]|[12]\d|3[01])"
+    r"(?:[T _-]?(?P<hour>[01]\d|2[0-3])(?P<in_time>[-_.:]?)(?P<minute>[0-5]\d)(?:(?P=in_time)(?P<second>[0-5]\d))?)?"
+)
+"""A date as loggers write it into file names, with or without a time: 20261122, 2026-11-22_14-30-00."""
+
 FIELDS: Mapping[str, str] = {"actuator": r"(?P<actuator>.+)", "date": r"(?P<date>[0-9][0-9T:.+\-Z]*)"}
 """What a pattern may name, and what stands there."""
+
+NO_ACTUATOR = ("bench", "capture", "data", "export", "file", "log", "measurement", "record", "run", "scope", "test")
+"""Words before a date that name no actuator."""
+
+MATCHING = 0.8
+"""Share of file names that must hold one date each before names are believed [fraction]."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +56,8 @@ def place_of(date: str, source: str) -> float:
     Parameters
     ----------
     date : str
-        ISO 8601, such as 2026-11-22, 20261122 or 2026-11-22T14:30, a month (2026-11: its first day), or a number such
-        as running hours.
+        ISO 8601, such as 2026-11-22, 20261122 or 2026-11-22T14:30, the same as in file names (20261122_143000,
+        2026-11-22_14-30), a month (2026-11: its first day), or a number such as running hours.
     source : str
         Where it stands, for the error.
 
@@ -63,8 +75,14 @@ def place_of(date: str, source: str) -> float:
     --------
     >>> place_of("1970-01-03", "a log"), place_of("1970-02", "a log"), place_of("812.5", "a log")
     (2.0, 31.0, 812.5)
+    >>> place_of("19700103_120000", "a log")
+    2.5
     """
+    stamp = STAMP.fullmatch(date)
     try:
+        if stamp is not None:
+            parts = (int(stamp[name] or 0) for name in ("year", "month", "day", "hour", "minute", "second"))
+            return datetime(*parts, tzinfo=UTC).timestamp() / 86400.0
         if re.fullmatch(r"\d{8}|\d{4}-.*", date):
             moment = datetime.fromisoformat(f"{date}-01" if re.fullmatch(r"\d{4}-\d\d", date) else date)
             moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
@@ -84,7 +102,8 @@ def by_pattern(files: Iterable[str], pattern: str) -> dict[str, Named]:
     files : iterable of str
         Paths of logs.
     pattern : str
-        Of the end of the path, such as ``{actuator}/{date}.csv`` or ``{actuator}_{date}*``; ``*`` is anything.
+        Of the end of the path, such as ``{actuator}/{date}.csv`` or ``{actuator}_{date}*``; ``*`` is anything. Where
+        a name can be split in several ways, the date is a `STAMP`.
 
     Returns
     -------
@@ -108,17 +127,72 @@ def by_pattern(files: Iterable[str], pattern: str) -> dict[str, Named]:
         raise HydrostateError(
             f"--pattern must hold {{actuator}} once, {{date}} once at most and no other name, got {pattern!r}"
         )
-    texts = [FIELDS[part[1:-1]] if part.startswith("{") else ".*" if part == "*" else re.escape(part) for part in parts]
-    wanted = re.compile("(?:^|.*/)" + "".join(texts) + "$")
+    stamped, wanted = (
+        re.compile("(?:^|.*/)" + "".join(_text(part, fields) for part in parts) + "$")
+        for fields in ({**FIELDS, "date": f"(?P<date>{STAMP.pattern})"}, FIELDS)
+    )
     found: dict[str, Named] = {}
     for file in files:
-        match = wanted.match(file.replace("\\", "/"))
+        path = file.replace("\\", "/")
+        match = stamped.match(path) or wanted.match(path)
         if match is None:
             found[file] = UNNAMED
             continue
         date = match.groupdict().get("date") or ""
         found[file] = _named(match["actuator"].split("/")[-1], date, "its name")
     return _require_a_date(found)
+
+
+def _text(part: str, fields: Mapping[str, str]) -> str:
+    """Return the regular expression of a part of a pattern."""
+    if part.startswith("{"):
+        return fields[part[1:-1]]
+    return ".*" if part == "*" else re.escape(part)
+
+
+def by_dates(files: Iterable[str], folder: str = "") -> dict[str, Named]:
+    """Read actuator and date from file names that hold one date each, such as P-12_20261122_143000.csv.
+
+    The actuator is what the name has beside the date. Where that is nothing, or a word such as "log", it is the folder.
+
+    Parameters
+    ----------
+    files : iterable of str
+        Paths of logs.
+    folder : str
+        Of all of them; empty where it names no actuator.
+
+    Returns
+    -------
+    dict[str, Named]
+        By file; empty if names do not group the logs: fewer than `MATCHING` of them hold one date and an actuator, or
+        no actuator has two logs.
+
+    Examples
+    --------
+    >>> found = by_dates(["P-12/log 2026-11-21.csv", "P-12/log 2026-11-22.csv"])
+    >>> {one.actuator for one in found.values()}
+    {'P-12'}
+    """
+    found = {file: _by_date(f"{folder}/{file}".replace("\\", "/")) for file in files}
+    named = [one.actuator for one in found.values() if one.actuator]
+    together = len(named) >= MATCHING * len(found) and len(set(named)) < len(named)
+    return found if together else {}
+
+
+def _by_date(path: str) -> Named:
+    """Return what the name of one file and of its folder says."""
+    *_, folder, name = path.split("/")
+    stem = re.sub(r"\.[A-Za-z][A-Za-z0-9]*(?:\.(?:gz|zst))?$", "", name)
+    dates = list(re.finditer(rf"(?<![0-9]){STAMP.pattern}(?![0-9])", stem))
+    if len(dates) != 1:
+        return UNNAMED
+    date = dates[0]
+    rest = [part.strip("_-. ") for part in (stem[: date.start()], stem[date.end() :])]
+    actuator = "_".join(part for part in rest if part)
+    if re.sub(r"[^a-z]", "", actuator.lower()) in {"", *NO_ACTUATOR} and not re.search(r"\d", actuator):
+        actuator = folder
+    return _named(actuator, date[0], "its name") if actuator else UNNAMED
 
 
 def _require_a_date(found: dict[str, Named]) -> dict[str, Named]:

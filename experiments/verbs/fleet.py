@@ -31,7 +31,12 @@ def fleet(
     place: Annotated[str, argument("FOLDER_OR_STORE", "Folder of logs, or the store of a batch study with diagnoses.")],
     out: Annotated[Path, option("DIR", "Folder of the pages.", "--out", "-o")] = Path("fleet"),
     pattern: Annotated[
-        str | None, option("PATTERN", "How files are named, such as '{actuator}_{date}.csv'.", "--pattern")
+        str | None,
+        option(
+            "PATTERN",
+            "How files are named, such as '{actuator}_{date}.csv'; without it, names that hold a date are split there.",
+            "--pattern",
+        ),
     ] = None,
     names: Annotated[
         Path | None, option("CSV", "Table with the columns file, actuator and, if known, date.", "--names")
@@ -75,13 +80,16 @@ def fleet(
         store = _diagnosed(Path(place), logs, out, plant, rig, load_columns(columns), workers or os.cpu_count() or 1)
     table = store.rows(["file", "verb", "outcome", "found_condition", "reason", "quantities", "against"]).to_pylist()
     files = [row["file"] for row in table if row["file"]]
-    rows = actuator_rows(log_rows(table, _names(files, pattern, names), limits), repairs)
+    named, unnamed = _names(files, pattern, names, Path(place).name if from_logs else "")
+    if pattern is None and names is None:
+        _say_split(named)
+    rows = actuator_rows(log_rows(table, named, limits), repairs)
     if not rows:
         raise HydrostateError(f"{place}: must contain logs that were diagnosed (verb diagnose), but there are none")
     base = Path(place) if from_logs else Path()
     links = write_pages(rows, out, pages, _page_writer(base, plant, rig, columns))
     write_whole(out / PAGE, fleet_page(rows, links, Path(place).name), "--out", parents=True)
-    _warn(rows, repairs, pattern, names)
+    _warn(rows, repairs, unnamed)
     failed = sum(one.state == "failed" for row in rows for one in row.logs)
     total = sum(len(row.logs) for row in rows)
     if failed:
@@ -93,15 +101,12 @@ def fleet(
         raise typer.Exit(USAGE if failed == total else SOME_FAILED)
 
 
-def _warn(
-    rows: "Sequence[ActuatorRow]", repairs: Mapping[str, Sequence[float]], pattern: str | None, names: Path | None
-) -> None:
+def _warn(rows: "Sequence[ActuatorRow]", repairs: Mapping[str, Sequence[float]], unnamed: str) -> None:
     """Say which files stand alone, and which repairs restart nothing."""
     every = [one for row in rows for one in row.logs]
     alone = [one.file for one in every if not (one.named.actuator or one.named.problem)]
-    if alone and (pattern or names):
-        told = f"do not match --pattern {pattern}" if pattern else f"are not in {names}"
-        note(f"warning: {len(alone)} of {len(every)} files {told}, so each has its own row, such as {alone[0]}")
+    if alone and unnamed:
+        note(f"warning: {len(alone)} of {len(every)} files {unnamed}, so each has its own row, such as {alone[0]}")
     known = {row.name: row for row in rows}
     for name in repairs:
         if name not in known:
@@ -143,14 +148,33 @@ def limits_of_options(texts: Sequence[str]) -> dict[str, float]:
     return found
 
 
-def _names(files: Sequence[str], pattern: str | None, names: Path | None) -> "Mapping[str, Named]":
-    from experiments.fleet.naming import by_pattern, by_table
+def _names(
+    files: Sequence[str], pattern: str | None, names: Path | None, folder: str = ""
+) -> "tuple[Mapping[str, Named], str]":
+    """Return actuator and date of logs, and what is said of those that have none."""
+    from experiments.fleet.naming import by_dates, by_pattern, by_table
 
     if pattern is not None and names is not None:
         raise HydrostateError("--pattern and --names say the same: give one of them")
     if pattern is not None:
-        return by_pattern(files, pattern)
-    return {} if names is None else by_table(files, names)
+        return by_pattern(files, pattern), f"do not match --pattern {pattern}"
+    if names is not None:
+        return by_table(files, names), f"are not in {names}"
+    found = by_dates(files, folder)
+    return found, "do not hold one date" if found else ""
+
+
+def _say_split(named: "Mapping[str, Named]") -> None:
+    """Say how names of files were split that no option explains."""
+    known = {file: one for file, one in named.items() if one.actuator}
+    if not known:
+        return
+    file, first = next(iter(known.items()))
+    count = len({one.actuator for one in known.values()})
+    note(
+        f"file names hold dates: {file} is taken for actuator {first.actuator}, {first.date}; {len(known)} logs are of "
+        f"{count} actuator{'s' if count > 1 else ''}. If that is wrong, give --pattern or --names"
+    )
 
 
 def _logs_in(folder: Path, out: Path) -> list[Path]:

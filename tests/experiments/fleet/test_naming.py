@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.fleet.naming import UNNAMED, by_pattern, by_table, place_of
+from experiments.fleet.naming import UNNAMED, by_dates, by_pattern, by_table, place_of
 from plant.errors import HydrostateError
 
 
@@ -16,6 +16,8 @@ from plant.errors import HydrostateError
         ("{actuator}_{date}*", "P_1_812.5_steps.csv", "P_1", "812.5"),
         ("run-{date}-{actuator}.csv", "run-7-B3.csv", "B3", "7"),
         ("{actuator}.csv", "hall\\P-12.csv", "P-12", ""),
+        ("{actuator}_{date}.csv", "P_12_20261122_143000.csv", "P_12", "20261122_143000"),
+        ("{actuator}_{date}*", "P-12_2026-11-22_14-30_steps.csv", "P-12", "2026-11-22_14-30"),
     ],
 )
 def test_a_pattern_reads_file_names(pattern: str, file: str, actuator: str, date: str) -> None:
@@ -39,6 +41,41 @@ def test_a_later_date_is_a_larger_number_whatever_its_form() -> None:
     ]
     assert places == sorted(places)
     assert place_of("2026-11-23", "log") - place_of("20261122", "log") == 1.0
+    assert (
+        place_of("20261122_180000", "log") == place_of("2026-11-22_18-00", "log") == place_of("20261122", "log") + 0.75
+    )
+
+
+@pytest.mark.parametrize(
+    ("files", "actuators"),
+    [
+        (["A-2026-11-21.csv", "A-2026-11-22.csv", "B-2026-11-22.csv"], ["A", "A", "B"]),
+        (["hall/20261122_0800_P-12.csv.gz", "hall/20261122_0900_P-12.csv.gz"], ["P-12", "P-12"]),
+        (["P-7/log 2026-11-21.csv", "P-7/2026.11.22.csv", "P-8/log 2026-11-22.csv"], ["P-7", "P-7", "P-8"]),
+        (["log_20261121.csv", "log_20261122.csv"], ["press 4", "press 4"]),
+        (["A_20261121.csv", "A_20261122.csv", "A_20261123.csv", "A_20261124.csv", "notes.csv"], ["A"] * 4 + [""]),
+    ],
+)
+def test_names_that_hold_one_date_each_say_which_actuator(files: list[str], actuators: list[str]) -> None:
+    found = by_dates(files, "press 4")
+    assert [found[file].actuator for file in files] == actuators
+    assert all(found[file].place is not None for file in files if found[file].actuator)
+
+
+@pytest.mark.parametrize(
+    "files",
+    [
+        ["run1_20261122.csv", "run2_20261122.csv"],  # nothing says that these are of one actuator
+        ["A_20261122.csv", "A_20261123.csv", "notes.csv"],
+        ["A_20261322.csv", "A_20261323.csv"],
+        ["serial 120261122.csv", "serial 120261123.csv"],
+        ["A_20261122-20261123.csv", "A_20261124-20261125.csv"],
+        ["log_20261121.csv", "log_20261122.csv"],
+        [],
+    ],
+)
+def test_names_that_do_not_group_logs_by_date_are_left_alone(files: list[str]) -> None:
+    assert by_dates(files) == {}
 
 
 def test_one_bad_date_costs_its_own_log_a_name_and_no_other() -> None:

@@ -94,6 +94,21 @@ def test_a_store_without_diagnoses_is_no_fleet(tmp_path: Path, monkeypatch: pyte
     assert "must contain logs that were diagnosed" in said
 
 
+def test_names_that_hold_a_date_group_logs_without_an_option_and_it_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stored = Stored([{**ROW, "file": f"{name}.csv"} for name in ("A_20261121", "A_20261122", "B_20261122")])
+    monkeypatch.setattr("experiments.batch.part_store.open_store", lambda _: stored)
+    code, _, said = invoke("fleet", tmp_path, "--out", tmp_path / "fleet")
+    assert code == 0
+    assert "A_20261121.csv is taken for actuator A, 20261121; 3 logs are of 2 actuators" in said
+    assert "None of 2 actuators is past a limit." in (tmp_path / "fleet" / "index.html").read_text("utf-8")
+    code, _, said = invoke("fleet", tmp_path, "--pattern", "{actuator}.csv", "--out", tmp_path / "apart")
+    assert code == 0
+    assert "is taken for" not in said
+    assert "None of 3 actuators is past a limit." in (tmp_path / "apart" / "index.html").read_text("utf-8")
+
+
 def test_files_are_named_by_a_table_or_by_a_pattern_and_not_by_both(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
