@@ -56,7 +56,8 @@ class Hypothesis:
     lower : bool
         Whether what is freed first is lower than the rig file has it: else it is not what the hypothesis says.
     known : bool
-        Whether what is freed first must be larger than its deviation: a valve that never opens tells no drop.
+        Whether what is freed first must be larger than its deviation: a valve that never opens tells no drop, and a
+        circuit without air not when it gets in.
     """
 
     name: str
@@ -184,6 +185,7 @@ AIR_MIDWAY = Hypothesis(
     at_end=("air_width",),
     beside=CRACKS,
     by_mass=True,
+    known=True,
 )
 """Where air gets in, lost flow says roughly. How long it takes is sought last: what is short stops a descent."""
 
@@ -222,7 +224,7 @@ HYPOTHESES = (
     DELIVERY,
     VOLUME,
     START_LOAD,
-    Hypothesis("air", ("air_softness",), ({"air_softness": 1e2}, {"air_softness": 1e3})),
+    Hypothesis("air", ("air_softness",), ({"air_softness": 1e2}, {"air_softness": 1e3}), known=True),
     AIR_MIDWAY,
     Hypothesis(
         "relief_low", ("relief_pressure", "relief_conductance"), shares_of_peak=(0.6, 0.85), far=True, lower=True

@@ -17,7 +17,7 @@ from estimation.fits.explaining.tried import Explanation
 from estimation.fits.flow.asked import ALWAYS_ASKED, asked_of, near_starts
 from estimation.fits.flow.log import homed_at_stop, without_strays
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, stiffer
-from estimation.fits.flow.search import lower_valley
+from estimation.fits.flow.valley import lower_valley
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
 from estimation.fits.greybox.small_teeth import with_small_teeth
@@ -215,7 +215,10 @@ def _elsewhere(plain: PlainFits, strange: Explanation) -> FitStart | None:
         turned := speed_instead(plain.unturned, plain.fitted, strange.values, displacement, cost - WORTH)
     ):
         return replace(start, speed_offset=turned, valley=None)
-    if start.valley is None and (lower := lower_valley(plain.log, plain.swinging, strange.values, cost + WORTH)):
+    if start.valley is not None:
+        return None
+    lower = lower_valley(plain.log, start.parameters, plain.swinging, strange.values, cost + WORTH)
+    if lower is not None:
         return replace(start, valley=lower)
     return None
 

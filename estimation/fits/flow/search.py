@@ -8,20 +8,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import ceil, prod
-from typing import TypeAlias
 
 import numpy as np
 
 from estimation.fits.explaining.form_fit import FAULTS_TRIED
 from estimation.fits.explaining.wide_problem import flow_bounds
 from estimation.fits.flow.log import DRAIN_START, LEAST_LEAKAGE, OPENING_START, carried, outruns_pump, usual_leakage
+from estimation.fits.flow.valley import FINISHING, Found, completed_form, from_valley
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import NEAR_ENOUGH, GreyBoxFit, Search, concluded, explained, roughly
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.greybox.side_by_side import LANES
-from estimation.models.completed_flow import CRACKS, completed
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
@@ -52,10 +51,6 @@ ROUGH_ENOUGH = 0.05
 """Half the sum of squares that a further step must promise while model steps are long [dimensionless]: their errors put
 the optimum off by more. With 0.3 logs of a sine, whose valleys are flat, took twice as many short steps after."""
 
-FINISHING = 60
-"""Evaluations with short model steps. Most searches end by themselves by the tenth. Where oil is stiff and a pump is
-large, long model steps lead so far astray that 15 left 74 of log-likelihood, and bulk modulus 1.3 % off [count]."""
-
 SETTLING = 15
 """The same of a form that no more than long steps explain: it is then asked what is strange [count]."""
 
@@ -64,10 +59,6 @@ UNLIKELY = 36.0
 
 RIVAL = 2.0 * UNLIKELY
 """The same between searches with long model steps, which have errors [dimensionless]."""
-
-
-_Found: TypeAlias = tuple[Problem, Point, tuple[Array, Array]]
-"""A problem, its solution, and the bounds of its search."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,12 +145,12 @@ def balanced(
     wanted = min(done, key=_cost)[1].cost
     done += each(lambda one: _finished(one, log, wanted, bent=bent), behind)
     if valley is not None:
-        done = each(lambda one: min(one, _from_valley(one[0].model, log, valley), key=_cost), done)
+        done = each(lambda one: min(one, from_valley(one[0].model, log, valley, bent=bent), key=_cost), done)
     best = min(done, key=_cost)
     swinging = min((one for one in done if not _held(one[0])), key=_cost)
     least = best[1].cost
 
-    def told(one: _Found) -> GreyBoxFit:
+    def told(one: Found) -> GreyBoxFit:
         problem, point, bounds = one
         counts, asked = point.cost < least + UNLIKELY, one is best or one is swinging
         return concluded(problem, point, least=bounds[0], disturbed=counts, asked=asked)
@@ -167,47 +158,7 @@ def balanced(
     return each(told, done)
 
 
-def lower_valley(
-    log: GreyBoxLog, fit: GreyBoxFit, found: Mapping[str, tuple[float, float]], wanted: float
-) -> Mapping[str, float] | None:
-    """Return a place from which the plain form leads lower than a cost, given what explains a log better than its fit.
-
-    A form has several valleys where make-up valves open and shut. The way out of one may lead through a hypothesis of
-    which nothing is left at the end: a drain of one port that ends as the other one's.
-
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log, as the flow form sees it.
-    fit : GreyBoxFit
-        The plain form's.
-    found : Mapping[str, tuple of float]
-        Value and deviation of what explains the log, by parameter [SI].
-    wanted : float
-        The cost [dimensionless].
-
-    Returns
-    -------
-    Mapping[str, float] or None
-        Values of the unknowns of the plain form [SI]; None where it leads nowhere so low, where it was not completed
-        because it comes nowhere near the log, or the log has gaps.
-    """
-    if log.gaps.size or CRACKS[0] not in fit.values:
-        return None
-    values = {**fit.values, **dict.fromkeys(CRACKS, 0.0), **{name: value for name, (value, _) in found.items()}}
-    _, point, _ = _from_valley(fit.model, log, values, wanted)
-    return values if point.cost < wanted else None
-
-
-def _from_valley(form: GreyBoxModel, log: GreyBoxLog, valley: Mapping[str, float], wanted: float = np.inf) -> _Found:
-    """Return where a form leads from values of its unknowns."""
-    problem = FreedProblem.of(form, log)
-    theta = form.theta({STIFFNESS: 0.0, **valley})
-    bounds = flow_bounds(form, [theta], log)
-    return problem, descend(problem.at, theta, FINISHING, bounds, radius=GUESSED_WITHIN, wanted=wanted), bounds
-
-
-def _finished(one: _Rough, log: GreyBoxLog, wanted: float = np.inf, *, bent: bool) -> _Found:
+def _finished(one: _Rough, log: GreyBoxLog, wanted: float = np.inf, *, bent: bool) -> Found:
     """Return where short model steps lead; what they alone explain is completed as well, for long ones have errors.
 
     A search that will not come down to the cost ``wanted`` ends early. Make-up valves that must let in more than the
@@ -222,7 +173,7 @@ def _finished(one: _Rough, log: GreyBoxLog, wanted: float = np.inf, *, bent: boo
     return problem, descend(problem.at, theta, FINISHING, bounds, wanted=wanted), bounds
 
 
-def _cost(one: _Found) -> float:
+def _cost(one: Found) -> float:
     return one[1].cost
 
 
@@ -241,7 +192,7 @@ def _plain(one: _Rough) -> bool:
 
 def _completed(one: _Rough, log: GreyBoxLog, *, bent: bool) -> tuple[Problem, Array, tuple[Array, Array]]:
     """Return the problem with what matters to the last digits alone, where its search begins, and its bounds."""
-    problem = FreedProblem.of(completed(one.problem.model, bent=bent), one.problem.log)
+    problem = FreedProblem.of(completed_form(one.problem.model, bent=bent), one.problem.log)
     theta = np.append(one.point.theta, np.zeros(len(problem.model.unknowns) - len(one.point.theta)))
     lowest, highest = flow_bounds(problem.model, [theta], log)
     known = len(one.point.theta)

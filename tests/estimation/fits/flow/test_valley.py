@@ -8,15 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+import hydrostate
 from estimation.fits.explaining.tried import Explanation
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import plain as plain_flow
 from estimation.fits.flow.log import flow_log, without_strays
-from estimation.fits.flow.search import balanced, flow_starts, lower_valley
+from estimation.fits.flow.search import balanced, flow_starts
+from estimation.fits.flow.valley import lower_valley
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import PORTS_DRAIN
 from estimation.models.completed_flow import CRACKS
+from estimation.models.inner_circuit import BEND
 from experiments.open_benchmark.kinds import make
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -49,26 +52,34 @@ def found(shift: float = 1.0) -> dict[str, tuple[float, float]]:
 @pytest.mark.parametrize(("wanted", "lower"), [(1.0, True), (-1.0, False)])
 def test_the_plain_form_is_led_where_a_hypothesis_ended(wanted: float, *, lower: bool) -> None:
     near = found(1.001)
-    valley = lower_valley(seen(), best(), near, best().cost + wanted)
-    assert valley is None or valley == {name: value for name, (value, _) in near.items()} | dict.fromkeys(CRACKS, 0.0)
+    valley = lower_valley(seen(), PAPER, best(), near, best().cost + wanted)
+    absent = dict.fromkeys((*CRACKS, BEND), 0.0)
+    assert valley is None or valley == {name: value for name, (value, _) in near.items()} | absent
     assert (valley is not None) == lower
 
 
 def test_what_a_hypothesis_held_is_as_the_plain_form_has_it() -> None:
     lacking = {name: pair for name, pair in found().items() if name != "speed_lead"}
-    valley = lower_valley(seen(), best(), lacking, np.inf)
+    valley = lower_valley(seen(), PAPER, best(), lacking, np.inf)
     assert valley is not None
     assert valley["speed_lead"] == best().values["speed_lead"]
 
 
-def test_a_form_that_comes_nowhere_near_a_log_is_led_nowhere() -> None:
+@pytest.mark.parametrize(("behind", "bend", "led"), [(WRONG, None, True), (-WRONG, None, False), (WRONG, 3e-5, False)])
+def test_a_form_whose_search_came_nowhere_near_is_led_on_if_it_is_nearer_there(
+    behind: float, bend: float | None, *, led: bool
+) -> None:
+    """Make-up valves that are orifices would be taken up unnamed."""
+    form = replace(best().model, unknowns=tuple(name for name in best().model.unknowns if name not in CRACKS))
     bare = {name: value for name, value in best().values.items() if name not in CRACKS}
-    assert lower_valley(seen(), replace(best(), values=bare), found(), np.inf) is None
+    far = replace(best(), model=form, values=bare, cost=best().cost + behind)
+    told = found() if bend is None else found() | {BEND: (bend, 1e-6)}
+    assert (lower_valley(seen(), PAPER, far, told, np.inf) is not None) == led
 
 
 def test_a_log_with_gaps_is_led_nowhere() -> None:
     gapped = replace(seen(), gaps=np.zeros((1, 2)))
-    assert lower_valley(gapped, best(), found(), np.inf) is None
+    assert lower_valley(gapped, PAPER, best(), found(), np.inf) is None
 
 
 def test_a_search_that_is_told_of_a_lower_valley_ends_there(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,3 +135,13 @@ def test_a_plain_log_whose_plain_form_has_two_valleys_is_explained_by_the_lower_
     value, std = answer.parameters["bulk_modulus"]
     assert value == pytest.approx(made.bulk_modulus[0], abs=2.0 * std)
     assert answer.parameters["case_leakage"][0] == pytest.approx(made.setup.machine.drain, rel=0.3)
+
+
+@pytest.mark.slow
+def test_a_plain_log_whose_search_ended_far_off_is_told_no_air() -> None:
+    """Air that enters after the end of the log, `0 ± inf %`, was found, and its bleeding advised."""
+    made = hydrostate.simulate("minor_leakage", drive="steps", duration=5.0, sample_time=1e-4, seed=2)
+    answer = flow_fit.fit_flow(made.record, PAPER, PAPER.bulk_modulus)
+    assert answer.explanation is None
+    value, std = answer.parameters["bulk_modulus"]
+    assert value == pytest.approx(PAPER.bulk_modulus, abs=2.0 * std)
