@@ -17,7 +17,7 @@ MAJOR = 2.0
 """Size of a fault from which it is treated as major, where 1 is minor [dimensionless]."""
 
 TOLD = 0.5
-"""Probability of other levels from which one of leakage, or of friction, is not told [probability]."""
+"""Probability of all else from which a level of leakage, or of friction, is not told [probability]."""
 
 LEAKS: Mapping[str, str] = {
     "minor": "leaks inside more than it should (minor leakage)",
@@ -88,13 +88,16 @@ def verdict(result: Mapping[str, Any]) -> str:
 
 
 def _levels(result: Mapping[str, Any]) -> dict[str, str | None]:
-    """Return the levels of leakage and of friction, None where others are together likelier than the verdict's."""
-    best, shares = CONDITIONS[result["condition"]], result.get("probabilities", {})
+    """Return the levels of leakage and of friction, None where all else is together likelier than the verdict's.
+
+    What the nine conditions leave to a fault that is none of them, as a worn pump, is something else too.
+    """
+    best, shares = CONDITIONS[result["condition"]], result.get("probabilities")
     found: dict[str, str | None] = {}
     for name in ("leakage", "friction"):
         level = getattr(best, name)
-        others = sum(share for one, share in shares.items() if getattr(CONDITIONS[one], name) != level)
-        found[name] = level if others < TOLD else None
+        own = sum(share for one, share in (shares or {}).items() if getattr(CONDITIONS[one], name) == level)
+        found[name] = level if not shares or own > 1.0 - TOLD else None
     return found
 
 

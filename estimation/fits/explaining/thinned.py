@@ -22,6 +22,13 @@ LOUD, FAINT = 10.0, 2.0
 which steps are long, and below which all samples count [dimensionless]."""
 
 
+MOST_LONGER = 1.5
+"""How many times its usual length a step may take, to come from one pressure to the next [dimensionless]; judged."""
+
+MOST_KEPT = 0.8
+"""Share of the pressures that a step comes to, below which all samples count [fraction]; judged."""
+
+
 class Spared(NamedTuple):
     """What is spared while hypotheses are compared.
 
@@ -47,13 +54,14 @@ def thinned(log: GreyBoxLog, every: int) -> GreyBoxLog:
     """Return a log of which every few samples count, with one model step from each to the next.
 
     What is pumped and what is swept between two of them stay: motor speed is averaged as far as a straight line between
-    means needs, position is as it was read. A pressure is the mean over a block. Each sample left stands for as many
-    residuals as the log has, so that costs stay what they were, but for what white noise makes of them.
+    means needs, position is as it was read. A pressure is the mean over a block; one that came slower than the rest is
+    as it was read, and the samples that count are those that have one. Each sample left stands for as many residuals as
+    the log has, so that costs stay what they were, but for what white noise makes of them.
 
     Parameters
     ----------
     log : GreyBoxLog
-        The log, widened; one with gaps in its speed is left as it is.
+        The log, widened; one with gaps in its speed, or with pressures at no even distance, is left as it is.
     every : int
         How many samples are one [count].
 
@@ -65,17 +73,27 @@ def thinned(log: GreyBoxLog, every: int) -> GreyBoxLog:
     if every < 2 or log.gaps.size:
         return log.coarsened()
     block = min(max(1, round(log.block / log.sample_time)), every)
-    drives = log.drives[::every].copy()
+    there = np.flatnonzero(np.isfinite(log.measured[:, 0]))
+    first, apart = 0, float(np.median(np.diff(there))) if len(there) > 1 else 1.0
+    if apart > 1.0:  # else a block that lacks one, or a step beside them, leaves none
+        block, every = 1, max(n for n in range(1, int(MOST_LONGER * every) + 1) if apart % n == 0)
+        first = int(there[0]) % every
+    rows = slice(first, None, every)
+    measured = _block_means(log.measured, block)[rows]
+    left, wanted = np.count_nonzero(np.isfinite(measured[:, 0])), len(there) * min(apart / every, 1.0)
+    if every < 2 or left < MOST_KEPT * wanted:
+        return log.coarsened()
+    drives = log.drives[rows].copy()
     speed = WIDE_FLOW_FORM.drives.index(SPEED)
-    drives[:, speed] = _smoothed(log.drives[:, speed], every)[::every]
+    drives[:, speed] = _smoothed(log.drives[:, speed], every)[rows]
     return replace(
         log,
         drives=drives,
-        measured=_block_means(log.measured, block)[::every],
+        measured=measured,
         sample_time=every * log.sample_time,
         steps=np.ones(len(drives), log.steps.dtype),
         noise=tuple(one.scaled(1.0 / block) for one in log.noise),
-        stands_for=every / block,
+        stands_for=max(every / apart, 1.0) / block,
     )
 
 

@@ -123,10 +123,11 @@ def asked_of(
 def _possible(promises: Sequence[Promise], fit: GreyBoxFit) -> Sequence[Promise]:
     """Return promises of what can be gained: none where one is of more than a fit leaves.
 
-    Slopes were then taken where a chamber that nothing feeds is below vapour pressure, as no oil can be.
+    Slopes were then taken where a chamber that nothing feeds is below vapour pressure, as no oil can be; how far they
+    would move what is freed is as wrong.
     """
     if max(one.gain for one in promises) > fit.cost:
-        return [one._replace(gain=0.0) for one in promises]
+        return [one._replace(gain=0.0, size=0.0) for one in promises]
     return promises
 
 

@@ -33,6 +33,9 @@ from plant.notes import Note
 OFFSETS = {OFFSET.name, "pressure_drift"}
 """Hypotheses that an offset of the speed may pass for."""
 
+LIKELIER_WORN = 0.5
+"""Probability of a worn pump from which it is none of the nine conditions that is told [probability]."""
+
 UNLIKELY = math.log(1e-3)
 """Log-likelihood of a delivery below the likeliest one's from which no circuit is fitted with it [dimensionless]."""
 
@@ -58,7 +61,8 @@ def whatever_the_pump_delivers(
     Diagnosis
         Where the balance tells what the pump delivers, without the circuit's doubt of it; where it leaves that open,
         with classes weighed over it (`probabilities_over_wear`); else, and without pressure, the same. Classes sum to
-        the probability that the pump is not worn (`chance_of_wear`).
+        the probability that the pump is not worn (`chance_of_wear`); where it is likelier worn, that speaks against all
+        nine.
     """
     if known := known_of_flow(estimate):
         told = replace(diagnosis, against=tuple(note for note in diagnosis.against if note.code not in known))
@@ -69,6 +73,8 @@ def whatever_the_pump_delivers(
     if chance < WORTH_SAYING and not wear_left_open(estimate.remarks):
         return told
     note = ClassCode.WEAR_NOT_TOLD.note(percent=100.0 * chance, limit=100.0 * WORN)
+    if chance > LIKELIER_WORN:
+        return replace(told, against=(*told.against, note))
     left = {name: (1.0 - chance) * share for name, share in told.probabilities.items()}
     return replace(told, probabilities=left, not_told=(*told.not_told, note))
 

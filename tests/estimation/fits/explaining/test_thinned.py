@@ -42,6 +42,28 @@ def test_what_is_pumped_and_swept_stays(every: int) -> None:
     assert thinned(ramp, every).drives[inside, 0] == pytest.approx(ramp.drives[::every, 0][inside])
 
 
+@pytest.mark.parametrize(("apart", "first", "every"), [(5, 3, 5), (6, 1, 6), (10, 0, 5), (3, 2, 3)])
+def test_a_pressure_that_came_slower_counts_as_often_as_it_was_read(apart: int, first: int, every: int) -> None:
+    """Of a pressure in every sixth sample none was left, or each counted four times over."""
+    whole = seen()
+    held = np.full_like(whole.measured, np.nan)
+    held[first::apart] = whole.measured[first::apart]
+    few = thinned(replace(whole, measured=held), 4)
+    assert few.sample_time == pytest.approx(every * whole.sample_time)
+    there = np.isfinite(few.measured[:, 0])
+    assert np.array_equal(few.measured[there], held[np.isfinite(held[:, 0])])
+    assert few.stands_for == 1.0
+    assert few.drives[0, 1] == whole.drives[first % every, 1]
+
+
+def test_a_pressure_at_no_even_distance_leaves_a_log_as_it_is() -> None:
+    whole = seen()
+    uneven = np.full_like(whole.measured, np.nan)
+    rows = np.cumsum(np.random.default_rng(2).integers(3, 8, 400))
+    uneven[rows] = whole.measured[rows]
+    assert len(thinned(replace(whole, measured=uneven), 4).drives) == len(whole.drives)
+
+
 def test_a_cost_stays_what_it_was_where_far_more_than_noise_is_left() -> None:
     whole = seen()
     costs = []
