@@ -15,9 +15,6 @@ from plant.unit_text import plain_unit
 if TYPE_CHECKING:
     import pint
 
-RPM = 0.10471975511965977
-"""One revolution a minute, in rad/s."""
-
 LITRE_PER_MINUTE = 1e-3 / 60.0
 """One litre a minute, in m^3/s."""
 

@@ -30,7 +30,7 @@ settings.load_profile("ci")
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Give a worker whole files, and those that stand on the same studies in one go."""
+    """Give a worker whole files, and those that stand on the same in one go."""
     from tests.together import WholeFiles  # needs xdist
 
     return WholeFiles(config, log) if config.getvalue("dist") == "loadfile" else None

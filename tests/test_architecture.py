@@ -82,9 +82,11 @@ def _targets(node: ast.AST, source: Source) -> list[str]:
             return [alias.name for alias in node.names]
         case ast.ImportFrom():
             return [f"{_absolute(node, source)}.{alias.name}" for alias in node.names]
-        case ast.Call(func=function, args=[ast.Constant(value=str(name)), *_]):
-            loads = ast.unparse(function) in {"importlib.import_module", "import_module", "__import__"}
-            return [name] if loads else []
+        case ast.Call(
+            func=ast.Name(id="import_module" | "__import__") | ast.Attribute(attr="import_module"),
+            args=[ast.Constant(value=str(name)), *_],
+        ):
+            return [name]
         case _:
             return []
 

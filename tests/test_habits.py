@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 
-from tests.together import SHOW_A_STUDY
+from tests.together import DIAGNOSE_A_MOTOR, SHOW_A_STUDY
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -111,12 +111,13 @@ def normal(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name.strip()).lower()
 
 
-def test_files_that_show_a_study_go_to_one_worker() -> None:
+def test_files_that_stand_on_the_same_go_to_one_worker() -> None:
     folder = ROOT / "tests" / "experiments"
     made = _fixtures(folder / "conftest.py") - {"browser"}
     assert len(made) > 5
     show = {file for file in folder.rglob("test_*.py") if made & (_asked(file) - _fixtures(file))}
     assert {file.relative_to(ROOT).as_posix() for file in show} == SHOW_A_STUDY
+    assert all((ROOT / file).is_file() for file in DIAGNOSE_A_MOTOR)
 
 
 def _functions(file: Path) -> dict[str, ast.FunctionDef]:

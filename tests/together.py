@@ -21,10 +21,29 @@ SHOW_A_STUDY = frozenset(
 )
 """Files that ask for the studies of `tests/experiments/conftest.py`, which two workers would both make."""
 
+MOTORS = "tests/faults/diaphragm_motor"
+
+DIAGNOSE_A_MOTOR = frozenset(
+    {
+        "tests/contracts/test_actuators.py",
+        "tests/experiments/batch/test_other_actuators.py",
+        "tests/experiments/verbs/test_kinds_on_screen.py",
+        "tests/experiments/verbs/test_motor_logs.py",
+        f"{MOTORS}/test_diagnose.py",
+        f"{MOTORS}/test_finding.py",
+        f"{MOTORS}/test_numbers.py",
+    }
+)
+"""Files that lay logs of a diaphragm motor beside the curves of its faults, some hundred runs of the model, which
+`faults.diaphragm_motor.diagnose` keeps while the process lives."""
+
+IN_ONE_GO = dict.fromkeys(SHOW_A_STUDY, STUDIES) | dict.fromkeys(DIAGNOSE_A_MOTOR, MOTORS)
+"""What a worker takes as one, by file."""
+
 
 class WholeFiles(LoadFileScheduling):
-    """Whole files to a worker, most tests first, and those that show a study together."""
+    """Whole files to a worker, most tests first, and those that stand on the same together."""
 
     def _split_scope(self, nodeid: str) -> str:
         file = super()._split_scope(nodeid)
-        return STUDIES if file in SHOW_A_STUDY else file
+        return IN_ONE_GO.get(file, file)

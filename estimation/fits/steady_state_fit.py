@@ -20,6 +20,9 @@ from plant.log.record import Record
 Variance: TypeAlias = Callable[[Array], Array]
 """Variance of the points' residuals, given the coefficients."""
 
+ROUNDS = 5
+"""How often a fit is weighted anew by the variances that its answer gives [count]."""
+
 CONFIDENCE = 0.95
 """Probability with which an interval should hold the true value."""
 
@@ -251,7 +254,7 @@ def _slope(values: Array, sample_time: float) -> tuple[float, float]:
     return slope, float(np.sqrt(rest @ rest / (len(values) - 2) / spread))
 
 
-def _fitted(names: Sequence[str], design: Array, target: Array, variance: Variance, rounds: int = 5) -> SteadyFit:
+def _fitted(names: Sequence[str], design: Array, target: Array, variance: Variance) -> SteadyFit:
     """Fit by least squares, weighted by variances that depend on the answer."""
     from scipy.stats import t as student
 
@@ -261,7 +264,7 @@ def _fitted(names: Sequence[str], design: Array, target: Array, variance: Varian
     scale = np.max(np.abs(design), axis=0)
     found = np.linalg.lstsq(design / scale, target, rcond=None)[0] / scale
     weights, scaled = np.ones(count), design / scale
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         known = variance(found)
         weights = 1.0 / np.sqrt(np.maximum(known, np.max(known) * np.finfo(float).eps))
         scaled = weights[:, None] * design / scale

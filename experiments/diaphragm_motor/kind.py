@@ -19,7 +19,7 @@ from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS, motor_with_faul
 from faults.diaphragm_motor.finding import motor_fault_finding, severity_of
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
 from plant.diaphragm_motor.run import ELECTRODES, MOTOR_SENSORS, NAME, SAMPLE_TIME, motor_drive, simulate_motor
-from plant.eha.rig import Rig
+from plant.eha.rig import UNNAMED, Rig
 from plant.errors import HydrostateError, require_known
 from plant.log.columns import CHANNELS
 from plant.notes import Code
@@ -143,7 +143,7 @@ DIAPHRAGM_MOTOR = ActuatorKind(
     channels={name: CHANNELS[name] for name in (DRIVE, *ELECTRODES, POSITION)},
     required=(DRIVE,),
     conditions=(HEALTHY, *MOTOR_FAULTS),
-    rig_name="paper",
+    rig_name=UNNAMED,
     simulate=Simulation(run=_simulated, options=SINE | BENCH | {"load": None, "fault": None}),
     estimate=LogVerb(
         run=lambda record, rig, calibration: motor_finding(record, rig.parameters, calibration=calibration),

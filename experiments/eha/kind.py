@@ -17,6 +17,7 @@ from experiments.eha.screens import diagnoses_shown, estimates_shown
 from experiments.eha.simulated import simulated
 from faults.conditions import CONDITIONS, find_condition, parameters_for
 from plant.eha.model import EhaParameters
+from plant.eha.rig import UNNAMED
 from plant.errors import HydrostateError, LogError, require_known
 from plant.log.columns import CHANNELS
 
@@ -211,7 +212,7 @@ EHA = ActuatorKind(
     required=("motor_speed_rad_s", "position_m or velocity_m_s"),
     conditions=tuple(CONDITIONS),
     models=("reduced", "lumped", "circuit"),
-    rig_name="paper",
+    rig_name=UNNAMED,
     simulate=Simulation(
         run=simulated,
         options=NOT_FAULTY

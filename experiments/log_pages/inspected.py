@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.command.json_output import Result, plain
+from experiments.command.json_output import Result
 from experiments.command.logs import caught, read_log
-from experiments.command.options import load_actuator
 from experiments.command.terminal import sparkline
 from plant.errors import HydrostateError
 
@@ -71,26 +70,6 @@ def _looked_at(
             if known is None or one.guess.sure > known.guess.sure:
                 best[one.guess.channel] = one
     return tables, list(best.values())
-
-
-def inspected(paths: Sequence[Path], plant: str | None = None) -> dict[str, Any]:
-    """Return what files of one test hold, as JSON values.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        The files, one a logger.
-    plant : str, optional
-        The kind of actuator; the gear-pump actuator if not given.
-
-    Raises
-    ------
-    LogError
-        If one cannot be opened.
-    """
-    kind, rig = load_actuator(plant, None)
-    tables, guesses = _looked_at(paths, kind, rig)
-    return plain(_entries(tables, guesses, {one.guess.channel: one.guess.spec for one in guesses}))
 
 
 def _reads(

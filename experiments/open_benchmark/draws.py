@@ -81,7 +81,7 @@ def draw_plain(condition: str, drive: str, rng: np.random.Generator, base: EhaPa
 
 
 def course_of(setup: Setup, rng: np.random.Generator) -> Array:
-    """Return what is asked and what changes, shape (n, 5), the columns and units of `COURSE`.
+    """Return what is asked of an actuator and what changes in it over a log.
 
     Parameters
     ----------
@@ -93,7 +93,8 @@ def course_of(setup: Setup, rng: np.random.Generator) -> Array:
     Returns
     -------
     ndarray, shape (n, 5)
-        A row every `TICK`.
+        A row every `TICK`: speed asked for [rad/s] or position [m]; viscosity and leakage over those at the start, and
+        entrained air, a unit of oil [dimensionless]; friction's grip over that at the start [dimensionless].
     """
     m, change = setup.machine, setup.change
     glide = 0.75 * m.efficiency * m.displacement / max(m.area_a, m.area_b)

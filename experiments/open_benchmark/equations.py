@@ -11,10 +11,6 @@ from plant.arrays import Array
 STATES = ("motor_speed", "shaft_angle", "position", "velocity", "pressure_a", "pressure_b", "made_up")
 """The states: rad/s, rad, m, m/s, stretch pressures of the chambers [Pa], and oil that left the accumulator [m^3]."""
 
-COURSE = ("demand", "viscosity", "wear", "air", "rough")
-"""What changes in time: speed asked for [rad/s] or position [m]; viscosity, leakage and grip over those at the start;
-entrained air, a unit of oil [all dimensionless]."""
-
 
 def clipped(value: float, low: float, high: float) -> float:
     """Return a value between two bounds, in its own unit."""

@@ -3,10 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from plant.eha.rig import UNNAMED
 from plant.log.notes import LogCode
-
-PAPER_RIG = "paper"
-"""Name of the rig without a rig file, and of a rig file until its owner gives another."""
 
 
 def rig_in_words(name: str) -> str:
@@ -17,7 +15,7 @@ def rig_in_words(name: str) -> str:
     >>> rig_in_words("bench 7"), rig_in_words("paper")
     ('rig bench 7', "the paper's actuator assumed (no rig file, or one still named paper)")
     """
-    if name == PAPER_RIG:
+    if name == UNNAMED:
         return f"the paper's actuator assumed (no rig file, or one still named {name})"
     return f"rig {name}"
 

@@ -16,7 +16,6 @@ from experiments.nine_conditions.bulk_modulus import (
     PRESSURE_STEPS,
     PUBLISHED_WAY,
     PUBLISHED_WAY_STUCK,
-    Experiment,
 )
 from experiments.nine_conditions.findings import by_experiment, recoveries
 from experiments.page.frames import Tables, cell
@@ -196,7 +195,7 @@ def _modelled_chambers(estimates: pd.DataFrame) -> Mapping[str, Ours]:
     return {"chambers_worst": Ours(worst, said=f"{_gate(estimates)}, errors {z:.2f} of their deviations rms")}
 
 
-def settled_by_condition(estimates: pd.DataFrame, which: Experiment = PUBLISHED_WAY) -> Mapping[str, Ours]:
+def settled_by_condition(estimates: pd.DataFrame) -> Mapping[str, Ours]:
     """Return where a filter settles in each condition, with its 95 % interval, gate and coverage.
 
     Parameters
@@ -209,7 +208,7 @@ def settled_by_condition(estimates: pd.DataFrame, which: Experiment = PUBLISHED_
     Mapping[str, Ours]
         By condition [Pa]: mean over the first guesses, whether or not the gate lets it out.
     """
-    rows = dict(by_experiment(estimates))[which]
+    rows = dict(by_experiment(estimates))[PUBLISHED_WAY]
     return {str(name): _settled(of_one) for name, of_one in rows.groupby("condition", sort=False)}
 
 

@@ -16,7 +16,7 @@ from experiments.log_pages.entries import BLANK, finding_entries
 from faults.conditions import CONDITIONS
 from faults.piezo_stack.diagnose import calibrated_stack, diagnose_stack
 from faults.piezo_stack.faults import stack_with_fault
-from plant.eha.rig import Rig
+from plant.eha.rig import UNNAMED, Rig
 from plant.errors import HydrostateError, require_known
 from plant.log.columns import CHANNELS
 from plant.notes import Code
@@ -127,7 +127,7 @@ PIEZO_STACK = ActuatorKind(
     channels={name: CHANNELS[name] for name in (DRIVE, *SENSORS.values())},
     required=(DRIVE,),
     conditions=tuple(CONDITIONS),
-    rig_name="paper",
+    rig_name=UNNAMED,
     simulate=Simulation(run=_simulated, options=SINE | OF_THE_RUN | BENCH | {"condition": None, "fault": None}),
     estimate=LogVerb(
         run=lambda record, rig, channels: stack_finding(record, rig.parameters, channels=channels),

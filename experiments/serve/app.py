@@ -69,8 +69,6 @@ def why(*more: int, page: bool = False) -> dict[int | str, dict[str, Any]]:
     return {one: {"description": WHY[one], **said} for one in sorted((400, 401, 403, 405, 408, 421, 429, *more))}
 
 
-EVENTS = {"description": "Server-sent events.", "content": {"text/event-stream": {"schema": {"type": "string"}}}}
-
 BODY = {
     "requestBody": {
         "required": True,

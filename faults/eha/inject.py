@@ -63,33 +63,6 @@ def growing(base: EhaParameters, faulty: EhaParameters, start: float, end: float
     return ParameterPath((start, end), (base, faulty), "linear")
 
 
-def with_bulk_modulus(parameters: EhaParameters, bulk_modulus: float) -> EhaParameters:
-    """Return the actuator with another effective bulk modulus, as entrained air lowers it (section 7).
-
-    Parameters
-    ----------
-    bulk_modulus : float
-        Effective bulk modulus [Pa], in the convention of equation 5.8 (errata E2).
-
-    Returns
-    -------
-    EhaParameters
-        The changed actuator; with `abrupt` or `growing` it becomes air ingress over time.
-
-    Raises
-    ------
-    RigError
-        If the bulk modulus is not positive and finite.
-
-    Examples
-    --------
-    >>> aerated = with_bulk_modulus(EhaParameters(), 0.5e8)
-    >>> growing(EhaParameters(), aerated, start=2.0, end=4.0).sample([3.0])[0, 4].item()
-    128500000.0
-    """
-    return replace(parameters, bulk_modulus=bulk_modulus)
-
-
 def spread(
     parameters: EhaParameters,
     rng: np.random.Generator,

@@ -35,6 +35,9 @@ _EXAMPLES: Mapping[str, str] = {
 EHA = "eha"
 """What a rig file calls the gear-pump actuator; one that names no plant is taken for what is needed."""
 
+UNNAMED = "paper"
+"""Name of the rig without a rig file, and of a rig file until its owner gives another."""
+
 UNEQUAL_SIDES = (*PAIRS.values(), "pilot_share")
 """Entries that two numbers for sides A and B set: a template has them as comments, so that they do not contradict."""
 
@@ -71,7 +74,7 @@ class Rig(Generic[P]):
     0.00304
     """
 
-    name: str = "paper"
+    name: str = UNNAMED
     parameters: P = field(default_factory=EhaParameters)  # pyright: ignore[reportAssignmentType] -- P's own default
     uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
     columns: Mapping[str, str] = field(default_factory=dict[str, str])
@@ -245,7 +248,7 @@ def rig_template(
         "# All values are SI, and those of the healthy actuator.",
         "# A parameter that is left out keeps the value shown here.",
         "",
-        *(['name = "paper"'] if plant == EHA else [f'name = "{plant}"', f'plant = "{plant}"']),
+        *([f'name = "{UNNAMED}"'] if plant == EHA else [f'name = "{plant}"', f'plant = "{plant}"']),
         *(
             [
                 "# Parameters that you measured on the bench; they get the smaller uncertainty that is given below.",

@@ -12,8 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.command.json_output import plain
 from experiments.command.logs import read_log
-from experiments.log_pages.inspected import inspected
+from experiments.command.options import load_actuator
+from experiments.log_pages.inspected import looked_into
 from tests.fuzz.guard import limited
 from tests.fuzz.mutations import CELLS, mutated
 from tests.fuzz.seeds import seeds
@@ -28,7 +30,8 @@ def read(path: Path) -> None:
 
 def inspect(path: Path) -> None:
     """Inspect a file as the command does."""
-    json.dumps(inspected([path]), allow_nan=False)
+    found, _ = looked_into(path, *load_actuator(None, None))
+    json.dumps(plain(found), allow_nan=False)
 
 
 def run(count: int, first: int = 0) -> list[str]:

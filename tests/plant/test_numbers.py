@@ -18,7 +18,7 @@ from plant.runs import (
     with_noise,
 )
 from plant.unit_text import plain_unit
-from plant.units import LITRE_PER_MINUTE, RPM, conversion_to, converts, notes, require_number, require_numbers, si
+from plant.units import LITRE_PER_MINUTE, conversion_to, converts, notes, require_number, require_numbers, si
 from tests.edges import edge
 from tests.numbers import Numbers, or_refused
 
@@ -97,7 +97,6 @@ def conversions() -> dict[str, Any]:
         },
         "convert": [converts(*pair) for pair in pairs],
         "spelt": {unit: or_refused(lambda unit=unit: plain_unit(unit)) for unit in spelt},
-        "one revolution a minute [rad/s]": RPM,
         "one litre a minute [m^3/s]": LITRE_PER_MINUTE,
     }
 

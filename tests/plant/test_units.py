@@ -1,18 +1,19 @@
 from dataclasses import make_dataclass
+from math import pi
 from typing import Annotated
 
 import pytest
 
 from plant.errors import RigError
-from plant.units import LITRE_PER_MINUTE, RPM, SI, conversion_to, notes, require_number
+from plant.units import LITRE_PER_MINUTE, SI, conversion_to, notes, require_number
 
 
 @pytest.mark.parametrize(
     ("unit", "wanted", "factor"),
     [
         ("mm", "m", 1e-3),
-        ("rpm", "rad/s", RPM),
-        ("rev/min", "rad/s", RPM),
+        ("rpm", "rad/s", 2.0 * pi / 60.0),
+        ("rev/min", "rad/s", 2.0 * pi / 60.0),
         ("deg/s", "rad/s", 0.017453292519943295),
         ("bar", "Pa", 1e5),
         ("psi", "Pa", 6894.757293168361),

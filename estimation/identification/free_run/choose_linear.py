@@ -23,9 +23,6 @@ DEAD_TIME = 0.03
 PATIENCE = 2
 """Orders without gain after which no higher one is tried."""
 
-FORMS = 4
-"""Ways of laying out the numerators that are tried at the first two orders; the best two at higher ones."""
-
 LONGEST_DELAY = 20
 """Dead time looked for at most [samples]."""
 

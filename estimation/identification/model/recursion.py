@@ -44,35 +44,6 @@ def filtered(numerator: ArrayLike, denominator: ArrayLike, series: ArrayLike, st
     return u
 
 
-def decayed(denominator: Array, series: Array, state: Array) -> Array:
-    """Return what ``1/F`` makes of a series, without the checks and the padding of `filtered`.
-
-    Parameters
-    ----------
-    denominator : ndarray, shape (n + 1,)
-        Monic, n at least 1.
-    series : ndarray, shape (n_samples,)
-        Input.
-    state : ndarray, shape (n,)
-        State before the first sample, of the observer form.
-
-    Returns
-    -------
-    ndarray, shape (n_samples,)
-        Output.
-
-    Examples
-    --------
-    >>> decayed(np.array([1.0, -0.5]), np.array([1.0, 0.0, 0.0]), np.zeros(1)).tolist()
-    [1.0, 0.5, 0.25]
-    """
-    b = np.zeros(denominator.size)
-    b[0] = 1.0
-    out = series.copy()
-    _run(b, denominator, out, state.copy())
-    return out
-
-
 @natively()
 def _run(b: Array, f: Array, u: Array, z: Array) -> None:
     """Write the output over the input (transposed direct form II); the state follows.

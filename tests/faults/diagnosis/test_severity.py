@@ -21,7 +21,6 @@ from faults.diagnosis.severity import (
     what_is_not_told,
     with_bulk_modulus,
 )
-from faults.eha import inject
 from faults.notes import ClassCode
 from plant.components.oil import effective_bulk_modulus
 from plant.eha.model import EhaParameters
@@ -57,7 +56,7 @@ def test_velocity_lost_and_pressure_rise_are_those_of_the_steady_state(name: str
 def test_air_is_what_would_make_the_oil_so_soft() -> None:
     share = 0.01
     soft = float(effective_bulk_modulus(RIG.accumulator_pressure, RIG.bulk_modulus, share, 0.0))
-    assert severities_of(inject.with_bulk_modulus(RIG, soft))["entrained_air"] == pytest.approx(100.0 * share, rel=0.05)
+    assert severities_of(replace(RIG, bulk_modulus=soft))["entrained_air"] == pytest.approx(100.0 * share, rel=0.05)
 
 
 def test_severities_rise_with_their_fault() -> None:

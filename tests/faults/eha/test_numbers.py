@@ -9,7 +9,7 @@ import pytest
 from faults.conditions import CONDITIONS, parameters_for
 from faults.eha import bank, isolability
 from faults.eha.bank import identification_run, mathematical_bank, predict_run, predict_runs
-from faults.eha.inject import abrupt, growing, spread, with_bulk_modulus
+from faults.eha.inject import abrupt, growing, spread
 from faults.eha.isolability import Distances, condition_distances, structural_isolability, wrong_verdicts
 from faults.eha.physical import THROTTLE_A, THROTTLE_B, aerated, drifted_relief, throttled, worn_pump
 from plant.eha.circuit_parameters import CircuitParameters
@@ -69,7 +69,6 @@ def injected_faults() -> dict[str, Any]:
             isinstance(or_refused(lambda one=one: growing(P, faulty, *one)), str)
             for one in ((1.0, 1.0), (1.0, 0.9), (1.0, 1.1), (np.nan, 1.0), (0.0, np.inf))
         ],
-        "with bulk modulus": differs(with_bulk_modulus(P, 1e8), P),
         "spread": differs(other, P),
         "a spread of one": differs(spread(P, np.random.default_rng(3), 0.0, 0.0, 0.5), P),
         "widths": [

@@ -13,7 +13,7 @@ from estimation.identification.model.export import _padded, to_ss
 from estimation.identification.model.held_input import held_input_model
 from estimation.identification.model.lags import lagged
 from estimation.identification.model.linear_model import LinearModel
-from estimation.identification.model.recursion import decayed, filtered
+from estimation.identification.model.recursion import filtered
 from estimation.identification.model.table import model_table
 from estimation.identification.model.uncertainty import _deviations, cancellations, complex_std, root_gradients
 from plant.arrays import Array
@@ -184,7 +184,6 @@ def series_that_are_filtered() -> dict[str, Any]:
             "longer numerator": some(filtered([0.5, 0.2, -0.1, 0.3], [1.0, -0.5], U), 7),
             "from a state": some(filtered([0.5], [1.0, -1.2, 0.5], U, [0.3, -0.2]), 7),
             "a gain": some(filtered([0.5], [1.0], U), 4),
-            "decayed": some(decayed(np.array([1.0, -1.2, 0.5]), U, np.array([0.1, 0.4])), 7),
         }
     return told | {"lags": lagged(np.arange(1.0, 5.0), 1, 2), "no lags": list(lagged(U, 1, 0).shape)}
 
