@@ -73,7 +73,7 @@ def test_from_any_first_guess_it_comes_to_the_same_value(start: float) -> None:
 
 
 def test_its_track_rests_on_what_came_before_alone() -> None:
-    record = on_circuit("normal", 1, duration=4.0)
+    record = on_circuit("normal", 1, duration=2.0)
     spoilt = record["differential_pressure_pa"].copy()
     spoilt[1500:] += 1e6
     noise = measurement_variances(record, tuple(record.channels))  # of the whole log
