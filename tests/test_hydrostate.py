@@ -62,7 +62,7 @@ def test_a_report_says_what_reading_the_log_brought_up(log: hs.Log, tmp_path: Pa
     with pytest.warns(LogWarning, match="column 'dp' was not used, but it may be differential_pressure_pa"):
         read = hs.read(table)
     for part in (read, read.between(0.0, 0.9)):
-        part.estimate().report(tmp_path / "page.html")
+        part.estimate(form="pressure").report(tmp_path / "page.html")
         assert "&#39;dp&#39; was not used" in (tmp_path / "page.html").read_text("utf-8")
 
 

@@ -61,7 +61,7 @@ def logs() -> dict[str, Record]:
         "frozen_encoder": frozen(leaking, POSITION),
         "frozen_velocity": frozen(leaking, VELOCITY),
         "frozen_pressure": frozen(leaking, PRESSURE),
-        "dead_pressure": leaking.replace(**{PRESSURE: np.zeros(len(leaking))}).slice(0, 500),
+        "dead_pressure": leaking.replace(**{PRESSURE: np.zeros(len(leaking))}).slice(0, 300),
         "clipped": leaking.replace(**{PRESSURE: np.clip(leaking[PRESSURE], -limit, limit)}),
         "outliers": leaking.replace(**spoilt),
         "gaps": healthy.replace(**{PRESSURE: gap}),

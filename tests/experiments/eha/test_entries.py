@@ -83,15 +83,15 @@ def test_an_estimate_has_the_entries_that_it_promises() -> None:
 
 
 def test_notes_are_codes_with_data_that_json_takes() -> None:
-    record = log(duration=2.0)
+    record = log(duration=1.0)
     values = record[PRESSURE].copy()
-    values[1000:] = values[1000]
+    values[500:] = values[500]
     found = diagnose_log(record.replace(**{PRESSURE: values}), Rig())
     entries = diagnosis_entries(found)
     written = json.loads(json.dumps(plain(entries), allow_nan=False))
     froze = next(note for note in written["notes"] if note["code"] == SensorCode.SENSOR_FROZE)
     assert froze["data"]["channel"] == PRESSURE
-    assert froze["data"]["begin_s"] == pytest.approx(1.0)
+    assert froze["data"]["begin_s"] == pytest.approx(0.5)
     assert froze["text"] == str(SensorCode.SENSOR_FROZE.note(**froze["data"]))
     assert froze["text"] in written["reasons"]
     assert froze["text"] in written["gate"]["reasons"]
