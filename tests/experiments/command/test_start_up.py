@@ -64,7 +64,7 @@ def loaded_by(arguments: Sequence[str]) -> set[str]:
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     healthy, rng = EhaParameters(), np.random.default_rng(3)
-    drive = make_drive("prbs", 4.0, 1e-3, healthy, rng)
+    drive = make_drive("prbs", 1.0, 1e-3, healthy, rng)
     record = simulate(LUMPED, drive, 1e-3, healthy, sensors=BENCH, rng=rng)
     folder = tmp_path_factory.mktemp("logs")
     paths = {suffix: folder / f"run.{suffix}" for suffix in ("csv", "parquet", "mat")}
