@@ -164,67 +164,65 @@ def slopes_of(
 
 
 @compiled
-def write_rows(
-    monomials: Array,
-    inputs: Array,
-    place: IntArray,
-    column: IntArray,
-    slope: Array,
-    start: int,
-    begin: int,
-    n_rub: int,
-    first: int,
-    last: int,
-    rows: Array,
+def write_own(
+    monomials: Array, inputs: Array, place: IntArray, column: IntArray, slope: Array, n_rub: int, rows: Array
 ) -> None:
-    """Write the free run's derivatives of some samples, what its past passes on included.
+    """Write the derivatives of some samples by coefficients and friction, as if the past did not depend on them.
 
     Parameters
     ----------
-    monomials : ndarray, shape (n, m)
+    monomials : ndarray, shape (r, m)
         As `slopes_of` writes them.
-    inputs : ndarray, shape (n, i)
+    inputs : ndarray, shape (r, i)
         Monomials of inputs.
     place, column : ndarray of int, shape (terms,)
         Monomial of past outputs and monomial of inputs that each term is the product of.
-    slope : ndarray, shape (n, k)
+    slope : ndarray, shape (r, k)
         As `slopes_of` writes it.
-    start : int
-        Column of the first of the log's first outputs.
-    begin, n_rub : int
-        First sample that was run, and number of the friction's values, which take the last columns.
-    first, last : int
-        Samples that are written: from, and up to without.
-    rows : ndarray, shape (l + r, p)
-        The first l rows hold the samples before; the next ones are written.
+    n_rub : int
+        Number of the friction's values, which take the last columns.
+    rows : ndarray, shape (r, p)
+        Written.
     """
-    values, depth = rows.shape[1], slope.shape[1]
-    if n_rub > 0:
-        depth -= 1
+    values, last = rows.shape[1], slope.shape[1] - 1
+    for t in range(rows.shape[0]):
+        rows[t, :] = 0.0
+        slips = 1.0
+        if n_rub > 0:
+            slips = abs(slope[t, last])
+        for i in range(place.size):
+            rows[t, i] = slips * monomials[t, place[i]] * inputs[t, column[i]]
+        if n_rub > 0:
+            if slope[t, last] < 0.0:
+                rows[t, values - n_rub] = 1.0
+            elif slope[t, last] > 0.0:
+                rows[t, values - n_rub + 1] = -1.0
+            elif n_rub > 2:
+                rows[t, values - 1] = 1.0
+
+
+@compiled
+def pass_on(slope: Array, depth: int, rows: Array) -> None:
+    """Add what the outputs before pass on to the derivatives of each output.
+
+    Parameters
+    ----------
+    slope : ndarray, shape (r, k)
+        As `slopes_of` writes it.
+    depth : int
+        How many outputs before it each one depends on.
+    rows : ndarray, shape (depth + r, p)
+        Derivatives of the outputs before the first sample; below them those of `write_own`, which are added to.
+    """
+    values = rows.shape[1]
     # built apart from the rows before it, so that the sums below vectorise
     now = np.zeros(values)
-    for t in range(first, last):
-        r = depth + t - first
-        now[:] = 0.0
-        if t < begin:
-            if t >= begin - depth:
-                now[start + t - begin + depth] = 1.0
-        else:
-            slips = 1.0
-            if n_rub > 0:
-                slips = abs(slope[t, depth])
-            for i in range(place.size):
-                now[i] = slips * monomials[t, place[i]] * inputs[t, column[i]]
-            if n_rub > 0:
-                if slope[t, depth] < 0.0:
-                    now[values - n_rub] = 1.0
-                elif slope[t, depth] > 0.0:
-                    now[values - n_rub + 1] = -1.0
-                elif n_rub > 2:
-                    now[values - 1] = 1.0
-            for k in range(depth):
-                gain = slope[t, k]
-                before = rows[r - 1 - k]
-                for j in range(values):
-                    now[j] += gain * before[j]
+    for t in range(slope.shape[0]):
+        r = depth + t
+        now[:] = rows[r]
+        for k in range(depth):
+            gain = slope[t, k]
+            before = rows[r - 1 - k]
+            for j in range(values):
+                now[j] += gain * before[j]
         rows[r, :] = now

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from estimation.arrays import Array, IntArray
-from estimation.identification.free_run.factored_kernel import run_factored, slopes_of, write_rows
+from estimation.identification.free_run.factored_kernel import pass_on, run_factored, slopes_of, write_own
 from estimation.identification.free_run.polynomial_variables import lagged_signals
 
 if TYPE_CHECKING:
@@ -211,11 +211,10 @@ class NormalEquations:
             One column a first output.
         """
         (begin,), (out,), n = self.runs.begins, self._outputs, self.runs.variables.n_start
-        slope = np.ascontiguousarray(self._slopes(0)[1][:, :n])
-        nothing, none, rows = np.empty((out.size, 0)), np.empty(0, dtype=np.int64), np.zeros((n + out.size, n))
-        # without terms and friction, rows hold what the first outputs pass on alone
-        write_rows(nothing, nothing, none, none, slope, 0, begin, 0, 0, out.size, rows)
-        return rows[n:]
+        rows = np.zeros((out.size, n))
+        rows[begin - n : begin] = np.eye(n)
+        pass_on(self._slopes(0)[1][begin:], n, rows[begin - n :])
+        return rows
 
     @property
     def n_values(self) -> int:
@@ -237,7 +236,7 @@ class NormalEquations:
         runs, one, p = self.runs, self.factors, self.n_values
         n, n_rub, place = runs.variables.n_start, runs.variables.n_friction, 0
         length = max(STRETCH // p, 32)
-        rows = np.zeros((n + length, p))
+        rows, first_outputs = np.zeros((n + length, p)), np.eye(n)
         for index, (inputs, out) in enumerate(zip(self.inputs, self._outputs, strict=True)):
             begin, size, start = runs.begins[index], out.size, runs.terms.shape[0] + index * n
             monomials, slope = self._slopes(index)
@@ -247,8 +246,13 @@ class NormalEquations:
             # before the run every derivative is zero
             for first in range(begin - n, size, length):
                 last = min(first + length, size)
-                write_rows(monomials, inputs, one.place, one.column, slope, start, begin, n_rub, first, last, rows)
-                counts, part = used[first:last], rows[n : n + last - first]
+                counts, part, block = used[first:last], rows[n : n + last - first], slope[first:last]
+                write_own(monomials[first:last], inputs[first:last], one.place, one.column, block, n_rub, part)
+                if first < begin:
+                    given = part[: begin - first]
+                    given[:] = 0.0
+                    given[:, start : start + n] = first_outputs[first - begin + n :][: len(given)]
+                pass_on(block, n, rows[: n + last - first])
                 if counts.all():
                     yield part, residual[first:last]
                 elif counts.any():

@@ -42,7 +42,7 @@ def made(friction: str, rub: tuple[float, ...]) -> tuple[Runs, Array]:
 @pytest.fixture(params=["compiled", "Python"])
 def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     if request.param == "Python":
-        for name in ("run_factored", "slopes_of", "write_rows"):
+        for name in ("run_factored", "slopes_of", "write_own", "pass_on"):
             monkeypatch.setattr(normal_equations, name, getattr(normal_equations, name).__wrapped__)
 
 
