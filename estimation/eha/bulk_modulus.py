@@ -256,7 +256,7 @@ def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusE
 
 
 def _form(options: EstimateOptions, record: Record) -> str:
-    """Return what is believed of the actuator: what is asked for, what a named method believes, what the log allows."""
+    """Return the form to fit: that of a named method, the one asked for, or the one that the log allows."""
     if options.method in NAMED:
         own = NAMED[options.method].form
         if options.form not in ("auto", own):

@@ -35,7 +35,7 @@ def growth_note(found: Explanation, _: EhaParameters) -> Note:
 
 
 def changed_note(factor: float, last: float) -> Note:
-    """Return what leakage is called that is so many times as large at the end of a log as at its beginning.
+    """Return the note on leakage that changes within a log: it drifts, or it grows.
 
     Parameters
     ----------

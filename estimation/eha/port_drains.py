@@ -1,4 +1,4 @@
-"""`drain_note(side)`: what a port that drains otherwise than the other one says: of its make-up valve, or nothing."""
+"""`drain_note(side)`: the note on a port that drains more than the other one: its make-up valve leaks, or none does."""
 
 from collections.abc import Callable
 from math import exp
@@ -35,7 +35,7 @@ def most_drained(p: EhaParameters) -> float:
 
 
 def drain_note(side: str) -> Callable[[Explanation, EhaParameters], Note]:
-    """Return what tells of a port whose drain is not the other one's.
+    """Return a function that writes the note on ports that drain differently.
 
     The port that drains more is the one of a make-up valve that leaks, whichever drain was freed; and where it drains
     no more than the case of a sound pump does, no valve leaks.

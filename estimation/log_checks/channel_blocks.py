@@ -149,7 +149,7 @@ def power_of(pressure: Array | None, flow: Array | None, piston: Array | None) -
 
 
 def gone_together(piston: Array | None, pumped: Array | None) -> tuple[float, float]:
-    """Return the same of where the piston went and what was pumped, without what drifts: slow motion counts most.
+    """Return how the piston's path and the pumped volume agree once their drift is taken off; slow motion counts most.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ AUGMENTABLE = (
 """Parameters that may be states beside bulk modulus."""
 
 MOST = 1e3
-"""A parameter is held to so many times its healthy value [dimensionless]."""
+"""Largest value of a parameter, over that of the healthy actuator [dimensionless]."""
 
 AIR = StateVariable(AIR_FRACTION, "1", 1e-2, 0.0, 1e-6, 0.2, logarithmic=True)
 """Begins at one percent; at most a foam's."""

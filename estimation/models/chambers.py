@@ -55,8 +55,8 @@ STATES = (
     logarithm_of("relief_pressure", "Pa", 1e6),
     logarithm_of("relief_conductance", "m^3/(s Pa)", 1e-8),
 )
-"""Chamber pressures, and constants: logarithms of what is positive and may be far from its first guess, as they are
-what may be nothing."""
+"""Chamber pressures and constants. A constant that is positive and may be far from its first guess is a logarithm; one
+that may be zero stands as it is."""
 
 STDS: Mapping[str, float] = {
     BULK_MODULUS: 0.3,

@@ -202,7 +202,7 @@ def flow_rates(
 
 
 def _delivery(drives: Any, p: SimpleNamespace, share: Scalar) -> Delivery:
-    """Return what acts on the chambers within a step, of what was measured at its ends."""
+    """Return the flow, velocity and position within a step, between those measured at its ends."""
     speeds, (x, next_x), step = drives
     return Delivery(delivered_flow(speeds, p, step, share), (next_x - x) / step, x + share * (next_x - x))
 

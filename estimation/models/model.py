@@ -20,8 +20,8 @@ from plant.runs import steps_a_sample
 from plant.solvers.steps import Parameters
 
 OPENING = "opening_"
-"""What a drive is called, before a state's name, that holds the variance that a sample adds to the state beside the
-process noise, in the filter's units [dimensionless]: see `estimation.log_checks.bridging`."""
+"""Begins the name of a drive that holds extra variance of a state, which a sample adds beside the process noise, in the
+filter's units [dimensionless]; the state's name follows. See `estimation.log_checks.bridging`."""
 
 MOST_SUBSTEPS = 1000
 """Steps of a model that a sample may need: a filter of slower samples would take forever, and its model has settled."""

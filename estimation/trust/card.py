@@ -17,7 +17,7 @@ INSEPARABLE = 0.95
 
 
 MOST_PAIRS = 3
-"""Of so many pairs of parameters that are hard to tell apart a card speaks."""
+"""Most pairs of parameters that a card names as hard to tell apart [count]."""
 
 
 @dataclass(frozen=True, eq=False)

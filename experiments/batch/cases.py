@@ -236,7 +236,7 @@ def _logs(logs: Logs, place: int, folder: Path) -> Iterator[Log]:
 
 
 def _content(series: Series) -> list[Any]:
-    """Return what makes a series what it is; where a log's folder stands is not part of it."""
+    """Return what identifies a series; the folder of a log is not part of it."""
     if isinstance(series, Log):
         return ["log", series.file, series.content, series.columns]
     return ["simulated", *(getattr(series, one.name) for one in fields(series))]

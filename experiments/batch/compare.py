@@ -84,7 +84,7 @@ def _paired(first: pd.DataFrame, second: pd.DataFrame) -> tuple[pd.DataFrame, st
 
 
 def _matchable(frame: pd.DataFrame, on: list[str]) -> pd.DataFrame:
-    """Return cases with what they are matched on filled in: what neither has is alike."""
+    """Return cases without gaps in the columns that match them: an entry that both lack counts as equal."""
     filled = {name: frame[name].astype(object).where(frame[name].notna(), "") for name in on}
     return frame.assign(**filled).drop_duplicates(on)
 

@@ -57,7 +57,7 @@ as JSON too, is a list of what speaks against every class, each a note's code an
 Row: TypeAlias = dict[str, Any]
 
 FOUND = tuple(name for name in SCHEMA.names[SCHEMA.names.index("outcome") :] if name != TRUTH)
-"""Columns of what came of a case; those before them, and the truth, say what it is."""
+"""Columns of the result of a case; the columns before them, and the truth, describe the case."""
 
 
 class Failure(NamedTuple):

@@ -32,7 +32,7 @@ def _corners(rig: EhaParameters) -> Iterator[EhaParameters]:
 
 
 def doubted_breaks(rig: EhaParameters, low_v: float, high_v: float) -> tuple[float, float]:
-    """Return what of the break frequencies is out of reach of the parameters' uncertainty.
+    """Return the limits of the break frequencies that the parameters' uncertainty can reach.
 
     Parameters
     ----------

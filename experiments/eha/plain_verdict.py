@@ -88,7 +88,7 @@ def verdict(result: Mapping[str, Any]) -> str:
 
 
 def _levels(result: Mapping[str, Any]) -> dict[str, str | None]:
-    """Return the levels of leakage and of friction, None where all else is together likelier than the verdict's.
+    """Return the levels of leakage and of friction, None where all else together is likelier.
 
     What the nine conditions leave to a fault that is none of them, as a worn pump, is something else too.
     """
@@ -127,7 +127,7 @@ def _raised(result: Mapping[str, Any]) -> dict[str, float]:
 
 
 def of_another_size(result: Mapping[str, Any]) -> bool:
-    """Return whether a circuit fits the log, and nothing but the size of its faults is in none of the nine conditions.
+    """Return whether a circuit fits the log and only the size of its faults differs from the nine conditions.
 
     Parameters
     ----------

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 MOST_MESSAGES = 3
-"""Up to so many logs, everything that speaks against a result is shown."""
+"""Most logs of which everything that speaks against a result is shown [count]."""
 
 MOST_TABLES = 3
-"""Up to so many logs, every condition's score is shown."""
+"""Most logs of which every condition's score is shown [count]."""
 
 
 def estimates_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "Iterable[RenderableType]":

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from plant.log.record import Record
 
 MOST_CHANNELS = 8
-"""Up to so many channels are drawn [count]."""
+"""Most channels that are drawn [count]."""
 
 SHOWN_IN = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "Pa": ("bar", 1e-5)}
 """Units that a shop reads, and the factor from SI."""

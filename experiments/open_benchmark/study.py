@@ -28,7 +28,7 @@ STRANGE = (
     *("plain", "closed_loop", "stiff_oil", "rig_mass_wrong", "pressure_lags_2_ms", "pressure_gain_20_percent_high"),
     *("worn_pump", "makeup_check_leaks", "pressure_reversed"),
 )
-"""Kinds of the page, from what was learnt to what is none of the nine."""
+"""Kinds of logs that the page shows: first the one that was learnt, last those outside the nine conditions."""
 
 SERIES = (8.0, 4e-3)
 """How much of a log the learners see, and on which clock [s]."""

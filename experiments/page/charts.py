@@ -16,7 +16,8 @@ from experiments.page.still import still_picture
 from plant.arrays import Array
 
 MOST_DRAWN = 200_000
-"""A longer series is carried as the ends of so many half stretches [count]: 20 s at 10 kHz are carried whole."""
+"""Values of a series that a page carries at most [count], as many as 20 s at 10 kHz; of a longer one it carries the
+ends of stretches."""
 
 
 @dataclass(frozen=True, eq=False)

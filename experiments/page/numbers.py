@@ -18,7 +18,7 @@ SHOP_UNITS: Mapping[str, tuple[float, str]] = {
     "m^3/s": (6e4, "L/min"),
     "m^3/(s Pa)": (6e9, "L/(min bar)"),
 }
-"""Units of SI that no gauge of a shop has: factor to another, and that."""
+"""By SI unit: the factor to the unit that gauges in a workshop show, and that unit."""
 
 
 def number(value: float | None, digits: int = 4) -> str:
@@ -71,7 +71,7 @@ def percent_text(probability: float) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """Write a number with so many decimals, for columns that are compared.
+    """Write a number with a given count of decimals, for columns that are compared.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def exact(value: float) -> str:
 
 
 def shop_unit(unit: str) -> tuple[float, str]:
-    """Return the unit in which a severity is shown to a shop, and how.
+    """Return the unit in which a workshop reads a severity.
 
     Returns
     -------

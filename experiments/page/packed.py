@@ -10,7 +10,7 @@ import numpy as np
 from plant.arrays import Array
 
 CODES = 32_500
-"""Values lie on twice so many steps about the middle of their range [count]."""
+"""Steps on either side of the middle of the range of values [count]."""
 
 MISSING = -32_768
 """Code of a value that is not there."""

@@ -117,7 +117,7 @@ def as_given(value: float) -> Cell:
 
 
 def decimals(count: int) -> Callable[[float | None], Cell]:
-    """Return a writer of cells with so many decimals.
+    """Return a writer of cells with a given count of decimals.
 
     Returns
     -------

@@ -88,7 +88,7 @@ def _told(actuators: Sequence[PiezoStackParameters]) -> Array:
 
 
 def _misfits(actuators: Sequence[PiezoStackParameters]) -> Array:
-    """Return what each misses of Figures 11 and 13, over what is allowed: shape (actuators, 4)."""
+    """Return how far each actuator is off Figures 11 and 13, over the error allowed: shape (actuators, 4)."""
     return (_told(actuators) - WANTED) / ALLOWED
 
 

@@ -1,4 +1,4 @@
-"""Scores as probabilities that hold: flattened and floored so that runs held back are found as probable as they were.
+"""Scores made into calibrated probabilities: flattened and floored until they fit the runs held back.
 
 A discriminant takes runs for independent and its covariance for known, so its probabilities are too near to 0 and 1.
 Scores are divided by a temperature (Guo and others, ICML 2017), and a share of all probability is spread evenly; both

@@ -80,7 +80,7 @@ def fill_predicted(
 def take_in(
     mean: Array, covariance: Array, evidence: Array, value: float, std: float, gross: float, scatter: Array
 ) -> None:
-    """Change what is believed to what is believed after a log.
+    """Update the belief by what a log says.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def follow(
     covariance: Array,
     evidence: Array,
 ) -> None:
-    """Fill in what is believed after each log, from what is believed before the first, which stands in the first row.
+    """Fill in the belief after each log; the first row holds the belief before the first log.
 
     Parameters
     ----------

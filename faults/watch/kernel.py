@@ -234,7 +234,7 @@ def drop_span(memory: Memory) -> None:
 
 
 def begin_again(memory: Memory) -> None:
-    """Forget most of what the balances were, after an alarm: they are learnt again, what the peaks said is kept."""
+    """Forget most of what is known of the balances after an alarm, so that they are learnt again; peaks are kept."""
     information, moment, score = memory.information, memory.moment, memory.score
     memory.clock[LEARNT_FROM] = memory.clock[USABLE]
     information *= 0.01

@@ -209,7 +209,7 @@ class FractionalStates:
 
 
 def oustaloup_states(order: float, low_hz: float, high_hz: float, count: int = 5) -> FractionalStates:
-    """Return a fractional derivative as so many states, right between two frequencies (Oustaloup et al. 2000).
+    """Return a fractional derivative made of first-order states, right between two frequencies (Oustaloup et al. 2000).
 
     Parameters
     ----------

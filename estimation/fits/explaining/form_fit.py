@@ -64,7 +64,7 @@ class FormFit:
 
 
 def with_structure(found: Mapping[str, tuple[float, float]], structure: float) -> dict[str, tuple[float, float]]:
-    """Return what was found, its bulk modulus with what the form itself may be wrong by.
+    """Return what was found, with a wider deviation of bulk modulus: the form itself may be wrong.
 
     Parameters
     ----------

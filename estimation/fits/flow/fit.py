@@ -224,7 +224,7 @@ def _elsewhere(plain: PlainFits, strange: Explanation) -> FitStart | None:
 
 
 def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, traits: LogTraits) -> FormFit:
-    """Return what a log says under what is strange about it."""
+    """Return the fit of a log with what is strange about it taken up."""
     one = strange.fit
     modulus, bound = one.values["bulk_modulus"], one.std["bulk_modulus"] / one.values["bulk_modulus"]
     if PLAY.name in strange.names:

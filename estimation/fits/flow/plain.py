@@ -125,7 +125,7 @@ class PlainFits:
         return _swinging(self.fits)
 
     def yields(self, sensed: ShownPlay, bulk_modulus: float) -> float:
-        """Return what the piston yields unseen, over what the oil does.
+        """Return the compliance within the encoder's play over that of the oil.
 
         Parameters
         ----------

@@ -64,7 +64,7 @@ def small_teeth(
 def with_small_teeth(
     found: Mapping[str, tuple[float, float]], small: tuple[Mapping[str, float], Mapping[str, float]]
 ) -> dict[str, tuple[float, float]]:
-    """Return what was found, with what small teeth may have to do with it.
+    """Return what was found, moved and widened by what small pump teeth may have done to it.
 
     Parameters
     ----------

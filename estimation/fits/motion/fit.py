@@ -175,7 +175,7 @@ def unseen(fit: GreyBoxFit, samples: int) -> float:
 
 
 def share_of_motion(chi_square: float, log: GreyBoxLog) -> float:
-    """Return the residuals over the motion, in the time over which a residual is told from drift.
+    """Return the size of the residuals over that of the motion, in the time after which drift hides a residual.
 
     Measured speed has noise, which is a random walk of position: what is older than ``sqrt(variance / walk)`` is
     forgotten. How many times the encoder's noise a residual is says how fine the encoder is, not how wrong the model.

@@ -13,7 +13,7 @@ from plant.compiled.native.scope import Scope
 
 
 def vector(width: int) -> str:
-    """Return the LLVM type of so many numbers side by side."""
+    """Return the LLVM type of a vector of numbers."""
     return "double" if width == 1 else f"<{width} x double>"
 
 

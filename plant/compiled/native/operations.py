@@ -109,7 +109,7 @@ def _spread(scope: Scope, number: str, width: int) -> str:
 
 
 def moving(width: int) -> Operation:
-    """Return ``move(source, target)``, which copies so many numbers."""
+    """Return ``move(source, target)``, which copies a fixed count of numbers."""
     kind = vector(width)
 
     def operation(scope: Scope, given: Sequence[Held]) -> Held:
@@ -121,7 +121,7 @@ def moving(width: int) -> Operation:
 
 
 def complete(width: int, count: int, stride: int) -> Operation:
-    """Return ``complete(address)``: whether so many vectors, a stride in bytes apart, hold no NaN."""
+    """Return ``complete(address)``: whether a fixed count of vectors, a stride in bytes apart, hold no NaN."""
     kind, truths = vector(width), "i1" if width == 1 else f"<{width} x i1>"
 
     def operation(scope: Scope, given: Sequence[Held]) -> Held:
@@ -140,7 +140,7 @@ def complete(width: int, count: int, stride: int) -> Operation:
 
 
 def loading(count: int) -> Operation:
-    """Return ``load(address)``: a tuple of so many numbers that stand one after the other."""
+    """Return ``load(address)``: a tuple of a fixed count of numbers that stand one after the other."""
 
     def operation(scope: Scope, given: Sequence[Held]) -> Held:
         places = [place(scope, given[0].parts[0], 8 * k) for k in range(count)]

@@ -153,7 +153,7 @@ def _named_tuple(name: str, of: Any) -> Argument:
 
 
 def _documented(what: Any, known: Collection[str] = ()) -> dict[str, Argument]:
-    """Return what the documentation of a function or a named tuple has, but for what is known, by name."""
+    """Return the documented arguments of a function or a named tuple that are not known yet, by name."""
     text = inspect.getdoc(what) or _documentation(what)
     section = text.partition("Parameters\n----------\n")[2]
     section = re.split(r"\n\n\w+\n-{3,}\n", section)[0]
