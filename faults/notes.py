@@ -28,6 +28,14 @@ class AgainstCode(Code):
         "of the nine conditions"
     )
     SPEED_BIAS = "motor speed reads wrong by {bias_rad_s:+.3g} rad/s"
+    LOAD_UNTOLD = (
+        "{load} on the rod that the rig file does not have would explain the log: if there is one, enter {entry} "
+        "(about {value:.2g} {unit})"
+    )
+    LOAD_OR_OFFSET = (
+        "motor speed reads wrong by {bias_rad_s:+.3g} rad/s, or there is {load} on the rod that the rig file does not "
+        "have ({entry} of about {value:.2g} {unit}): without differential_pressure_pa the log does not tell which"
+    )
     PRESSURE_BIAS = "differential pressure reads wrong by {bias_pa:+.3g} Pa"
     OIL_SOFT = "the oil's bulk modulus is {share:.2f} times that in the rig file: air in the oil, or a soft hose"
     OIL_STIFF = "the oil's bulk modulus is {share:.2f} times that in the rig file: another oil, or a wrong rig file"

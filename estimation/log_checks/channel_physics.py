@@ -54,7 +54,12 @@ FARTHEST = 3.0
 """Times the pumped flow that no piston moves, whatever is wrong in the rig file [dimensionless]."""
 
 RPM = 60.0 / (2.0 * np.pi)
-TURNS: Mapping[float, str] = {1.0 / RPM: "rpm read as rad/s", RPM: "rad/s read as rpm"}
+TURN = 2.0 * np.pi
+TURNS: Mapping[float, str] = {
+    1.0 / RPM: "rpm read as rad/s",
+    RPM: "rad/s read as rpm",
+    TURN: "rev/s read as rad/s",
+}
 """Slips of the speed's unit, by how many times too far the piston then seems to go."""
 
 LENGTHS: Mapping[float, str] = {
@@ -70,7 +75,8 @@ LENGTHS: Mapping[float, str] = {
 """Slips of a length's unit, by the factor that they make."""
 
 UNKNOWN_UNIT, UNKNOWN_RIG = "another unit", "another unit, or a rig file of another actuator"
-"""What is said of a factor that no known slip makes."""
+LOSSY = "another unit, such as mm read as m where much of the flow is lost, or a rig file of another actuator"
+"""What is said of a factor that no known slip makes, or that one makes of a piston that loses most of the flow."""
 
 EXPLAINED, KNOWN, TOLD = 0.9, 0.1, 4.0
 """Share of the flow that a balance must explain, relative deviation at which its factor counts, and deviations from
@@ -224,7 +230,7 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
     gone = p.piston_area * ratio
     far = gone > FARTHEST
     turn = length = None
-    believed = False, False
+    believed, alike = (False, False), set[float]()
     if balance is not None and 0.0 < balance.swept_std < KNOWN * balance.swept and balance.contradicts_rig > REFUTED:
         times = 1.0 / balance.swept
         far = far and times > 1.0
@@ -235,21 +241,23 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
         believed = False, gone < TINY * NEAR and _resolved(record, long)
     if turn is None and length is None and far and together > FOLLOWS:  # a balance may take motion for leakage
         turn, length = (_near(gone, slips, LOST) for slips in (TURNS, LENGTHS))
-        believed = True, True
+        believed, alike = (True, True), {one for one in TURNS if LOST <= gone / one <= NEAR}
     if together > FOLLOWS and _too_fast(record, p) and gone < NEAR * min(TURNS):
         turn, believed = min(TURNS), (True, believed[1])
     moved = _moved(record)
     slips: list[tuple[str, str, float]] = []
     if turn is not None and believed[0] and gone < NEAR * turn:
-        slips.append((SPEED, TURNS[turn], 1.0 / turn))
+        said = " or ".join(TURNS[one] for one in TURNS if one == turn or one in alike)
+        slips.append((SPEED, said, 1.0 / turn))
     if (
         length is not None and believed[1] and gone < NEAR * length and not (slips and " and " in moved)
     ):  # two that agree are right
         slips.append((moved, LENGTHS[length], length))
     if not slips and far and together > FOLLOWS and (balance is None or balance.swept * FARTHEST < 1.0):
-        channel = SPEED if " and " in moved else f"{moved} or {SPEED}"
+        lossy = 100.0 * NEAR < gone < 1e3  # too far for cm, and for any unit of speed
+        channel = SPEED if " and " in moved and not lossy else f"{moved} or {SPEED}"
         times = 1.0 / gone if channel == SPEED else gone
-        return (_unit(channel, moved if channel == SPEED else SPEED, times, UNKNOWN_RIG),)
+        return (_unit(channel, moved if channel == SPEED else SPEED, times, LOSSY if lossy else UNKNOWN_RIG),)
     if not slips:
         return ()
     channel, slip = " or ".join(one[0] for one in slips), " or ".join(one[1] for one in slips)

@@ -13,11 +13,10 @@ from estimation.fits.motion.values import share_at
 from estimation.log_checks.clean import CleanLog
 from estimation.notes import EstimateCode
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
-from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COLUMN, parameter_rows
 from faults.diagnosis.circuits.class_fit import PointFit
-from faults.diagnosis.circuits.out_of_model import UNEXPLAINED, yielding_velocity
 from faults.diagnosis.circuits.rivals import doubts_left
+from faults.diagnosis.circuits.yielding import UNEXPLAINED, yields_on_seals
 from faults.diagnosis.evidence import Scoreboard
 from plant.eha.model import EhaParameters
 from plant.notes import Note
@@ -71,17 +70,11 @@ def doubts_after(
     if large is None or estimate.form != "motion":
         return left
     actuator, best = actuator_of(healthy), board.fits.best
-    if not _yields(board.blocks, best, actuator):
+    if not yields_on_seals(board.blocks, best, actuator):
         share = share_at(log.record, healthy, values_of(best, actuator), log.variances["motor_speed_rad_s"])
         if not share <= min(UNEXPLAINED[0], LESS * float(large.data["motion_percent"]) / 100.0):
             return left
     return tuple(note for note in left if note.code not in NOT_THE_LOGS)
-
-
-def _yields(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
-    """Return whether a piston hardly moves, and a circuit follows it to what seals yield."""
-    yielding = yielding_velocity(blocks, actuator)
-    return float(fit.scales[0]) <= yielding and UNEXPLAINED[0] * float(blocks.sizes[0]) <= yielding
 
 
 def values_of(fit: PointFit, actuator: Actuator) -> Mapping[str, float]:

@@ -19,7 +19,7 @@ from faults.diagnosis.circuits.blocks import LONGEST, Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.circuits.class_fit import LASTING, PointFit, fit_freely, misfit
 from faults.diagnosis.circuits.class_regions import ClassFits, is_stuck
-from faults.diagnosis.circuits.out_of_model import UNEXPLAINED
+from faults.diagnosis.circuits.yielding import UNEXPLAINED, yields_on_seals
 from plant.arrays import Array
 from plant.notes import Note
 
@@ -91,11 +91,13 @@ def drift_of(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Drift | Non
     Returns
     -------
     Drift or None
-        None with pressure, where the log shows none, where no circuit with one follows it, and of logs that are longer
-        than what is fitted.
+        None with pressure, where the log shows none, where no circuit with one follows it, where one without follows a
+        piston that hardly moves to what its seals yield, and of logs that are longer than what is fitted.
     """
     whole = len(blocks.speed) * blocks.sample_time <= LONGEST
     if blocks.pressure is not None or blocks.course is not None or not whole or is_stuck(blocks, actuator):
+        return None
+    if yields_on_seals(blocks, fits.best, actuator):
         return None
     condition, none = list(CONDITIONS)[int(np.argmax(fits.scores))], Drift(0.0, fits.best, 0.0)
     promised, moved, step = _step(blocks, none, actuator)

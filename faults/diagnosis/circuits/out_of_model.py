@@ -19,13 +19,12 @@ from faults.diagnosis.circuits.blocks import Blocks, blocks_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.circuits.class_fit import LASTING, SEALS, STEP, WEAK, PointFit, fit_freely
 from faults.diagnosis.circuits.class_regions import ClassFits, region_scores
+from faults.diagnosis.circuits.load_or_offset import load_for_offset
+from faults.diagnosis.circuits.yielding import UNEXPLAINED, follows, yielding_velocity
 from faults.notes import AgainstCode
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.log.record import Record
 from plant.notes import Note
-
-UNEXPLAINED = (0.12, 0.08)
-"""Share of velocity and of pressure, root mean square, that the best circuit may leave [dimensionless]."""
 
 EARLIER = 0.1
 """Time over which velocity is averaged once more where pressure is logged [s]: a piston that hardly moves breaks loose
@@ -33,14 +32,6 @@ some blocks sooner or later than the circuit's, and goes as far."""
 
 UNEXPLAINED_LONGER = 0.06
 """Share of velocity that means over `EARLIER` may leave [dimensionless]: half of what blocks may."""
-
-YIELDING = 0.015
-"""Share of the velocity at which the pump's whole flow would move the piston, root mean square, that may be left in any
-case [dimensionless]: a piston that hardly moves yields on its seals, which no circuit describes to the last digit."""
-
-HALF_POWER = math.sqrt(0.5)
-"""Share of velocity, root mean square, beyond which a circuit explains less than half of its power [dimensionless]:
-where pressure is not followed either, it says nothing of the log."""
 
 STICKS = math.exp(SEALS)
 """How far seals may yield, over the rig's presliding displacement [dimensionless]: a standard deviation more, 54 um."""
@@ -184,27 +175,6 @@ def unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Not
     ]
 
 
-def yielding_velocity(blocks: Blocks, actuator: Actuator) -> float:
-    """Return the velocity that a piston which yields on its seals may have beside a circuit's.
-
-    Parameters
-    ----------
-    blocks : Blocks
-        The log in blocks.
-    actuator : Actuator
-        The healthy actuator.
-
-    Returns
-    -------
-    float
-        `YIELDING` of the velocity at which the pump's whole flow would move the piston, root mean square [m/s]; without
-        pressure no more than `HALF_POWER` of the piston's own.
-    """
-    pump = actuator.circuit.pump_displacement / actuator.circuit.piston_area
-    yielding = YIELDING * pump * float(np.sqrt(np.mean(blocks.speed**2)))
-    return yielding if blocks.pressure is not None else min(yielding, HALF_POWER * float(blocks.sizes[0]))
-
-
 def sticks_and_slips(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
     """Return whether a circuit misses only when the piston breaks loose and jumps, and not how far it goes.
 
@@ -248,7 +218,7 @@ def _biases(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
 
     Both are looked for in one linear step from the best circuit. A pump that is off bends the other coordinates, so it
     is put into the circuit and the step taken again; it counts if the circuit then explains the log better. So does an
-    offset of motor speed without pressure.
+    offset of motor speed without pressure, unless a load on the rod explains the log as well.
     """
     size = float(np.sqrt(np.mean(blocks.speed**2)))
     if size == 0.0:
@@ -262,7 +232,7 @@ def _biases(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
     pump = found["pump"][0]
     if blocks.pressure is None and pump < 0.0:  # `other_faults` looks for a worn pump
         matters["pump"] = False
-    nearest = list(CONDITIONS)[int(np.argmax(fits.scores))]
+    nearest, load = list(CONDITIONS)[int(np.argmax(fits.scores))], None
     if matters["pump"]:
         healthy = actuator.circuit
         other = replace(healthy, pump_displacement=healthy.pump_displacement * max(1.0 + pump, SMALLEST_PUMP))
@@ -272,10 +242,17 @@ def _biases(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
         matters["pump"] = without.cost - again.cost > least * LASTING
         pump = (1.0 + pump) * (1.0 + _one_step(blocks, again, trust, tried, sizes)["pump"][0]) - 1.0
     if blocks.pressure is None and matters["motor_speed_rad_s"]:
-        moved = replace(blocks, speed=blocks.speed + found["motor_speed_rad_s"][0])
-        without, again = (fit_freely(one, actuator, nearest) for one in (blocks, moved))
-        matters["motor_speed_rad_s"] = without.cost - again.cost > BIAS_GAIN * LASTING
-    return [_bias(name, pump if name == "pump" else found[name][0]) for name in found if matters[name]]
+        offset = found["motor_speed_rad_s"][0]
+        without, again = (
+            fit_freely(replace(blocks, speed=blocks.speed + one), actuator, nearest) for one in (0.0, offset)
+        )
+        gain = (without.cost - again.cost) / LASTING
+        if gain > BIAS_GAIN:
+            load = load_for_offset(blocks, actuator, nearest, without, offset, gain)
+        # with an offset that explains a log a circuit follows it
+        matters["motor_speed_rad_s"] = load is not None or (gain > BIAS_GAIN and follows(blocks, again, actuator))
+    said = {name: _bias(name, pump if name == "pump" else found[name][0]) for name in found if matters[name]}
+    return list((said if load is None else said | {"motor_speed_rad_s": load}).values())
 
 
 def _least(name: str, error: float, sizes: Mapping[str, float]) -> float:

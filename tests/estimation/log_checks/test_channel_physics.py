@@ -98,6 +98,7 @@ def test_a_wrong_rig_file_accuses_no_channel(wrong: dict[str, float]) -> None:
         (swapped, ChannelCode.CHANNELS_SWAPPED, POSITION),
         (scaled(SPEED, RPM), ChannelCode.CHANNEL_UNIT, SPEED),
         (scaled(SPEED, 1.0 / RPM), ChannelCode.CHANNEL_UNIT, SPEED),
+        (scaled(SPEED, 0.5 / np.pi), ChannelCode.CHANNEL_UNIT, SPEED),
         (scaled(POSITION, 1e3), ChannelCode.CHANNEL_UNIT, POSITION),
         (scaled(POSITION, 0.1), ChannelCode.CHANNEL_UNIT, POSITION),
         (scaled(VELOCITY, 1e3), ChannelCode.CHANNEL_UNIT, VELOCITY),
@@ -165,6 +166,26 @@ def test_a_pump_that_would_deliver_what_none_can_is_a_speed_in_another_unit(
 def test_a_mistake_shows_without_pressure(mistake: Callable[[Record], Record]) -> None:
     for drive in ("steps", "prbs"):
         assert channel_mistakes(mistake(run(drive=drive)).replace(**{PRESSURE: None}), HEALTHY)
+
+
+RADIANS, TURNS_A_SECOND = "rad/s read as rpm", "rev/s read as rad/s"
+
+
+@pytest.mark.parametrize(
+    ("condition", "factor", "accused", "slip"),
+    [
+        ("normal", 0.5 / np.pi, SPEED, f"{RADIANS} or {TURNS_A_SECOND}"),
+        ("minor_leakage", 0.5 / np.pi, SPEED, TURNS_A_SECOND),
+        ("normal", 1.0 / RPM, SPEED, RADIANS),
+        ("minor_leakage", 1.0 / RPM, SPEED, f"{RADIANS} or {TURNS_A_SECOND}"),
+        ("major_leakage_major_friction", 1e-3, f"{POSITION} and {VELOCITY} or {SPEED}", channel_physics.LOSSY),
+    ],
+)
+def test_without_pressure_lost_flow_leaves_open_which_slip_of_a_unit_it_was(
+    condition: str, factor: float, accused: str, slip: str
+) -> None:
+    (said,) = channel_mistakes(scaled(SPEED, factor)(run(condition)).replace(**{PRESSURE: None}), HEALTHY)
+    assert (said.data["channel"], said.data["slip"]) == (accused, slip)
 
 
 @pytest.mark.parametrize("pressure", [True, False], ids=["with pressure", "without"])

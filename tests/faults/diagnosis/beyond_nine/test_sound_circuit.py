@@ -10,7 +10,7 @@ from experiments.open_benchmark.kinds import make
 from faults.diagnosis.beyond_nine import sound_circuit as subject
 from faults.diagnosis.beyond_nine.sound_circuit import WIDER, another_sound_circuit, sound_circuit
 from faults.diagnosis.by_circuits import diagnose_clean
-from faults.diagnosis.circuits import out_of_model
+from faults.diagnosis.circuits import yielding
 from faults.diagnosis.circuits.class_fit import nominal_runs
 from faults.diagnosis.circuits.class_regions import fit_classes
 from faults.diagnosis.circuits.out_of_model import unexplained
@@ -51,7 +51,7 @@ def test_a_plain_log_that_wider_valves_explain_gets_its_class(monkeypatch: pytes
 
     The piston moves so little that its seals might yield that much. They may not here, else nothing is unexplained.
     """
-    monkeypatch.setattr(out_of_model, "YIELDING", 0.0)
+    monkeypatch.setattr(yielding, "YIELDING", 0.0)
     log = make("plain", "training", 9753).log
     record = Record(1e-3, {name: log[name].to_numpy() for name in ("motor_speed_rad_s", "position_m", "velocity_m_s")})
     clean = clean_log(record, EhaParameters())

@@ -16,6 +16,7 @@ from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.changes import warming
 from faults.diagnosis.changes.onset import last_part
 from faults.diagnosis.changes.warming import LEAST, Drift, course_of, drift_of, drifting, with_course
+from faults.diagnosis.circuits import yielding
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import LONGEST, Blocks, blocks_of
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
@@ -90,6 +91,13 @@ def test_a_drift_with_which_no_circuit_follows_the_log_explains_nothing(monkeypa
     for share, is_one in ((1.1, True), (0.9, False)):
         monkeypatch.setattr(warming, "UNEXPLAINED", (share * left, 1.0))
         assert (drift_of(blocks, fits, ACTUATOR) is not None) == is_one
+
+
+def test_of_a_piston_that_hardly_moves_a_drift_explains_how_its_seals_yield(monkeypatch: pytest.MonkeyPatch) -> None:
+    blocks, fits = fitted("minor_leakage", 2.0)
+    assert drift_of(blocks, fits, ACTUATOR) is not None
+    monkeypatch.setattr(yielding, "YIELDING", 1.0)
+    assert drift_of(blocks, fits, ACTUATOR) is None
 
 
 def test_no_drift_is_asked_for_with_pressure_beside_one_that_was_found_or_in_part_of_a_log() -> None:

@@ -20,7 +20,7 @@ from tests.faults.diagnosis.short_logs import ACTUATOR, blocks
 def is_offset(log: Blocks) -> bool:
     fits = fit_classes(log, ACTUATOR)
     against = reasons_against(log, fits, how_near(fits, log, ACTUATOR), ACTUATOR)
-    return any(note.code is AgainstCode.SPEED_BIAS for note in against)
+    return any(note.code in (AgainstCode.SPEED_BIAS, AgainstCode.LOAD_OR_OFFSET) for note in against)
 
 
 def test_an_offset_counts_by_what_it_gains(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,11 +18,10 @@ from faults.diagnosis.circuits.out_of_model import (
     LEAST_BIAS,
     SOFT,
     STICKS,
-    UNEXPLAINED,
-    YIELDING,
     reasons_against,
     sensors_disagree,
 )
+from faults.diagnosis.circuits.yielding import UNEXPLAINED, YIELDING
 from faults.notes import AgainstCode
 from plant.eha.model import EhaParameters
 from plant.log.record import Record

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from faults.diagnosis.circuits.class_fit import scales_of
-from faults.diagnosis.circuits.out_of_model import YIELDING, reasons_against
+from faults.diagnosis.circuits.out_of_model import reasons_against
+from faults.diagnosis.circuits.yielding import YIELDING
 from faults.notes import AgainstCode
 from tests.faults.diagnosis.circuits.test_out_of_model import ACTUATOR, NOISE, fitted, healthy
 

@@ -1,0 +1,117 @@
+"""Without pressure: a load on the rod that the rig file does not have, beside an offset of motor speed.
+
+Both move a piston that leaks further one way than the other. Where an offset explains a log better than none, circuits
+with a constant force and with a spring on the rod are fitted beside it. Other logs pay nothing for that.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.circuit_runs import parameter_rows, predicted
+from faults.diagnosis.circuits.class_fit import LASTING, WEAK, PointFit, fit_freely
+from faults.diagnosis.circuits.yielding import follows
+from faults.notes import AgainstCode
+from plant.eha.circuit_parameters import CircuitParameters
+from plant.notes import Note
+
+APART = math.log(10.0)
+"""Log-likelihood by which one of two explanations must be better to be named alone [dimensionless], in `LASTING` blocks
+that count as one: evidence is called strong from there on (Jeffreys, Theory of Probability, 1961, appendix B)."""
+
+ROUNDS = 2
+"""Linear steps towards a load at most: a second one gained up to a tenth more."""
+
+NUDGE = 0.02
+"""Step of the finite difference, over what is presumed of a load [dimensionless]."""
+
+
+@dataclass(frozen=True)
+class _Load:
+    """A load by its entry in a rig file: what it is called, its unit, and what is presumed of its size [same unit]."""
+
+    entry: str
+    name: str
+    unit: str
+    presumed: float
+
+
+def load_for_offset(
+    blocks: Blocks, actuator: Actuator, nearest: str, without: PointFit, offset: float, gain: float
+) -> Note | None:
+    """Return what is said in place of an offset of motor speed where a load on the rod explains a log as well.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log, without pressure.
+    actuator : Actuator
+        The healthy actuator.
+    nearest : str
+        The nearest condition.
+    without : PointFit
+        The circuit that was fitted freely without an offset.
+    offset : float
+        What motor speed would have to read less [rad/s].
+    gain : float
+        Log-likelihood that it gains [dimensionless].
+
+    Returns
+    -------
+    Note or None
+        A load alone where it is ten times likelier; both where neither is; None where the offset is, and where no
+        circuit under a load follows the log.
+    """
+    force = actuator.circuit.piston_area * actuator.circuit.relief_pressure
+    loads = (
+        _Load("load_force", "a constant load", "N", force),
+        _Load("load_stiffness", "a spring", "N/m", force / max(blocks.travel, np.finfo(float).eps)),
+    )
+    found = [(*_fitted(one, blocks, actuator, nearest, without), one) for one in loads]
+    gained, size, fit, load = max(found, key=lambda one: one[0])
+    gained -= gain * LASTING
+    if gained < -APART * LASTING or not follows(blocks, fit, actuator):
+        return None
+    told = {"load": load.name, "entry": load.entry, "value": size, "unit": load.unit}
+    if gained > APART * LASTING:
+        return AgainstCode.LOAD_UNTOLD.note(**told)
+    return AgainstCode.LOAD_OR_OFFSET.note(**told, bias_rad_s=-offset)
+
+
+def _fitted(
+    load: _Load, blocks: Blocks, actuator: Actuator, nearest: str, without: PointFit
+) -> tuple[float, float, PointFit]:
+    """Return what log-likelihood gains under a load, its entry in the rig file [SI], and the circuit."""
+    rig = float(getattr(actuator.circuit, load.entry))
+
+    def under(value: float) -> CircuitParameters:
+        return replace(actuator.circuit, **{load.entry: value})
+
+    gained, value, fit = 0.0, rig, without
+    for _ in range(ROUNDS):
+        further = value + _step(lambda step, at=value: under(at + step), load.presumed, blocks, actuator, fit)
+        if load.entry == "load_stiffness" and further < 0.0:
+            break
+        tried = fit_freely(blocks, replace(actuator, circuit=under(further)), nearest, start=fit.coordinates)
+        if not without.cost - tried.cost > gained:
+            break
+        gained, value, fit = without.cost - tried.cost, further, tried
+    return gained, value, fit
+
+
+def _step(
+    moved: Callable[[float], CircuitParameters], presumed: float, blocks: Blocks, actuator: Actuator, fit: PointFit
+) -> float:
+    """Return the linear step of a load from a circuit, all else that is fitted moving with it [unit of the load]."""
+    first, nudge = blocks.first, NUDGE * presumed
+    rows = parameter_rows(fit.coordinates[None], moved(nudge), actuator.rated)
+    columns = np.concatenate([fit.slopes, (predicted(blocks, rows) - fit.fitted) / NUDGE])[:, first:] / fit.scales
+    weighted = np.where(blocks.seen, columns, 0.0).reshape(len(columns), -1)
+    left = np.where(blocks.seen, (blocks.outputs - fit.fitted)[first:] / fit.scales, 0.0).ravel()
+    pull = np.eye(len(columns)) * LASTING
+    pull[: len(WEAK), : len(WEAK)] = LASTING * np.linalg.inv(WEAK)
+    return presumed * float(np.linalg.solve(weighted @ weighted.T + pull, weighted @ left)[-1])

@@ -1,0 +1,83 @@
+"""How much of a velocity a circuit may leave: of any, and of a piston that hardly moves and yields on its seals."""
+
+import math
+
+import numpy as np
+
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.class_fit import PointFit
+
+UNEXPLAINED = (0.12, 0.08)
+"""Share of velocity and of pressure, root mean square, that the best circuit may leave [dimensionless]."""
+
+YIELDING = 0.015
+"""Share of the velocity at which the pump's whole flow would move the piston, root mean square, that may be left in any
+case [dimensionless]: a piston that hardly moves yields on its seals, which no circuit describes to the last digit."""
+
+HALF_POWER = math.sqrt(0.5)
+"""Share of velocity, root mean square, beyond which a circuit explains less than half of its power [dimensionless]:
+where pressure is not followed either, it says nothing of the log."""
+
+
+def yielding_velocity(blocks: Blocks, actuator: Actuator) -> float:
+    """Return the velocity that a piston which yields on its seals may have beside a circuit's.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    float
+        `YIELDING` of the velocity at which the pump's whole flow would move the piston, root mean square [m/s]; without
+        pressure no more than `HALF_POWER` of the piston's own.
+    """
+    pump = actuator.circuit.pump_displacement / actuator.circuit.piston_area
+    yielding = YIELDING * pump * float(np.sqrt(np.mean(blocks.speed**2)))
+    return yielding if blocks.pressure is not None else min(yielding, HALF_POWER * float(blocks.sizes[0]))
+
+
+def yields_on_seals(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
+    """Return whether a piston hardly moves, and a circuit follows it to what seals yield.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks.
+    fit : PointFit
+        The circuit.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    bool
+        Whether what the circuit leaves of velocity is no more than seals may yield, and `UNEXPLAINED` of velocity too.
+    """
+    yielding = yielding_velocity(blocks, actuator)
+    return float(fit.scales[0]) <= yielding and UNEXPLAINED[0] * float(blocks.sizes[0]) <= yielding
+
+
+def follows(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
+    """Return whether a circuit follows the velocity of a log as far as a circuit must.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks.
+    fit : PointFit
+        The circuit.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    bool
+        Whether it leaves no more than `UNEXPLAINED` of it, twice its noise, or what seals yield.
+    """
+    least = max(2.0 * float(blocks.noise[0]), yielding_velocity(blocks, actuator))
+    return float(fit.scales[0]) <= max(UNEXPLAINED[0] * float(blocks.sizes[0]), least)
