@@ -3,15 +3,22 @@
 Where pressure is logged, bulk modulus is measured before a circuit is fitted. Soft oil holds air, which is a fault.
 """
 
+import math
 from dataclasses import replace
 
 from faults.diagnosis.beyond_nine.load import Diagnosed, Loaded
+from faults.diagnosis.beyond_nine.near_enough import only_beside
+from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.out_of_model import SOFT
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.model import EhaParameters
 
 
 def whatever_the_oil(diagnosed: Diagnosed, parameters: EhaParameters) -> Loaded:
     """Return a diagnosis, around stiffer oil than the rig file's where that alone speaks against all conditions.
+
+    Oil that the log knows only roughly is not called stiff, but its circuit may lie beside the nine conditions for it.
 
     Parameters
     ----------
@@ -26,8 +33,22 @@ def whatever_the_oil(diagnosed: Diagnosed, parameters: EhaParameters) -> Loaded:
         The diagnosis, the actuator around which it is, and a note where its oil is another.
     """
     found = diagnosed(parameters, 0.0)
-    if [note.code for note in found.against] != [AgainstCode.OIL_STIFF]:
+    ratio = _stiffness(found, parameters)
+    if ratio is None:
         return Loaded(found, parameters)
-    ratio = float(found.against[0].data["share"])
     stiffer = replace(parameters, bulk_modulus=ratio * parameters.bulk_modulus)
-    return Loaded(diagnosed(stiffer, 0.0), stiffer, (ClassCode.OIL_STIFFER_CLASS.note(ratio=ratio),))
+    around = diagnosed(stiffer, 0.0)
+    if around.unknown and only_beside(found.against):  # then it is not the oil that lies beside the nine
+        return Loaded(found, parameters)
+    return Loaded(around, stiffer, (ClassCode.OIL_STIFFER_CLASS.note(ratio=ratio),))
+
+
+def _stiffness(found: Diagnosis, parameters: EhaParameters) -> float | None:
+    """Return the oil's bulk modulus over the rig file's where that may be all that speaks against the conditions."""
+    if [note.code for note in found.against] == [AgainstCode.OIL_STIFF]:
+        return float(found.against[0].data["share"])
+    if not found.against or not only_beside(found.against):
+        return None
+    logarithm = float(found.scoreboard.fits.best.coordinates[COORDINATES.index("bulk_modulus")])
+    ratio = math.exp(logarithm) / parameters.bulk_modulus
+    return ratio if ratio > 1.0 / SOFT else None

@@ -9,6 +9,9 @@ import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
+from faults.diagnosis.beyond_nine.load import Loaded
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.circuit_runs import coordinates_of
 from faults.diagnosis.diagnose import diagnose_log
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.drives import make_drive
@@ -19,33 +22,63 @@ from plant.notes import Note
 from plant.sensors.sensors import BENCH
 
 HEALTHY = EhaParameters()
+ACTUATOR = actuator_of(HEALTHY)
 STIFF = AgainstCode.OIL_STIFF.note(share=4.0)
 SOFT = AgainstCode.OIL_SOFT.note(share=0.3)
+BESIDE = AgainstCode.OUTSIDE_CONDITIONS.note()
 BIASED = AgainstCode.SPEED_BIAS.note(bias_rad_s=3.0)
 
 
-@pytest.mark.parametrize(
-    ("against", "moduli"),
-    [((), [1.0]), ((STIFF,), [1.0, 4.0]), ((SOFT,), [1.0]), ((STIFF, BIASED), [1.0])],
-    ids=["sound", "stiff", "soft", "stiff and biased"],
-)
-def test_a_circuit_is_fitted_again_around_stiff_oil_that_alone_speaks_against_it(
-    against: tuple[Note, ...], moduli: list[float]
-) -> None:
+def asked_of(
+    against: tuple[Note, ...], fitted: float = 1.0, again: tuple[Note, ...] = ()
+) -> tuple[Loaded, list[float]]:
+    """Return what is said of a log, and around which moduli it was diagnosed, over the rig file's.
+
+    The first circuit has ``fitted`` times the rig file's bulk modulus; ``again`` speaks against the second one.
+    """
     asked: list[float] = []
+    coordinates = coordinates_of(replace(HEALTHY, bulk_modulus=fitted * HEALTHY.bulk_modulus), ACTUATOR.rated)
+    board = SimpleNamespace(fits=SimpleNamespace(best=SimpleNamespace(coordinates=coordinates)))
 
     def diagnosed(tried: EhaParameters, doubt: float) -> Any:
         asked.append(tried.bulk_modulus / HEALTHY.bulk_modulus)
-        return SimpleNamespace(against=against if len(asked) == 1 else (), doubt=doubt)
+        said = against if len(asked) == 1 else again
+        return SimpleNamespace(against=said, unknown=bool(said), doubt=doubt, scoreboard=board)
 
-    found = whatever_the_oil(diagnosed, HEALTHY)
+    return whatever_the_oil(diagnosed, HEALTHY), asked
+
+
+@pytest.mark.parametrize(
+    ("against", "fitted", "moduli"),
+    [
+        ((), 1.0, [1.0]),
+        ((STIFF,), 1.0, [1.0, 4.0]),
+        ((SOFT,), 1.0, [1.0]),
+        ((STIFF, BIASED), 1.0, [1.0]),
+        ((BESIDE,), 2.5, [1.0, 2.5]),
+        ((BESIDE,), 1.5, [1.0]),
+        ((), 2.5, [1.0]),
+        ((BESIDE, BIASED), 2.5, [1.0]),
+    ],
+)
+def test_a_circuit_is_fitted_again_around_stiff_oil_that_alone_may_speak_against_it(
+    against: tuple[Note, ...], fitted: float, moduli: list[float]
+) -> None:
+    found, asked = asked_of(against, fitted)
     assert asked == pytest.approx(moduli)
     again = len(moduli) > 1
     assert found.diagnosis.against == (() if again else against)
     assert found.parameters.bulk_modulus == pytest.approx(moduli[-1] * HEALTHY.bulk_modulus)
     assert [(note.code, note.data["ratio"]) for note in found.notes] == (
-        [(ClassCode.OIL_STIFFER_CLASS, 4.0)] if again else []
+        [(ClassCode.OIL_STIFFER_CLASS, pytest.approx(moduli[-1]))] if again else []
     )
+
+
+def test_what_lies_beside_the_nine_around_stiffer_oil_too_has_another_cause() -> None:
+    found, asked = asked_of((BESIDE,), 2.5, again=(BIASED,))
+    assert len(asked) == 2
+    assert found.diagnosis.against == (BESIDE,)
+    assert (found.parameters, found.notes) == (HEALTHY, ())
 
 
 def test_a_log_of_stiff_oil_gets_its_class_without_pressure_and_says_so() -> None:
