@@ -13,6 +13,7 @@ from estimation.eha.bulk_modulus import EstimateOptions
 from estimation.eha.estimate import estimated, explained, finding_of, refused
 from estimation.eha.explained import OUTSIDE, at_pump_speed, rig_set_right, set_right
 from estimation.eha.result import BulkModulusEstimate
+from estimation.eha.rig_share import scaled_responses, with_total
 from estimation.finding import Finding, Outcome, Quantity
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
@@ -286,8 +287,15 @@ def _another_oil(estimate: BulkModulusEstimate, healthy: EhaParameters) -> Note 
 def _severities(
     diagnosis: Diagnosis, estimate: BulkModulusEstimate, healthy: EhaParameters, rig: Rig, *, pressure: bool
 ) -> Mapping[str, Quantity]:
-    """Return how bad it is, with the bulk modulus that was estimated, and what is not known of the rig."""
-    found = with_bulk_modulus(diagnosis.severity, estimate.quantity, actuator_of(healthy))
+    """Return how bad it is, with the bulk modulus that was estimated, and what is not known of the rig.
+
+    Without pressure, where the check refuses the fit of motion, the circuit's own bulk modulus stays.
+    """
+    oil = estimate.quantity
+    if not pressure and not estimate.gate.passed:
+        laws = scaled_responses(healthy, {}, pressure=False)["bulk_modulus"]
+        oil = with_total(diagnosis.severity["bulk_modulus"], laws, estimate.spreads)
+    found = with_bulk_modulus(diagnosis.severity, oil, actuator_of(healthy))
     return with_totals(found, actuator_of(rig.parameters), estimate.spreads, pressure=pressure)
 
 
