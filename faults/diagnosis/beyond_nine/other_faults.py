@@ -61,6 +61,10 @@ WELL_WORN = 0.8
 """Share up to which a pump is a worn one whatever the rig file's displacement is worth [dimensionless]: an entry may be
 off by 5 %, and what is presumed of wear has a deviation of 15 %."""
 
+SHUT = (0.9, 0.97, 0.99, 1.0)
+"""Shares of a make-up valve that are stuck shut [dimensionless]: one that lets a little oil through passes for friction
+beside one that lets none through. A search finds no more than its neighbours."""
+
 SEATS = (0.4, 1.0)
 """Leakage past the seat of a make-up valve, over all the leakage of an actuator with major leakage [dimensionless]."""
 
@@ -321,9 +325,10 @@ def _faults(actuator: Actuator, pressure: float) -> Iterator[_Fault]:
         yield _Fault(AgainstCode.RELIEF_EARLY.note(), EARLY, early, presumed=SO_SET)
     major = actuator.conditions[list(CONDITIONS).index("major_leakage"), COORDINATES.index("leakage")]
     for side in "ab":
-        stuck = one_sided(sound, **{f"makeup_shut_{side}": 1.0})
         note = AgainstCode.MAKEUP_STUCK.note(side=side.upper())
-        yield _Fault(note, "a make-up valve that is stuck shut", stuck)
+        for share in SHUT:
+            stuck = one_sided(sound, **{f"makeup_shut_{side}": share})
+            yield _Fault(note, "a make-up valve that is stuck shut", stuck)
         for size in SEATS:
             leaking = one_sided(sound, **{f"seat_leakage_{side}": size * float(np.exp(major))})
             yield _Fault(AgainstCode.MAKEUP_LEAKS.note(), "a make-up valve that leaks", leaking)

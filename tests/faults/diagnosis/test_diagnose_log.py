@@ -7,7 +7,8 @@ from functools import cache, partial
 import numpy as np
 import pytest
 
-from estimation.finding import Finding, Outcome
+from estimation.eha.result import BulkModulusEstimate
+from estimation.finding import Finding, Gate, Outcome
 from estimation.log_checks.clean import clean_log
 from estimation.notes import ChannelCode, EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
@@ -187,3 +188,16 @@ def test_oil_that_is_no_kin_of_the_rigs_is_compared_with_the_rigs(share: float, 
     assert found.evidence.diagnosis.limits["bulk_modulus"] == pytest.approx(0.8 * HEALTHY.bulk_modulus)
     (said,) = [one for one in found.advice if one.code == advised]
     assert said.data["volume"] == pytest.approx(HEALTHY.chamber_volume, rel=0.02)
+
+
+def test_without_pressure_a_refused_fit_of_motion_leaves_the_circuits_bulk_modulus() -> None:
+    """A refused number with a narrow interval stood there, and nothing where it was not observable."""
+    record = log(duration=1.0).replace(**{PRESSURE: None})
+    large = EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=4.0, motion_percent=2.0)
+    gate = Gate(False, (large,))
+    refused = BulkModulusEstimate(Outcome.OK, 3e8, 1e5, 1.0, gate, "motion", ("position_m",), {}, {})
+    found = diagnose_log(record, RIG, (clean_log(record, HEALTHY), refused))
+    told, circuits = found.severities["bulk_modulus"], found.evidence.diagnosis.severity["bulk_modulus"]
+    assert (told.value, told.ci95) == (circuits.value, circuits.ci95)
+    assert told.ci95[0] < HEALTHY.bulk_modulus < told.ci95[1]
+    assert found.severities["entrained_air"].ci95_total is not None

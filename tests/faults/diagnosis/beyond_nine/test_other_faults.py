@@ -60,6 +60,7 @@ FAULTS = {
     "pump": (replace(SOUND, pump_displacement=0.8 * SOUND.pump_displacement), AgainstCode.PUMP_DELIVERS_LESS),
     "valve A": (one_sided(SOUND, makeup_shut_a=1.0), AgainstCode.MAKEUP_STUCK),
     "valve B": (one_sided(SOUND, makeup_shut_b=1.0), AgainstCode.MAKEUP_STUCK),
+    "throttled valve B": (one_sided(SOUND, makeup_shut_b=0.95), AgainstCode.MAKEUP_STUCK),
     "seat A": (one_sided(SOUND, seat_leakage_a=0.6 * MAJOR), AgainstCode.MAKEUP_LEAKS),
     "relief": (replace(SOUND, relief_pressure=5.5e5), AgainstCode.RELIEF_EARLY),
 }
