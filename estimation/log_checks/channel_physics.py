@@ -242,6 +242,8 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
     if turn is None and length is None and far and together > FOLLOWS:  # a balance may take motion for leakage
         turn, length = (_near(gone, slips, LOST) for slips in (TURNS, LENGTHS))
         believed, alike = (True, True), {one for one in TURNS if LOST <= gone / one <= NEAR}
+        if length is not None and length < 100.0 and " and " in _moved(record):
+            length = None  # two that agree: a piston that drifts as it sticks makes as much of a slip of the speed
     if together > FOLLOWS and _too_fast(record, p) and gone < NEAR * min(TURNS):
         turn, believed = min(TURNS), (True, believed[1])
     moved = _moved(record)

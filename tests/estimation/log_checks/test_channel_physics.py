@@ -257,3 +257,9 @@ def test_a_logger_that_repeats_one_row_is_named_at_once() -> None:
     found = diagnose_log(stuck, Rig("rig", HEALTHY))
     assert found.outcome is Outcome.MISMATCH
     assert [note.code for note in found.advice] == [AdviceCode.CHECK_LOGGER]
+
+
+def test_position_and_velocity_that_agree_are_not_accused_of_tens() -> None:
+    """A piston that sticks one way drifts, and went 11 times too far where motor speed was in rev/s."""
+    (said,) = channel_mistakes(scaled(SPEED, 1.0 / 12.4)(run()).replace(**{PRESSURE: None}), HEALTHY)
+    assert (said.code, said.data["channel"]) == (ChannelCode.CHANNEL_UNIT, SPEED)
