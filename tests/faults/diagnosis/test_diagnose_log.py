@@ -199,5 +199,6 @@ def test_without_pressure_a_refused_fit_of_motion_leaves_the_circuits_bulk_modul
     found = diagnose_log(record, RIG, (clean_log(record, HEALTHY), refused))
     told, circuits = found.severities["bulk_modulus"], found.evidence.diagnosis.severity["bulk_modulus"]
     assert (told.value, told.ci95) == (circuits.value, circuits.ci95)
+    assert told.ci95 is not None
     assert told.ci95[0] < HEALTHY.bulk_modulus < told.ci95[1]
     assert found.severities["entrained_air"].ci95_total is not None
