@@ -1,10 +1,12 @@
 """One result folder a study, written whole or not at all."""
 
+import errno
 import json
 import os
+import re
 import shutil
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
 from types import MappingProxyType
@@ -21,6 +23,9 @@ SERIES_FORMAT = "%.9g"
 
 UNWRITABLE = "result folder {} must be in a place that can be written, got"
 
+_TRIES = 10
+"""Times that a result is moved to its name while other studies take it [count]."""
+
 DESKTOP_FILES = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 """Files that file managers leave behind, which are nobody's work."""
 
@@ -34,7 +39,8 @@ def write_tables(
 ) -> Path:
     """Write a study's tables, and what was made of them, as one folder, replacing an earlier study's.
 
-    All is written beside the folder first and takes its name at the end: an earlier result stays whole until then.
+    All is written beside the folder first, reaches the disk, and takes its name at the end: an earlier result stays
+    whole until then, also where the power fails.
 
     Parameters
     ----------
@@ -65,11 +71,15 @@ def write_tables(
     temporary = target.with_name(f".{target.name}.{token_hex(4)}.tmp")
     with refused(UNWRITABLE.format(folder)):
         try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            for name, content in contents.items():
-                (temporary / name).parent.mkdir(parents=True, exist_ok=True)
-                (temporary / name).write_bytes(content)
-            _swap(temporary, target)
+            temporary.mkdir(parents=True)
+            with held(temporary):
+                for name, content in contents.items():
+                    (temporary / name).parent.mkdir(parents=True, exist_ok=True)
+                    with (temporary / name).open("wb") as file:
+                        file.write(content)
+                        file.flush()
+                        os.fsync(file.fileno())
+                _swap(temporary, target)
         except BaseException:
             shutil.rmtree(temporary, ignore_errors=True)
             raise
@@ -114,6 +124,8 @@ def json_file(values: Mapping[str, Any]) -> bytes:
 def check_target(folder: Path) -> Path:
     """Tell whether a study may be written to a folder, before the study is run.
 
+    What a run left beside it that was killed is removed; an earlier result that it had moved gets its name back.
+
     Returns
     -------
     Path
@@ -126,6 +138,7 @@ def check_target(folder: Path) -> Path:
         written there.
     """
     with refused(UNWRITABLE.format(folder)):
+        _tidy(folder.resolve())
         return _checked(folder)
 
 
@@ -159,14 +172,65 @@ def _strangers(folder: Path) -> set[str]:
 
 
 def _swap(temporary: Path, target: Path) -> None:
-    if not target.exists():
-        temporary.rename(target)
-        return
     old = target.with_name(f".{target.name}.{token_hex(4)}.old")
-    target.rename(old)
     try:
-        temporary.rename(target)
-    except BaseException:
-        old.rename(target)
-        raise
-    shutil.rmtree(old, ignore_errors=True)
+        for _ in range(_TRIES):
+            with suppress(FileNotFoundError):
+                target.rename(old)
+            try:
+                temporary.rename(target)
+            except OSError as error:
+                if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+                    raise
+                shutil.rmtree(old, ignore_errors=True)  # another study took the name first, and this was before it
+            else:
+                return
+        raise OSError(errno.EBUSY, os.strerror(errno.EBUSY))
+    finally:
+        if old.exists() and not target.exists():
+            old.rename(target)
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def _tidy(target: Path) -> None:
+    """Remove what a writer left that was killed, and give a result back its name that it had moved."""
+    if not target.parent.is_dir() or not os.access(target.parent, os.W_OK | os.X_OK):
+        return
+    left = re.compile(rf"\.{re.escape(target.name)}\.[0-9a-f]{{8}}\.(?:tmp|old)")
+    for place in sorted(one for one in target.parent.iterdir() if left.fullmatch(one.name) and one.is_dir()):
+        with suppress(OSError), held(place) as free:
+            if free and place.suffix == ".old" and not target.exists():
+                place.rename(target)
+            elif free:
+                shutil.rmtree(place, ignore_errors=True)
+
+
+@contextmanager
+def held(folder: Path) -> Generator[bool]:
+    """Hold a folder as one that is written to, until the block or the process ends.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+
+    Yields
+    ------
+    bool
+        False where another process holds it, or no system can tell.
+    """
+    if os.name == "nt":  # pragma: no cover -- folders have no locks there, and nothing is tidied
+        yield False
+        return
+    import fcntl
+
+    number = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            free = True
+        except OSError:
+            free = False
+        yield free  # the lock goes with the process, whatever ends it
+    finally:
+        os.close(number)

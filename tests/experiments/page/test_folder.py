@@ -2,19 +2,22 @@
 
 import json
 import os
+import signal
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from estimation.identification.model.linear_model import LinearModel
+from experiments.command.study_verb import finish_study
 from experiments.nine_conditions.figures import FIGURES
 from experiments.nine_conditions.study import NINE_CONDITIONS
 from experiments.nine_conditions.transfer_functions import identification_study
 from experiments.page.figure_files import figure_files
-from experiments.page.folder import check_target
+from experiments.page.folder import check_target, held
 from experiments.running import study as runner
 from experiments.running.study import Found, write_result
 from plant.eha.model import EhaParameters
@@ -97,16 +100,17 @@ def test_a_failure_midway_leaves_the_earlier_result(
     write_study(short, target)
     before = {name: (target / name).read_bytes() for name in _listing(target)}
 
-    write_bytes = Path.write_bytes
+    opened = Path.open
 
-    def fail_at_the_report(path: Path, content: bytes) -> int:
-        if path.name == "report.html":
+    def fail_at_the_report(path: Path, mode: str = "r", **more: Any) -> Any:
+        if path.name == "report.html" and mode == "wb":
             raise failure
-        return write_bytes(path, content)
+        return opened(path, mode, **more)
 
-    monkeypatch.setattr(Path, "write_bytes", fail_at_the_report)
+    monkeypatch.setattr(Path, "open", fail_at_the_report)
     with pytest.raises((HydrostateError, KeyboardInterrupt)):
         write_study(short, target)
+    monkeypatch.setattr(Path, "open", opened)
     assert {name: (target / name).read_bytes() for name in _listing(target)} == before
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
@@ -193,3 +197,57 @@ def test_a_place_that_cannot_be_written_is_said_before_the_study_runs(
 def test_a_path_that_no_file_system_takes_is_said_in_a_sentence(short: Found, tmp_path: Path) -> None:
     with pytest.raises(HydrostateError, match="result folder"):
         write_study(short, tmp_path / ("x" * 300))
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_what_a_killed_run_left_is_tidied_and_an_earlier_result_gets_its_name_back(
+    short: Found, tmp_path: Path
+) -> None:
+    write_study(short, tmp_path / "out")
+    (tmp_path / "out").rename(tmp_path / ".out.0123abcd.old")  # killed before the new result took the name
+    for name in (".out.89abcdef.tmp", ".out.ffff0000.tmp", ".out.mine.tmp"):
+        (tmp_path / name).mkdir()
+    with held(tmp_path / ".out.ffff0000.tmp") as free:  # another study is at work
+        assert free
+        check_target(tmp_path / "out")
+    assert (tmp_path / "out/manifest.json").is_file()
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".out.ffff0000.tmp", ".out.mine.tmp", "out"]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_study_that_takes_the_name_meanwhile_is_replaced(
+    short: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_study(short, target := tmp_path / "out")
+    rename, others = Path.rename, iter([b"another"])
+
+    def beaten(path: Path, new: Path) -> Path:
+        moved = rename(path, new)
+        for content in others if path == target else ():
+            target.mkdir()
+            (target / "report.html").write_bytes(content)
+        return moved
+
+    monkeypatch.setattr(Path, "rename", beaten)
+    assert write_study(short, target).read_text() == "report"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_result_reaches_the_disk_before_it_takes_its_name(
+    short: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[str] = []
+    monkeypatch.setattr(os, "fsync", lambda number: synced.append(str(Path(f"/proc/self/fd/{number}").readlink())))
+    write_study(short, tmp_path / "out")
+    assert {one.split(".tmp/")[-1] for one in synced} == set(_listing(tmp_path / "out"))
+
+
+def test_a_study_that_is_asked_to_end_is_interrupted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(runner, "run_study", lambda *_: os.kill(os.getpid(), signal.SIGTERM))
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            finish_study(NINE_CONDITIONS, SMALL, tmp_path / "out", as_json=False)
+    finally:
+        signal.signal(signal.SIGTERM, before)
