@@ -9,6 +9,7 @@ from plant.unit_text import plain_unit
 
 _BRACKETED = re.compile(r"^(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]{0,40})\]|\((?P<round>[^()]{0,40})\))$")
 _AFTER = re.compile(r"^(?P<name>.*\S)(?:\s+/\s*|\s*,\s+|\s+in\s+)(?P<unit>\S{1,20})$")
+_UNITS_FOLLOW = ("unit", "units", "unit:", "units:", "einheit", "einheiten")
 _NO_UNIT = ("", "-", "--", "[-]", "[]", "1", "n/a", "none")
 
 
@@ -67,8 +68,8 @@ def is_unit(text: str) -> bool:
 
     Examples
     --------
-    >>> is_unit("mm/s"), is_unit("actual"), is_unit("9**9")
-    (True, False, False)
+    >>> is_unit("mm/s"), is_unit("um"), is_unit("actual"), is_unit("9**9")
+    (True, True, False, False)
     """
     text = text.strip().strip("[]()").strip()
     try:
@@ -83,7 +84,8 @@ _SCALED = frozenset(("m", "s", "A", "V", "N", "g", "J", "W", "Pa", "Hz", "rad", 
 _KNOWN = _SCALED | frozenset(
     (
         *("rpm", "rev", "turn", "revolution", "min", "sec", "msec", "usec", "h", "d", "hour", "minute", "day"),
-        *("psi", "kgf", "lbf", "atm", "torr", "mmHg", "pascal", "in", "inch", "ft", "mils", "mm", "cm", "meter"),
+        *("psi", "kgf", "lbf", "atm", "torr", "mmHg", "pascal", "in", "inch", "ft", "mils", "meter"),
+        *("km", "cm", "mm", "um", "µm", "nm"),
         *("metre", "deg", "degree", "radian", "°", "degC", "degF", "°C", "°F", "K", "kelvin", "volt", "newton"),
         *("second", "lpm", "%"),
     )
@@ -105,3 +107,36 @@ def cleaned(names: Sequence["str | Heading"]) -> list[Heading]:
     """
     given = [one if isinstance(one, Heading) else Heading(one) for one in names]
     return [replace(one, name=one.name.strip().removeprefix("\ufeff").strip()) for one in given]
+
+
+def is_unit_row(row: Sequence[str]) -> bool:
+    """Return whether cells are units, or say that there is none; the first may say that the others are units.
+
+    Examples
+    --------
+    >>> is_unit_row(["Unit", "rpm", "-"]), is_unit_row(["s", "rpm", "ten"])
+    (True, False)
+    """
+    cells = row[1:] if row and row[0].strip().lower() in _UNITS_FOLLOW else row
+    return any(map(is_unit, cells)) and all(unit_or_none(cell) is None or is_unit(cell) for cell in cells)
+
+
+def names_and_units(above: Sequence[list[str]], width: int) -> tuple[list[str], list[str | None]]:
+    """Return names and units from the lines above the data; columns without a name are numbered.
+
+    Parameters
+    ----------
+    above : sequence of list of str
+        Cells of the lines right above the data, as many as it has columns.
+    width : int
+        Columns [count].
+    """
+    units: list[str | None] = [None] * width
+    names = above
+    for row in above[1:]:
+        if is_unit_row(row):
+            units = [unit_or_none(cell.strip("[]()")) if is_unit(cell) else None for cell in row]
+            names = [other for other in above if other is not row]
+            break
+    best = max(names, key=lambda row: len(set(row) - {""}), default=[""] * width)
+    return [name or f"column {place + 1}" for place, name in enumerate(best)], units

@@ -2,8 +2,8 @@
 
 import gzip
 import io
-from collections.abc import Generator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO, cast
@@ -19,6 +19,7 @@ from plant.log.formats.cells import MISSING
 from plant.log.formats.csv_cells import read_cells
 from plant.log.formats.csv_layout import BLANKS, Layout, cells_of, layout_of
 from plant.log.formats.packed import opened, packing_of
+from plant.log.formats.thousands import may_group_thousands, require_none_grouped
 from plant.log.table import Table
 
 _BLOCK = 1 << 20
@@ -50,12 +51,17 @@ def open_csv(path: Path, metadata: str | None) -> Table:
 
 def _read(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
     """Return columns as logged, NaN in empty cells; refuse a row of another width, or a cell that is no number."""
+    found: dict[Column, Array] | None = None
     if layout.delimiter != BLANKS:
-        try:
-            return _read_fast(path, layout, chosen)
-        except (pa.ArrowInvalid, UnicodeError, _NotFastError):  # stray bytes harm nobody outside their cell
-            pass
-    return _read_cells(path, layout, chosen)
+        with suppress(pa.ArrowInvalid, UnicodeError, _NotFastError):  # stray bytes harm nobody outside their cell
+            found = _read_fast(path, layout, chosen)
+    found = _read_cells(path, layout, chosen) if found is None else found
+    for column, values in found.items():
+        if column.position not in layout.stamped and may_group_thousands(values):
+            with _rows(path, layout) as rows:
+                cells = (row[column.position].strip() for row in rows if len(row) > column.position)
+                require_none_grouped(cells, column.name, str(path))
+    return found
 
 
 def write_csv(columns: Mapping[str, Array], file: BinaryIO, *, compressed: bool) -> None:
@@ -149,7 +155,13 @@ def _lines_if_quoted(source: Path | bytes, layout: Layout) -> int | None:
 
 def _read_cells(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
     """Read what pyarrow will not, line by line, or say in which row and column it is no number."""
+    with _rows(path, layout) as rows:
+        return read_cells(rows, layout, chosen, str(path))
+
+
+@contextmanager
+def _rows(path: Path, layout: Layout) -> Generator[Iterator[list[str]]]:
+    """Open what stands below the header, as the cells of each line."""
     with _text(path, layout) as text:
         lines = (line.rstrip("\n") for line in islice(text, layout.skipped, None))
-        rows = (cells_of(line, layout.delimiter) if line else [] for line in lines)
-        return read_cells(rows, layout, chosen, str(path))
+        yield (cells_of(line, layout.delimiter) if line else [] for line in lines)

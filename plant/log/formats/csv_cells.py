@@ -15,6 +15,7 @@ from plant.log.clock.stamps import is_stamp, read_stamps
 from plant.log.columns import TIME, TRUTH, Column
 from plant.log.formats.cells import MISSING, MOST_STRANGE, SHOWN, no_numbers, not_a_number, number, wrong_width
 from plant.log.formats.csv_layout import COMMENT, Layout, is_value
+from plant.log.formats.thousands import is_grouped, thousands_error
 from plant.log.headings import unit_or_none
 from plant.log.notes import LogCode
 from plant.notes import Note
@@ -111,10 +112,22 @@ class _Strange(NamedTuple):
 
 @dataclass
 class _Cells:
-    """A column as it is read: its values, and the cells that are no numbers by their place among the rows."""
+    """A column as it is read: its values, and the cells that are no numbers by their place among the rows.
+
+    Where decimals have a comma, those with a point alone are kept apart as long as each can be a number of thousands.
+    """
 
     values: Any
     bad: dict[int, str] = field(default_factory=dict[int, str])
+    pointed: str = ""
+    only_thousands: bool = True
+
+    def note_points(self, cells: Sequence[str]) -> None:
+        pointed = [
+            plain for cell in cells if "." in cell and "," not in cell and (plain := cell.strip()) not in MISSING
+        ]
+        self.pointed = self.pointed or next(iter(pointed), "")
+        self.only_thousands = self.only_thousands and all(map(is_grouped, pointed))
 
 
 @dataclass
@@ -163,6 +176,8 @@ class _Body:
                 if column.channel == TIME:
                     self.timeless[len(self.rows) + place] = kept[place].said
             cells.values.extend(values)
+            if self.layout.decimal_point == "," and column.position not in self.layout.stamped:
+                cells.note_points([row.cells[column.position] for row in kept])
         self.rows.extend((row.line, row.row) for row in kept)
 
     def _units_again(self, cells: Sequence[str]) -> bool:
@@ -196,6 +211,9 @@ class _Body:
 
     def judged(self) -> tuple[dict[Column, Array], list[Note]]:
         """Return the columns without what is no data, and what was left out; refuse where that is much."""
+        for column, cells in self.columns.items():
+            if cells.pointed and cells.only_thousands:
+                raise thousands_error(column.name, cells.pointed, self.source)
         found = {one: self._values(one, cells) for one, cells in self.columns.items()}
         allowed = MOST_STRANGE * len(self.rows)
         for column in [one for one in found if len(self.columns[one].bad) > allowed]:

@@ -12,10 +12,19 @@ from pathlib import Path
 from plant.errors import LogError
 from plant.log.clock.stamps import is_stamp
 from plant.log.formats.cells import MISSING
+from plant.log.formats.csv_loggers import (
+    HEADER_ENDS,
+    LABVIEW,
+    TWINCAT_KEYS,
+    TWINCAT_STEP,
+    with_labview_header,
+    with_twincat_clock,
+    without_remarks,
+)
 from plant.log.formats.layouts_seen import remember, remembered
 from plant.log.formats.packed import opened
 from plant.log.formats.thousands import require_ungrouped
-from plant.log.headings import Heading, is_unit, unit_or_none
+from plant.log.headings import Heading, is_unit_row, names_and_units
 
 LOOKED_AT = 1 << 18
 """Bytes of a log that are looked at to tell how it is written."""
@@ -30,12 +39,12 @@ MOST_ZEROS = 0.02
 """Bytes of zero at the start of a text, as a logger leaves where its power fails; more are of another encoding
 [fraction]."""
 
+NO_TEXT = "a text file is needed for a CSV log, got binary data; export a logger's own format as CSV, MDF, TDMS or MAT"
+
 DELIMITERS = (",", ";", "\t", "|", BLANKS)
 _NUMBER = re.compile(r"[-+\u2212]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][-+]?\d+)?")
 COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
 """How a line of comment begins."""
-
-LABVIEW, HEADER_ENDS = "LabVIEW Measurement", "***End_of_Header***"
 
 _WIDEST = 10_000
 
@@ -129,7 +138,7 @@ def _encoding(start: bytes, source: str) -> str:
         for side, name in ((1, "utf-16-le"), (0, "utf-16-be")):
             if zeros[side] > 0.9 * half > 0 and not zeros[1 - side]:
                 return name
-        raise LogError("a text file is needed for a CSV log, got binary data", source)
+        raise LogError(NO_TEXT, source)
     try:
         start.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -165,10 +174,14 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
         raise LogError("a header line is needed, but the file is empty", source)
     if lines[0].startswith(LABVIEW) and (found := _of_labview(lines, encoding, source)) is not None:
         return found
+    if any(line.startswith(TWINCAT_STEP) for line in lines):
+        found = _of_twincat(lines, encoding, source)
+        if found is not None:
+            return found
     head = "\n".join(lines[:5])
     strange = sum(one == "\ufffd" or (ord(one) < 32 and one not in "\t\n\x0c\x0b") for one in head)
     if strange > 0.1 * len(head) or "\0" in head:
-        raise LogError("a text file is needed for a CSV log, got binary data", source)
+        raise LogError(NO_TEXT, source)
     absent = [one for one in DELIMITERS if one != BLANKS and not any(one in line for line in lines)]
     # those that no line holds leave the same single cells: the first of them stands for all
     tried = [one for one in DELIMITERS if one not in absent[1:]]
@@ -185,18 +198,20 @@ def _of_labview(lines: Sequence[str], encoding: str, source: str) -> Layout | No
     ends = [place for place, line in enumerate(lines) if line.startswith(HEADER_ENDS)]
     if not ends:
         return None
-    layout = layout_of_lines(lines[ends[-1] + 1 :] or [""], encoding, source)
-    said = {name: cells for name, *cells in (cells_of(line, layout.delimiter) for line in lines[: ends[-1]])}
-    has_x = (said.get("X_Columns") or [""])[0].strip() != "No"
-    units = {**dict(enumerate(said.get("Y_Unit_Label", []), start=1)), 0: "s" if has_x else ""}
-    headings = tuple(
-        Heading(one.name, unit_or_none(units.get(place, "")), one.stamped) for place, one in enumerate(layout.headings)
-    )
-    try:
-        step = float((said.get("Delta_X") or [""])[0].replace(",", ".")) if not has_x else None
-    except ValueError:
-        step = None
-    return replace(layout, headings=headings, skipped=layout.skipped + ends[-1] + 1, step=step)
+    layout = layout_of_lines(without_remarks(lines[ends[-1] + 1 :]), encoding, source)
+    told = with_labview_header(layout, [cells_of(line, layout.delimiter) for line in lines[: ends[-1]]])
+    return replace(told, skipped=layout.skipped + ends[-1] + 1)
+
+
+def _of_twincat(lines: Sequence[str], encoding: str, source: str) -> Layout | None:
+    """Return the layout of an export of TwinCAT Scope, None where its channels have clocks of their own."""
+    skipped = 1 + max(place for place, line in enumerate(lines) if line.startswith(TWINCAT_KEYS))
+    if not any(line.strip() for line in lines[skipped:]):
+        return None
+    layout = layout_of_lines(lines[skipped:], encoding, source)
+    above, rows = ([cells_of(one, layout.delimiter) for one in some] for some in (lines[:skipped], lines[skipped:]))
+    told = with_twincat_clock(layout, above, rows)
+    return None if told is layout else replace(told, skipped=layout.skipped + skipped)
 
 
 def _header_parts_at_commas(lines: Sequence[str], block: "_Block") -> bool:
@@ -235,10 +250,13 @@ class _Block:
     def layout(self, lines: Sequence[str], encoding: str) -> Layout:
         """Return the layout, with the names and units that stand above the rows."""
         first, width = self.rows[0][0], len(self.numeric)
+        for place, _ in self.rows[1:2]:
+            if place == first + 2 and is_unit_row(cells_of(lines[place - 1], self.delimiter)):
+                first = place  # numbers of channels, whose units stand below them
         while first and _has_number(cells_of(lines[first - 1], self.delimiter), width):
             first -= 1
         closed = all(not row[-1] for _, row in self.rows)
-        names, units = _names_and_units(_above(lines[:first], self.delimiter, width, closed=closed), width)
+        names, units = names_and_units(_above(lines[:first], self.delimiter, width, closed=closed), width)
         numbers = "".join(cell for _, row in self.rows for cell in row if _NUMBER.fullmatch(cell))
         comma = "," in numbers and "." not in numbers and self.delimiter != BLANKS
         stamped = frozenset(
@@ -317,16 +335,3 @@ def _above(lines: Sequence[str], delimiter: str, width: int, *, closed: bool) ->
             break
         found.insert(0, cells)
     return found
-
-
-def _names_and_units(above: list[list[str]], width: int) -> tuple[list[str], list[str | None]]:
-    """Return names and units from the lines above the data; columns without a name are numbered."""
-    units: list[str | None] = [None] * width
-    names = above
-    for row in above[1:]:
-        if any(map(is_unit, row)) and all(unit_or_none(cell) is None or is_unit(cell) for cell in row):
-            units = [unit_or_none(cell.strip("[]()")) for cell in row]
-            names = [other for other in above if other is not row]
-            break
-    best = max(names, key=lambda row: len(set(row) - {""}), default=[""] * width)
-    return [name or f"column {place + 1}" for place, name in enumerate(best)], units

@@ -27,6 +27,11 @@ SIGNS: Mapping[bytes, str] = {
     b"\xd0\xcf\x11\xe0": "xls",
     b"\x1f\x8b": "csv",
     b"\x28\xb5\x2f\xfd": "csv",
+    b"|CF,": "famos",
+    b"#ROSBAG": "bag",
+    b"\x89MCAP": "bag",
+    b"LOGG": "blf",
+    b"SQLite format 3": "sqlite",
     b"\x93NUMPY": "numpy",
     b"\x80\x03": "pickle",
     b"\x80\x04": "pickle",
@@ -62,6 +67,11 @@ OLD_EXCEL = "a workbook of Excel before 2007 (.xls), or one that is encrypted, c
 REFUSED: Mapping[str, str] = {
     "xls": OLD_EXCEL,
     "pickle": "a pickle may run any program when it is read, so it is not read: save the log as .parquet or .csv",
+    "famos": "a file of imc FAMOS cannot be read: export it as CSV, MAT, TDMS or MDF",
+    "bag": "a bag of ROS cannot be read: write its topics as CSV or Parquet",
+    "blf": "a log of a bus by Vector (.blf) cannot be read: convert its signals to MDF or CSV",
+    "sqlite": "a database cannot be read: export the table that holds the log as CSV or Parquet",
+    "markup": "a file of XML or HTML cannot be read: export the log as CSV, XLSX or TDMS",
     "ods": "a sheet of OpenDocument (.ods) cannot be read: save it as .xlsx or .csv",
 }
 """Formats that are known and not read, and what to do."""
@@ -108,6 +118,8 @@ def _by_suffix(path: Path, start: bytes) -> str:
     """Return what a file is taken for that no first bytes tell: text where it is text."""
     kind = SUFFIXES.get(path.suffix.lower(), "csv")
     text = start.removeprefix(b"\xef\xbb\xbf").lstrip()
+    if kind == "csv" and re.match(rb"<(?:\?xml|!doctype|html|table)\b", text, re.IGNORECASE):
+        return "markup"
     if kind == "csv" and re.match(rb'\{\s*"|\[\s*[\[{]', text):
         return "json"
     return kind if b"\0" in start or kind in ("mat", "xls") else "csv"

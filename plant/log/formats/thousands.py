@@ -1,8 +1,11 @@
 """Whole numbers with separators of thousands, which would be read as a thousandth of what they are."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
+import numpy as np
+
+from plant.arrays import Array
 from plant.errors import LogError
 
 _GROUPED = re.compile(r"[-+\u2212]?[1-9]\d{0,2}[.,]\d{3}")
@@ -28,7 +31,56 @@ def groups_thousands(cells: Sequence[str]) -> bool:
     (True, False)
     """
     parted = [cell for cell in cells if not _SMALL.fullmatch(cell)]
-    return LEAST <= len(parted) < len(cells) and all(map(_GROUPED.fullmatch, parted))
+    return LEAST <= len(parted) < len(cells) and all(map(is_grouped, parted))
+
+
+def is_grouped(cell: str) -> bool:
+    """Return whether a cell is a number of thousands, or of ones with three decimals: 1.002, not 0.998 or 1.02."""
+    return _GROUPED.fullmatch(cell) is not None
+
+
+def may_group_thousands(values: Array) -> bool:
+    """Return whether numbers, read as decimals, can be whole ones such as 998 and 1.002; only their text tells.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        A column; NaN where nothing was measured.
+
+    Examples
+    --------
+    >>> may_group_thousands(np.tile([998.0, 1.002], 40)), may_group_thousands(np.tile([998.0, 1.02, 0.5], 40))
+    (True, False)
+    """
+    if not _all_grouped(values[-1000:]) or not _all_grouped(values):
+        return False
+    known = values[np.isfinite(values)]
+    small = known == np.trunc(known)
+    return bool(small.any()) and bool((np.abs(known[small]) < 1000.0).all()) and int((~small).sum()) >= LEAST
+
+
+def _all_grouped(values: Array) -> bool:
+    known = values[np.isfinite(values)]
+    parted = np.abs(known[known != np.trunc(known)])
+    thousands = 1e3 * parted
+    return bool((parted > 1.0).all() and (np.abs(thousands - np.rint(thousands)) < 1e-9 * thousands).all())
+
+
+def thousands_error(name: str, shown: str, source: str) -> LogError:
+    """Return the error for a column whose numbers have separators of thousands.
+
+    Parameters
+    ----------
+    name, shown : str
+        The column, and a cell of it.
+    source : str
+        What messages call the log.
+    """
+    return LogError(
+        f"column {name[:80]!r} has separators of thousands, as in {shown!r}, which cannot be told from "
+        "decimals everywhere; write the log without them",
+        source,
+    )
 
 
 def require_ungrouped(rows: Sequence[Sequence[str]], names: Sequence[str], source: str) -> None:
@@ -49,11 +101,24 @@ def require_ungrouped(rows: Sequence[Sequence[str]], names: Sequence[str], sourc
         If a column does, by its name.
     """
     for place, name in enumerate(names):
-        cells = [row[place] for row in rows if row[place]]
-        if groups_thousands(cells):
-            shown = next(cell for cell in cells if not _SMALL.fullmatch(cell))
-            raise LogError(
-                f"column {name[:80]!r} has separators of thousands, as in {shown!r}, which cannot be told from "
-                "decimals everywhere; write the log without them",
-                source,
-            )
+        require_none_grouped((row[place] for row in rows), name, source)
+
+
+def require_none_grouped(cells: Iterable[str], name: str, source: str) -> None:
+    """Refuse a column whose numbers have separators of thousands.
+
+    Parameters
+    ----------
+    cells : iterable of str
+        All of the column.
+    name, source : str
+        The column, and the log, for messages.
+
+    Raises
+    ------
+    LogError
+        If they have.
+    """
+    filled = [cell for cell in cells if cell]
+    if groups_thousands(filled):
+        raise thousands_error(name, next(cell for cell in filled if not _SMALL.fullmatch(cell)), source)

@@ -12,6 +12,7 @@ import pytest
 from plant.errors import LogError
 from plant.log.columns import Column
 from plant.log.formats import hdf5, xlsx
+from plant.log.formats.detect import open_tables
 from plant.log.formats.hdf5 import OBJECTS, open_hdf5
 from plant.log.formats.mat import tables_of
 from plant.log.formats.xlsx import open_xlsx
@@ -225,3 +226,24 @@ def test_structs_within_structs_are_columns_with_both_names_and_none_is_refused(
     assert names(table) == ["rod.way", "speed"]
     with pytest.raises(LogError, match=re.escape(f"a.mat: {OBJECTS}")):
         tables_of({"gain": np.array(1.0), "who": "me"}, "a.mat")
+
+
+@pytest.mark.parametrize(
+    ("start", "said"),
+    [
+        (b"|CF,2,1,1;|CK,1,3,1,1;", "imc FAMOS cannot be read: export it as CSV"),
+        (b"#ROSBAG V2.0\n", "bag of ROS"),
+        (b"\x89MCAP0\r\n", "bag of ROS"),
+        (b"LOGG\x90\0\0\0", "by Vector"),
+        (b"SQLite format 3\0", "export the table"),
+        (b"<?xml version='1.0'?><usi:tdm/>", "XML or HTML"),
+        (b"\xef\xbb\xbf <TABLE border=1><tr>", "XML or HTML"),
+    ],
+)
+def test_files_that_benches_write_and_nobody_reads_here_are_refused_with_what_to_do(
+    tmp_path: Path, start: bytes, said: str
+) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes(start + bytes(600))
+    with pytest.raises(LogError, match=said):
+        open_tables(path)

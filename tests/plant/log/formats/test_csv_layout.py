@@ -94,3 +94,61 @@ def test_one_number_a_row_under_a_header_with_as_many_commas_is_two_cells() -> N
     made = layout("time_s,motor_speed_rad_s", "0,1", "1,x")
     assert (names(made), made.delimiter, made.decimal_point) == (["time_s", "motor_speed_rad_s"], ",", ".")
     assert layout("Weg", "0,1", "1,x").decimal_point == ","
+
+
+def test_a_unit_of_micrometres_and_a_word_for_units_make_a_row_of_units() -> None:
+    made = layout("Zeit,Weg", "(ms),(µm)", "", "0.0,1.0", "0.1,2.0")
+    assert [(one.bare, one.unit) for one in made.headings] == [("Zeit", "ms"), ("Weg", "µm")]
+    made = layout("path,,way", "unit,s,um", "rows,0.0,1.0", ",0.1,2.0", ",0.2,2.0")
+    assert [one.unit for one in made.headings] == [None, "s", "um"]
+    made = layout("x-axis,1", "second,um", *(f"0.{k},1.0" for k in range(9)))
+    assert ([one.unit for one in made.headings], names(made), made.skipped) == (["second", "um"], ["x-axis", "1"], 2)
+
+
+@pytest.mark.parametrize(
+    ("header", "row"), [("X_Value\tWay\tComment", "0.{k}\t1.{k}"), ("X_Value\tWay", "0.{k}\t1.{k}")]
+)
+def test_labview_may_name_a_column_of_remarks_that_no_row_has(header: str, row: str) -> None:
+    above = (
+        "LabVIEW Measurement",
+        "X_Columns\tOne",
+        "***End_of_Header***",
+        "",
+        "Y_Unit_Label\tum",
+        "***End_of_Header***",
+    )
+    made = layout(*above, header, *(row.format(k=k) for k in range(9)))
+    assert [(one.name, one.unit) for one in made.headings] == [("X_Value", "s"), ("Way", "um")]
+    assert made.skipped == 7
+
+
+def scope(step: str, rows: list[str], *more: str, names_of: str = "Name\tWay\tName\tSpeed") -> Layout:
+    """Return the layout of an export of TwinCAT Scope."""
+    steps = "\t".join(f"SampleTime[ms]\t{step}" for _ in range(names_of.count("Name")))
+    return layout("Name\tProject", "File\tx.svdx", "", names_of, steps, *more, "", *rows, "EOF")
+
+
+def test_twincat_scope_has_one_clock_in_milliseconds_where_all_channels_share_it() -> None:
+    rows = [f"{2 * k}\t1,{k}\t{2 * k}\t3,{k}" for k in range(5)]
+    made = scope("2", rows, "Port\t851\tPort\t851", "Unit\tum\tUnit\t(None)")
+    assert names(made) == ["Time", "Way", "Time of Speed", "Speed"]
+    assert [one.unit for one in made.headings] == ["ms", "um", None, None]
+    assert (made.decimal_point, made.skipped) == (",", 8)
+    assert names(scope("1", rows)) == ["Name", "Way", "Name", "Speed"]  # the clock is none in milliseconds
+    skewed = [row.replace("\t", "\t", 1).replace(f"\t{2 * k}\t", f"\t{2 * k + 1}\t") for k, row in enumerate(rows)]
+    assert names(scope("2", skewed)) == ["Name", "Way", "Name", "Speed"]
+    for hostile in ([], ["0\t1"], ["x\ty\tz\tw"] * 5):
+        assert scope("2", hostile).headings
+
+
+def test_channels_of_twincat_that_share_a_sample_time_share_a_clock() -> None:
+    made = layout(
+        "Name\tProject",
+        "",
+        "Name\tWay\tSpeed",
+        "SampleTime[ms]\t1\t1",
+        "Offset\t0\t0",
+        "",
+        *(f"{k}\t1\t2" for k in range(9)),
+    )
+    assert ((made.headings[0].name, made.headings[0].unit), made.skipped) == (("Time", "ms"), 6)

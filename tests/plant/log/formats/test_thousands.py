@@ -47,3 +47,31 @@ def test_decimals_are_none(tmp_path: Path, digits: int) -> None:
 
 def test_few_cells_are_not_judged() -> None:
     assert not groups_thousands(["998", "1.002"])
+
+
+def late(folder: Path, cells: list[str]) -> Path:
+    """Return a log whose numbers reach a thousand below the lines that are looked at for its layout."""
+    rows = (f"{1e-3 * k:.3f};{speed};{1e-6 * k:.7f}" for k, speed in enumerate(cells))
+    path = folder / "log.csv"
+    path.write_text("\n".join(["time_s;Motor speed [rpm];position_m", *rows]) + "\n")
+    return path
+
+
+def test_thousands_that_are_reached_late_are_refused_too(tmp_path: Path) -> None:
+    path = late(tmp_path, [f"{max(k - 300, k % 7):,d}".replace(",", ".") for k in range(0, 3600, 2)])
+    with pytest.raises(LogError, match=r"thousands, as in '1\.000'"):
+        read_record(path)
+    assert len(read_record(late(tmp_path, [f"{0.004 * k:g}" for k in range(1800)]))) == 1800
+
+
+def test_where_decimals_have_a_comma_a_point_that_parts_thousands_is_refused(tmp_path: Path) -> None:
+    cells = [f"{one:d},5" for one in range(600)]
+    path = tmp_path / "log.csv"
+    for last, said in (("1.002", r"thousands, as in '1\.002'"), ("0.98", "")):
+        rows = (f"0,{k:04d};{speed};0,{k:03d}1" for k, speed in enumerate([*cells, last]))
+        path.write_text("\n".join(["time_s;Motor speed [rpm];position_m", *rows]) + "\n")
+        if said:
+            with pytest.raises(LogError, match=said):
+                read_record(path)
+        else:
+            assert read_record(path)["motor_speed_rad_s"][-1] == pytest.approx(0.98 * np.pi / 30.0)
