@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
+from math import isfinite
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
@@ -139,7 +140,9 @@ class Log(Shown):
         """
         from plant.log.clock.uniform import FEWEST_SAMPLES
 
-        first, last = (round((at - self.record.start_time) / self.sample_time) for at in (begin, end))
+        start = self.record.start_time
+        until = min(end, start + self.duration + self.sample_time)
+        first, last = (round((at - start) / self.sample_time) if isfinite(at) else -1 for at in (begin, until))
         if not 0 <= first < last:
             refuse(f"a part of the log is needed from an earlier to a later time, got {begin:g} s to {end:g} s")
         span = first, last + 1

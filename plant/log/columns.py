@@ -202,6 +202,9 @@ def _own(position: int, heading: Heading, channel: str, source: str) -> Column:
 
 
 def _foreign(headings: Sequence[Heading], channel: str, spec: str, source: str) -> Column:
+    for one in (channel, spec):
+        if not isinstance(one, str):  # pyright: ignore[reportUnnecessaryIsInstance] -- Python's users give what they like
+            raise LogError(f"columns must be names by channel, such as 'POS_MM:mm', got {one!r:.80}", source)
     _known_channel(channel, lambda message: LogError(message, source))
     names, bares = [one.name for one in headings], [one.bare for one in headings]
     name, unit = _name_and_unit(spec)

@@ -52,7 +52,7 @@ def _tables(asammdf: Any, path: Path) -> tuple[Table, ...]:
     most = most_unpacked(path.stat().st_size)
     with path.open("rb") as stream, asammdf.MDF(stream) as file:
         for number, group in enumerate(file.groups):
-            if max(8, group.channel_group.samples_byte_nr) * group.channel_group.cycles_nr > most:
+            if max(8, _record_bytes(group)) * group.channel_group.cycles_nr > most:
                 raise too_large(str(path), most)
             _require_within(group, str(path))
             columns: dict[str, Any] = {}
@@ -82,9 +82,14 @@ def _valid(signal: Any) -> Any:
     return np.where(invalid, np.nan, samples)
 
 
+def _record_bytes(group: Any) -> int:
+    """Return the bytes of a record of a group, with those that say which samples are invalid."""
+    return group.channel_group.samples_byte_nr + getattr(group.channel_group, "invalidation_bytes_nr", 0)
+
+
 def _require_within(group: Any, source: str) -> None:
     """Refuse a group with a channel outside its records: asammdf copies from there unchecked, and the process ends."""
-    bits = 8 * (group.channel_group.samples_byte_nr + getattr(group.channel_group, "invalidation_bytes_nr", 0))
+    bits = 8 * _record_bytes(group)
     for channel in group.channels:
         if getattr(channel, "channel_type", 0) in VIRTUAL:
             continue

@@ -52,7 +52,8 @@ def test_a_part_of_a_log_runs_from_an_earlier_to_a_later_time(log: hs.Log) -> No
     part = log.between(0.1, 0.2)
     assert (part.record.start_time, len(part.record)) == (pytest.approx(0.1), 101)
     np.testing.assert_array_equal(part.record["position_m"], log.record["position_m"][100:201])
-    for begin, end in ((0.2, 0.1), (0.1, 0.1), (-0.1, 0.2)):
+    assert len(log.between(0.1, float("inf")).record) == len(log.record) - 100
+    for begin, end in ((0.2, 0.1), (0.1, 0.1), (-0.1, 0.2), (float("-inf"), 0.2), (0.1, float("nan"))):
         with pytest.raises(hs.HydrostateError, match="from an earlier to a later time"):
             log.between(begin, end)
 

@@ -1,3 +1,5 @@
+from typing import Any
+
 import pytest
 
 from plant.errors import HydrostateError, LogError, RigError
@@ -91,9 +93,11 @@ def test_a_foreign_name_may_hold_a_colon() -> None:
         ({"position_m": "X:mm"}, "needed once for position_m, the log has it 2 times"),
         ({"position_m": "Y:bar"}, "column 'Y' cannot become position_m: unit 'bar'"),
         ({"positon_m": "Y"}, "channel 'positon_m' is unknown, did you mean 'position_m'"),
+        ({"position_m": 3}, "columns must be names by channel, such as 'POS_MM:mm', got 3"),
+        ({3: "Y"}, "columns must be names by channel, such as 'POS_MM:mm', got 3"),
     ],
 )
-def test_a_mapping_that_does_not_fit_the_log_is_refused(mapping: dict[str, str], message: str) -> None:
+def test_a_mapping_that_does_not_fit_the_log_is_refused(mapping: dict[str, Any], message: str) -> None:
     with pytest.raises(LogError, match=message):
         resolve_columns(["X", "X", "Y"], mapping, "a.csv")
 

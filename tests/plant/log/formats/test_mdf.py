@@ -49,6 +49,14 @@ def test_a_group_of_more_rows_than_a_log_is_refused(two_groups: Path, monkeypatc
     assert len(open_mdf(two_groups)) == 2
 
 
+def test_bytes_that_say_which_samples_are_invalid_count_too(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.mf4", [("speed", "rpm", TIME), ("way", "", TIME)])
+    with asammdf.MDF(path) as file:
+        file.groups[0].channel_group.invalidation_bytes_nr = 0xFF000000  # which the library would allocate
+        with pytest.raises(LogError, match="it unpacks to more than"):
+            mdf._tables(_Opened(file), path)
+
+
 def test_a_file_without_a_channel_is_refused(tmp_path: Path) -> None:
     with asammdf.MDF() as file:
         path = Path(file.save(tmp_path / "none.mf4"))
