@@ -15,7 +15,6 @@ from plant.log.formats.cells import MISSING
 from plant.log.formats.csv_loggers import (
     HEADER_ENDS,
     LABVIEW,
-    TWINCAT_KEYS,
     TWINCAT_STEP,
     with_labview_header,
     with_twincat_clock,
@@ -198,15 +197,16 @@ def _of_labview(lines: Sequence[str], encoding: str, source: str) -> Layout | No
     ends = [place for place, line in enumerate(lines) if line.startswith(HEADER_ENDS)]
     if not ends:
         return None
-    layout = layout_of_lines(without_remarks(lines[ends[-1] + 1 :]), encoding, source)
-    told = with_labview_header(layout, [cells_of(line, layout.delimiter) for line in lines[: ends[-1]]])
-    return replace(told, skipped=layout.skipped + ends[-1] + 1)
+    last = ends[:2][-1]  # a third ends the header of another segment, whose rows are none of this one
+    layout = layout_of_lines(without_remarks(lines[last + 1 :]), encoding, source)
+    told = with_labview_header(layout, [cells_of(line, layout.delimiter) for line in lines[:last]])
+    return replace(told, skipped=layout.skipped + last + 1)
 
 
 def _of_twincat(lines: Sequence[str], encoding: str, source: str) -> Layout | None:
     """Return the layout of an export of TwinCAT Scope, None where its channels have clocks of their own."""
-    skipped = 1 + max(place for place, line in enumerate(lines) if line.startswith(TWINCAT_KEYS))
-    if not any(line.strip() for line in lines[skipped:]):
+    skipped = next((place for place, line in enumerate(lines) if re.match(r"[-+\d]", line)), None)
+    if skipped is None or not any(line.startswith(TWINCAT_STEP) for line in lines[:skipped]):
         return None
     layout = layout_of_lines(lines[skipped:], encoding, source)
     above, rows = ([cells_of(one, layout.delimiter) for one in some] for some in (lines[:skipped], lines[skipped:]))
@@ -251,7 +251,8 @@ class _Block:
         """Return the layout, with the names and units that stand above the rows."""
         first, width = self.rows[0][0], len(self.numeric)
         for place, _ in self.rows[1:2]:
-            if place == first + 2 and is_unit_row(cells_of(lines[place - 1], self.delimiter)):
+            beneath = cells_of(lines[place - 1], self.delimiter)
+            if place == 2 and not first and is_unit_row(beneath):
                 first = place  # numbers of channels, whose units stand below them
         while first and _has_number(cells_of(lines[first - 1], self.delimiter), width):
             first -= 1

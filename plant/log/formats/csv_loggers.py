@@ -15,12 +15,6 @@ LABVIEW, HEADER_ENDS = "LabVIEW Measurement", "***End_of_Header***"
 TWINCAT_STEP = "SampleTime[ms]"
 """How TwinCAT Scope says the sample time of each channel."""
 
-TWINCAT_KEYS = (
-    *("Name", "File", "Start", "End", "Symbol", "Data-Type", TWINCAT_STEP, "VariableSize", "Index", "NetI", "Port"),
-    *("Offset", "ScaleFactor", "BitMask", "Unit"),
-)
-"""How the lines begin that it writes above the rows."""
-
 
 def without_remarks(lines: Sequence[str]) -> list[str]:
     """Return lines whose header does not name LabVIEW's column of remarks, where rows have none.

@@ -101,7 +101,9 @@ def test_a_unit_of_micrometres_and_a_word_for_units_make_a_row_of_units() -> Non
     assert [(one.bare, one.unit) for one in made.headings] == [("Zeit", "ms"), ("Weg", "µm")]
     made = layout("path,,way", "unit,s,um", "rows,0.0,1.0", ",0.1,2.0", ",0.2,2.0")
     assert [one.unit for one in made.headings] == [None, "s", "um"]
-    made = layout("x-axis,1", "second,um", *(f"0.{k},1.0" for k in range(9)))
+    rows = [f"0.{k},1.0" for k in range(9)]
+    assert layout("t,x", rows[0], "s,um", *rows[1:]).skipped == 1  # a row of units among the rows makes none a header
+    made = layout("x-axis,1", "second,um", *rows)
     assert ([one.unit for one in made.headings], names(made), made.skipped) == (["second", "um"], ["x-axis", "1"], 2)
 
 
@@ -120,6 +122,8 @@ def test_labview_may_name_a_column_of_remarks_that_no_row_has(header: str, row: 
     made = layout(*above, header, *(row.format(k=k) for k in range(9)))
     assert [(one.name, one.unit) for one in made.headings] == [("X_Value", "s"), ("Way", "um")]
     assert made.skipped == 7
+    again = layout(*above, header, *(row.format(k=k) for k in range(9)), *above[3:], header, row.format(k=1))
+    assert again == made  # another segment is none of the header
 
 
 def scope(step: str, rows: list[str], *more: str, names_of: str = "Name\tWay\tName\tSpeed") -> Layout:
@@ -137,6 +141,8 @@ def test_twincat_scope_has_one_clock_in_milliseconds_where_all_channels_share_it
     assert names(scope("1", rows)) == ["Name", "Way", "Name", "Speed"]  # the clock is none in milliseconds
     skewed = [row.replace("\t", "\t", 1).replace(f"\t{2 * k}\t", f"\t{2 * k + 1}\t") for k, row in enumerate(rows)]
     assert names(scope("2", skewed)) == ["Name", "Way", "Name", "Speed"]
+    again = ["Name\tWay\tName\tSpeed", "SampleTime[ms]\t2\tSampleTime[ms]\t2", *rows]
+    assert scope("2", [*rows, *again]).skipped == 6
     for hostile in ([], ["0\t1"], ["x\ty\tz\tw"] * 5):
         assert scope("2", hostile).headings
 
