@@ -213,8 +213,11 @@ def rounded_clock(time: Array, slots: Array) -> tuple[float, float, float] | Non
     sample_time = float(centred @ time) / float(centred @ centred)
     if not sample_time > 0.0:
         return None
-    ticks = max(1.0, np.rint(quantum / sample_time))
-    for tried in (quantum / ticks, sample_time):  # a whole number of samples a quantum, if the stamps allow it
+    turns = slots[1:][quanta > 0]  # where a new stamp begins: few of them say little of a slope
+    between = float(quanta[quanta > 0][1:].sum())
+    ticks = [one for one in ((turns[-1] - turns[0]) / max(between, 1.0), quantum / sample_time) if np.isfinite(one)]
+    whole = [quantum / max(1.0, np.rint(one)) for one in ticks]
+    for tried in (*whole, sample_time):  # a whole number of samples a quantum, if the stamps allow it
         left = time - tried * slots
         most = 1.0 + 1e-6 if tried is not sample_time else ROUNDED
         if np.ptp(left) <= most * quantum and np.std(left) >= FILLED * quantum:

@@ -25,7 +25,7 @@ _PATTERNS = (
         for day, clock in (
             (r"(?P<Y>\d{4})[-/.](?P<M>\d{1,2})[-/.](?P<D>\d{1,2})", rf"(?:(?:\s*[T,_]\s*|\s+){_CLOCK})?"),
             (r"(?P<D>\d{1,2})\.(?P<M>\d{1,2})\.(?P<Y>\d{4}|\d{2})", _AFTER_DAY),
-            (rf"(?P<D>\d{{1,2}})[- ](?P<word>{'|'.join(_MONTHS)})[- ](?P<Y>\d{{4}})", _AFTER_DAY),
+            (rf"(?P<D>\d{{1,2}})[- ](?P<word>{'|'.join(_MONTHS)})[- ](?P<Y>\d{{4}}|\d{{2}})", _AFTER_DAY),
             (r"(?P<Y>\d{4})(?P<M>\d{2})(?P<D>\d{2})", _COMPACT),
         )
     ),
@@ -125,9 +125,20 @@ def _offset(zone: str) -> int:
 
 
 def _months_first(cells: Sequence[str]) -> bool:
-    """Return whether 3/4/2026 is in March: American, unless a first number is no month."""
+    """Return whether 3/4/2026 is in March: American, unless no month has that number, or days would be months apart."""
     found = (_EITHER.fullmatch(cell.strip()) for cell in cells)
-    return not any(one and int(one["one"]) > 12 for one in found)
+    days = {(int(one["one"]), int(one["two"]), int(one["Y"])) for one in found if one}
+    if any(one > 12 for one, _, _ in days) or any(two > 12 for _, two, _ in days):
+        return not any(one > 12 for one, _, _ in days)
+    american = [(year, one, two) for one, two, year in days]
+    european = [(year, two, one) for one, two, year in days]
+    return _months_apart(american) <= _months_apart(european)
+
+
+def _months_apart(days: Sequence[tuple[int, int, int]]) -> int:
+    """Return how far apart days are, as year, month and day, in units of which a month has 31."""
+    counted = [372 * year + 31 * month + day for year, month, day in days]
+    return max(counted, default=0) - min(counted, default=0)
 
 
 def _nanoseconds(text: str, *, months_first: bool) -> int | None:

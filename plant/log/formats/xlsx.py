@@ -1,5 +1,6 @@
 """Excel workbooks: every sheet with rows of numbers is a table, laid out as a text log would be."""
 
+import re
 import zlib
 from collections.abc import Sequence
 from datetime import date, datetime, time, timedelta
@@ -23,7 +24,9 @@ LONGEST_ROW = 8 << 20
 MOST_CELLS = 40_000_000
 """Cells of the largest workbook that is read; a sheet has 1,048,576 rows."""
 
+UNCOMPUTED = "values of formulas are not stored in the workbook: open it in Excel, save it, and try again"
 _BLOCK = 1 << 18
+_UNCOMPUTED = re.compile(rb"</f>\s*(?:<v>\s*</v>|<v\s*/>|</c>)")
 Cells = Sequence[Sequence[Any]]
 
 
@@ -41,7 +44,7 @@ def open_xlsx(path: Path) -> tuple[Table, ...]:
         If openpyxl is not installed, it is no workbook, unpacks to more than a log does, or holds no numbers.
     """
     openpyxl = library("openpyxl", "Excel", str(path))
-    _bounded(path)
+    uncomputed = _bounded(path)
     import warnings
 
     made: list[Table] = []
@@ -51,17 +54,18 @@ def open_xlsx(path: Path) -> tuple[Table, ...]:
         try:
             for sheet in book.worksheets:
                 sheet.reset_dimensions()
-                if (table := _table(path, sheet.title, _cells(sheet, str(path)))) is not None:
+                if (table := _table(path, sheet.title, _cells(sheet, str(path)), uncomputed)) is not None:
                     made.append(table)
         finally:
             book.close()
     if not made:
-        raise LogError("no sheet has rows of numbers", str(path))
+        raise LogError(f"no sheet has rows of numbers{f', and {UNCOMPUTED}' if uncomputed else ''}", str(path))
     return tuple(made)
 
 
-def _bounded(path: Path) -> None:
-    """Refuse what unpacks to more than a log does, whatever the archive says of its sizes."""
+def _bounded(path: Path) -> bool:
+    """Refuse what unpacks to more than a log, whatever the archive says; return whether formulas lack values."""
+    uncomputed = False
     most = left = most_unpacked(path.stat().st_size)
     with ZipFile(path) as archive, path.open("rb") as file:
         if not any(name.startswith("xl/workbook") for name in archive.namelist()):
@@ -78,12 +82,14 @@ def _bounded(path: Path) -> None:
                 while part:
                     text = machine.decompress(part, _BLOCK)
                     left -= len(text)
+                    uncomputed = uncomputed or _UNCOMPUTED.search(text) is not None
                     row = len(text) - ended if (ended := text.rfind(b"row")) >= 0 else row + len(text)
                     part = machine.unconsumed_tail
                     if left < 0:
                         raise too_large(str(path), most)
                     if row > LONGEST_ROW and one.filename.startswith("xl/worksheets/"):
                         raise LogError(f"a row of {one.filename} is longer than any of a sheet", str(path))
+    return uncomputed
 
 
 def _cells(sheet: Any, source: str) -> Cells:
@@ -97,8 +103,8 @@ def _cells(sheet: Any, source: str) -> Cells:
     return rows
 
 
-def _said(cell: Any) -> str:
-    """Return a cell as a text log would have it."""
+def _said(cell: Any, *, of_numbers: bool = False) -> str:
+    """Return a cell as a text log would have it; yes or no in a column of numbers is a word."""
     if cell is None:
         return ""
     if isinstance(cell, datetime):
@@ -110,12 +116,12 @@ def _said(cell: Any) -> str:
     if isinstance(cell, date):
         return cell.isoformat()
     if isinstance(cell, bool):
-        return str(int(cell))
+        return str(cell).upper() if of_numbers else str(int(cell))
     return " ".join(str(cell).split()) if isinstance(cell, str) else repr(cell)
 
 
-def _table(path: Path, title: str, rows: Cells) -> Table | None:
-    """Return a sheet as a table, None where it has no rows of numbers."""
+def _table(path: Path, title: str, rows: Cells, uncomputed: bool = False) -> Table | None:
+    """Return a sheet as a table, None where it has no rows of numbers; formulas of it may lack their values."""
     width = max((len(row) for row in islice(rows, LINES)), default=0)
     while width and all(len(row) < width or row[width - 1] is None for row in islice(rows, LINES)):
         width -= 1
@@ -128,14 +134,30 @@ def _table(path: Path, title: str, rows: Cells) -> Table | None:
     if layout.delimiter != "\t" or len(layout.headings) != width:
         return None
 
+    below = rows[layout.skipped :]
+    numeric = [any(_is_number(row[place]) for row in below if place < len(row)) for place in range(width)]
+
     def read(chosen: Sequence[Column]) -> dict[Column, Array]:
+        for column in chosen if uncomputed else ():
+            empty = sum(column.position >= len(row) or row[column.position] is None for row in below)
+            if 2 * empty > len(below):
+                raise LogError(
+                    f"column {column.name[:80]!r} is empty in {empty} rows, and {UNCOMPUTED}",
+                    str(path),
+                )
         texts = (
-            [_said(cell) for cell in _wide(row, width)] if any(cell is not None for cell in row) else []
-            for row in rows[layout.skipped :]
+            [_said(cell, of_numbers=one) for cell, one in zip(_wide(row, width), numeric, strict=True)]
+            if any(cell is not None for cell in row)
+            else []
+            for row in below
         )
         return read_cells(texts, layout, chosen, str(path))
 
     return Table(str(path), layout.headings, read, label=title)
+
+
+def _is_number(cell: Any) -> bool:
+    return isinstance(cell, int | float) and not isinstance(cell, bool)
 
 
 def _wide(row: Sequence[Any], width: int) -> list[Any]:

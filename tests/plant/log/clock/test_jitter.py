@@ -45,3 +45,11 @@ def test_values_without_a_quantum_are_not_rounded_and_those_with_one_are() -> No
 )
 def test_stamps_that_rounding_does_not_explain_are_no_rounded_clock(time: np.ndarray) -> None:
     assert rounded_clock(time, TICKS) is None
+
+
+@pytest.mark.parametrize("count", [600, 1050])
+def test_a_few_stamps_say_the_sample_time_by_where_they_change(count: int) -> None:
+    ticks = np.arange(float(count))
+    found = rounded_clock(0.1 * np.floor(ticks / 100.0), ticks)
+    assert found is not None
+    assert found[1] == pytest.approx(1e-3, rel=1e-9)

@@ -22,6 +22,7 @@ def read(*cells: str) -> list[str]:
         "1.3.26 12:00:00.25",
         "01-Mar-2026 12:00:00.250",
         "1 Mar 2026 12:00:00.25 PM",
+        "1-Mar-26 12:00:00.25 PM",
         "20260301T120000.250",
         "20260301T140000.250+0200",
     ],
@@ -33,6 +34,15 @@ def test_one_moment_is_read_however_it_is_written(cell: str) -> None:
 
 def test_a_day_that_is_no_month_comes_first() -> None:
     assert read("1/2/2026 0:00:00", "13/2/2026 0:00:00") == ["2026-02-01T00:00:00.000", "2026-02-13T00:00:00.000"]
+
+
+@pytest.mark.parametrize(
+    ("evening", "morning"),
+    [("4/3/2026", "5/3/2026"), ("3/4/2026", "3/5/2026"), ("11/11/2026", "12/11/2026"), ("31/3/2026", "1/4/2026")],
+)
+def test_days_that_would_be_months_apart_are_read_the_other_way(evening: str, morning: str) -> None:
+    last, first = (np.datetime64(one) for one in read(f"{evening} 23:59:59.5", f"{morning} 00:00:00.5"))
+    assert first - last == np.timedelta64(1, "s")
 
 
 def test_a_time_of_the_day_goes_on_over_midnight() -> None:

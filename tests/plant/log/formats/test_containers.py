@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant.errors import LogError
+from plant.errors import LogError, LogWarning
 from plant.log.columns import Column
 from plant.log.formats import hdf5, xlsx
 from plant.log.formats.detect import open_tables
@@ -247,3 +247,17 @@ def test_files_that_benches_write_and_nobody_reads_here_are_refused_with_what_to
     path.write_bytes(start + bytes(600))
     with pytest.raises(LogError, match=said):
         open_tables(path)
+
+
+def test_formulas_whose_values_are_not_stored_are_named_and_yes_among_numbers_is_none(tmp_path: Path) -> None:
+    rows: list[list[Any]] = [["t", "x"], *([0.1 * k, float(k)] for k in range(200))]
+    rows[50][1] = True
+    (table,) = open_xlsx(workbook(tmp_path / "log.xlsx", rows))
+    with pytest.warns(LogWarning, match="'TRUE' in line 51"):
+        assert np.flatnonzero(np.isnan(read(table)["x"])).tolist() == [49]
+    rows[50][1] = 49.0
+    (table,) = open_xlsx(workbook(tmp_path / "log.xlsx", [["t", "x", "y"], *([t, f"={x}*2", x] for t, x in rows[1:])]))
+    with pytest.raises(LogError, match="column 'x' is empty in 200 rows, and values of formulas are not stored"):
+        read(table)
+    with pytest.raises(LogError, match="no sheet has rows of numbers, and values of formulas are not stored"):
+        open_xlsx(workbook(tmp_path / "log.xlsx", [rows[0], *([t, f"={x}*2"] for t, x in rows[1:])]))
