@@ -124,6 +124,7 @@ def _finite(columns: Channels, source: str) -> None:
 
 def _rows_with_time(columns: Channels, source: str, notes: list[Note]) -> Channels:
     """Drop the rows whose time is empty; inside the log they leave gaps, which are counted again there."""
+    columns = _without_end(columns, notes)
     empty = np.isnan(columns[TIME])
     count, total = int(empty.sum()), len(empty)
     if count == 0:
@@ -132,6 +133,18 @@ def _rows_with_time(columns: Channels, source: str, notes: list[Note]) -> Channe
         raise LogError(f"{TIME} is missing in {_share(count, total)}, at most 5 % may be", source)
     notes.append(LogCode.TIME_MISSING.note(channel=TIME, **_counted(count, total)))
     return {name: values[~empty] for name, values in columns.items()}
+
+
+def _without_end(columns: Channels, notes: list[Note]) -> Channels:
+    """Leave out the last rows in which nothing was written, as of arrays that were made before the test."""
+    if not np.isnan(columns[TIME][-1:]).any():
+        return columns
+    written = np.flatnonzero(~np.logical_and.reduce([np.isnan(values) for values in columns.values()]))
+    taken, total = (int(written[-1]) + 1 if len(written) else 0), len(columns[TIME])
+    if taken < FEWEST_SAMPLES or taken == total:
+        return columns
+    notes.append(LogCode.END_LEFT_OUT.note(count=total - taken, taken=taken))
+    return {name: values[:taken] for name, values in columns.items()}
 
 
 def _share(count: int, total: int) -> str:

@@ -164,6 +164,10 @@ def _dated(headings: Sequence[Heading]) -> int | None:
     return None if any(_channel_of(heading) == TIME for heading in headings) else stamped[0]
 
 
+_PART = re.compile(r"[.\s]")
+"""What tells a part of a structure or a matrix from a unit."""
+
+
 def _channel_of(heading: Heading) -> str | None:
     name = heading.name
     if name in UNITS or (name.startswith(TRUTH) and name != TRUTH):
@@ -172,7 +176,7 @@ def _channel_of(heading: Heading) -> str | None:
         return known
     if heading.stem in TIMES and heading.unit is not None and converts(heading.unit, "s"):
         return TIME
-    stems = [stem for stem in STEMS if name.startswith(stem)]
+    stems = [stem for stem in STEMS if name.startswith(stem) and not _PART.search(name)]
     return STEMS[max(stems, key=len)] if stems and heading.name == heading.bare else None
 
 

@@ -15,6 +15,9 @@ from plant.log.table import Table, table_of
 UNITS = ("unit", "units", "Unit", "Units", "UNIT")
 NAMES = ("columns", "names", "column_names", "channels")
 
+PACKED = ("_FillValue", "missing_value", "scale_factor", "add_offset")
+"""How netCDF says that numbers are packed: what stands for none, and what they are multiplied by and added to."""
+
 MOST_OBJECTS = 10_000
 """Groups and vectors of the largest file that is read."""
 
@@ -55,7 +58,8 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
                 raise too_large(str(path), most)
             for column, values in _columns(one, leaf).items():
                 groups[group][column] = values
-                units[group][column] = next((said for key in UNITS if (said := _attribute(one, key))), None)
+                said = next((said for key in UNITS if (said := _attribute(one, key))), None)
+                units[group][column] = said.split(" since ")[0] if said else None  # of a clock of netCDF
     if STRUCT in groups and STRUCT in texts:
         groups = defaultdict(dict, {STRUCT: groups[STRUCT]})
     if not any(groups.values()):
@@ -72,7 +76,7 @@ def _holds_numbers(one: Any) -> bool:
 
 def _columns(one: Any, leaf: str) -> dict[str, Any]:
     """Return the columns that a data set of numbers holds."""
-    kind, values = one.dtype, np.asarray(one[()])
+    kind, values = one.dtype, _unpacked(one, np.asarray(one[()]))
     if kind.names is not None:
         if values.ndim != 1:
             return {}
@@ -83,6 +87,27 @@ def _columns(one: Any, leaf: str) -> dict[str, Any]:
     named = spread(leaf, values)
     names = _names(one)
     return dict(zip(names, named.values(), strict=True)) if len(names) == len(named) > 1 else named
+
+
+def _unpacked(one: Any, values: Any) -> Any:
+    """Return values with what the conventions of netCDF say of them: no value, scale and offset."""
+    told = {name: _number(one, name) for name in PACKED}
+    if values.dtype.names is not None or not any(number is not None for number in told.values()):
+        return values
+    missing = [told[name] for name in PACKED[:2] if told[name] is not None]
+    scale, offset = (1.0 if told[PACKED[2]] is None else told[PACKED[2]]), told[PACKED[3]] or 0.0
+    return np.where(np.isin(values, missing), np.nan, scale * values.astype(float) + offset)
+
+
+def _number(one: Any, name: str) -> float | None:
+    """Return an attribute that is one finite number, else None."""
+    try:
+        value = np.asarray(one.attrs.get(name))
+    except (OSError, KeyError, TypeError, ValueError):
+        return None
+    if value.size != 1 or value.dtype.kind not in "fiu" or not np.isfinite(value.reshape(-1)[0]):
+        return None
+    return float(value.reshape(-1)[0])
 
 
 def _attribute(one: Any, name: str) -> str:

@@ -11,6 +11,9 @@ from plant.errors import LogError
 from plant.log.formats.packed import opened
 from plant.log.table import Table, table_of
 
+MOST_PARTS = 8_000_000
+"""Lists and objects of the largest file that is read: each takes some hundred bytes, however few its letters."""
+
 WANTED = (
     "JSON is read as one object a row (a list of them, or one a line), or as one object with a list a column; "
     "save the log as .csv or .parquet"
@@ -23,10 +26,14 @@ def open_json(path: Path) -> Table:
     Raises
     ------
     LogError
-        If it is no table, or no JSON.
+        If it is no table, no JSON, or has more parts than a log.
     """
     with opened(path) as file:
-        text = file.read().decode("utf-8-sig", errors="replace")
+        content = file.read()
+    if content.count(b"[") + content.count(b"{") > MOST_PARTS:
+        raise LogError(f"it has more than {MOST_PARTS} lists and objects; save the log as .csv or .parquet", str(path))
+    text = content.decode("utf-8-sig", errors="replace")
+    del content
     columns = _columns(_document(text, str(path)))
     if not columns:
         raise LogError(WANTED, str(path))

@@ -24,7 +24,6 @@ LONGEST_ROW = 8 << 20
 MOST_CELLS = 40_000_000
 """Cells of the largest workbook that is read; a sheet has 1,048,576 rows."""
 
-UNCOMPUTED = "values of formulas are not stored in the workbook: open it in Excel, save it, and try again"
 _BLOCK = 1 << 18
 _UNCOMPUTED = re.compile(rb"</f>\s*(?:<v>\s*</v>|<v\s*/>|</c>)")
 Cells = Sequence[Sequence[Any]]
@@ -59,7 +58,7 @@ def open_xlsx(path: Path) -> tuple[Table, ...]:
         finally:
             book.close()
     if not made:
-        raise LogError(f"no sheet has rows of numbers{f', and {UNCOMPUTED}' if uncomputed else ''}", str(path))
+        raise LogError("no sheet has rows of numbers", str(path))
     return tuple(made)
 
 
@@ -142,7 +141,8 @@ def _table(path: Path, title: str, rows: Cells, uncomputed: bool = False) -> Tab
             empty = sum(column.position >= len(row) or row[column.position] is None for row in below)
             if 2 * empty > len(below):
                 raise LogError(
-                    f"column {column.name[:80]!r} is empty in {empty} rows, and {UNCOMPUTED}",
+                    f"column {column.name[:80]!r} is empty in {empty} rows, and values of formulas are not stored "
+                    "in the workbook: open it in Excel, save it, and try again",
                     str(path),
                 )
         texts = (

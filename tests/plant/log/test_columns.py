@@ -53,6 +53,10 @@ def test_unknown_columns_are_ignored_and_simulated_truth_is_kept() -> None:
     ]
 
 
+def test_a_part_of_a_structure_or_matrix_is_no_unit_of_its_channel() -> None:
+    assert channels("position_m.Data", "velocity_m_s 1", "time_s.Time") == {}
+
+
 def test_an_unknown_unit_names_file_column_wanted_and_got() -> None:
     with pytest.raises(LogError, match=r"a\.csv: column 'position_xyz' cannot become position_m: unit 'xyz'"):
         channels("time_s", "position_xyz")

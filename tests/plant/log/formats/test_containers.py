@@ -11,7 +11,7 @@ import pytest
 
 from plant.errors import LogError, LogWarning
 from plant.log.columns import Column
-from plant.log.formats import hdf5, xlsx
+from plant.log.formats import hdf5, json_text, xlsx
 from plant.log.formats.detect import open_tables
 from plant.log.formats.hdf5 import OBJECTS, open_hdf5
 from plant.log.formats.mat import tables_of
@@ -258,6 +258,29 @@ def test_formulas_whose_values_are_not_stored_are_named_and_yes_among_numbers_is
     rows[50][1] = 49.0
     (table,) = open_xlsx(workbook(tmp_path / "log.xlsx", [["t", "x", "y"], *([t, f"={x}*2", x] for t, x in rows[1:])]))
     with pytest.raises(LogError, match="column 'x' is empty in 200 rows, and values of formulas are not stored"):
-        read(table)
-    with pytest.raises(LogError, match="no sheet has rows of numbers, and values of formulas are not stored"):
-        open_xlsx(workbook(tmp_path / "log.xlsx", [rows[0], *([t, f"={x}*2"] for t, x in rows[1:])]))
+        table.read([Column(1, "x", "position_m")])
+
+
+def test_hdf5_of_netcdf_is_unpacked_as_it_says(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        way = file.create_dataset("way", data=np.arange(20, dtype="i2"))
+        way.attrs.update({"scale_factor": 0.5, "add_offset": [3.0], "_FillValue": np.int16(7), "units": "mm"})
+        time_ = file.create_dataset("time", data=np.arange(20.0))
+        time_.attrs.update({"units": "milliseconds since 2026-01-01", "scale_factor": "text", "add_offset": np.nan})
+        file["speed"] = np.arange(20.0)
+    (table,) = open_hdf5(tmp_path / "log.h5")
+    assert {one.name: one.unit for one in table.headings} == {"way": "mm", "time": "milliseconds", "speed": None}
+    wanted = np.where(np.arange(20) == 7, np.nan, 3.0 + 0.5 * np.arange(20))
+    np.testing.assert_array_equal(read(table)["way"], wanted)
+    for name in ("time", "speed"):
+        np.testing.assert_array_equal(read(table)[name], np.arange(20.0))
+
+
+def test_json_of_more_parts_than_a_log_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "log.json").write_text("[" + ",".join(["[]"] * 30) + "]")
+    monkeypatch.setattr(json_text, "MOST_PARTS", 30)
+    with pytest.raises(LogError, match="it has more than 30 lists and objects"):
+        open_tables(tmp_path / "log.json")
+    monkeypatch.setattr(json_text, "MOST_PARTS", 31)
+    with pytest.raises(LogError, match="JSON is read as"):
+        open_tables(tmp_path / "log.json")
