@@ -1,9 +1,11 @@
 """A reduced run of the fuzzers, which are run at length as ``python -m tests.fuzz.files`` and ``tests.fuzz.texts``."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from tests.fuzz import columns_held, files, spellings, texts
+from tests.fuzz import bench_layouts, columns_held, files, spellings, texts
 from tests.fuzz.guard import limited
 from tests.fuzz.mutations import CELLS, mutated
 from tests.fuzz.seeds import KINDS
@@ -32,6 +34,17 @@ def test_a_few_spellings_of_one_log_are_that_log_or_refused() -> None:
 
 def test_a_few_files_of_columns_that_are_no_plain_numbers_end_in_a_record_or_a_sentence() -> None:
     assert columns_held.run(8, first=1_000_000) == []
+
+
+def test_logs_as_programs_of_benches_write_them_are_read(tmp_path: Path) -> None:
+    for kind in bench_layouts.LAYOUTS:
+        assert len(bench_layouts.read_unspoilt(kind, tmp_path)) == bench_layouts.N
+    assert bench_layouts.run(6, first=1_000_000) == []
+
+
+@pytest.mark.slow
+def test_no_mishap_of_a_log_is_passed_over_in_silence() -> None:
+    assert bench_layouts.run(600) == []
 
 
 @pytest.mark.slow

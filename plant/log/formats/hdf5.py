@@ -94,7 +94,7 @@ def _unpacked(one: Any, values: Any) -> Any:
     told = {name: _number(one, name) for name in PACKED}
     if values.dtype.names is not None or not any(number is not None for number in told.values()):
         return values
-    missing = [told[name] for name in PACKED[:2] if told[name] is not None]
+    missing = [number for name in PACKED[:2] if (number := told[name]) is not None]
     scale, offset = (1.0 if told[PACKED[2]] is None else told[PACKED[2]]), told[PACKED[3]] or 0.0
     return np.where(np.isin(values, missing), np.nan, scale * values.astype(float) + offset)
 

@@ -21,7 +21,9 @@ import scipy.io
 
 from experiments.command.logs import read_log
 from plant.errors import LogError, LogWarning
+from plant.log.checks import trusted
 from plant.log.files import read_record
+from plant.log.notes import LogCode
 from tests.log_formats.written import SI, mdf4
 
 N = 400
@@ -202,3 +204,14 @@ def test_a_row_of_a_sheet_that_is_longer_than_any_is_refused_before_it_is_held(
         file.writestr("xl/worksheets/sheet1.xml", f"<sheetData><row>{'<c><v>1</v></c>' * 100_000}</row></sheetData>")
     with pytest.raises(LogError, match="longer than any of a sheet"):
         read_record(tmp_path / "bomb.xlsx")
+
+
+def test_the_empty_end_of_arrays_that_were_made_before_the_test_is_left_out() -> None:
+    ended = np.concatenate((np.ones(N), np.full(300, np.nan)))
+    channels = {name: scale * ended for name, scale in (("motor_speed_rad_s", 9.0), ("velocity_m_s", 0.1))}
+    checked = trusted({"time_s": 1e-3 * np.arange(N + 300) * ended, **channels}, source="a.csv")
+    assert checked.notes[0].code == LogCode.END_LEFT_OUT
+    assert len(checked.channels["velocity_m_s"]) == N
+    channels["velocity_m_s"][-1] = 0.1  # something was measured there
+    with pytest.raises(LogError, match="time_s is missing in 300 of 700 samples"):
+        trusted({"time_s": 1e-3 * np.arange(N + 300) * ended, **channels}, source="a.csv")

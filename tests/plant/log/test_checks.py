@@ -37,15 +37,6 @@ def test_times_rounded_when_printed_pass_silently(digits: int) -> None:
     assert check(time).notes == ()
 
 
-def test_the_empty_end_of_arrays_that_were_made_before_the_test_is_left_out() -> None:
-    ended = np.concatenate((np.ones(N - 400), np.full(400, np.nan)))
-    checked = check(TIME * ended, motor_speed_rad_s=SPEED * ended, velocity_m_s=VELOCITY * ended)
-    assert [note.code for note in checked.notes] == [LogCode.END_LEFT_OUT]
-    np.testing.assert_array_equal(checked.channels["velocity_m_s"], VELOCITY[:600])
-    with pytest.raises(LogError, match="time_s is missing in 400 of 1000 samples"):
-        check(TIME * ended)  # something was measured there
-
-
 def test_times_since_the_epoch_pass_silently() -> None:
     checked = check(1.7e9 + TIME)
     assert checked.notes == ()
