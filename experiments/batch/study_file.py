@@ -19,7 +19,7 @@ from plant.eha.drives import DRIVES
 from plant.eha.simulate import PLANTS
 from plant.errors import HydrostateError
 from plant.sensors.sensors import SENSORS
-from plant.small_file import shown, small_toml
+from plant.small_file import SHOWN, shown, small_toml
 
 SHIPPED = "experiments.batch.studies"
 
@@ -291,7 +291,8 @@ def _sentence(error: Any) -> str:
         if isinstance(part, int):
             where += f"[{part}]"
         elif part not in ("constrained-int", "int", "tuple[constrained-int, ...]", "tuple[int, ...]"):
-            where += f".{part}" if where else str(part)
+            name = part if part.isprintable() and len(part) <= SHOWN else shown(part)
+            where += f".{name}" if where else name
     match error["type"]:
         case "extra_forbidden":
             return f"{where} is unknown{_nearest(error['loc'])}"

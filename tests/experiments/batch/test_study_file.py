@@ -38,6 +38,7 @@ def changed(**changes: Any) -> dict[str, Any]:
         ({"runs": GOOD["runs"]}, "name is needed, and not there"),
         ({"name": "a"}, "the file must have at least one [[runs]] or [[logs]], got none"),
         ({**GOOD, "log": []}, "log is unknown, did you mean 'logs'?"),
+        ({**GOOD, "\x1b[2J": []}, r"'\x1b[2J' is unknown, wanted one of name"),
     ],
 )
 def test_every_error_names_its_field(content: dict[str, Any], said: str) -> None:
