@@ -13,7 +13,7 @@ from pyarrow import csv as arrow_csv
 
 from plant.arrays import Array
 from plant.log.clock.stamps import read_stamps
-from plant.log.columns import Column
+from plant.log.columns import TIME, Column
 from plant.log.formats.arrow import from_arrow, to_arrow
 from plant.log.formats.cells import MISSING
 from plant.log.formats.csv_cells import read_cells
@@ -57,10 +57,8 @@ def _read(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, 
             found = _read_fast(path, layout, chosen)
     found = _read_cells(path, layout, chosen) if found is None else found
     for column, values in found.items():
-        if column.position not in layout.stamped and may_group_thousands(values):
-            with _rows(path, layout) as rows:
-                cells = (row[column.position].strip() for row in rows if len(row) > column.position)
-                require_none_grouped(cells, column.name, str(path))
+        if column.channel != TIME and column.position not in layout.stamped and may_group_thousands(values):
+            require_none_grouped(_texts(path, layout, column), column.name, str(path))
     return found
 
 
@@ -108,22 +106,11 @@ def _source(path: Path, layout: Layout) -> Path | bytes:
 
 
 def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
-    labels = [str(position) for position in range(len(layout.headings))]
-    wanted = [labels[column.position] for column in chosen]
-    texts = {labels[place] for place in layout.stamped}
+    wanted = [str(column.position) for column in chosen]
+    texts = {str(place) for place in layout.stamped}
     kinds: dict[str, Any] = {one: pa.string() if one in texts else pa.float64() for one in wanted}
     source = _source(path, layout)
-    table = arrow_csv.read_csv(
-        cast("Any", source if isinstance(source, Path) else pa.BufferReader(source)),
-        read_options=arrow_csv.ReadOptions(column_names=labels, skip_rows=layout.skipped),
-        parse_options=arrow_csv.ParseOptions(delimiter=layout.delimiter),
-        convert_options=arrow_csv.ConvertOptions(
-            include_columns=wanted,
-            column_types=kinds,
-            null_values=list(MISSING),
-            decimal_point=layout.decimal_point,
-        ),
-    )
+    table = _arrow_table(source, layout, kinds)
     if (lines := _lines_if_quoted(source, layout)) is not None and lines != table.num_rows:
         raise _NotFastError  # a quote that is never closed makes one cell of all that follows
     out: dict[Column, Array] = {}
@@ -135,6 +122,34 @@ def _read_fast(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Col
             out[column] = from_arrow(table.column(label))
         table = table.drop_columns([label])  # hands each column's memory back before the next is copied
     return out
+
+
+def _arrow_table(source: Path | bytes, layout: Layout, kinds: Mapping[str, Any]) -> Any:
+    """Return columns as Arrow reads them, each of its kind, by their places as text."""
+    return arrow_csv.read_csv(
+        cast("Any", source if isinstance(source, Path) else pa.BufferReader(source)),
+        read_options=arrow_csv.ReadOptions(
+            column_names=[str(place) for place in range(len(layout.headings))], skip_rows=layout.skipped
+        ),
+        parse_options=arrow_csv.ParseOptions(delimiter=layout.delimiter),
+        convert_options=arrow_csv.ConvertOptions(
+            include_columns=list(kinds),
+            column_types=dict(kinds),
+            null_values=list(MISSING),
+            decimal_point=layout.decimal_point,
+        ),
+    )
+
+
+def _texts(path: Path, layout: Layout, column: Column) -> list[str]:
+    """Return the cells of a column as they are written."""
+    if layout.delimiter != BLANKS:
+        with suppress(pa.ArrowInvalid, UnicodeError):
+            label = str(column.position)
+            table = _arrow_table(_source(path, layout), layout, {label: pa.string()})
+            return [cell.strip() for cell in table.column(label).to_pylist() if cell]
+    with _rows(path, layout) as rows:
+        return [row[column.position].strip() for row in rows if len(row) > column.position]
 
 
 def _refused(row: int, cell: str) -> Exception:

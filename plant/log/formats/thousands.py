@@ -11,6 +11,9 @@ from plant.errors import LogError
 _GROUPED = re.compile(r"[-+\u2212]?[1-9]\d{0,2}[.,]\d{3}")
 _SMALL = re.compile(r"[-+\u2212]?\d{1,3}")
 
+_LONGEST_SMALL = 4
+"""Characters of the longest number below a thousand, with its sign [count]."""
+
 LEAST = 30
 """Cells with a separator from which a column may be judged [count]: decimals of as many would not all be three."""
 
@@ -30,6 +33,8 @@ def groups_thousands(cells: Sequence[str]) -> bool:
     >>> groups_thousands(["998", "1,002"] * 40), groups_thousands(["0", "0,998", "1,002"] * 40)
     (True, False)
     """
+    if min(map(len, cells), default=0) > _LONGEST_SMALL:
+        return False
     parted = [cell for cell in cells if not _SMALL.fullmatch(cell)]
     return LEAST <= len(parted) < len(cells) and all(map(is_grouped, parted))
 
