@@ -205,18 +205,16 @@ def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[
     relieved = reaches_relief(log.measured, parameters.relief_pressure)
     forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
     afar = log.taken_at(parameters.bulk_modulus)
-    if not log.gaps.size:
-        guess, near = _guess(forms[0], afar, starts)
-        if not near:  # in a wrong valley the whole log takes all steps that there are
-            first = _searched(forms[0], log, afar, starts, hopeful=True)
-            if _explains(first):
-                return [first, *_others(forms[1:], log, afar, first)]
-        first = _searched(forms[0], log, afar, [guess], alone=True)
-        others = _others(forms[1:], log, afar, first, alone=True)
-        if _explains(first) or _explains(others[0]):
-            return [first, *others]
-        starts = [*starts, first.values]
-    first = _searched(forms[0], log, afar, starts)
+    guess, near = _guess(forms[0], afar, starts)
+    if not near:  # in a wrong valley the whole log takes all steps that there are
+        first = _searched(forms[0], log, afar, starts, hopeful=True)
+        if _explains(first):
+            return [first, *_others(forms[1:], log, afar, first)]
+    first = _searched(forms[0], log, afar, [guess], alone=True)
+    others = _others(forms[1:], log, afar, first, alone=True)
+    if _explains(first) or _explains(others[0]):
+        return [first, *others]
+    first = _searched(forms[0], log, afar, [*starts, first.values])
     return [first, *_others(forms[1:], log, afar, first)]
 
 
@@ -279,7 +277,7 @@ def _searched(
 ) -> _Rough:
     """Return the best that is found from starts, at first with noise of position as it is at the rig's bulk modulus."""
     search = _search(log)
-    problem = Problem(form, afar) if log.gaps.size else FreedProblem.of(form, afar)  # what gaps leave open, once
+    problem = FreedProblem.of(form, afar)
     guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in starts]
     bounds = flow_bounds(form, guesses, afar)
     if not log.passes_on:

@@ -65,6 +65,7 @@ class FreedProblem(Problem):
             model = replace(model, jump=())
         super().__init__(replace(model, unknowns=tuple(free), linear=sizes), log, partial(_by_itself, model))
         self._bare, self._sizes = model, linear
+        self._most = LANES if model.jump else MANY  # with gaps, `MANY` take twice as long as `LANES`
         self._last: list[tuple[Array, Array, Array, Array]] = []
         self._columns = [parameter_names(model.parameters).index(name) for name in free]
         self._kernels: dict[int, ResidualsRun] = {}
@@ -207,7 +208,7 @@ class FreedProblem(Problem):
         ndarray, shape (outputs, blocks)
             As of `residuals`.
         """
-        if self.log.gaps.size or len(self.log.drives) > MOST_SIDE_BY_SIDE:
+        if len(self.log.drives) > MOST_SIDE_BY_SIDE:
             yield from super().disturbed(theta, drives)
             return
         waiting = iter(drives)
@@ -231,9 +232,8 @@ class FreedProblem(Problem):
         ndarray, shape (outputs, blocks, `LANES` or `MANY`)
             As of `residuals`.
         """
-        if self.log.gaps.size:  # what a gap leaves open only the other kernel follows
-            return super().disturbed_together(theta, drives)
-        most = LANES if len(theta) < LANES else MANY  # as many as its slopes take: no kernel for the drives alone
+        # as many as its slopes take: no kernel for the drives alone
+        most = LANES if len(theta) < LANES else self._most
         row, variance = self._rows(theta[None], self.log.parameters), self._variances(theta)
         parts = [drives[..., first : first + most] for first in range(0, drives.shape[-1], most)]
         found = [self._side_by_side(np.repeat(row, part.shape[-1], axis=0), part, variance) for part in parts]
@@ -301,10 +301,10 @@ class FreedProblem(Problem):
 
         ``most`` run side by side.
         """
-        # one run is cheaper alone, and what a gap leaves open only its kernel follows
-        if len(rows) == 1 or self.log.gaps.size:
+        if len(rows) == 1:  # cheaper alone
             return np.stack([self._alone(row, drives, variance) for row in rows], axis=-1)
         shared = (self.log.drives if drives is None else drives)[..., None]
+        most = min(most, self._most)
         groups = [rows[first : first + most] for first in range(0, len(rows), most)]
         found = each(lambda some: self._side_by_side(some, shared, variance), groups)
         return found[0] if len(found) == 1 else np.concatenate(found, axis=-1)
@@ -315,7 +315,8 @@ class FreedProblem(Problem):
         found = self._room(lanes)
         filled = rows if len(rows) == lanes else np.concatenate([rows, np.repeat(rows[-1:], lanes - len(rows), axis=0)])
         with np.errstate(all="ignore"):  # a try that runs away is stepped back from
-            self._kernel_of(lanes)(filled, drives, self.log.measured, *self._course(variance), found)
+            gaps = (self.log.gaps,) if self._bare.jump else ()
+            self._kernel_of(lanes)(filled, drives, self.log.measured, *self._course(variance), *gaps, found)
         return found
 
     def _kernel_of(self, lanes: int) -> ResidualsRun:

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from functools import cache
 from typing import TypeAlias
 
-from estimation.arrays import Array, IntArray
+from estimation.fits.greybox.gap_loops import carry_each, correct_each, residuals_across_gaps
 from estimation.fits.greybox.kernel import model_step
-from estimation.fits.greybox.loops import RUNAWAY
-from estimation.fits.greybox.side_by_side_loops import absorb, residuals_side_by_side
+from estimation.fits.greybox.loops import RUNAWAY, SETTLED
+from estimation.fits.greybox.side_by_side_loops import absorb, drive, residuals_side_by_side
 from estimation.models.greybox import GreyBoxModel
-from plant.compiled.expression import as_expression, symbol
+from plant.compiled.expression import Expression, as_expression, jacobian, symbol
 from plant.compiled.hoist import hoisted
 from plant.compiled.native.load import load_native
 from plant.compiled.native.machine import native_width
@@ -32,8 +32,9 @@ MANY = 2 * LANES
 """The same where there are more: two vectors a step, of which one is worked on while the other waits, take from 1.3
 to 1.6 times as long as one."""
 
-ResidualsRun: TypeAlias = Callable[[Array, Array, Array, float, IntArray, int, Array, Array, Array, Array], None]
-"""``run(parameters, drives, measured, sample_time, substeps, block, variance, walk, open_at, errors)`` fills errors."""
+ResidualsRun: TypeAlias = Callable[..., None]
+"""``run(parameters, drives, measured, sample_time, substeps, block, variance, walk, open_at, errors)`` fills errors; of
+a model that bears gaps, these come before the errors."""
 
 
 @cache
@@ -50,12 +51,14 @@ def compile_side_by_side(model: GreyBoxModel, lanes: int) -> ResidualsRun:
     Returns
     -------
     callable
-        Takes what `estimation.fits.greybox.side_by_side_loops.residuals_side_by_side` does, so many parameter rows.
+        Takes what `estimation.fits.greybox.side_by_side_loops.residuals_side_by_side` does, so many parameter rows; of
+        a model that bears gaps, what `estimation.fits.greybox.gap_loops.residuals_across_gaps` does.
     """
-    takes = signature_of(residuals_side_by_side, lanes=lanes, outputs=len(model.outputs), drives=len(model.drives))
-    entries, made_of = {residuals_side_by_side.__name__: takes}, (model, lanes, native_width())
-    kernel = load_native(f"residuals_{model.name}_{lanes}", lambda: _source(model, lanes), entries, made_of)
-    return kernel.residuals_side_by_side
+    loop = residuals_across_gaps if model.jump else residuals_side_by_side
+    takes = signature_of(loop, lanes=lanes, outputs=len(model.outputs), drives=len(model.drives))
+    entries, made_of = {loop.__name__: takes}, (model, lanes, native_width())
+    name = f"{'gaps' if model.jump else 'residuals'}_{model.name}_{lanes}"
+    return getattr(load_native(name, lambda: _source(model, lanes), entries, made_of), loop.__name__)
 
 
 @cache
@@ -69,18 +72,28 @@ def _written(model: GreyBoxModel) -> tuple[dict[str, str], list[str], int]:
     ends = [start + symbol(f"rise{i}") for i, start in zip(drives, starts, strict=True)]
     moved = model_step(model, states, p, list(zip(starts, ends, strict=True)))
     shown = {f"y{i}": as_expression(value) for i, value in enumerate(model.observe(tuple(states)))}
+    jumps = states[: len(model.jump)]
+    opened = _named("f", jacobian(moved[: len(jumps)], jumps))
+    seen = _named("g", jacobian([*shown.values()], jumps))
     moving = [*begun, *(f"base{i}" for i in drives), *(f"rise{i}" for i in drives)]
     settled, stepped = hoisted(
-        simplified(dict(zip(begun, moved, strict=True)), {*names, "h", "share"}), {*moving, "j"}, "c"
+        simplified({**dict(zip(begun, moved, strict=True)), **opened}, {*names, "h", "share"}), {*moving, "j"}, "c"
     )
-    every = [*moving, *shown, "h", *names, *settled, "share"]
+    every = [*moving, *shown, "h", *names, *settled, "share", *opened, *seen]
     lines = {
         "begin": lines_source("begin", begun),
         "settle": lines_source("settle", settled),
-        "step": packed_source("step", fused(stepped)),
-        "show": lines_source("show", shown),
+        "step": packed_source("step", fused({name: stepped[name] for name in begun})),
+        "show": lines_source("show", {**shown, **seen}),
     }
+    if jumps:
+        lines["open_step"] = packed_source("open_step", fused(stepped))
     return lines, every, len(begun)
+
+
+def _named(letter: str, slopes: list[list[Expression]]) -> dict[str, Expression]:
+    """Return slopes by the names of their places in memory, row by row."""
+    return {f"{letter}{i}_{m}": slope for i, row in enumerate(slopes) for m, slope in enumerate(row)}
 
 
 def _source(model: GreyBoxModel, lanes: int) -> str:
@@ -97,9 +110,18 @@ def _source(model: GreyBoxModel, lanes: int) -> str:
         "NUMBERS": lanes * len(every),
         "RUNAWAY": RUNAWAY,
     }
+    parts, loop = [lay, share, drive, absorb], residuals_side_by_side
+    if model.jump:
+        sizes |= {
+            "JUMP": model.jump,
+            "JUMPS": len(model.jump),
+            "SETTLED": SETTLED,
+            "SLOPES": lanes * every.index("f0_0"),
+        }
+        parts, loop = [*parts, carry_each, correct_each], residuals_across_gaps
     return kernel_text(
         f"residuals of the {model.name} model, {lanes} parameter sets side by side",
         operations_source(lines, {each: lanes * i for i, each in enumerate(every)}, vector),
-        pasted(lay, share, absorb, constants=sizes, inlined=True),
-        pasted(residuals_side_by_side),
+        pasted(*parts, constants=sizes, inlined=True),
+        pasted(loop),
     )

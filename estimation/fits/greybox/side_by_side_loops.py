@@ -75,14 +75,12 @@ def residuals_side_by_side(
     room = np.zeros(kernel.NUMBERS + 8)  # what is at no time set, the share of a step at its start, is zero
     work = room[-room.ctypes.data % 64 // 8 :]  # a vector across two cache lines takes twice as long
     slots, lanes = work.ctypes.data, kernel.LANES
-    bases = kernel.WIDTH * lanes
-    rises = bases + kernel.DRIVES * lanes
-    shown = rises + kernel.DRIVES * lanes
+    shown = (kernel.WIDTH + 2 * kernel.DRIVES) * lanes
     pace = shown + kernel.OUTPUTS * lanes
     lay(kernel, work, pace + lanes, parameters.T, kernel.COLUMNS)
     excess, level = np.zeros((kernel.OUTPUTS, lanes)), np.zeros((kernel.OUTPUTS, lanes))
     present, spread = np.zeros(kernel.OUTPUTS), np.zeros(kernel.OUTPUTS)
-    n, steps, own = drives.shape[0], 0, drives.shape[2] > 1
+    n, steps = drives.shape[0], 0
     for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
         kernel.begin_at(slots + first, 0.0)
     for k in range(n):
@@ -92,16 +90,7 @@ def residuals_side_by_side(
                 share(kernel, work, pace, (sample_time / steps,))
                 for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
                     kernel.settle_at(slots + first, 0.0)
-            for i in range(kernel.DRIVES):
-                if own:
-                    for lane in range(lanes):
-                        work[bases + i * lanes + lane] = drives[k - 1, i, lane]
-                        work[rises + i * lanes + lane] = (drives[k, i, lane] - drives[k - 1, i, lane]) / steps
-                else:
-                    rise = (drives[k, i, 0] - drives[k - 1, i, 0]) / steps
-                    for lane in range(lanes):
-                        work[bases + i * lanes + lane] = drives[k - 1, i, 0]
-                        work[rises + i * lanes + lane] = rise
+            drive(kernel, work, drives, k, steps)
             for j in range(steps):
                 for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
                     kernel.step_at(slots + first, float(j))
@@ -121,6 +110,34 @@ def residuals_side_by_side(
                     spread[i] -= gain * spread[i]
                     present[i] = 0.0
                 spread[i] += walk[i, min(k // block, walk.shape[1] - 1)]
+
+
+def drive(kernel: SideBySideKernel, work: Array, drives: Array, k: int, steps: int) -> None:
+    """Put the drives at the last sample, and their rises in a step up to the sample ``k``, in their places.
+
+    Parameters
+    ----------
+    work : ndarray, shape (numbers,)
+        All numbers.
+    drives : ndarray, shape (n, drives, one or lanes)
+        Drives at the samples [their SI units].
+    k : int
+        The sample.
+    steps : int
+        Steps up to it.
+    """
+    lanes = kernel.LANES
+    bases, rises = kernel.WIDTH * lanes, (kernel.WIDTH + kernel.DRIVES) * lanes
+    for i in range(kernel.DRIVES):
+        if drives.shape[2] > 1:
+            for lane in range(lanes):
+                work[bases + i * lanes + lane] = drives[k - 1, i, lane]
+                work[rises + i * lanes + lane] = (drives[k, i, lane] - drives[k - 1, i, lane]) / steps
+        else:
+            rise = (drives[k, i, 0] - drives[k - 1, i, 0]) / steps
+            for lane in range(lanes):
+                work[bases + i * lanes + lane] = drives[k - 1, i, 0]
+                work[rises + i * lanes + lane] = rise
 
 
 def absorb(

@@ -10,6 +10,7 @@ from estimation.fits.explaining.wide_log import usual_values, widened
 from estimation.fits.explaining.wide_problem import freed
 from estimation.fits.greybox import freed_problem, side_by_side
 from estimation.fits.greybox.freed_problem import NUDGE, FreedProblem
+from estimation.fits.greybox.gap_loops import residuals_across_gaps
 from estimation.fits.greybox.log import greybox_log
 from estimation.fits.greybox.loops import RUNAWAY
 from estimation.fits.greybox.problem import OUTLIER, Problem
@@ -88,7 +89,7 @@ def test_the_normal_equations_are_those_of_residuals_one_by_one(problem: FreedPr
 def test_a_run_that_escapes_keeps_a_finite_residual_and_leaves_its_neighbours_alone(problem: FreedProblem) -> None:
     mad = problem.log.parameters.copy()
     mad[parameter_names(WideFlowParameters).index("chamber_volume")] = np.nan
-    run = compile_side_by_side(WIDE_FLOW_FORM, LANES)
+    run = compile_side_by_side(replace(WIDE_FLOW_FORM, jump=()), LANES)
     log, rows = problem.log, np.repeat(problem.log.parameters[None], LANES, axis=0)
     rows[3] = mad
     errors = np.zeros((1, len(log.measured), LANES))
@@ -178,7 +179,8 @@ def test_the_loop_run_as_python_gives_what_its_kernel_gives(
     measured[4:6] = np.nan
     given = measured, 1e-3, np.array([0, *[2] * (n - 3), 3, 3]), 2, np.array([1e7])
     given = *given, np.array([[1e6, 0.0, 2e6]]), np.array([[0.0, 3e7]])
-    text = text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(FLOW_FORM, LANES))
+    form = replace(FLOW_FORM, jump=())
+    text = text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(form, LANES))
     file = functions_of(text)
     plain = SimpleNamespace(**vars(file))
     plain.VECTOR = 1
@@ -186,13 +188,11 @@ def test_the_loop_run_as_python_gives_what_its_kernel_gives(
         setattr(plain, f"{name}_at", on_memory(file, getattr(file, name)))
     found, wanted = (np.full((1, n // 2, LANES), np.nan) for _ in range(2))
     residuals_side_by_side(plain, rows, drives, *given, found)
-    compile_side_by_side(FLOW_FORM, LANES)(rows, drives, *given, wanted)
+    compile_side_by_side(form, LANES)(rows, drives, *given, wanted)
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9)
 
 
-def test_other_drives_of_a_log_with_gaps_or_of_a_long_one_are_run_one_by_one(
-    problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_other_drives_of_a_long_log_are_run_one_by_one(problem: FreedProblem, monkeypatch: pytest.MonkeyPatch) -> None:
     (theta,) = points(problem, 1)
     drives = [problem.log.drives, 1.001 * problem.log.drives]
     together = list(problem.disturbed(theta, drives))
@@ -202,11 +202,50 @@ def test_other_drives_of_a_log_with_gaps_or_of_a_long_one_are_run_one_by_one(
     monkeypatch.setattr(freed_problem, "MOST_SIDE_BY_SIDE", len(problem.log.drives))
     with pytest.raises(pytest.fail.Exception, match="run together"):
         list(problem.disturbed(theta, drives))
-    open_gap = freed(replace(problem.log, gaps=np.array([[300.0, 340.0, 1e12]])), HYPOTHESES)
-    found = list(open_gap.disturbed(theta, drives))
-    for errors, one in zip(found, drives, strict=True):
-        np.testing.assert_allclose(errors, open_gap.residuals(theta, drives=one), rtol=1e-7, atol=1e-7)
-    assert np.max(np.abs(found[0] - together[0])) > 1.0
+
+
+@pytest.fixture(scope="module")
+def gapped(problem: FreedProblem) -> FreedProblem:
+    """A problem with two gaps in the motor's speed; pressure is missing in the first."""
+    log = replace(problem.log, drives=problem.log.drives[:, :2], parameters=parameter_row(flow_parameters(HEALTHY)))
+    return FreedProblem.of(FLOW_FORM, replace(log, gaps=np.array([[18.0, 24.0, 1e9], [300.0, 340.0, 1e12]])))
+
+
+def test_across_gaps_what_is_run_side_by_side_is_what_is_run_one_by_one(gapped: FreedProblem) -> None:
+    values = {**vars(flow_parameters(HEALTHY)), "case_leakage": 1e-13, "speed_lead": 1e-5, "makeup_opening": 1e3}
+    theta, rng = gapped.model.theta(values), np.random.default_rng(4)
+    rows = [gapped.log.parameters * rng.uniform(0.95, 1.05, len(gapped.log.parameters)) for _ in range(LANES + 2)]
+    together = gapped.residuals_of(theta, rows)
+    for errors, row in zip(together, rows, strict=True):
+        np.testing.assert_allclose(errors, gapped.residuals(theta, parameters=row), rtol=1e-7, atol=1e-7)
+    bridged = gapped.on(replace(gapped.log, gaps=np.empty((0, 3))))
+    assert np.max(np.abs(bridged.residuals(theta, parameters=rows[0]) - together[0])) > 1.0
+    drives = [gapped.log.drives, 1.001 * gapped.log.drives]
+    for errors, one in zip(gapped.disturbed(theta, drives), drives, strict=True):
+        np.testing.assert_allclose(errors, gapped.residuals(theta, drives=one), rtol=1e-7, atol=1e-7)
+
+
+def test_the_loop_across_gaps_run_as_python_gives_what_its_kernel_gives(
+    problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    n, rng = 10, np.random.default_rng(5)
+    rows = parameter_row(flow_parameters(HEALTHY)) * (1.0 + 0.01 * rng.standard_normal((LANES, 1)))
+    rows[:, parameter_names(FLOW_FORM.parameters).index("leakage_coefficient")] *= np.geomspace(1.0, 1e4, LANES)
+    measured = problem.log.measured[200 : 200 + n].copy()
+    measured[4:6] = np.nan
+    given = problem.log.drives[200 : 200 + n, :2, None], measured, 1e-3, np.array([0, *[2] * (n - 3), 3, 3]), 2
+    given = *given, np.array([1e7]), np.array([[1e6, 0.0, 2e6]]), np.array([[0.0, 3e7]])
+    given = *given, np.array([[0.0, 1.0, 1e6], [3.0, 5.0, 1e10]])
+    text = text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(FLOW_FORM, LANES))
+    file = functions_of(text)
+    plain = SimpleNamespace(**vars(file))
+    plain.VECTOR = 1
+    for name in ("begin", "settle", "step", "open_step", "show"):
+        setattr(plain, f"{name}_at", on_memory(file, getattr(file, name)))
+    found, wanted = (np.full((1, n // 2, LANES), np.nan) for _ in range(2))
+    residuals_across_gaps(plain, rows, *given, found)
+    compile_side_by_side(FLOW_FORM, LANES)(rows, *given, wanted)
+    np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9)
 
 
 def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[int]:
