@@ -212,8 +212,8 @@ def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change,
     tuple of Change, Blocks and ClassFits, or None
         The change, the log with all before it taken as missing, and the circuits that fit the rest, which go on from
         where the circuit before had brought the piston; None for a log in one condition throughout, where no circuit
-        follows what came before or, without pressure, what comes after, and where one with a fault outside the nine
-        explains the log as well.
+        follows what came before or what comes after, and where one with a fault outside the nine explains the log as
+        well.
     """
     (before, after), (first, last) = two.fits, two.conditions
     if two.gain < GAIN or first == last:
@@ -230,7 +230,7 @@ def find_onset(blocks: Blocks, two: Parted, actuator: Actuator) -> tuple[Change,
     onset = Change(best * step, (low * step, high * step), list(CONDITIONS)[first])
     rest = replace(part_of(blocks, best, len(blocks.velocity)), earlier=(best * blocks.block, row))
     fits = fit_classes(rest, actuator)
-    if blocks.pressure is None and unexplained(rest, fits, actuator):  # what no circuit follows began in no condition
+    if unexplained(rest, fits, actuator):  # what no circuit follows began in no condition
         return None
     return onset, rest, fits
 
