@@ -104,8 +104,9 @@ def explain(
         pairs = _paired(wide, first, starts[0], accepted)
         near = left_by(wide, first.cost) < NEARLY or (pairs and _explained(pairs[0], accepted))
         as_good = second and second.cost <= NEARLY_AS_GOOD * first.cost and not _same(first, second)
-        if second and near and as_good:
-            pairs += _paired(wide, second, starts[0], accepted, rival=True)
+        sought = not (pairs and _explained(pairs[0], accepted) and left_by(wide, pairs[0].cost) < NOISE)
+        if second and near and as_good and sought:
+            pairs += _paired(wide, second, starts[0], accepted, rivalled=min(one.cost for one in (first, *pairs)))
         finished = _distinct([first, *pairs])
     best = finished[0]
     if not best.fits:
@@ -151,7 +152,7 @@ def _alone(
         first, second = sorted((ended, more), key=lambda each: each[0].cost)
         finished = led_on(log, first, spared=spared)
         return ranked([*finished, *led_on(log, second, finished[0].cost, spared)])
-    finished = led_on(log, ended, spared=spared)
+    finished = led_on(log, ended, spared=spared._replace(starts=hopeful(starts, begun)))
     if _explained(finished[0], accepted):  # a stuck valve was told as a small step of leakage, at 1.1 times the noise
         others = [one for one in others if one.far] if left_by(log, finished[0].cost) > NOISE else []
     if not others:
@@ -170,41 +171,56 @@ def _promising_enough(asked: Sequence[Hypothesis], gains: Mapping[str, float], n
 
 
 def _paired(
-    log: GreyBoxLog, first: Tried, plain: Mapping[str, float], accepted: Accepted, *, rival: bool = False
+    log: GreyBoxLog, first: Tried, plain: Mapping[str, float], accepted: Accepted, *, rivalled: float = np.inf
 ) -> list[Tried]:
     """Return what explains a log together with a hypothesis that does not alone, and better; the best first.
 
     What slopes promise most is tried first, and all else where that does not explain the log: slopes are taken where
     the first hypothesis has gone to take up what the second one does. The best of it is fitted to the end in any case.
-    Beside a ``rival`` of the best, nothing is tried where all hypotheses together do not explain the log.
+    Beside a rival of the best, ``rivalled`` is the cost of what is known. Nothing is tried there where all hypotheses
+    together do not explain the log, and a pair counts only if it comes lower.
     """
     late = delayed(log, first.delays)
     taken = {one.name for one in first.together}
     asked = [one for one in HYPOTHESES if one.name not in taken]
     reached = within_reach(log, first, asked)
-    if rival and len(reached) < len(asked):
+    if rivalled < np.inf and len(reached) < len(asked):
         return []
     likely, others, gains = promising(late, first.together, first.values, reached)
     begun = [_begun_again(log, first), {**plain, **own_starts(log, first.together[-1])[0]}]
     left = left_by(log, first.cost)
     spared = Spared(skipping(log, left), left, begun)
-    long, useful = len(log.drives) >= FEW, first.cost - WORTH
+    long, useful = len(log.drives) >= FEW, min(first.cost, rivalled) - WORTH
     faint = long and spared.every == 1
     if long:  # none is told that does not explain the log
         useful = min(useful, (REACHED if len(reached) < len(asked) else NEARLY) * first.cost / left)
     far, rest = [one for one in others if one.far], [one for one in others if not one.far]
     near = [*likely, *far]
-    nearer = [
-        [*screened(late, (*first.together, one), begun, every=spared.every)] for one in (likely if faint else near)
-    ]
-    pairs = likeliest(late, nearer, first.cost, spared, useful) if nearer else []
+    nearer: list[list[Tried]] = []
+    for one in likely if faint else near:
+        nearer.append([*screened(late, (*first.together, one), begun, every=spared.every)])
+        if faint and min(way.cost for way in nearer[-1]) < NEARLY * first.cost and len(begun) > 1:
+            begun, nearer = _kept(begun, nearer)
+    least = min(first.cost, rivalled)
+    ended = settled_each(late, nearer, least, spared) if nearer else []
+    if ended and rest and long and not faint and left_by(log, ended[0].cost) > REACHED:
+        known = min(least, ended[0].cost)
+        wanted, begun = NEARLY_AS_GOOD * known, hopeful(begun, nearer)
+        more = [screened(late, (*first.together, one), begun, wanted, spared.every) for one in rest]
+        ended, others = sorted((ended, settled_each(late, more, known, spared)), key=lambda each: each[0].cost)
+        pairs = led_on(late, ended, least, spared, useful)
+        known, useful = min(least, pairs[0].cost), _as_useful(pairs, useful)
+        return _better(first, ranked([*pairs, *led_on(late, others, known, spared, useful)]), least)
+    pairs = led_on(late, ended, least, spared, useful)
+    useful = _as_useful(pairs, useful)
     if faint and not (pairs and _explained(pairs[0], accepted) and left_by(log, pairs[0].cost) < NOISE):
-        wanted = NEARLY * min(one.cost for one in (first, *pairs[:1]))
+        wanted = NEARLY * min([least, *(one.cost for one in pairs[:1])])
         distant = [[*screened(late, (*first.together, one), begun, wanted, spared.every)] for one in far]
         distant = [ways for ways in distant if min(one.cost for one in ways) < wanted]
         pairs = ranked([*pairs, *likeliest(late, distant, wanted / NEARLY, spared, useful)]) if distant else pairs
+        useful = _as_useful(pairs, useful)
     if not pairs or not _explained(pairs[0], accepted):
-        known = min(one.cost for one in (first, *pairs[:1]))
+        known = min([least, *(one.cost for one in pairs[:1])])
         if faint:
             needed = first.cost - min(NEARLY_AS_GOOD * known, REACHED * first.cost / left)
             rest = _promising_enough(rest, gains, max(WORTH, needed))
@@ -212,8 +228,26 @@ def _paired(
         more = [screened(late, (*first.together, one), begun, wanted, spared.every) for one in rest]
         if more:
             pairs = ranked([*pairs, *likeliest(late, more, known, spared, useful)])
-    better = (one for one in pairs if one.cost < first.cost - WORTH)
+    return _better(first, pairs, least)
+
+
+def _better(first: Tried, pairs: Iterable[Tried], least: float) -> list[Tried]:
+    """Return the pairs that come lower than what is known, with the delays of the first hypothesis."""
+    better = (one for one in pairs if one.cost < least - WORTH)
     return [replace(one, delays={**first.delays, **one.delays}) for one in better]
+
+
+def _kept(
+    starts: Sequence[Mapping[str, float]], tried: Sequence[Sequence[Tried]]
+) -> tuple[list[Mapping[str, float]], list[list[Tried]]]:
+    """Return the starts that are used again, and what was tried from these."""
+    kept = hopeful(starts, tried)
+    return kept, [[way for start, way in zip(starts, each, strict=True) if start in kept] for each in tried]
+
+
+def _as_useful(pairs: Sequence[Tried], useful: float) -> float:
+    """Return the cost above which no further pair is told, given those that are known, the best first."""
+    return min(useful, pairs[0].cost + ALIKE) if pairs and pairs[0].fits else useful
 
 
 def _plain_point(log: GreyBoxLog, plain: Mapping[str, float]) -> Point:

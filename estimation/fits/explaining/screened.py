@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 
-from estimation.fits.explaining.settled import NEAR, at_end, coarse
+from estimation.fits.explaining.settled import NEAR, SLIGHT, at_end, coarse
 from estimation.fits.explaining.tried import Tried
 from estimation.fits.explaining.wide_log import usual_values
 from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_starts, worn_start
@@ -58,7 +58,7 @@ def screened(
         for (delays, problem), own in product(problems, (*begun, *worn)):
             guess = problem.model.theta({**absent, **start, **own})
             bounds = flow_bounds(problem.model, [guess], log)
-            point = descend(problem.at, guess, SCREENING, bounds, radius=NEAR, wanted=wanted)
+            point = descend(problem.at, guess, SCREENING, bounds, radius=NEAR, wanted=wanted, least_share=SLIGHT)
             tried.append(Tried(together, point, problem.model.values(point.theta), delays, absent))
             wanted = min(wanted, NEARLY * tried[-1].cost)
         yield min(tried, key=lambda one: one.cost)
@@ -97,7 +97,8 @@ def nearing(
 ) -> Iterator[Sequence[Tried]]:
     """Yield hypotheses from their starts, those first of which slopes say nothing; none is followed far from the best.
 
-    Those begin from every start, the others from the ``likely`` ones.
+    Those begin from every start, the others from the ``likely`` ones. Where one of those comes lower than all that is
+    known, the others begin from where it did so.
 
     Parameters
     ----------
@@ -117,7 +118,11 @@ def nearing(
     sequence of Tried
         One a start.
     """
+    lower: list[Sequence[Tried]] = []
     for one in sorted(asked, key=lambda each: not each.far):
-        found = [*screened(log, (one,), starts if one.far else likely, NEARLY * known, every)]
+        from_these = starts if one.far else hopeful(starts, lower) if lower else likely
+        found = [*screened(log, (one,), from_these, NEARLY * known, every)]
+        if one.far and min(each.cost for each in found) < known:
+            lower.append(found)
         known = min(known, *(each.cost for each in found))
         yield found

@@ -1,6 +1,8 @@
 """What is tried by itself, and in pairs, where little is left of a long log, or much."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from operator import attrgetter
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +15,8 @@ from estimation.fits.explaining.thinned import FEW, Spared
 from estimation.fits.explaining.tried import Tried
 from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import DELIVERY, OFFSET, Hypothesis
+
+COST = attrgetter("cost")
 
 LONG: Any = SimpleNamespace(drives=np.zeros((FEW, 1)))
 
@@ -96,6 +100,8 @@ def test_beside_what_leaves_little_no_pair_is_tried_that_cannot_explain_the_log(
     monkeypatch.setattr(explain, "skipping", lambda *_: 1)
     monkeypatch.setattr(explain, "left_by", lambda _, cost: cost / 1000.0)
     monkeypatch.setattr(explain, "screened", screened)
+    monkeypatch.setattr(explain, "settled_each", lambda *_: [])
+    monkeypatch.setattr(explain, "led_on", lambda *_: [])
     monkeypatch.setattr(explain, "likeliest", lambda *given, **_: [*map(list, given[1])] and [])
     first = tried(1800.0, together=(hypothesis("first"),))
     explain._paired(LONG, first, {}, lambda _: False)  # pyright: ignore[reportPrivateUsage]
@@ -124,9 +130,9 @@ def test_where_a_cause_explains_a_log_but_leaves_more_than_noise_what_slopes_do_
     assert [one.cost for one in found] == ([700.0, 800.0] if asked else [800.0])
 
 
-@pytest.mark.parametrize(("rival", "asked"), [(False, ["far"]), (True, [])])
+@pytest.mark.parametrize(("rivalled", "asked"), [(np.inf, ["far"]), (1700.0, [])])
 def test_beside_a_rival_nothing_is_tried_that_is_out_of_reach(
-    rival: bool, asked: list[str], monkeypatch: pytest.MonkeyPatch
+    rivalled: float, asked: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given: list[str] = []
     monkeypatch.setattr(explain, "within_reach", lambda _, __, asked: [one for one in asked if one.far][:1])
@@ -143,8 +149,78 @@ def test_beside_a_rival_nothing_is_tried_that_is_out_of_reach(
 
     monkeypatch.setattr(explain, "screened", screened)
     first = tried(1800.0, together=(hypothesis("first"),))
-    assert not explain._paired(LONG, first, {}, lambda _: False, rival=rival)  # pyright: ignore[reportPrivateUsage]
+    assert not explain._paired(LONG, first, {}, lambda _: False, rivalled=rivalled)  # pyright: ignore[reportPrivateUsage]
     assert given == asked
+
+
+Pairing = Callable[..., list[Tried]]
+
+
+@pytest.fixture
+def pairing(monkeypatch: pytest.MonkeyPatch) -> Pairing:
+    """Pairs beside a hypothesis that costs 5,000, of sets and searches that are given; the noise costs 1,000."""
+
+    def paired(every: int, screened: Any, led_on: Any, rivalled: float = np.inf) -> list[Tried]:
+        gains = {"far": 0.0, "some": 1e3, "none": 0.0}
+        monkeypatch.setattr(explain, "delayed", lambda log, _: log)
+        monkeypatch.setattr(explain, "promising", lambda *_: ([LIKELY], [FAR, SOME, NONE], gains))
+        monkeypatch.setattr(explain, "own_starts", lambda *_: [{}])
+        monkeypatch.setattr(explain, "_begun_again", lambda *_: {"from": 1.0})
+        monkeypatch.setattr(explain, "skipping", lambda *_: every)
+        monkeypatch.setattr(explain, "left_by", lambda _, cost: cost / 1000.0)
+        monkeypatch.setattr(explain, "screened", screened)
+        monkeypatch.setattr(explain, "settled_each", lambda _, ways, *__: [min(way, key=COST) for way in ways])
+        monkeypatch.setattr(explain, "led_on", led_on)
+        monkeypatch.setattr(explain, "likeliest", lambda log, ways, *_: led_on(log, [next(iter(way)) for way in ways]))
+        first = tried(5000.0, together=(hypothesis("first"),))
+        return explain._paired(LONG, first, {}, lambda _: False, rivalled=rivalled)  # pyright: ignore[reportPrivateUsage]
+
+    return paired
+
+
+@pytest.mark.parametrize(("near", "swapped"), [(1400.0, False), (1600.0, True)])
+def test_pairs_that_few_samples_leave_unexplained_are_not_led_on_before_all_others_are_compared(
+    near: float, swapped: bool, pairing: Pairing
+) -> None:
+    led: list[str] = []
+
+    def screened(_: Any, together: Any, starts: Any, *__: Any, **___: Any) -> list[Tried]:
+        cost = near if together[-1] in (LIKELY, FAR) else 1500.0
+        return [tried(cost, together=together)] * len(starts)
+
+    def led_on(_: Any, ended: Sequence[Tried], *__: Any) -> list[Tried]:
+        led.append(" ".join(one.together[-1].name for one in ended))
+        return [*ended]
+
+    found = pairing(2, screened, led_on)
+    assert led == (["some none", "likely far"] if swapped else ["likely far", "some none"])
+    assert found[0].cost == min(near, 1500.0)
+
+
+def test_a_pair_beside_a_rival_counts_only_below_what_is_known(pairing: Pairing) -> None:
+    useful: list[float] = []
+
+    def screened(_: Any, together: Any, starts: Any, *__: Any, **___: Any) -> list[Tried]:
+        return [tried(1450.0, together=together)] * len(starts)
+
+    def led_on(_: Any, ended: Sequence[Tried], *given: Any) -> list[Tried]:
+        useful.extend(given[2:])
+        return [*ended]
+
+    assert [one.cost for one in pairing(2, screened, led_on, 1461.0)] == [1450.0] * 4
+    assert not pairing(2, screened, led_on, 1459.0)
+    assert useful == [1461.0 - explain.WORTH, 1459.0 - explain.WORTH]
+
+
+def test_where_little_is_left_a_start_that_leads_a_pair_nowhere_is_not_used_again(pairing: Pairing) -> None:
+    begun: list[int] = []
+
+    def screened(_: Any, together: Any, starts: Any, *__: Any, **___: Any) -> list[Tried]:
+        begun.append(len(starts))
+        return [tried(1450.0 if "from" in start else 9e4, together=together) for start in starts]
+
+    pairing(1, screened, lambda _, ended, *__: [*ended])
+    assert begun == [2, 1, 1]
 
 
 def test_a_speed_that_is_late_and_one_that_is_early_are_one_where_they_came_to_one_place() -> None:

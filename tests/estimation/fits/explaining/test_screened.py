@@ -1,11 +1,15 @@
 """Where hypotheses lead in a few steps."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from estimation.fits.explaining import screened as screening
-from estimation.fits.explaining.screened import screened
+from estimation.fits.explaining.screened import nearing, screened
+from estimation.fits.explaining.settled import SLIGHT
 from estimation.fits.explaining.wide_log import widened
-from estimation.fits.hypotheses import DELIVERY
+from estimation.fits.hypotheses import DELIVERY, VOLUME
 from tests.estimation.fits.short_logs import PAPER, at_one_speed, lost_in_bias, seen
 
 
@@ -17,3 +21,42 @@ def test_a_worn_pump_at_one_speed_is_found_sooner_from_where_the_flow_bias_is_he
     monkeypatch.setattr(screening, "worn_start", lambda *_: ())
     (from_sound,) = screened(log, (DELIVERY,), [plain])
     assert from_worn.cost < from_sound.cost - 1.0
+
+
+def test_a_screening_ends_where_a_step_promises_less_than_long_steps_err(monkeypatch: pytest.MonkeyPatch) -> None:
+    log, descend = widened(seen(at_one_speed()), PAPER), screening.descend
+    counted: list[int] = []
+
+    def counting(at: Any, *given: Any, **options: Any) -> Any:
+        counted.append(0)
+
+        def once_more(theta: Any) -> Any:
+            counted[-1] += 1
+            return at(theta)
+
+        assert options["least_share"] == SLIGHT
+        return descend(once_more, *given, **options)
+
+    monkeypatch.setattr(screening, "descend", counting)
+    (near,) = screened(log, (VOLUME,), [lost_in_bias()])
+    (again,) = screened(log, (VOLUME,), [near.values])
+    assert counted[-1] < counted[0] <= screening.SCREENING
+    assert again.cost > (1.0 - 2.0 * SLIGHT) * near.cost
+
+
+@pytest.mark.parametrize(("lowest", "begun"), [(90.0, ["b"]), (110.0, ["a", "c"])])
+def test_where_what_slopes_do_not_see_comes_lower_than_all_else_others_begin_from_where_it_did_so(
+    lowest: float, begun: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Any] = []
+
+    def from_starts(_: Any, __: Any, starts: Any, *___: Any) -> Any:
+        asked.append(starts)
+        return [SimpleNamespace(cost=lowest if start == "b" else 900.0) for start in starts]
+
+    monkeypatch.setattr(screening, "screened", from_starts)
+    far, some = (SimpleNamespace(far=far) for far in (True, False))
+    starts: Any = ["a", "b", "c"]
+    nothing: Any = None
+    assert len([*nearing(nothing, [some, far], starts, ["a", "c"], 100.0, 2)]) == 2  # pyright: ignore[reportArgumentType]
+    assert asked == [starts, begun]
