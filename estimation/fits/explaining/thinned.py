@@ -56,12 +56,13 @@ def thinned(log: GreyBoxLog, every: int) -> GreyBoxLog:
     What is pumped and what is swept between two of them stay: motor speed is averaged as far as a straight line between
     means needs, position is as it was read. A pressure is the mean over a block; one that came slower than the rest is
     as it was read, and the samples that count are those that have one. Each sample left stands for as many residuals as
-    the log has, so that costs stay what they were, but for what white noise makes of them.
+    the log has, so that costs stay what they were, but for what white noise makes of them. What a gap in the speed
+    leaves open stays, too.
 
     Parameters
     ----------
     log : GreyBoxLog
-        The log, widened; one with gaps in its speed, or with pressures at no even distance, is left as it is.
+        The log, widened; one with pressures at no even distance is left as it is.
     every : int
         How many samples are one [count].
 
@@ -70,7 +71,7 @@ def thinned(log: GreyBoxLog, every: int) -> GreyBoxLog:
     GreyBoxLog
         The log.
     """
-    if every < 2 or log.gaps.size:
+    if every < 2:
         return log.coarsened()
     block = min(max(1, round(log.block / log.sample_time)), every)
     there = np.flatnonzero(np.isfinite(log.measured[:, 0]))
@@ -93,6 +94,7 @@ def thinned(log: GreyBoxLog, every: int) -> GreyBoxLog:
         sample_time=every * log.sample_time,
         steps=np.ones(len(drives), log.steps.dtype),
         noise=tuple(one.scaled(1.0 / block) for one in log.noise),
+        gaps=_gaps_at(log.gaps, first, every),
         stands_for=max(every / apart, 1.0) / block,
     )
 
@@ -102,6 +104,13 @@ def _smoothed(speed: Array, every: int) -> Array:
     rising = np.arange(1.0, every + 1.0)
     window = np.concatenate([rising, rising[-2::-1]]) / every**2
     return np.convolve(np.pad(speed, every - 1, mode="edge"), window, "valid")
+
+
+def _gaps_at(gaps: Array, row: int, every: int) -> Array:
+    """Return gaps by the samples that are left from a row on; each opens what those opened that it stands for."""
+    first, last, variance = gaps.T
+    begun, ended = (np.maximum(end - row, 0.0) // every for end in (first, last))
+    return np.column_stack([begun, ended, variance * (last - first + 1.0) / (ended - begun + 1.0)])
 
 
 def _block_means(measured: Array, block: int) -> Array:

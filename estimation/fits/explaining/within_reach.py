@@ -52,7 +52,7 @@ def within_reach(log: GreyBoxLog, tried: Tried, asked: Sequence[Hypothesis]) -> 
     sequence of Hypothesis
         Some of them, or all; always all of a short log, whose search takes a second or two.
     """
-    if not asked or len(log.drives) < FEW or log.gaps.size:
+    if not asked or len(log.drives) < FEW:
         return asked
     left = left_by(log, tried.cost)
     if not REACHED < left < UNFINISHED:

@@ -64,6 +64,15 @@ def test_a_pressure_at_no_even_distance_leaves_a_log_as_it_is() -> None:
     assert len(thinned(replace(whole, measured=uneven), 4).drives) == len(whole.drives)
 
 
+@pytest.mark.parametrize("every", [2, 4])
+def test_what_a_gap_in_the_speed_leaves_open_stays(every: int) -> None:
+    whole = replace(seen(), gaps=np.array([[9.0, 20.0, 1e9], [401.0, 401.0, 2e9]]))
+    first, last, variance = thinned(whole, every).gaps.T
+    assert first.tolist() == [9 // every, 401 // every]
+    assert last.tolist() == [20 // every, 401 // every]
+    assert variance * (last - first + 1.0) == pytest.approx([12e9, 2e9])
+
+
 def test_a_cost_stays_what_it_was_where_far_more_than_noise_is_left() -> None:
     whole = seen()
     costs = []
