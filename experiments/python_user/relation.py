@@ -81,7 +81,8 @@ class Relation(Shown):
         Warns
         -----
         LogWarning
-            If a linear model is run in place of a polynomial one, or an input lies beyond the range of the fit.
+            If a linear model is run in place of a polynomial one, an input lies beyond the range of the fit, or rows
+            that the logger wrote a second time are left out.
         """
         import numpy as np
 
@@ -89,8 +90,9 @@ class Relation(Shown):
         from estimation.identification.free_run.from_records import channels_to_run
 
         runs: list[np.ndarray[Any, Any]] = []
+        records = self._records_of(log)
         for one in self.models:
-            record = _record_of(log, one.sample_time)
+            record = records[one.sample_time]
             if record is None:
                 run, judged = one.judged_run(log)
                 u = np.asarray(log, dtype=np.float64).reshape(len(run), -1)
@@ -128,14 +130,22 @@ class Relation(Shown):
         import pandas as pd
 
         rows: dict[str, Any] = {}
+        records = self._records_of(log)
         for one in self.models:
-            if (record := _record_of(log, one.sample_time)) is None:
+            if (record := records[one.sample_time]) is None:
                 refuse(f"a Log, a Record or a table with the channels is needed, got {type(log).__name__}")
             part = _channels(one, record, split=True)
             quality, judged = one.judged_quality(part.u, part.y)
             _warn_of_inputs(one, part, judged)
             rows[one.output] = vars(quality)
         return pd.DataFrame.from_dict(rows, orient="index")
+
+    def _records_of(self, log: Any) -> "dict[float, Record | None]":
+        """Return the record of a log for each sample time of the models, without rows that were sent twice."""
+        names = [*dict.fromkeys(name for one in self.models for name in (*one.inputs, one.output))]
+        return {
+            sample_time: _record_of(log, sample_time, names) for sample_time in {o.sample_time for o in self.models}
+        }
 
     def to_control(self) -> "TransferFunction | StateSpace":
         """Return linear models as one object of python-control, a row an output.
@@ -210,8 +220,12 @@ def _shared_states(models: "Sequence[FreeRunModel]", outputs: "Sequence[StateSpa
     return control.StateSpace(*one.with_delays_as_states(), one.sample_time, **names)
 
 
-def _record_of(log: Any, sample_time: float) -> "Record | None":
-    """Return the record of a log or of a table, rows without a time `sample_time` apart; None of plain arrays."""
+def _record_of(log: Any, sample_time: float, names: Sequence[str]) -> "Record | None":
+    """Return the record of a log or of a table, rows without a time `sample_time` apart; None of plain arrays.
+
+    Rows that were sent twice are left out, by those of the named columns that are there.
+    """
+    from estimation.identification.free_run.from_records import sent_once
     from experiments.python_user.log import Log
     from plant.log.any_columns import read_any
     from plant.log.frames import by_name, frame_table, is_frame
@@ -219,10 +233,13 @@ def _record_of(log: Any, sample_time: float) -> "Record | None":
 
     if isinstance(log, str | Path):
         refuse(f"a log is needed, got the text {str(log)!r}; hydrostate.read opens a file")
+    record: Record | None
     if isinstance(log, Log | Record):
-        return log.related if isinstance(log, Log) else log
-    table = log if is_frame(log) else by_name(log)
-    return None if table is None else read_any(frame_table(table), assumed=sample_time)
+        record = log.related if isinstance(log, Log) else log
+    else:
+        table = log if is_frame(log) else by_name(log)
+        record = None if table is None else read_any(frame_table(table), assumed=sample_time)
+    return None if record is None else sent_once(record, [name for name in names if name in record])
 
 
 def _warn_of_inputs(

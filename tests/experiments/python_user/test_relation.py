@@ -91,6 +91,18 @@ def test_another_log_is_followed_output_by_output(both: Relation) -> None:
     assert told["rmse"].to_numpy() == pytest.approx(0.02, rel=0.2)  # the noise is all that is left
 
 
+def test_rows_that_were_sent_twice_are_left_out_of_all_outputs_and_told(both: Relation) -> None:
+    once = record(2)
+    rows = np.r_[0:220, 200:400]
+    twice = Record(T, {name: once[name][rows] for name in once})
+    with pytest.warns(LogWarning, match="20 rows"):
+        again = both.simulate(opened(twice))
+    np.testing.assert_allclose(again, both.simulate(once))
+    with pytest.warns(LogWarning, match="20 rows"):
+        told = both.validate(twice)
+    np.testing.assert_allclose(told["rmse"], both.validate(once)["rmse"])
+
+
 def test_saved_models_are_loaded_without_what_was_fitted(both: Relation, tmp_path: Path) -> None:
     both.save(tmp_path / "model.json")
     loaded = Relation(load_models(tmp_path / "model.json"))
