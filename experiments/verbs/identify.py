@@ -1,7 +1,8 @@
 """`hydrostate identify LOG...`: the discrete transfer function of each log, or a model between any columns."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Any, NoReturn
 
 import typer
 
@@ -16,17 +17,31 @@ from experiments.command.options import (
     listed,
     load_columns,
     load_rig,
-    option,
     refuse_given,
 )
 from experiments.command.output_paths import require_place
-from experiments.identification.of_channels import INPUT, OUTPUT, STRUCTURES, ChannelFit, identify_channels
+from experiments.identification.of_channels import INPUT, OUTPUT, ChannelFit, identify_channels
 from experiments.identification.of_columns import ColumnFit, identify_columns
+from experiments.identification.options import (
+    ONLY_BETWEEN_COLUMNS,
+    Delay,
+    Figure,
+    FilterHz,
+    Inputs,
+    Numerator,
+    Order,
+    Outputs,
+    References,
+    Resample,
+    Response,
+    SampleTime,
+    Simulate,
+    Simulated,
+    StructureName,
+    Validate,
+)
 from experiments.identification.simulate_model import simulate_model
 from plant.errors import HydrostateError
-
-ONLY_BETWEEN_COLUMNS = ("narx", "hammerstein", "state-space")
-"""Structures that are fitted between any columns only."""
 
 commands = typer.Typer()
 
@@ -34,83 +49,21 @@ commands = typer.Typer()
 @commands.command(epilog="Example: hydrostate identify prbs.csv --structure auto --order auto --out library.json")
 def identify(
     logs: Logs,
-    structure: Annotated[
-        str,
-        option(
-            "NAME",
-            f"{', '.join([*STRUCTURES, *ONLY_BETWEEN_COLUMNS])}; auto takes the best on held-back data. "
-            "With --input and --output also: narx (polynomial), hammerstein (dead zone, saturation or backlash before "
-            "a linear model), state-space (one model of all outputs; its order is the number of states).",
-        ),
-    ] = "output-error",
-    order: Annotated[
-        str | None,
-        option(
-            "INT|auto",
-            "Order of the denominator; auto takes the best by BIC, or with --input and --output the best free run on "
-            "held-back blocks.",
-            show_default="2; auto with --input",
-        ),
-    ] = None,
-    numerator: Annotated[
-        int | None, option("INT", "Number of numerator coefficients; by default one more than the order.", min=1)
-    ] = None,
-    delay: Annotated[
-        str | None, option("INT|auto", "Dead time [samples of the model].", show_default="0; auto with --input")
-    ] = None,
-    sample_time: Annotated[
-        float | None,
-        option(
-            "S",
-            "Sample time of the model [s], and of a log without a time column; by default 1e-3 (Table 6), or the log's "
-            "if that is longer. With --input, only of logs without a time column.",
-        ),
-    ] = None,
-    resample: Annotated[
-        float | None, option("S", "With --input: sample time of the model [s]; by default the log's.")
-    ] = None,
-    filter_hz: Annotated[
-        float | None,
-        option("HZ", "Cut-off of a zero-phase low-pass on input and output before the fit [Hz]; none by default."),
-    ] = None,
-    inputs: Annotated[
-        list[str] | None,
-        option(
-            "COLUMN",
-            "Input: any column in any unit; repeat the option, or separate several by commas.",
-            "--input",
-            show_default="motor_speed_rad_s",
-        ),
-    ] = None,
-    outputs: Annotated[
-        list[str] | None,
-        option("COLUMN", "Output, likewise; one model per output.", "--output", show_default="velocity_m_s"),
-    ] = None,
-    references: Annotated[
-        list[str] | None,
-        option("COLUMN", "With --input, of a closed loop: what drives it, such as its set-point.", "--reference"),
-    ] = None,
-    validate: Annotated[
-        list[Path] | None, option("LOG", "With --input: a log to test the model on; it is not used for the fit.")
-    ] = None,
-    simulate: Annotated[
-        Path | None,
-        option("MODEL", "Simulate this saved model (a file from --out) on the logs instead of fitting one."),
-    ] = None,
-    simulated: Annotated[
-        Path | None, option("CSV", "With --input or --simulate: write time, inputs, measured and simulated output.")
-    ] = None,
-    figure: Annotated[
-        Path | None, option("PNG", "Draw measured and simulated output, the residual, its correlations, and the gain.")
-    ] = None,
-    response: Annotated[
-        Path | None,
-        option(
-            "PNG",
-            "With --input: draw the frequency response; --json also prints it, with the distortion levels of a "
-            "multisine.",
-        ),
-    ] = None,
+    structure: StructureName = "output-error",
+    order: Order = None,
+    numerator: Numerator = None,
+    delay: Delay = None,
+    sample_time: SampleTime = None,
+    resample: Resample = None,
+    filter_hz: FilterHz = None,
+    inputs: Inputs = None,
+    outputs: Outputs = None,
+    references: References = None,
+    validate: Validate = None,
+    simulate: Simulate = None,
+    simulated: Simulated = None,
+    figure: Figure = None,
+    response: Response = None,
     rig: RigFile = None,
     columns: Columns = None,
     out: Out = None,
@@ -130,6 +83,12 @@ def identify(
     require_place("--figure", figure, ".png")
     require_place("--response", response, ".png")
     require_place("--simulated", simulated)
+    asked: dict[str, Any] = {
+        "structure": structure,
+        "numerator": numerator,
+        "sample_time": sample_time,
+        "figure": figure,
+    }
     related = any(one is not None for one in (inputs, outputs, references, simulate))
     if (related and rig is None and not columns) or structure in ONLY_BETWEEN_COLUMNS:
         of_channels = {"--rig": rig, "--columns": columns, "--filter-hz": filter_hz}
@@ -138,38 +97,40 @@ def identify(
             listed(*(inputs or ())),
             listed(*(outputs or ())),
             listed(*(references or ())),
-            structure=structure,
-            order=whole_or_auto("--order", "auto" if order is None else order, 1),
-            delay=whole_or_auto("--delay", "auto" if delay is None else delay, 0),
-            numerator=numerator,
-            sample_time=sample_time,
+            order=whole_or_auto("--order", order or "auto", 1),
+            delay=whole_or_auto("--delay", delay or "auto", 0),
             resampled=resample,
             validate=tuple(validate or ()),
-            figure=figure,
             simulated=simulated,
             response=response,
+            **asked,
         )
-        if simulate is None:
-            identify_columns(logs, between, as_json=as_json, out=out)
-        of_fits = {"--validate": validate, "--figure": figure, "--response": response, "--resample": resample}
-        refuse_given(of_fits, "goes with a fit, not with --simulate")
-        simulate_model(logs, simulate, between, as_json=as_json, out=out)
+        _relate_columns(logs, between, simulate, as_json=as_json, out=out)
     of_columns = {"--reference": references, "--simulate": simulate, "--simulated": simulated, "--validate": validate}
     of_columns |= {"--response": response, "--resample": resample}
     refuse_given(of_columns, "goes with --input and --output that name columns, without --rig and --columns")
     fit = ChannelFit(
         input=_one_channel("--input", inputs, INPUT),
         output=_one_channel("--output", outputs, OUTPUT),
-        structure=structure,
         order=whole_or_auto("--order", order or "2", 1),
         delay=whole_or_auto("--delay", delay or "0", 0),
-        numerator=numerator,
-        sample_time=sample_time,
         filter_hz=filter_hz,
-        figure=figure,
         seed=seed,
+        **asked,
     )
     identify_channels(logs, fit, load_rig(rig), load_columns(columns), as_json=as_json, out=out)
+
+
+def _relate_columns(
+    logs: Sequence[Path], fit: ColumnFit, model: Path | None, *, as_json: bool, out: Path | None
+) -> NoReturn:
+    """Fit a model between any columns, or run a saved one on the logs, and leave."""
+    if model is None:
+        identify_columns(logs, fit, as_json=as_json, out=out)
+    of_fits: dict[str, object] = {"--validate": fit.validate or None, "--figure": fit.figure}
+    of_fits |= {"--response": fit.response, "--resample": fit.resampled}
+    refuse_given(of_fits, "goes with a fit, not with --simulate")
+    simulate_model(logs, model, fit, as_json=as_json, out=out)
 
 
 def _one_channel(option: str, given: list[str] | None, default: str) -> str:
