@@ -123,6 +123,25 @@ def minimise(structure: Structure, data: Experiments) -> Array:
     ndarray, shape (n_numerator + n_denominator + experiments * n_initial,)
         Numerator, denominator behind its 1, and the initial state of each experiment.
     """
+    carried = structure.n_main if data.count == 1 and data.u.size > liveliest_section(data).u.size else None
+    finalists = screened(structure, data)
+    finished = [descend_from(structure, theta[:carried], data, FINAL_STEPS, TOLERANCE) for _, theta in finalists]
+    return min(finished, key=lambda found: found[0])[1]
+
+
+def screened(structure: Structure, data: Experiments) -> list[tuple[float, Array]]:
+    """Return the best of the starts after a few steps from each, on the liveliest section of a long record.
+
+    Parameters
+    ----------
+    data : Experiments
+        Input and output of order one.
+
+    Returns
+    -------
+    list of tuple of float and ndarray, shape (p,)
+        Sums of squared residuals, and values as `minimise` returns them, the lowest first.
+    """
     part = liveliest_section(data)
     count = int(np.clip(STARTS_TIMES_SAMPLES // part.u.size, *STARTS))
     screened = [
@@ -134,9 +153,7 @@ def minimise(structure: Structure, data: Experiments) -> Array:
         is_new = all(cost - other > SAME_MINIMUM * cost for other, _ in finalists)
         if is_new and len(finalists) < FINALISTS:
             finalists.append((cost, theta))
-    carried = structure.n_main if part is not data else None
-    finished = [descend_from(structure, theta[:carried], data, FINAL_STEPS, TOLERANCE) for _, theta in finalists]
-    return min(finished, key=lambda found: found[0])[1]
+    return finalists
 
 
 def _one_order_less(structure: Structure, data: Experiments) -> list[Array]:

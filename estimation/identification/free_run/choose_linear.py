@@ -14,8 +14,9 @@ from estimation.progress import tell
 BLOCKS = 4
 """Blocks of every log, each held back once."""
 
-CLEARLY = 0.01
-"""Share by which a larger model must do better on what was held back."""
+CLEARLY, NEAR = 0.01, 1e-6
+"""Share by which a larger model must do better on what was held back, and share of the cost that two steps of a descent
+in a row must gain each while forms are compared: the chosen one is fitted on."""
 
 DEAD_TIME = 0.03
 """Share by which a dead time of more than one sample must do better."""
@@ -110,7 +111,7 @@ def held_back_blocks(fit: LinearFit, data: Channels) -> tuple[float, ...]:
     tell("linear models")
     for masks in blocks(data, BLOCKS):
         mask = np.concatenate(masks) & np.isfinite(target)
-        part = fit_linear(fit.form, data.without(masks), [fit.f], bounded=fit.bounded)
+        part = fit_linear(fit.form, data.without(masks), [fit.f], bounded=fit.bounded, least_gain=NEAR)
         errors.append(block_error(Problem(fit.form, data).jacobian(part.theta)[0] - target, mask))
     return tuple(errors)
 
@@ -201,7 +202,7 @@ def halves_error(fit: LinearFit, data: Channels) -> float:
         return float("nan")
     squares = list[Array]()
     for part, other in ((first, second), (second, first)):
-        dynamics = LinearDynamics.of(fit_linear(fit.form, part, [fit.f], bounded=fit.bounded))
+        dynamics = LinearDynamics.of(fit_linear(fit.form, part, [fit.f], bounded=fit.bounded, least_gain=NEAR))
         squares += [(dynamics.run(u, y) - y) ** 2 for u, y in zip(other.u, other.y, strict=True)]
     return float(np.sqrt(np.nanmean(np.concatenate(squares))))
 
@@ -304,9 +305,9 @@ def linear_candidates(
 
 
 def _best_start(form: Form, data: Channels, previous: Sequence[Array]) -> LinearFit:
-    fits = [fit_linear(form, data)]
+    fits = [fit_linear(form, data, least_gain=NEAR)]
     if previous:
-        fits.append(fit_linear(form, data, previous))
+        fits.append(fit_linear(form, data, previous, least_gain=NEAR))
     return min(fits, key=lambda fit: fit.cost)
 
 

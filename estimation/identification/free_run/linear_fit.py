@@ -6,18 +6,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.arrays import Array, BoolArray
-from estimation.identification.fit.output_error import minimise
+from estimation.identification.fit.output_error import FINAL_STEPS, descend_from, screened
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.lagged_columns import columns_of, lay_shifted
 from estimation.identification.free_run.least_squares import Counted, least_squares
 from estimation.identification.free_run.linear_kernel import decay_rows, longest_pole, settles
-from estimation.identification.search.criterion import Structure, polynomial, stabilised
+from estimation.identification.search.criterion import Structure, held_within
 from estimation.identification.search.descent import stable
 from estimation.identification.search.experiments import Experiments
 from estimation.identification.search.levenberg import levenberg
+from estimation.identification.search.reflections import stable_step
 
-TOLERANCE, MOST_STEPS = 1e-9, 80
-"""Share of the cost that a further step may promise at the end, and evaluations at most."""
+TOLERANCE, MOST_STEPS, FIRST_STEPS = 1e-9, 80, 20
+"""Share of the cost that a further step may promise at the end, evaluations at most, and those of each of several
+starts."""
 
 MOST_SEARCHED = 100_000
 """Samples of which the global minimum is searched; more begin at other starts alone."""
@@ -192,7 +194,9 @@ class Problem:
                 lay_shifted(jacobian[part, n_b + k - 1], moved[0], k, -before / float(f.sum()))
         return output
 
-    def descend(self, theta: Array, *, bounded: bool = False, least_gain: float = 0.0) -> LinearFit:
+    def descend(
+        self, theta: Array, *, bounded: bool = False, least_gain: float = 0.0, most_steps: int = MOST_STEPS
+    ) -> LinearFit:
         """Return the minimum that one start leads to.
 
         Parameters
@@ -203,6 +207,8 @@ class Problem:
             Whether every time constant must stay within the record.
         least_gain : float
             As `levenberg` takes it [dimensionless].
+        most_steps : int
+            Evaluations at most.
         """
         n_b, n = self.form.n_b, self.form.order
         jacobian = np.zeros((self.y.size, theta.size), order="F")
@@ -223,8 +229,9 @@ class Problem:
             theta,
             acceptable,
             tolerance=TOLERANCE,
-            most_steps=MOST_STEPS,
+            most_steps=most_steps,
             least_gain=least_gain,
+            within=lambda *now: stable_step(*now, slice(n_b, n_b + n), stretched if bounded else np.ones(n)),
         )
         return LinearFit(self.form, best, cost, bounded)
 
@@ -232,7 +239,7 @@ class Problem:
 def fit_linear(
     form: Form, data: Channels, starts: Sequence[Array] = (), *, bounded: bool = False, least_gain: float = 0.0
 ) -> LinearFit:
-    """Return the best linear model of one form.
+    """Return the best linear model of one form: of the three best starts, what leads after a few steps goes on alone.
 
     Parameters
     ----------
@@ -253,13 +260,16 @@ def fit_linear(
     problem = Problem(form, data)
     tried = list(starts) or [*_steiglitz_mcbride(problem), *_searched(problem)]
     radius = longest_pole(data.longest) ** 1.5 if bounded else 1.0 - 0.3 / data.longest
-    ranked = sorted((problem.profiled(_inside(f, data.longest, radius)) for f in tried), key=lambda one: one[0])
+    ranked = sorted((problem.profiled(held_within(f, data.longest, radius)) for f in tried), key=lambda one: one[0])
     kept: list[tuple[float, Array]] = []
     for cost, theta in ranked:
         if len(kept) < 3 and all(cost - other > 1e-7 * cost for other, _ in kept):
             kept.append((cost, theta))
-    fits = (problem.descend(theta, bounded=bounded, least_gain=least_gain) for _, theta in kept)
-    return min(fits, key=lambda fit: fit.cost)
+    theta = kept[0][1]
+    if len(kept) > 1:
+        begun = (problem.descend(x, bounded=bounded, least_gain=least_gain, most_steps=FIRST_STEPS) for _, x in kept)
+        theta = min(begun, key=lambda fit: fit.cost).theta
+    return problem.descend(theta, bounded=bounded, least_gain=least_gain)
 
 
 def fit_coarsely(form: Form, data: Channels, starts: Sequence[Array] = (), *, bounded: bool = False) -> LinearFit:
@@ -287,13 +297,6 @@ def extended(fit: LinearFit) -> list[Array]:
     return [np.convolve(fit.f, [1.0, -pole]) for pole in SLOWER]
 
 
-def _inside(f: Array, n_samples: int, limit: float) -> Array:
-    f = stabilised(f, n_samples)
-    roots = np.roots(f).astype(np.complex128)
-    radius = np.abs(roots)
-    return f if (radius <= limit).all() else polynomial(roots * np.minimum(1.0, limit / np.maximum(radius, limit)))
-
-
 def _steiglitz_mcbride(problem: Problem) -> list[Array]:
     """Return denominators of the iteration of Steiglitz and McBride (1965), begun at ARX; gaps end a run of rows."""
     form, n, n_samples = problem.form, problem.form.order, problem.data.longest
@@ -313,7 +316,7 @@ def _steiglitz_mcbride(problem: Problem) -> list[Array]:
             rows.append(np.column_stack([series[:-1].T, -past])[near])
             wanted.append(out[near])
         values = least_squares(np.concatenate(rows), np.concatenate(wanted))[0]
-        new = _inside(np.concatenate([[1.0], values[form.n_b + 1 :]]), n_samples, 1.0 - 0.3 / n_samples)
+        new = held_within(np.concatenate([[1.0], values[form.n_b + 1 :]]), n_samples, 1.0 - 0.3 / n_samples)
         found.append(new)
         if np.abs(new - f).max() < 1e-6:
             break
@@ -331,7 +334,9 @@ def _searched(problem: Problem) -> list[Array]:
     for index, (size, delay) in enumerate(zip(form.sizes, form.delays, strict=True)):
         u = np.concatenate([one[:, index] for one in data.u])
         pair = Experiments(u, np.where(problem.used, problem.y, 0.0), problem.used, bounds)
-        theta = minimise(Structure(size, form.order, delay), pair)
+        structure = Structure(size, form.order, delay)
+        # what is found there is a start: the best after a few steps goes on alone
+        theta = descend_from(structure, screened(structure, pair)[0][1], pair, FINAL_STEPS)[1]
         found.append(np.concatenate([[1.0], theta[size : size + form.order]]))
     return found
 

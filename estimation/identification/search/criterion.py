@@ -131,6 +131,29 @@ def stabilised(denominator: Array, n_samples: int) -> Array:
     return polynomial(roots * shrink)
 
 
+def held_within(denominator: Array, n_samples: int, limit: float) -> Array:
+    """Return the denominator with unstable roots reflected, and those outside a circle moved onto it.
+
+    Parameters
+    ----------
+    denominator : ndarray, shape (n + 1,)
+        Monic.
+    n_samples : int
+        Length of the data, as `stabilised` takes it.
+    limit : float
+        Radius of the circle [dimensionless].
+
+    Returns
+    -------
+    ndarray, shape (n + 1,)
+        Monic, stable.
+    """
+    f = stabilised(denominator, n_samples)
+    roots = np.roots(f).astype(np.complex128)
+    radius = np.abs(roots)
+    return f if (radius <= limit).all() else polynomial(roots * np.minimum(1.0, limit / np.maximum(radius, limit)))
+
+
 def predict(structure: Structure, theta: Array, u: Array) -> Array:
     """Return the model's output.
 

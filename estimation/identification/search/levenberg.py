@@ -20,6 +20,7 @@ def levenberg(
     most_steps: int,
     slower: float = 3.0,
     least_gain: float = 0.0,
+    within: Callable[[Array, Array, Array, float], tuple[Array, float] | None] | None = None,
 ) -> tuple[float, Array]:
     """Minimise a sum of squares from one start; a step that is not acceptable is rejected like one that raises it.
 
@@ -40,6 +41,9 @@ def levenberg(
     least_gain : float
         Share of the cost; where two accepted steps in a row gain less each, with little damping, the descent ends: with
         much of it a step is short and says nothing [dimensionless].
+    within : callable, optional
+        Where a step that is not acceptable may lead instead, by values, normal equations and damping, and what the cost
+        should fall by; None where there is no such step.
 
     Returns
     -------
@@ -65,7 +69,13 @@ def levenberg(
             continue
         promised = -float(gradient @ step) + damping * float(np.diag(gram) @ step**2)
         trial, near = theta + step, promised <= tolerance * cost
-        new = at(trial) if acceptable(trial) else (np.inf, gram, gradient)
+        allowed = acceptable(trial)
+        if not allowed and within is not None:
+            other = within(theta, gram, gradient, damping)
+            if other is not None and acceptable(other[0]):
+                (trial, promised), allowed = other, True
+                near = promised <= tolerance * cost
+        new = at(trial) if allowed else (np.inf, gram, gradient)
         if new[0] < cost:
             gained, theta, (cost, gram, gradient) = cost - new[0], trial, new
             idle = idle + 1 if gained < least_gain * cost and damping <= 1e-2 else 0

@@ -189,18 +189,25 @@ def _multiplied(kept: Array, additions: Array) -> Array:
 
 
 def _distinct(ranked: Array, count: int) -> Array:
-    chosen: list[Array] = []
-    poles: list[ComplexArray] = []
-    for row in ranked[: 12 * count]:
-        ordered = np.sort_complex(np.roots(np.concatenate([[1.0], row])).astype(np.complex128))
-        if ordered.size == 0 or (np.abs(ordered) >= 1.0).any():
-            continue
-        if all((np.abs(ordered - other) > DISTINCT * np.abs(1.0 - other)).any() for other in poles):
-            chosen.append(row)
-            poles.append(ordered)
+    rows = ranked[: 12 * count]
+    poles, n = _sorted_poles(rows), ranked.shape[1]
+    chosen: list[int] = []
+    for index in np.flatnonzero((np.abs(poles) < 1.0).all(axis=1)) if n else ():
+        apart = np.abs(poles[index] - poles[chosen]) > DISTINCT * np.abs(1.0 - poles[chosen])
+        if apart.any(axis=1).all():
+            chosen.append(int(index))
         if len(chosen) == count:
             break
-    return np.array(chosen).reshape(-1, ranked.shape[1])
+    return rows[chosen].reshape(-1, n)
+
+
+def _sorted_poles(rows: Array) -> ComplexArray:
+    """Return the roots of monic polynomials given behind their 1, all at once by their companion matrices."""
+    n = rows.shape[1]
+    companion = np.zeros((len(rows), n, n))
+    companion[:, np.arange(1, n), np.arange(n - 1)] = 1.0
+    companion[:, 0] = -rows
+    return np.sort(np.linalg.eigvals(companion).astype(np.complex128), axis=1)
 
 
 def reflected(denominators: list[Array]) -> Array:

@@ -19,6 +19,7 @@ from estimation.identification.free_run.linear_kernel import decay_rows
 from estimation.identification.free_run.model import FreeRunModel, _fit
 from estimation.identification.free_run.other_structures import adopt
 from estimation.identification.free_run.transfer_function import linear_model
+from estimation.identification.search import criterion
 from plant.arrays import Array
 from tests.estimation.identification.free_run.made_channels import NOISE, N, U, answer, channels
 from tests.kernels import loops_in_python
@@ -61,7 +62,8 @@ def problems() -> dict[str, Any]:
     told["lagged beyond the log"] = linear_fit.columns_of(Form(1, (3,), (2,)), U[:3, :1])
     told["no inputs"] = list(linear_fit.columns_of(Form(1, (), ()), U[:3, :0]).shape)
     told["inside"] = [
-        linear_fit._inside(np.poly(roots), 100, 0.95) for roots in ((0.9, 0.5), (0.97, 0.5), (1.3, 0.2), (-0.99, 0.1))
+        criterion.held_within(np.poly(roots), 100, 0.95)
+        for roots in ((0.9, 0.5), (0.97, 0.5), (1.3, 0.2), (-0.99, 0.1))
     ]
     told["longest pole"] = [linear_fit.longest_pole(n) for n in (10, 1000)]
     told["least squares"] = [*least_squares(np.column_stack([U[:9], np.zeros(9)]), NOISE[:9])]
