@@ -308,6 +308,27 @@ class RigCode(Code):
         "the pump loses {share:.2g} ± {half_width:.2g} times what the oil that it delivers is compressed by: it is "
         "filled at the pressure of its inlet; the fit includes this"
     )
+    BORE_LEAKS = (
+        "near position {at_mm:.3g} mm, within about {width_mm:.2g} mm, leakage is {factor:.2g} times as large as "
+        "elsewhere: the bore may be scored or worn there; the fit includes this"
+    )
+    TOOTH_LEAKS = (
+        "once in each turn of the pump, leakage rises to {factor:.2g} times its usual value: one tooth of the pump may "
+        "be worn or chipped; the fit includes this"
+    )
+    PUMP_STARVES = (
+        "above a motor speed of {from_rad_s:.3g} rad/s the pump delivers less than its displacement, at "
+        "{fastest_rad_s:.3g} rad/s {percent:.1f} ± {half_width:.1g} % less: it fills badly (low inlet pressure, "
+        "blocked suction line, cold oil); the fit includes this"
+    )
+    LEAKAGE_LIFTS = (
+        "above a differential pressure of {at_pa:.3g} Pa, leakage grows {factor:.2g} times as fast with pressure: a "
+        "seal lifts, or a valve opens there; the fit includes this"
+    )
+    LEAKS_ONE_WAY = (
+        "leakage is {factor:.2g} times as large while chamber {side} is loaded: a relief or check valve of that side "
+        "may leak; the fit includes this"
+    )
     CHECKS_CRACK = (
         "on average the make-up valves open {crack_pa:.3g} ± {half_width_pa:.2g} Pa below the accumulator pressure in "
         "the rig file; that of chamber {side} opens {later_pa:.3g} ± {later_half_width_pa:.2g} Pa lower than the other"

@@ -42,6 +42,11 @@ OUTSIDE = {
     RigCode.PORT_DRAINS,
     RigCode.AIR_ENTERS,
     RigCode.RELIEF_LOW,
+    RigCode.BORE_LEAKS,
+    RigCode.TOOTH_LEAKS,
+    RigCode.PUMP_STARVES,
+    RigCode.LEAKAGE_LIFTS,
+    RigCode.LEAKS_ONE_WAY,
 }
 """Faults that are none of the nine conditions."""
 

@@ -196,6 +196,14 @@ def _work_on(fault: Note) -> Note | None:
     match fault.code:
         case RigCode.LEAKAGE_GROWS:
             return AdviceCode.STOP_LEAKAGE.note()
+        case RigCode.BORE_LEAKS:
+            return AdviceCode.INSPECT_BORE.note(at_mm=fault.data["at_mm"])
+        case RigCode.TOOTH_LEAKS:
+            return AdviceCode.INSPECT_PUMP.note()
+        case RigCode.PUMP_STARVES:
+            return AdviceCode.CHECK_INLET.note()
+        case RigCode.LEAKAGE_LIFTS | RigCode.LEAKS_ONE_WAY:
+            return AdviceCode.CHECK_VALVES.note()
         case RigCode.PUMP_WORN | AgainstCode.PUMP_DELIVERS_LESS:
             return AdviceCode.CHECK_PUMP.note()
         case RigCode.MAKEUP_BLOCKED | RigCode.PORT_DRAINS | AgainstCode.MAKEUP_STUCK:

@@ -10,13 +10,15 @@ from estimation.fits.explaining.delivery import contradicted
 from estimation.fits.explaining.explain import WORTH, explain
 from estimation.fits.explaining.form_fit import DISCRETISED, FormFit, weighed, with_structure
 from estimation.fits.explaining.left_open import valves_unseen, wear_open
-from estimation.fits.explaining.objections import doubted, fit_explains_all, objections
+from estimation.fits.explaining.objections import doubted, fit_explains_all, limits, objections
 from estimation.fits.explaining.speed_instead import speed_instead
 from estimation.fits.explaining.toothed import asked_for_teeth
 from estimation.fits.explaining.tried import Explanation
-from estimation.fits.flow.asked import ALWAYS_ASKED, asked_of, near_starts
+from estimation.fits.explaining.uneven_loss import UnevenLoss, loss_note, uneven_loss
+from estimation.fits.flow.asked import ALWAYS_ASKED, MOST_ASKED, asked_of, near_starts
 from estimation.fits.flow.log import homed_at_stop, without_strays
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, stiffer
+from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.flow.valley import lower_valley
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
@@ -47,6 +49,10 @@ moving average of 2 to 6 ms have their bulk modulus 0.1 % too low."""
 BUBBLES = 2e-3
 """The same where air gets in within the log: bubbles are taken to yield as slow ones do (exponent 1), quick ones reach
 1.4. 16 training logs, whose exponent is 1.3, are 0.15 % off by root mean square, up to 0.4 % (decision 249)."""
+
+UNEVEN = 3e-3
+"""The same where a loss goes with what is measured: its course has the shape that is assumed of it, and a real one not
+quite [fraction]; judged."""
 
 SURER = 1.4
 """What a difference of log-likelihood between balances is divided by [dimensionless]: they leave out less than the
@@ -157,6 +163,9 @@ def fit_flow(
         asked, open_ends = _asked(plain, sensed, traits)
         strange = _strange(plain, asked, traits) if asked else None
         if strange is None:
+            loss = _uneven(plain, traits) if len(asked) >= len(HYPOTHESES) else None
+            if loss is not None:
+                return _losing_fit(plain, loss, sensed)
             return _plain_fit(plain, sensed, open_ends, begun=BEGUN in asked)
         if (elsewhere := _elsewhere(plain, strange)) is None:
             return _explained_fit(plain, strange, sensed, traits)
@@ -197,6 +206,34 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
     wanted = _wanted(strange.names, plain.best, plain.swinging, homed=homed_at_stop(plain.log), late=traits.filtered)
     believed = _known(strange.names, strange.fit) and explains(strange.fit) and strange.fit.cost < wanted
     return strange if believed else None
+
+
+def _uneven(plain: PlainFits, traits: LogTraits) -> UnevenLoss | None:
+    """Return the loss that goes with what is measured and explains a log that nothing else does."""
+    log, best = plain.log, plain.best
+    if plain.explains(best) or log.gaps.size or log.passes_on or traits.loaded or len(log.drives) > MOST_ASKED:
+        return None
+    usual = [start for start in plain.starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
+    starts = [plain.swinging.values, *usual]
+    largest, _ = limits(log.passes_on, best.seen)
+    return uneven_loss(log, plain.start.parameters, starts, plain.explains, best.cost, largest)
+
+
+def _losing_fit(plain: PlainFits, loss: UnevenLoss, sensed: ShownPlay) -> FormFit:
+    """Return what a log says that a loss explains which goes with what is measured."""
+    one = loss.fit
+    untaken, open_play = plain.play_untaken(one.play, sensed)
+    value, std = one.values["bulk_modulus"], one.std["bulk_modulus"]
+    found = {name: (each, one.std[name]) for name, each in one.values.items()}
+    return FormFit(
+        parameters=with_structure(found, float(np.linalg.norm([UNEVEN, untaken, loss.opened]))),
+        bound=std / value,
+        chi_square=one.chi_square[0],
+        reasons=play_left(one.play, sensed),
+        rig_slopes=one.rig_slopes,
+        remarks=(*plain.teeth, loss_note(loss), *open_play),
+        turning=plain.turning,
+    )
 
 
 def _told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:

@@ -175,6 +175,9 @@ def test_a_fault_outside_the_nine_is_worked_on_before_the_rig_file() -> None:
     assert advice_for(staircase([100.0]), SURE, (blocked,), (), ALL) == (AdviceCode.CHECK_MAKEUP.note(side="B"),)
 
 
+STARVES = RigCode.PUMP_STARVES.note(from_rad_s=80.0, percent=12.0, half_width=1.0, fastest_rad_s=150.0)
+
+
 @pytest.mark.parametrize(
     ("fault", "work"),
     [
@@ -182,6 +185,11 @@ def test_a_fault_outside_the_nine_is_worked_on_before_the_rig_file() -> None:
         (RigCode.RELIEF_LOW.note(setting_pa=2e6, half_width_pa=1e4, rig_pa=3e6), AdviceCode.CHECK_RELIEF.note()),
         (RigCode.AIR_ENTERS.note(percent=1.0, half_width=0.1, percent_of_log=40.0), AdviceCode.FIND_AIR.note()),
         (RigCode.PORT_DRAINS.note(side="A", drain=1e-12), AdviceCode.CHECK_MAKEUP.note(side="A")),
+        (RigCode.BORE_LEAKS.note(at_mm=4.0, width_mm=3.0, factor=9.0), AdviceCode.INSPECT_BORE.note(at_mm=4.0)),
+        (RigCode.TOOTH_LEAKS.note(factor=9.0), AdviceCode.INSPECT_PUMP.note()),
+        (STARVES, AdviceCode.CHECK_INLET.note()),
+        (RigCode.LEAKAGE_LIFTS.note(at_pa=6e5, factor=4.0), AdviceCode.CHECK_VALVES.note()),
+        (RigCode.LEAKS_ONE_WAY.note(side="A", factor=4.0), AdviceCode.CHECK_VALVES.note()),
         (AgainstCode.PUMP_DELIVERS_LESS.note(percent=80.0), AdviceCode.CHECK_PUMP.note()),
         (AgainstCode.MAKEUP_STUCK.note(side="B"), AdviceCode.CHECK_MAKEUP.note(side="B")),
         (AgainstCode.MAKEUP_LEAKS.note(), AdviceCode.CHECK_MAKEUP.note(side="A or B")),

@@ -1,0 +1,190 @@
+"""Courses of losses that go with what is measured: position, the shaft's angle, speed, pressure, or its direction.
+
+A scored bore leaks where the piston passes the score, a worn tooth once a turn, a pump that fills badly loses flow
+above some speed, a lip that lifts leaks above some pressure, and a leaking relief valve leaks one way.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.fits.flow.log import usual_leakage
+from estimation.fits.greybox.log import GreyBoxLog
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+
+BORE, TOOTH, FILLING, LIFTING, ONE_WAY = "bore", "tooth", "filling", "lifting", "one_way"
+"""What a loss goes with: position, the shaft's angle, speed, pressure, the direction of pressure."""
+
+NARROWEST = 2e-4
+"""Least width of a score [m], or of a tooth's passing over its tenth [rad]; judged."""
+
+WIDEST_TOOTH = 1.0
+"""Largest width of a tooth's passing [rad]: a wider one is no single tooth's."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """What a loss goes with.
+
+    Parameters
+    ----------
+    kind : str
+        `BORE`, `TOOTH`, `FILLING`, `LIFTING` or `ONE_WAY`.
+    at : float
+        Where it is largest [m, rad], from where on it grows [rad/s, Pa], or the sign of its pressure.
+    width : float
+        How wide it is [m, rad]; 1 where it has no width.
+    """
+
+    kind: str
+    at: float
+    width: float = 1.0
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """What of it is sought."""
+        return {BORE: ("at", "width"), TOOTH: ("at", "width"), ONE_WAY: ()}.get(self.kind, ("at",))
+
+
+class Measured(NamedTuple):
+    """What courses of losses are made of.
+
+    Parameters
+    ----------
+    speed, angle, position, pressure : ndarray, shape (n,)
+        Of the motor [rad/s, rad], of the piston [m], across it [Pa].
+    leakage, displacement : float
+        Of the rig [m^3/(s Pa), m^3/rad].
+    """
+
+    speed: Array
+    angle: Array
+    position: Array
+    pressure: Array
+    leakage: float
+    displacement: float
+
+    def of(self, course: Course) -> Array:
+        """Return a unit of a loss: a healthy leakage at its worst, or all flow above a speed.
+
+        Parameters
+        ----------
+        course : Course
+            What it goes with [SI].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Flow from chamber 1 to chamber 2 [m^3/s].
+        """
+        along = self.leakage * self.pressure
+        match course.kind:
+            case "bore":
+                return along * np.exp(-0.5 * ((self.position - course.at) / course.width) ** 2)
+            case "tooth":
+                return along * np.exp((np.cos(self.angle - course.at) - 1.0) / course.width**2)
+            case "filling":
+                above = np.maximum(np.abs(self.speed) - course.at, 0.0)
+                return self.displacement * np.sign(self.speed) * above
+            case "lifting":
+                return self.leakage * np.sign(self.pressure) * np.maximum(np.abs(self.pressure) - course.at, 0.0)
+            case _:
+                return np.where(self.pressure * course.at > 0.0, along, 0.0)
+
+    def tried(self) -> list[Course]:
+        """Return the courses that a log is asked for.
+
+        Returns
+        -------
+        list of Course
+            A score only where the piston moves by several of its least widths.
+        """
+        low, high = float(np.min(self.position)), float(np.max(self.position))
+        fastest = float(np.max(np.abs(self.speed)))
+        highest = float(np.quantile(np.abs(self.pressure), 0.99))
+        span = high - low
+        places = np.linspace(low, high, 13).tolist() if span > 10.0 * NARROWEST else []
+        return [
+            *(Course(BORE, at, max(share * span, NARROWEST)) for at in places for share in (0.04, 0.1, 0.25)),
+            *(Course(TOOTH, float(at), width) for at in np.arange(12) * np.pi / 6.0 for width in (0.25, 0.7)),
+            *(Course(FILLING, share * fastest) for share in (0.2, 0.35, 0.5, 0.65, 0.8)),
+            *(Course(LIFTING, share * highest) for share in (0.3, 0.5, 0.65, 0.8, 0.9)),
+            *(Course(ONE_WAY, side) for side in (-1.0, 1.0)),
+        ]
+
+    def moves(self, course: Course) -> dict[str, float]:
+        """Return by how much a course is moved to read off how residuals answer.
+
+        Parameters
+        ----------
+        course : Course
+            What a loss goes with [SI].
+
+        Returns
+        -------
+        dict
+            By field that is sought, in its unit.
+        """
+        along = {BORE: 0.05 * course.width, TOOTH: 0.05, FILLING: 1.0, LIFTING: 3e3}
+        return {name: along[course.kind] if name == "at" else 0.05 * course.width for name in course.free}
+
+
+def measured_of(log: GreyBoxLog, parameters: EhaParameters) -> Measured:
+    """Return what courses of losses are made of.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    Measured
+        Pressure is interpolated where it is missing.
+    """
+    speed, position, pressure = log.drives[:, 0], log.drives[:, 1], log.measured[:, 0]
+    rows, seen = np.arange(len(pressure)), np.isfinite(pressure)
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * log.sample_time * (speed[1:] + speed[:-1]))])
+    return Measured(
+        speed,
+        angle,
+        position,
+        np.interp(rows, rows[seen], pressure[seen]),
+        usual_leakage(parameters),
+        parameters.pump_displacement,
+    )
+
+
+def moved(course: Course, step: Mapping[str, float], share: float) -> Course:
+    """Return a course that was moved by a share of a step.
+
+    Parameters
+    ----------
+    course : Course
+        What a loss goes with [SI].
+    step : Mapping[str, float]
+        By how much, by field [SI].
+    share : float
+        Of that step [fraction].
+
+    Returns
+    -------
+    Course
+        No width changes by more than a factor of two, nor leaves its bounds.
+
+    Examples
+    --------
+    >>> moved(Course(BORE, 0.01, 0.004), {"at": 0.002, "width": 0.1}, 0.5)
+    Course(kind='bore', at=0.011, width=0.008)
+    """
+    changed = {name: getattr(course, name) + share * by for name, by in step.items()}
+    if "width" in changed:
+        least, most = (10.0 * NARROWEST, WIDEST_TOOTH) if course.kind == TOOTH else (NARROWEST, np.inf)
+        width = min(max(changed["width"], 0.5 * course.width, least), 2.0 * course.width, most)
+        changed["width"] = float(width)
+    return replace(course, **changed)

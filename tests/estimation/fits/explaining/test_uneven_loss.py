@@ -1,0 +1,81 @@
+"""A loss that goes with position, the shaft's angle, speed or the direction of pressure is found where it is."""
+
+from collections.abc import Mapping
+from functools import cache
+
+import numpy as np
+import pytest
+
+from estimation.fits.explaining.loss_courses import BORE, FILLING, ONE_WAY, TOOTH, Course, Measured
+from estimation.fits.explaining.uneven_loss import UnevenLoss, loss_note, uneven_loss
+from estimation.fits.flow.log import flow_log, without_strays
+from estimation.fits.flow.search import flow_starts
+from estimation.models.losing_flow import LOSING_FLOW_FORM, LOSS, LOSS_SIZE
+from estimation.notes import RigCode
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+HEALTHY = EhaParameters()
+SPEED, POSITION, PRESSURE = "motor_speed_rad_s", "position_m", "differential_pressure_pa"
+SIZE: Mapping[str, float] = {BORE: 8.0, TOOTH: 15.0, FILLING: 0.2, ONE_WAY: 4.0}
+COURSES = (Course(BORE, 0.0018, 6e-4), Course(TOOTH, 2.0, 0.3), Course(FILLING, 70.0), Course(ONE_WAY, 1.0))
+
+
+def losing(course: Course) -> Record:
+    """Return three seconds of a log whose pump turned faster to make up for a loss."""
+    rng = np.random.default_rng(4)
+    record = simulate(CIRCUIT, make_drive("multisine", 3.0, 1e-3, HEALTHY, rng), 1e-3, HEALTHY, sensors=BENCH, rng=rng)
+    speed, fill = record[SPEED], HEALTHY.pump_displacement
+    for _ in range(30):  # the loss goes with the faster speed
+        angle = np.concatenate([[0.0], np.cumsum(5e-4 * (speed[1:] + speed[:-1]))])
+        seen = Measured(speed, angle, record[POSITION], record[PRESSURE], HEALTHY.leakage_coefficient, fill)
+        speed = record[SPEED] + SIZE[course.kind] * seen.of(course) / fill
+    return record.replace(**{SPEED: speed})
+
+
+@cache
+def found_of(course: Course) -> UnevenLoss:
+    sound, variances = without_strays(losing(course))
+    log = flow_log(sound, HEALTHY, {}, variances)
+    start = flow_starts(HEALTHY, HEALTHY.bulk_modulus)[0]
+    loss = uneven_loss(log, HEALTHY, [start], lambda fit: fit.chi_square[0] < 1.2, np.inf, 1.2)
+    assert loss is not None
+    return loss
+
+
+@pytest.mark.parametrize("course", COURSES, ids=lambda one: one.kind)
+def test_a_loss_is_found_where_it_is_and_leaves_bulk_modulus_right(course: Course) -> None:
+    loss = found_of(course)
+    assert loss.course.kind == course.kind
+    assert loss.course.at == pytest.approx(course.at, rel=0.05)
+    assert loss.course.width == pytest.approx(course.width, rel=0.1)
+    assert loss.size == pytest.approx(SIZE[course.kind], rel=0.1)
+    assert loss.fit.values["bulk_modulus"] == pytest.approx(HEALTHY.bulk_modulus, rel=0.01)
+
+
+def test_where_a_loss_lies_adds_to_what_is_not_known_of_bulk_modulus() -> None:
+    tooth, one_way = (found_of(course) for course in (COURSES[1], COURSES[3]))
+    assert tooth.opened > 0.0
+    assert one_way.opened == 0.0
+
+
+def test_each_loss_has_a_note_of_its_own() -> None:
+    notes = {course.kind: loss_note(found_of(course)) for course in COURSES}
+    assert {kind: note.code for kind, note in notes.items()} == {
+        BORE: RigCode.BORE_LEAKS,
+        TOOTH: RigCode.TOOTH_LEAKS,
+        FILLING: RigCode.PUMP_STARVES,
+        ONE_WAY: RigCode.LEAKS_ONE_WAY,
+    }
+    assert notes[BORE].data["at_mm"] == pytest.approx(1.8, abs=0.1)
+    assert notes[BORE].data["factor"] == pytest.approx(9.0, rel=0.15)
+    assert notes[FILLING].data["from_rad_s"] == pytest.approx(70.0, rel=0.05)
+    assert notes[ONE_WAY].data["side"] == "A"
+
+
+def test_a_loss_is_the_last_drive_and_the_last_unknown_of_its_form() -> None:
+    assert LOSING_FLOW_FORM.drives[-1] == LOSS
+    assert LOSING_FLOW_FORM.unknowns[-1] == LOSS_SIZE
