@@ -60,6 +60,10 @@ class SensorCode(Code):
     SENSORS_DISAGREE = (
         "velocity_m_s and the slope of position_m differ by {difference_m_s:.2g} m/s: one of the two sensors is wrong"
     )
+    VELOCITY_LATE = (
+        "{channel} comes {late_ms:.2g} ms later than the slope of position_m: it was filtered, or derived from position "
+        "with a delay; it was not used"
+    )
     VELOCITY_OFFSET = (
         "{channel} reads {offset_m_s:.2g} m/s too much, compared with position_m; the offset was subtracted"
     )

@@ -11,6 +11,7 @@ from estimation.log_checks.filtered import independent_variance, without_correla
 from estimation.log_checks.held import without_held
 from estimation.log_checks.held_alone import without_held_alone
 from estimation.log_checks.hum import without_hum
+from estimation.log_checks.late_velocity import without_late_velocity
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
 from estimation.log_checks.outliers import without_gross_outliers
 from estimation.log_checks.position_range import without_position_beyond_range
@@ -36,7 +37,7 @@ class CleanLog:
     ----------
     record : Record
         The log, without repeated samples and rows, dropouts, gross outliers, clipped pressures and positions, steps of
-        a zero, hum, an offset of its velocity sensor, and samples of like noise; its longest part where rows were lost.
+        a zero, hum, a velocity that is late or its offset, and samples of like noise; its longest part where rows were lost.
     variances : Mapping[str, float]
         Measurement variance of each of its channels [SI squared].
     left_out : tuple of Note
@@ -115,6 +116,7 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
         sound = mended
     sound, hum = without_hum(sound)
     sound, offset = without_velocity_offset(sound)
+    sound, late = without_late_velocity(sound)
     known = [name for name in MEASURED if name in sound]
     objections = sensor_objections(sound, parameters)
     dead = any(note.data["channel"] == PRESSURE for note in objections)
@@ -122,7 +124,7 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     if mistakes:  # a sensor cannot be judged by channels of another meaning
         objections = steps = ()
     sound, filtered = without_correlated_noise(sound)
-    left_out = (*held, *twice, *dropouts, *alone, *outliers, *clipped, *beyond, *steps, *hum, *offset, *filtered)
+    left_out = (*held, *twice, *dropouts, *alone, *outliers, *clipped, *beyond, *steps, *hum, *offset, *late, *filtered)
     variances = {**measurement_variances(sound, known), **_thinned_variances(sound, filtered)}
     return CleanLog(sound, variances, left_out, objections, mistakes)
 
