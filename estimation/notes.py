@@ -61,8 +61,8 @@ class SensorCode(Code):
         "velocity_m_s and the slope of position_m differ by {difference_m_s:.2g} m/s: one of the two sensors is wrong"
     )
     VELOCITY_LATE = (
-        "{channel} comes {late_ms:.2g} ms later than the slope of position_m: it was filtered, or derived from position "
-        "with a delay; it was not used"
+        "{channel} comes {late_ms:.2g} ms later than the slope of position_m: it was filtered, or derived from "
+        "position with a delay; it was not used"
     )
     VELOCITY_OFFSET = (
         "{channel} reads {offset_m_s:.2g} m/s too much, compared with position_m; the offset was subtracted"
@@ -326,8 +326,9 @@ class RigCode(Code):
         "blocked suction line, cold oil); the fit includes this"
     )
     LEAKAGE_LIFTS = (
-        "above a differential pressure of {at_pa:.3g} Pa, leakage grows {factor:.2g} times as fast with pressure: a "
-        "seal lifts, or a valve opens there; the fit includes this"
+        "above a differential pressure of {from_pa:.3g} Pa, leakage grows by more than pressure does, at "
+        "{highest_pa:.3g} Pa to {factor:.2g} times its usual value: a seal lifts, or a valve opens there; the fit "
+        "includes this"
     )
     LEAKS_ONE_WAY = (
         "leakage is {factor:.2g} times as large while chamber {side} is loaded: a relief or check valve of that side "

@@ -37,7 +37,8 @@ class CleanLog:
     ----------
     record : Record
         The log, without repeated samples and rows, dropouts, gross outliers, clipped pressures and positions, steps of
-        a zero, hum, a velocity that is late or its offset, and samples of like noise; its longest part where rows were lost.
+        a zero, hum, a late velocity or an offset of it, and samples of like noise; its longest part where rows were
+        lost.
     variances : Mapping[str, float]
         Measurement variance of each of its channels [SI squared].
     left_out : tuple of Note

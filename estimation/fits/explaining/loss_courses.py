@@ -18,8 +18,15 @@ from plant.eha.model import EhaParameters
 BORE, TOOTH, FILLING, LIFTING, ONE_WAY = "bore", "tooth", "filling", "lifting", "one_way"
 """What a loss goes with: position, the shaft's angle, speed, pressure, the direction of pressure."""
 
+AVERAGED = 1e-2
+"""Time over which pressure is averaged where its direction is asked for [s]; judged: it reverses about as fast."""
+
 NARROWEST = 2e-4
 """Least width of a score [m], or of a tooth's passing over its tenth [rad]; judged."""
+
+LEAST_POWER, MOST_POWER = 0.7, 3.0
+"""Powers with which a loss may grow from where it begins [dimensionless]: a flow that a pump no longer takes in grows
+evenly, a lip that is pushed open with the cube of its gap."""
 
 WIDEST_TOOTH = 1.0
 """Largest width of a tooth's passing [rad]: a wider one is no single tooth's."""
@@ -36,7 +43,7 @@ class Course:
     at : float
         Where it is largest [m, rad], from where on it grows [rad/s, Pa], or the sign of its pressure.
     width : float
-        How wide it is [m, rad]; 1 where it has no width.
+        How wide it is [m, rad], or the power with which it grows from there [dimensionless]; 1 where it has neither.
     """
 
     kind: str
@@ -46,7 +53,7 @@ class Course:
     @property
     def free(self) -> tuple[str, ...]:
         """What of it is sought."""
-        return {BORE: ("at", "width"), TOOTH: ("at", "width"), ONE_WAY: ()}.get(self.kind, ("at",))
+        return () if self.kind == ONE_WAY else ("at", "width")
 
 
 class Measured(NamedTuple):
@@ -56,6 +63,8 @@ class Measured(NamedTuple):
     ----------
     speed, angle, position, pressure : ndarray, shape (n,)
         Of the motor [rad/s, rad], of the piston [m], across it [Pa].
+    steady : ndarray, shape (n,)
+        The same pressure averaged over `AVERAGED` [Pa]: at rest, half of its noise would pass for one direction.
     leakage, displacement : float
         Of the rig [m^3/(s Pa), m^3/rad].
     """
@@ -64,6 +73,7 @@ class Measured(NamedTuple):
     angle: Array
     position: Array
     pressure: Array
+    steady: Array
     leakage: float
     displacement: float
 
@@ -87,12 +97,11 @@ class Measured(NamedTuple):
             case "tooth":
                 return along * np.exp((np.cos(self.angle - course.at) - 1.0) / course.width**2)
             case "filling":
-                above = np.maximum(np.abs(self.speed) - course.at, 0.0)
-                return self.displacement * np.sign(self.speed) * above
+                return self.displacement * np.sign(self.speed) * _above(self.speed, course)
             case "lifting":
-                return self.leakage * np.sign(self.pressure) * np.maximum(np.abs(self.pressure) - course.at, 0.0)
+                return self.leakage * np.sign(self.pressure) * _above(self.pressure, course)
             case _:
-                return np.where(self.pressure * course.at > 0.0, along, 0.0)
+                return self.leakage * np.where(self.steady * course.at > 0.0, self.steady, 0.0)
 
     def tried(self) -> list[Course]:
         """Return the courses that a log is asked for.
@@ -128,8 +137,13 @@ class Measured(NamedTuple):
         dict
             By field that is sought, in its unit.
         """
-        along = {BORE: 0.05 * course.width, TOOTH: 0.05, FILLING: 1.0, LIFTING: 3e3}
+        along = {BORE: 0.05 * course.width, TOOTH: 0.05, FILLING: 0.01 * course.at, LIFTING: 0.01 * course.at}
         return {name: along[course.kind] if name == "at" else 0.05 * course.width for name in course.free}
+
+
+def _above(what: Array, course: Course) -> Array:
+    """Return a power of how far a signal is above where a loss begins, in that unit: itself where the power is 1."""
+    return course.at * np.maximum(np.abs(what) / course.at - 1.0, 0.0) ** course.width
 
 
 def measured_of(log: GreyBoxLog, parameters: EhaParameters) -> Measured:
@@ -145,16 +159,20 @@ def measured_of(log: GreyBoxLog, parameters: EhaParameters) -> Measured:
     Returns
     -------
     Measured
-        Pressure is interpolated where it is missing.
+        Pressure is interpolated where it is missing, and none where it is missing throughout.
     """
     speed, position, pressure = log.drives[:, 0], log.drives[:, 1], log.measured[:, 0]
     rows, seen = np.arange(len(pressure)), np.isfinite(pressure)
     angle = np.concatenate([[0.0], np.cumsum(0.5 * log.sample_time * (speed[1:] + speed[:-1]))])
+    pressure = np.interp(rows, rows[seen], pressure[seen]) if np.any(seen) else np.zeros(len(rows))
+    half = round(0.5 * AVERAGED / log.sample_time)
+    window = np.full(2 * half + 1, 1.0 / (2 * half + 1))
     return Measured(
         speed,
         angle,
         position,
-        np.interp(rows, rows[seen], pressure[seen]),
+        pressure,
+        np.convolve(np.pad(pressure, half, mode="edge"), window, "valid"),
         usual_leakage(parameters),
         parameters.pump_displacement,
     )
@@ -183,8 +201,12 @@ def moved(course: Course, step: Mapping[str, float], share: float) -> Course:
     Course(kind='bore', at=0.011, width=0.008)
     """
     changed = {name: getattr(course, name) + share * by for name, by in step.items()}
+    if course.kind in (FILLING, LIFTING):
+        changed["at"] = max(changed.get("at", course.at), 0.5 * course.at)
     if "width" in changed:
-        least, most = (10.0 * NARROWEST, WIDEST_TOOTH) if course.kind == TOOTH else (NARROWEST, np.inf)
+        powers = LEAST_POWER, MOST_POWER
+        ends = {BORE: (NARROWEST, np.inf), TOOTH: (10.0 * NARROWEST, WIDEST_TOOTH), FILLING: powers, LIFTING: powers}
+        least, most = ends[course.kind]
         width = min(max(changed["width"], 0.5 * course.width, least), 2.0 * course.width, most)
         changed["width"] = float(width)
     return replace(course, **changed)

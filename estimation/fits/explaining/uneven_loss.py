@@ -141,13 +141,18 @@ def loss_note(loss: UnevenLoss) -> Note:
             return RigCode.TOOTH_LEAKS.note(factor=factor)
         case "filling":
             fastest = float(np.max(np.abs(measured.speed)))
-            lost = 100.0 * (1.0 - course.at / fastest)
-            share, half_width = loss.size * lost, NORMAL_95 * loss.std * lost
+            share = 100.0 * float(np.max(np.abs(measured.of(course)))) / (measured.displacement * fastest)
             return RigCode.PUMP_STARVES.note(
-                from_rad_s=course.at, percent=share, half_width=half_width, fastest_rad_s=fastest
+                from_rad_s=course.at,
+                fastest_rad_s=fastest,
+                percent=loss.size * share,
+                half_width=NORMAL_95 * loss.std * share,
             )
         case "lifting":
-            return RigCode.LEAKAGE_LIFTS.note(at_pa=course.at, factor=factor)
+            highest = float(np.max(np.abs(measured.pressure)))
+            lost = loss.size * float(np.max(np.abs(measured.of(course))))
+            factor = 1.0 + lost / (loss.fit.values["leakage_coefficient"] * highest)
+            return RigCode.LEAKAGE_LIFTS.note(from_pa=course.at, highest_pa=highest, factor=factor)
         case _:
             return RigCode.LEAKS_ONE_WAY.note(side="A" if course.at > 0.0 else "B", factor=factor)
 

@@ -188,7 +188,7 @@ STARVES = RigCode.PUMP_STARVES.note(from_rad_s=80.0, percent=12.0, half_width=1.
         (RigCode.BORE_LEAKS.note(at_mm=4.0, width_mm=3.0, factor=9.0), AdviceCode.INSPECT_BORE.note(at_mm=4.0)),
         (RigCode.TOOTH_LEAKS.note(factor=9.0), AdviceCode.INSPECT_PUMP.note()),
         (STARVES, AdviceCode.CHECK_INLET.note()),
-        (RigCode.LEAKAGE_LIFTS.note(at_pa=6e5, factor=4.0), AdviceCode.CHECK_VALVES.note()),
+        (RigCode.LEAKAGE_LIFTS.note(from_pa=6e5, highest_pa=9e5, factor=4.0), AdviceCode.CHECK_VALVES.note()),
         (RigCode.LEAKS_ONE_WAY.note(side="A", factor=4.0), AdviceCode.CHECK_VALVES.note()),
         (AgainstCode.PUMP_DELIVERS_LESS.note(percent=80.0), AdviceCode.CHECK_PUMP.note()),
         (AgainstCode.MAKEUP_STUCK.note(side="B"), AdviceCode.CHECK_MAKEUP.note(side="B")),

@@ -6,6 +6,7 @@ import pytest
 from estimation.fits.explaining.loss_courses import (
     BORE,
     FILLING,
+    LEAST_POWER,
     LIFTING,
     NARROWEST,
     ONE_WAY,
@@ -21,6 +22,7 @@ SEEN = Measured(
     angle=np.array([0.0, 1.0, np.pi, 2.0 * np.pi + 1.0]),
     position=np.array([0.0, 0.01, 0.02, 0.03]),
     pressure=np.array([-4e5, 1e5, 2e5, 4e5]),
+    steady=np.array([-4e5, 1e5, 2e5, 4e5]),
     leakage=5e-12,
     displacement=5e-7,
 )
@@ -34,6 +36,7 @@ LEAKED = SEEN.leakage * SEEN.pressure
         (Course(TOOTH, 1.0, 0.5), LEAKED * np.exp(4.0 * (np.cos([-1.0, 0.0, np.pi - 1.0, 0.0]) - 1.0))),
         (Course(FILLING, 50.0), [-2.5e-5, 0.0, 5e-6, 2.5e-5]),
         (Course(LIFTING, 1e5), [-1.5e-6, 0.0, 5e-7, 1.5e-6]),
+        (Course(LIFTING, 1e5, 2.0), [-4.5e-6, 0.0, 5e-7, 4.5e-6]),
         (Course(ONE_WAY, 1.0), [0.0, 5e-7, 1e-6, 2e-6]),
         (Course(ONE_WAY, -1.0), [-2e-6, 0.0, 0.0, 0.0]),
     ],
@@ -60,8 +63,8 @@ def test_what_is_sought_of_a_course_is_moved_and_nothing_else() -> None:
     assert {kind: tuple(SEEN.moves(Course(kind, 1.0, 0.1))) for kind in (BORE, TOOTH, FILLING, LIFTING, ONE_WAY)} == {
         BORE: ("at", "width"),
         TOOTH: ("at", "width"),
-        FILLING: ("at",),
-        LIFTING: ("at",),
+        FILLING: ("at", "width"),
+        LIFTING: ("at", "width"),
         ONE_WAY: (),
     }
 
@@ -70,3 +73,5 @@ def test_a_width_stays_within_its_bounds() -> None:
     assert moved(Course(BORE, 0.0, NARROWEST), {"width": -1.0}, 1.0).width == NARROWEST
     assert moved(Course(TOOTH, 0.0, 0.8), {"width": 5.0}, 1.0).width == WIDEST_TOOTH
     assert moved(Course(BORE, 0.0, 0.004), {"width": 5.0}, 1.0).width == 0.008
+    assert moved(Course(LIFTING, 1e5, 1.0), {"width": -5.0}, 1.0).width == LEAST_POWER
+    assert moved(Course(FILLING, 50.0), {"at": -80.0}, 1.0).at == 25.0
