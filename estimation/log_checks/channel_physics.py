@@ -86,6 +86,10 @@ REFUTED = 2.0
 """Times what a balance leaves unexplained by which the piston's flow must differ from the rig's before a slip of units
 is seen in it [dimensionless]."""
 
+HELD = 0.7
+"""Share of the rig's Coulomb friction up to which pressure moves no piston [fraction]; judged. The oil that a stuck one
+takes with its seals was a tenth of what a sliding one takes, and told as rpm read as rad/s."""
+
 RESOLVED = 1e3
 """Deviations of its noise that a position in a wrong unit spans; a stuck piston spans fewer [dimensionless]."""
 
@@ -231,8 +235,9 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
     far = gone > FARTHEST
     turn = length = None
     believed, alike = (False, False), set[float]()
-    if balance is not None and 0.0 < balance.swept_std < KNOWN * balance.swept and balance.contradicts_rig > REFUTED:
-        times = 1.0 / balance.swept
+    told = balance if balance is not None and 0.0 < balance.swept_std < KNOWN * balance.swept else None
+    if told is not None and told.contradicts_rig > REFUTED and (far or _slides(record, p)):
+        times = 1.0 / told.swept
         far = far and times > 1.0
         turn, length = (_near(times, slips, 1.0 / MOST, 1.0 / (LOST if far else LEAST)) for slips in (TURNS, LENGTHS))
         believed = (far or times < 1.0,) * 2
@@ -264,6 +269,12 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
         return ()
     channel, slip = " or ".join(one[0] for one in slips), " or ".join(one[1] for one in slips)
     return (_unit(channel, moved if channel == SPEED else SPEED, slips[0][2], slip),)
+
+
+def _slides(record: Record, p: EhaParameters) -> bool:
+    """Return whether pressure is ever high enough to move a piston: one that sticks yields as its seals do."""
+    highest = float(np.nanmax(np.abs(record[PRESSURE]))) if PRESSURE in record else np.inf
+    return highest * p.piston_area > HELD * p.friction_coulomb
 
 
 def _too_fast(record: Record, p: EhaParameters) -> bool:

@@ -263,3 +263,12 @@ def test_position_and_velocity_that_agree_are_not_accused_of_tens() -> None:
     """A piston that sticks one way drifts, and went 11 times too far where motor speed was in rev/s."""
     (said,) = channel_mistakes(scaled(SPEED, 1.0 / 12.4)(run()).replace(**{PRESSURE: None}), HEALTHY)
     assert (said.code, said.data["channel"]) == (ChannelCode.CHANNEL_UNIT, SPEED)
+
+
+def test_a_piston_that_pressure_cannot_move_tells_no_unit_of_speed() -> None:
+    log = scaled(POSITION, 0.1)(scaled(VELOCITY, 0.1)(run("major_leakage")))
+    (note,) = channel_mistakes(log, HEALTHY)
+    assert note.data["slip"] == "rpm read as rad/s"
+    most = 0.7 * HEALTHY.friction_coulomb / HEALTHY.piston_area
+    stuck = scaled(PRESSURE, most / float(np.max(np.abs(log[PRESSURE]))))(log)
+    assert channel_mistakes(stuck, HEALTHY) == ()
