@@ -11,6 +11,7 @@ from estimation.finding import NORMAL_95
 from estimation.fits.explaining.tried import Explanation
 from estimation.fits.greybox.play_courses import crossings
 from estimation.fits.greybox.teeth import EVENLY, Turning, delivering
+from estimation.fits.hypotheses import WORN
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.clean import CleanLog
@@ -22,9 +23,6 @@ from plant.components.oil import ATMOSPHERE
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
-
-WORN = 0.9
-"""Delivery over the pump's displacement below which the pump counts as worn, and not the rig file as rounded."""
 
 LAGS: Mapping[str, str] = {PRESSURE: "pressure_lag", SPEED: "speed_lag", POSITION: "position_lag"}
 """The lag of each channel that may come late, beside its delay."""

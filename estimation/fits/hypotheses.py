@@ -291,6 +291,9 @@ LEAST_SHARE, MOST_SHARE = 0.6, 1.25
 """Shares of its displacement in the rig file that a pump may deliver, being worn, or displacement and area rounded
 [fraction]: the usual doubts of the two allow 1.07 (two deviations), and a pump is renewed before it delivers 0.6."""
 
+WORN = 0.9
+"""Delivery over the pump's displacement below which the pump counts as worn, and not the rig file as rounded."""
+
 LEAST_ZERO = 0.5
 """Least reading of the encoder in the middle position that is sought, in its typical size of 10 mm: 5 mm change a
 chamber of the paper's actuator by a third of a percent [dimensionless]."""

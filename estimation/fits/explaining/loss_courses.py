@@ -15,8 +15,9 @@ from estimation.fits.greybox.log import GreyBoxLog
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
-BORE, TOOTH, FILLING, LIFTING, ONE_WAY = "bore", "tooth", "filling", "lifting", "one_way"
-"""What a loss goes with: position, the shaft's angle, speed, pressure, the direction of pressure."""
+BORE, TOOTH, FILLING, LIFTING, ONE_WAY, WEAR = "bore", "tooth", "filling", "lifting", "one_way", "wear"
+"""What a loss goes with: position, the shaft's angle, speed from some speed on, pressure from some pressure on, the
+direction of pressure, speed."""
 
 AVERAGED = 1e-2
 """Time over which pressure is averaged where its direction is asked for [s]; judged: it reverses about as fast."""
@@ -39,7 +40,7 @@ class Course:
     Parameters
     ----------
     kind : str
-        `BORE`, `TOOTH`, `FILLING`, `LIFTING` or `ONE_WAY`.
+        `BORE`, `TOOTH`, `FILLING`, `LIFTING`, `ONE_WAY` or `WEAR`.
     at : float
         Where it is largest [m, rad], from where on it grows [rad/s, Pa], or the sign of its pressure.
     width : float
@@ -53,7 +54,7 @@ class Course:
     @property
     def free(self) -> tuple[str, ...]:
         """What of it is sought."""
-        return () if self.kind == ONE_WAY else ("at", "width")
+        return () if self.kind in (ONE_WAY, WEAR) else ("at", "width")
 
 
 class Measured(NamedTuple):
@@ -98,6 +99,8 @@ class Measured(NamedTuple):
                 return along * np.exp((np.cos(self.angle - course.at) - 1.0) / course.width**2)
             case "filling":
                 return self.displacement * np.sign(self.speed) * _above(self.speed, course)
+            case "wear":
+                return self.displacement * self.speed
             case "lifting":
                 return self.leakage * np.sign(self.pressure) * _above(self.pressure, course)
             case _:
@@ -122,6 +125,7 @@ class Measured(NamedTuple):
             *(Course(FILLING, share * fastest) for share in (0.2, 0.35, 0.5, 0.65, 0.8)),
             *(Course(LIFTING, share * highest) for share in (0.3, 0.5, 0.65, 0.8, 0.9)),
             *(Course(ONE_WAY, side) for side in (-1.0, 1.0)),
+            Course(WEAR, 0.0),
         ]
 
     def moves(self, course: Course) -> dict[str, float]:

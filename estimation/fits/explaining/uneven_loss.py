@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.finding import NORMAL_95
-from estimation.fits.explaining.loss_courses import ONE_WAY, Course, Measured, measured_of, moved
+from estimation.fits.explaining.finished import ALIKE
+from estimation.fits.explaining.loss_courses import ONE_WAY, WEAR, Course, Measured, measured_of, moved
 from estimation.fits.explaining.settled import gone
 from estimation.fits.explaining.wide_log import widened
 from estimation.fits.explaining.wide_problem import flow_bounds
@@ -20,6 +21,7 @@ from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypotheses import WORN
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.losing_flow import LOSING_FLOW_FORM, LOSS_SIZE
@@ -114,9 +116,13 @@ def uneven_loss(
     for course, size in search.promising(starts[0], largest):
         ended = min((search.followed(course, {**one, LOSS_SIZE: size}) for one in starts), key=lambda one: one[1].cost)
         loss = search.concluded(*ended)
-        if loss.size > 0.0 and explains(loss.fit) and loss.fit.cost < wanted - WORTH:
+        least = 1.0 - WORN if course.kind == WEAR else 0.0
+        if loss.size > least and explains(loss.fit) and loss.fit.cost < wanted - WORTH:
             found.append(loss)
-    return min(found, key=lambda one: one.fit.cost, default=None)
+    best = min(found, key=lambda one: one.fit.cost, default=None)
+    # with another flow bias, a pump that fills badly from a low speed on does what a worn one does
+    worn = [one for one in found if one.course.kind == WEAR and best and one.fit.cost < best.fit.cost + ALIKE]
+    return worn[0] if worn else best
 
 
 def loss_note(loss: UnevenLoss) -> Note:
@@ -139,6 +145,8 @@ def loss_note(loss: UnevenLoss) -> Note:
             return RigCode.BORE_LEAKS.note(at_mm=1e3 * course.at, width_mm=1e3 * course.width, factor=factor)
         case "tooth":
             return RigCode.TOOTH_LEAKS.note(factor=factor)
+        case "wear":
+            return RigCode.PUMP_WORN.note(percent=100.0 * (1.0 - loss.size), half_width=100.0 * NORMAL_95 * loss.std)
         case "filling":
             fastest = float(np.max(np.abs(measured.speed)))
             share = 100.0 * float(np.max(np.abs(measured.of(course)))) / (measured.displacement * fastest)
@@ -187,9 +195,10 @@ class _Search:
         for i in np.argsort(-gain).tolist():
             best.setdefault(asked[i].kind, i)
         found = [(asked[i], float(size[i])) for i in best.values() if gain[i] > 0.0 and HOPE * gain[i] > needed]
-        if all(course.kind != ONE_WAY for course, _ in found[:TRIED]):  # far from none, slopes say little of it
-            return [*found[:TRIED], *((course, ONE_WAY_TRIED) for course in asked if course.kind == ONE_WAY)]
-        return found[:TRIED]
+        found = [*found[:TRIED], *(one for one in found[TRIED:] if one[0].kind == WEAR)]
+        if all(course.kind != ONE_WAY for course, _ in found):  # far from none, slopes say little of it
+            return [*found, *((course, ONE_WAY_TRIED) for course in asked if course.kind == ONE_WAY)]
+        return found
 
     def followed(self, course: Course, start: Mapping[str, float]) -> tuple[Course, Point]:
         """Return where a search for a loss leads; what has vanished by mistake is tried once more."""

@@ -11,6 +11,7 @@ from estimation.fits.explaining.loss_courses import (
     NARROWEST,
     ONE_WAY,
     TOOTH,
+    WEAR,
     WIDEST_TOOTH,
     Course,
     Measured,
@@ -38,6 +39,7 @@ LEAKED = SEEN.leakage * SEEN.pressure
         (Course(LIFTING, 1e5), [-1.5e-6, 0.0, 5e-7, 1.5e-6]),
         (Course(LIFTING, 1e5, 2.0), [-4.5e-6, 0.0, 5e-7, 4.5e-6]),
         (Course(ONE_WAY, 1.0), [0.0, 5e-7, 1e-6, 2e-6]),
+        (Course(WEAR, 0.0), 5e-7 * SEEN.speed),
         (Course(ONE_WAY, -1.0), [-2e-6, 0.0, 0.0, 0.0]),
     ],
     ids=lambda one: one.kind if isinstance(one, Course) else "",
@@ -48,7 +50,7 @@ def test_a_unit_of_each_loss_is_what_its_name_says(course: Course, expected: np.
 
 def test_every_kind_is_tried_within_what_the_log_shows() -> None:
     tried = SEEN.tried()
-    assert {one.kind for one in tried} == {BORE, TOOTH, FILLING, LIFTING, ONE_WAY}
+    assert {one.kind for one in tried} == {BORE, TOOTH, FILLING, LIFTING, ONE_WAY, WEAR}
     assert all(0.0 <= one.at <= 0.03 for one in tried if one.kind == BORE)
     assert all(0.0 < one.at < 100.0 for one in tried if one.kind == FILLING)
     assert all(np.any(SEEN.of(one) != 0.0) for one in tried)
@@ -60,12 +62,15 @@ def test_a_piston_that_hardly_moves_shows_no_score() -> None:
 
 
 def test_what_is_sought_of_a_course_is_moved_and_nothing_else() -> None:
-    assert {kind: tuple(SEEN.moves(Course(kind, 1.0, 0.1))) for kind in (BORE, TOOTH, FILLING, LIFTING, ONE_WAY)} == {
+    assert {
+        kind: tuple(SEEN.moves(Course(kind, 1.0, 0.1))) for kind in (BORE, TOOTH, FILLING, LIFTING, ONE_WAY, WEAR)
+    } == {
         BORE: ("at", "width"),
         TOOTH: ("at", "width"),
         FILLING: ("at", "width"),
         LIFTING: ("at", "width"),
         ONE_WAY: (),
+        WEAR: (),
     }
 
 

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from estimation.fits.explaining.loss_courses import BORE, FILLING, ONE_WAY, TOOTH, Course, Measured
+from estimation.fits.explaining.loss_courses import BORE, FILLING, ONE_WAY, TOOTH, WEAR, Course, Measured
 from estimation.fits.explaining.uneven_loss import UnevenLoss, loss_note, uneven_loss
 from estimation.fits.flow.log import flow_log, without_strays
 from estimation.fits.flow.search import flow_starts
@@ -20,7 +20,7 @@ from plant.sensors.sensors import BENCH
 
 HEALTHY = EhaParameters()
 SPEED, POSITION, PRESSURE = "motor_speed_rad_s", "position_m", "differential_pressure_pa"
-SIZE: Mapping[str, float] = {BORE: 8.0, TOOTH: 15.0, FILLING: 0.2, ONE_WAY: 4.0}
+SIZE: Mapping[str, float] = {BORE: 8.0, TOOTH: 15.0, FILLING: 0.2, ONE_WAY: 4.0, WEAR: 0.15}
 COURSES = (Course(BORE, 0.0018, 6e-4), Course(TOOTH, 2.0, 0.3), Course(FILLING, 70.0), Course(ONE_WAY, 1.0))
 
 
@@ -76,6 +76,14 @@ def test_each_loss_has_a_note_of_its_own() -> None:
     assert notes[FILLING].data["from_rad_s"] == pytest.approx(70.0, rel=0.1)
     assert notes[FILLING].data["percent"] == pytest.approx(20.0 * (1.0 - 70.0 / 138.1), rel=0.05)
     assert notes[ONE_WAY].data["side"] == "A"
+
+
+def test_a_pump_that_fills_badly_from_a_low_speed_on_is_told_as_a_worn_one() -> None:
+    loss = found_of(Course(WEAR, 0.0))
+    assert loss.course.kind == WEAR
+    note = loss_note(loss)
+    assert note.code is RigCode.PUMP_WORN
+    assert note.data["percent"] == pytest.approx(85.0, abs=1.0)
 
 
 def test_a_loss_is_the_last_drive_and_the_last_unknown_of_its_form() -> None:
