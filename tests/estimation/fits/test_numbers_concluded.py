@@ -68,6 +68,7 @@ def concluded(
         patch.multiple(
             flow_fit,
             explain=explained,
+            uneven_loss=lambda *_: None,
             contradicted=lambda *_: (),
             sensed_play=lambda _: sensed or ShownPlay(0.0, 0.0),
         ),
