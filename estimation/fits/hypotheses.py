@@ -200,9 +200,9 @@ PORTS_DRAIN = tuple(
     Hypothesis(f"port_{side}_drains", (f"drain_share_{side}",), ({f"drain_share_{side}": 1e2},)) for side in "ab"
 )
 
-MAY_HIDE = (replace(MAKEUP_BLOCKED, far=False), *PORTS_DRAIN, LEAKAGE_RISE, OFFSET)
+MAY_HIDE = (replace(MAKEUP_BLOCKED, far=False), *PORTS_DRAIN, LEAKAGE_RISE, OFFSET, PUMP_COMPRESSES)
 """What a log that the plain form explains is asked too: drops at which valves open, and leakage, may take it up. With
-`DELIVERY` and `ENCODER_ZERO` they fill the eight runs side by side that one evaluation takes. Slopes say what each
+`DELIVERY` and `ENCODER_ZERO` they are eight, of which one evaluation is made beside the fit. Slopes say what each
 promises, a stuck valve included, for it is near what the plain form found."""
 
 HYPOTHESES = (
