@@ -122,8 +122,8 @@ class Measured(NamedTuple):
         return [
             *(Course(BORE, at, max(share * span, NARROWEST)) for at in places for share in (0.04, 0.1, 0.25)),
             *(Course(TOOTH, float(at), width) for at in np.arange(12) * np.pi / 6.0 for width in (0.25, 0.7)),
-            *(Course(FILLING, share * fastest) for share in (0.2, 0.35, 0.5, 0.65, 0.8)),
-            *(Course(LIFTING, share * highest) for share in (0.3, 0.5, 0.65, 0.8, 0.9)),
+            *(Course(FILLING, share * fastest) for share in (0.2, 0.35, 0.5, 0.65, 0.8) if fastest > 0.0),
+            *(Course(LIFTING, share * highest) for share in (0.3, 0.5, 0.65, 0.8, 0.9) if highest > 0.0),
             *(Course(ONE_WAY, side) for side in (-1.0, 1.0)),
             Course(WEAR, 0.0),
         ]

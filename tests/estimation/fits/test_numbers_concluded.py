@@ -69,6 +69,7 @@ def concluded(
             flow_fit,
             explain=explained,
             uneven_loss=lambda *_: None,
+            lower_valley=lambda *_: None,
             contradicted=lambda *_: (),
             sensed_play=lambda _: sensed or ShownPlay(0.0, 0.0),
         ),

@@ -61,6 +61,11 @@ def test_a_piston_that_hardly_moves_shows_no_score() -> None:
     assert all(one.kind != BORE for one in still.tried())
 
 
+def test_a_dead_pressure_and_a_motor_at_rest_tell_nothing_that_begins_at_a_share_of_them() -> None:
+    still = SEEN._replace(speed=np.zeros(4), pressure=np.zeros(4), steady=np.zeros(4))
+    assert not {FILLING, LIFTING} & {course.kind for course in still.tried()}
+
+
 def test_what_is_sought_of_a_course_is_moved_and_nothing_else() -> None:
     assert {
         kind: tuple(SEEN.moves(Course(kind, 1.0, 0.1))) for kind in (BORE, TOOTH, FILLING, LIFTING, ONE_WAY, WEAR)
