@@ -220,8 +220,10 @@ class Problem:
         # poles within a circle are those of the polynomial stretched by its radius within the unit circle
         stretched = longest_pole(self.data.longest) ** -np.arange(1.0, n + 1.0)
 
+        poles, circle = slice(n_b, n_b + n), stretched if bounded else np.ones(n)
+
         def acceptable(values: Array) -> bool:
-            f = values[n_b : n_b + n]
+            f = values[poles]
             return settles(f) and (not bounded or bool(stable(f * stretched)))
 
         cost, best = levenberg(
@@ -231,7 +233,7 @@ class Problem:
             tolerance=TOLERANCE,
             most_steps=most_steps,
             least_gain=least_gain,
-            within=lambda *now: stable_step(*now, slice(n_b, n_b + n), stretched if bounded else np.ones(n)),
+            within=lambda now, gram, slope, damping: stable_step(now, gram, slope, damping, poles, circle),
         )
         return LinearFit(self.form, best, cost, bounded)
 

@@ -33,8 +33,9 @@ from plant.notes import Note
 OFFSETS = {OFFSET.name, "pressure_drift"}
 """Hypotheses that an offset of the speed may pass for."""
 
-LIKELIER_WORN = 0.5
-"""Probability of a worn pump from which it is none of the nine conditions that is told [probability]."""
+SUREST = 0.99
+"""Most that slopes make a worn pump likely to which no search led [probability]; judged. They hold to first order, and
+the nine conditions keep their order below it."""
 
 UNLIKELY = math.log(1e-3)
 """Log-likelihood of a delivery below the likeliest one's from which no circuit is fitted with it [dimensionless]."""
@@ -61,8 +62,7 @@ def whatever_the_pump_delivers(
     Diagnosis
         Where the balance tells what the pump delivers, without the circuit's doubt of it; where it leaves that open,
         with classes weighed over it (`probabilities_over_wear`); else, and without pressure, the same. Classes sum to
-        the probability that the pump is not worn (`chance_of_wear`); where it is likelier worn, that speaks against all
-        nine.
+        the probability that the pump is not worn (`chance_of_wear`).
     """
     if known := known_of_flow(estimate):
         told = replace(diagnosis, against=tuple(note for note in diagnosis.against if note.code not in known))
@@ -73,8 +73,6 @@ def whatever_the_pump_delivers(
     if chance < WORTH_SAYING and not wear_left_open(estimate.remarks):
         return told
     note = ClassCode.WEAR_NOT_TOLD.note(percent=100.0 * chance, limit=100.0 * WORN)
-    if chance > LIKELIER_WORN:
-        return replace(told, against=(*told.against, note))
     left = {name: (1.0 - chance) * share for name, share in told.probabilities.items()}
     return replace(told, probabilities=left, not_told=(*told.not_told, note))
 
@@ -90,11 +88,11 @@ def chance_of_wear(said: Sequence[Note]) -> float:
     Returns
     -------
     float
-        Of a normal distribution, with what is presumed of a pump [probability]; zero where a worn pump was found,
-        which speaks against all nine conditions, and where wear is excluded.
+        Of a normal distribution, with what is presumed of a pump, `SUREST` at most [probability]; zero where a worn
+        pump was found, which speaks against all nine conditions, and where wear is excluded.
     """
     if (left := delivery_left_open(said)) is not None:
-        return _below(math.log(WORN), *left)
+        return min(_below(math.log(WORN), *left), SUREST)
     for note in said:
         if note.code is RigCode.AREA_TO_DISPLACEMENT:
             return _below(100.0 * WORN, note.data["percent"], note.data["half_width"] / NORMAL_95)

@@ -159,15 +159,15 @@ def test_the_nine_lose_the_probability_that_the_pump_is_worn(board: Scoreboard) 
     assert sum(open_.probabilities.values()) == pytest.approx(1.0 - chance_of_wear(OPEN))
 
 
-def test_a_pump_that_is_likelier_worn_than_not_is_none_of_the_nine(board: Scoreboard) -> None:
+def test_the_nine_keep_their_order_where_slopes_call_a_pump_worn_for_sure(board: Scoreboard) -> None:
     """A probability of 100 % left nothing to the nine, and the first of them was told: a healthy actuator."""
     found = board.probabilities(shipped_calibration())
-    diagnosis = Diagnosis(found, (), {}, {}, {}, (), board)
-    for percent, against in ((91.0, []), (89.0, [ClassCode.WEAR_NOT_TOLD]), (40.0, [ClassCode.WEAR_NOT_TOLD])):
-        near = (RigCode.AREA_TO_DISPLACEMENT.note(percent=percent, half_width=2.0 * NORMAL_95),)
-        judged = whatever_the_pump_delivers(diagnosis, ACTUATOR, said("delivery"), near)
-        assert [note.code for note in judged.against] == against
-        assert judged.condition == max(found, key=lambda name: found[name])
+    sure = (RigCode.WEAR_NOT_EXCLUDED.note(percent=42.0, half_width=6.0),)
+    judged = whatever_the_pump_delivers(Diagnosis(found, (), {}, {}, {}, (), board), ACTUATOR, said(remarks=sure))
+    over = probabilities_over_wear(board, ACTUATOR, sure, shipped_calibration())
+    assert over is not None
+    assert judged.condition == max(over, key=lambda name: over[name])
+    assert sum(judged.probabilities.values()) == pytest.approx(0.01)
 
 
 def test_no_circuit_is_fitted_with_a_pump_that_the_balance_excludes(
