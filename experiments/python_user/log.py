@@ -143,7 +143,7 @@ class Log(Shown):
         start = self.record.start_time
         until = min(end, start + self.duration + self.sample_time)
         first, last = (round((at - start) / self.sample_time) if isfinite(at) else -1 for at in (begin, until))
-        if not 0 <= first < last:
+        if first < 0 or not begin < end:
             refuse(f"a part of the log is needed from an earlier to a later time, got {begin:g} s to {end:g} s")
         span = first, last + 1
         if (count := max(0, min(last + 1, len(self)) - first)) < FEWEST_SAMPLES:

@@ -77,7 +77,10 @@ def watched(
         yield asked
 
 
-def options(*_: Any, tolerance: float, most_steps: int, slower: float = 3.0, least_gain: float = 0.0) -> list[float]:
+def options(
+    *_: Any, tolerance: float, most_steps: int, slower: float = 3.0, least_gain: float = 0.0, within: Any = None
+) -> list[float]:
+    assert within is None or callable(within)
     return [tolerance, most_steps, slower, *([least_gain] if least_gain else [])]
 
 
@@ -182,7 +185,7 @@ def free_runs() -> dict[str, Any]:
     logs = [np.resize(U, n)[:, None]] * 2
     for name, size in (("searched", n - 1), ("not searched", n)):
         two = channels_from([one[:size] for one in logs], [np.resize(answer(), size)] * 2, 0.1, ("a",), "y")
-        with watched(linear_fit, "minimise", lambda *_: 0, lambda *_: np.zeros(9)) as asked:
+        with watched(linear_fit, "descend_from", lambda *_: 0, lambda *_: (0.0, np.zeros(9))) as asked:
             linear_fit._searched(linear_fit.Problem(form, two))
         told[name] = len(asked)
     swinging = iter(np.tile([0.1, 0.2], 99))

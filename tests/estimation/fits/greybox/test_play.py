@@ -252,6 +252,7 @@ def concluded(
     monkeypatch.setattr(plain_flow, "balanced", lambda *_, **__: [fit])
     monkeypatch.setattr(asked, "promised_each", lambda *_, **__: len(ALWAYS_ASKED) * [Promise(0.0, 0.0, 0.01)])
     monkeypatch.setattr(flow_fit, "explain", explained)
+    monkeypatch.setattr(flow_fit, "lower_valley", lambda *_: None)
     return fit_flow(record or logged("normal", "prbs", 0.0), PAPER, PAPER.bulk_modulus)
 
 
