@@ -86,6 +86,11 @@ REFUTED = 2.0
 """Times what a balance leaves unexplained by which the piston's flow must differ from the rig's before a slip of units
 is seen in it [dimensionless]."""
 
+LEAST_SWEPT = 0.25
+"""Share of the pumped flow that a piston must take up once a slip is set right, for a balance to see the slip
+[fraction]; judged: eight training logs in rpm have 0.38 or more, while a piston that mostly yields on its seals under a
+quick sine has 0.2 at most, and was accused."""
+
 HELD = 0.7
 """Share of the rig's Coulomb friction up to which pressure moves no piston [fraction]; judged. The oil that a stuck one
 takes with its seals was a tenth of what a sliding one takes, and told as rpm read as rad/s."""
@@ -236,7 +241,8 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
     turn = length = None
     believed, alike = (False, False), set[float]()
     told = balance if balance is not None and 0.0 < balance.swept_std < KNOWN * balance.swept else None
-    if told is not None and told.contradicts_rig > REFUTED and (far or _slides(record, p)):
+    takes_up = told is not None and (far or told.swept * told.moving > LEAST_SWEPT)
+    if told is not None and takes_up and told.contradicts_rig > REFUTED and (far or _slides(record, p)):
         times = 1.0 / told.swept
         far = far and times > 1.0
         turn, length = (_near(times, slips, 1.0 / MOST, 1.0 / (LOST if far else LEAST)) for slips in (TURNS, LENGTHS))
