@@ -171,8 +171,7 @@ class _Search:
     def __init__(self, log: GreyBoxLog, parameters: EhaParameters) -> None:
         relieved = reaches_relief(log.measured, parameters.relief_pressure)
         self._form = relieving(LOSING_FLOW_FORM) if relieved else LOSING_FLOW_FORM
-        self._measured, self._log = measured_of(log, parameters), log
-        self._lost = lambda values: gone(widened(log, parameters), values)
+        self._measured, self._log, self._wide = measured_of(log, parameters), log, widened(log, parameters)
 
     def promising(self, start: Mapping[str, float], largest: float) -> list[tuple[Course, float]]:
         """Return the best course of each kind and its size, those first that promise most."""
@@ -204,7 +203,7 @@ class _Search:
         """Return where a search for a loss leads; what has vanished by mistake is tried once more."""
         course, best = self._led(course, start)
         values = self._problem(None, coarse=True).model.values(best.theta)
-        if lost := self._lost(values):
+        if lost := gone(self._wide, values):
             again = self._led(course, {**values, **lost})
             return min((course, best), again, key=lambda one: one[1].cost)
         return course, best

@@ -255,9 +255,7 @@ def _elsewhere(plain: PlainFits, strange: Explanation) -> FitStart | None:
     if start.valley is not None:
         return None
     lower = lower_valley(plain.log, start.parameters, plain.swinging, strange.values, cost + WORTH)
-    if lower is not None:
-        return replace(start, valley=lower)
-    return None
+    return None if lower is None else replace(start, valley=lower)
 
 
 def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, traits: LogTraits) -> FormFit:

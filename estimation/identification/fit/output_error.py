@@ -123,7 +123,7 @@ def minimise(structure: Structure, data: Experiments) -> Array:
     ndarray, shape (n_numerator + n_denominator + experiments * n_initial,)
         Numerator, denominator behind its 1, and the initial state of each experiment.
     """
-    carried = structure.n_main if data.count == 1 and data.u.size > liveliest_section(data).u.size else None
+    carried = None if liveliest_section(data) is data else structure.n_main
     finalists = screened(structure, data)
     finished = [descend_from(structure, theta[:carried], data, FINAL_STEPS, TOLERANCE) for _, theta in finalists]
     return min(finished, key=lambda found: found[0])[1]
