@@ -52,16 +52,13 @@ FITS = ("diagnosis.fit_diagnosis",)
 WITH_PEERS = ("identification.identification_peers", "watching.streaming")
 """Those that need environments of other tools, which `make peers` sets up."""
 
-OF_COMMITS = ("same_numbers.same_numbers",)
-"""Those that compare commits, named behind the script's name."""
-
 OF_TESTS = ("mutants.mutants",)
 """Those that ask the tests themselves, and take minutes to hours."""
 
 OF_RUNS = ("history",)
 """Those that compare earlier runs of the others."""
 
-ALL = {module.rpartition(".")[2]: module for module in (*NAMES, *FITS, *WITH_PEERS, *OF_COMMITS, *OF_TESTS, *OF_RUNS)}
+ALL = {module.rpartition(".")[2]: module for module in (*NAMES, *FITS, *WITH_PEERS, *OF_TESTS, *OF_RUNS)}
 """The module of each, by the name that the command takes."""
 
 

@@ -1,1 +1,0 @@
-"""Whether two commits give the same numbers."""
