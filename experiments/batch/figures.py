@@ -57,18 +57,10 @@ def way_in_words(row: Mapping[Any, Any]) -> str:
     return f"{place}: {how}" + ("" if row["pressure"] else ", pressure not used")
 
 
-def draw_errors(table: pd.DataFrame) -> Figure:
+def _draw_errors(table: pd.DataFrame) -> Figure:
     """Draw the error of bulk modulus of every method in every condition.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        The table ``bulk modulus``.
-
-    Returns
-    -------
-    Figure
-        The median and the range from the 5th to the 95th percentile [%], a row a condition.
+    The median and the range from the 5th to the 95th percentile [%], a row a condition.
     """
     shown = table[table["median_percent"].notna()]
     count = shown["condition"].nunique()
@@ -125,7 +117,7 @@ def _confusion(tables: Tables) -> Figure:
 
 
 BATCH_FIGURES: Drawings = {
-    "bulk_modulus": lambda tables: draw_errors(tables["bulk modulus"]),
+    "bulk_modulus": lambda tables: _draw_errors(tables["bulk modulus"]),
     "confusion": _confusion,
     "classes": lambda tables: draw_classes(tables["classes"]),
 }

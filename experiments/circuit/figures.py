@@ -24,18 +24,10 @@ LITRES_A_MINUTE = 6e4
 MARKERS = {"none": "o", "minor": "s", "major": "^"}
 
 
-def draw_throttles(tables: Tables) -> Figure:
+def _draw_throttles(tables: Tables) -> Figure:
     """Draw what settles against the throttles' voltages, as Figures 3 and 4 do.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The circuit's tables.
-
-    Returns
-    -------
-    Figure
-        Velocity on the left, differential pressure on the right, both in percent of normal.
+    Velocity on the left, differential pressure on the right, both in percent of normal.
     """
     title = "What settles at 4 V: velocity against throttle A, pressure against throttle B"
     figure, (left, right) = panels(title, 1, 2, 3.8, Margins(left=0.7, top=0.65, across=0.8))
@@ -59,18 +51,10 @@ def _settled(axis: Axes, curve: pd.DataFrame, volts: str) -> None:
     diamonds(axis, curve[volts], curve["published_percent"], "published definition")
 
 
-def draw_responses(tables: Tables) -> Figure:
+def _draw_responses(tables: Tables) -> Figure:
     """Draw empirical frequency responses over input means and amplitudes, as Figures 5 and 6 do.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The circuit's tables.
-
-    Returns
-    -------
-    Figure
-        Gain above, phase below; means on the left, amplitudes on the right.
+    Gain above, phase below; means on the left, amplitudes on the right.
     """
     title = "Frequency response from motor speed to velocity, normal condition"
     figure, axes = panels(title, 2, 2, 6.2, Margins(left=0.75, top=0.7, down=0.2), sharex=True, sharey="row")
@@ -99,18 +83,10 @@ def draw_responses(tables: Tables) -> Figure:
     return figure
 
 
-def draw_refits(tables: Tables) -> Figure:
+def _draw_refits(tables: Tables) -> Figure:
     """Draw steady points with the refitted and the published laws, as Figures 8 and 9 do.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The circuit's tables.
-
-    Returns
-    -------
-    Figure
-        Lost flow against pressure on the left, friction against velocity on the right.
+    Lost flow against pressure on the left, friction against velocity on the right.
     """
     title = "Leakage and friction refitted from steady points"
     figure, (left, right) = panels(title, 1, 2, 4.2, Margins(left=0.7, top=0.65, across=0.8))
@@ -154,14 +130,8 @@ def _law(axis: Axes, refit: pd.DataFrame, across: np.ndarray, law: Callable[[pd.
         axis.plot(across, law(by_name["published"]), color=BLACK, linewidth=1.0, linestyle=(0, (1, 2)), zorder=3)
 
 
-def draw_validation_input(tables: Tables) -> Figure:
-    """Draw the nine steps of section 6, as Figure 10 does.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The circuit's tables.
-    """
+def _draw_validation_input(tables: Tables) -> Figure:
+    """Draw the nine steps of section 6, as Figure 10 does."""
     steps = tables["figure 10 validation input"]
     title = "The validation input: nine steps of 2.5 V to 4 V that turn round"
     figure, (axis,) = panels(title, 1, 1, 2.8, Margins(left=0.7))
@@ -174,10 +144,10 @@ def draw_validation_input(tables: Tables) -> Figure:
 
 
 CIRCUIT_FIGURES: Drawings = {
-    "figures_3_and_4": draw_throttles,
-    "figures_5_and_6": draw_responses,
+    "figures_3_and_4": _draw_throttles,
+    "figures_5_and_6": _draw_responses,
     "figure_7": lambda tables: draw_order(tables["figure 7 singular values"]),
-    "figures_8_and_9": draw_refits,
-    "figure_10": draw_validation_input,
+    "figures_8_and_9": _draw_refits,
+    "figure_10": _draw_validation_input,
     "figure_11": draw_bulk_modulus,
 }

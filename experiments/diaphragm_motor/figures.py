@@ -51,19 +51,8 @@ def _swept(flow: Axes, sensing: Axes, sweep: pd.DataFrame, across: str, label: s
     sensing.legend(loc="lower left", ncols=2)
 
 
-def draw_frequency(tables: Tables) -> Figure:
-    """Draw flow and sensing over frequency, as section 7.1 tells.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Flow on the left, electrodes on the right.
-    """
+def _draw_frequency(tables: Tables) -> Figure:
+    """Draw flow and sensing over frequency, as section 7.1 tells. Flow on the left, electrodes on the right."""
     title = "Pump alone at 200 V peak to peak: flow and sensing peak together"
     figure, (left, right) = panels(title, 1, 2, 3.8, Margins(left=0.65, across=0.7))
     _swept(left, right, tables["frequency sweep"], "frequency_hz", "frequency [Hz]")
@@ -73,19 +62,8 @@ def draw_frequency(tables: Tables) -> Figure:
     return figure
 
 
-def draw_voltage(tables: Tables) -> Figure:
-    """Draw flow and sensing over voltage, as section 7.1 tells.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Flow on the left, electrodes on the right.
-    """
+def _draw_voltage(tables: Tables) -> Figure:
+    """Draw flow and sensing over voltage, as section 7.1 tells. Flow on the left, electrodes on the right."""
     title = "Pump alone at 480 Hz: flow and sensing rise with voltage"
     figure, (left, right) = panels(title, 1, 2, 3.6, Margins(left=0.65, across=0.7))
     _swept(left, right, tables["voltage sweep"], "voltage_v", "voltage, peak to peak [V]", marker="o", markersize=3.5)
@@ -93,18 +71,10 @@ def draw_voltage(tables: Tables) -> Figure:
     return figure
 
 
-def draw_load(tables: Tables) -> Figure:
+def _draw_load(tables: Tables) -> Figure:
     """Draw velocity over load, and over frequency under load, as equation 18 and section 7.2 tell.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Load on the left, frequency on the right.
+    Load on the left, frequency on the right.
     """
     title = "Velocity of the piston: straight against load, and best at lower frequency the heavier it is"
     figure, (left, right) = panels(title, 1, 2, 3.8, Margins(left=0.65, across=0.7))
@@ -124,18 +94,10 @@ def draw_load(tables: Tables) -> Figure:
     return figure
 
 
-def draw_cycle(tables: Tables) -> Figure:
+def _draw_cycle(tables: Tables) -> Figure:
     """Draw two cycles of the pump: pressures of neighbours, the valves between them, and flows (Figure 3).
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Three panels over one time axis.
+    Three panels over one time axis.
     """
     cycle = tables["pump cycle"]
     title = "Two cycles at 480 Hz and 200 V: neighbours push against each other, the valves follow late"
@@ -144,18 +106,10 @@ def draw_cycle(tables: Tables) -> Figure:
     return figure
 
 
-def draw_reversal(tables: Tables) -> Figure:
+def _draw_reversal(tables: Tables) -> Figure:
     """Draw the piston while the 4/3 valve extends, holds, retracts and holds (section 5.1).
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Position over time, the spool behind it.
+    Position over time, the spool behind it.
     """
     course = tables["reversal"]
     title = "The 4/3 valve extends, holds and retracts the piston; the pump runs on"
@@ -174,14 +128,8 @@ def draw_reversal(tables: Tables) -> Figure:
     return figure
 
 
-def draw_averaged(tables: Tables) -> Figure:
-    """Draw the piston's velocity by the fast plant and by the averaged motor.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-    """
+def _draw_averaged(tables: Tables) -> Figure:
+    """Draw the piston's velocity by the fast plant and by the averaged motor."""
     course = tables["averaged"]
     title = "Averaged over cycles: 150, 250 and 200 V at 480 Hz against 5 N"
     figure, (axis,) = panels(title, 1, 1, 3.2, Margins(left=0.7))
@@ -193,18 +141,10 @@ def draw_averaged(tables: Tables) -> Figure:
     return figure
 
 
-def draw_control(tables: Tables) -> Figure:
+def _draw_control(tables: Tables) -> Figure:
     """Draw velocity under PI control, healthy above, with a leak past the piston below.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Encoder on the left, self-sensing on the right.
+    Encoder on the left, self-sensing on the right.
     """
     title = "PI on the drive's voltage: velocity steps at 0.8 s, load at 1.6 s"
     figure, axes = panels(title, 2, 2, 5.6, Margins(left=0.65, top=0.75, across=0.35, down=0.55), sharey=True)
@@ -223,11 +163,11 @@ def draw_control(tables: Tables) -> Figure:
 
 
 MOTOR_FIGURES: Drawings = {
-    "frequency": draw_frequency,
-    "voltage": draw_voltage,
-    "load": draw_load,
-    "pump_cycle": draw_cycle,
-    "reversal": draw_reversal,
-    "averaged": draw_averaged,
-    "control": draw_control,
+    "frequency": _draw_frequency,
+    "voltage": _draw_voltage,
+    "load": _draw_load,
+    "pump_cycle": _draw_cycle,
+    "reversal": _draw_reversal,
+    "averaged": _draw_averaged,
+    "control": _draw_control,
 }

@@ -37,18 +37,10 @@ COMPARED = {
 """Panels of the comparison: column, title and axis."""
 
 
-def draw_structures(tables: Tables) -> Figure:
+def _draw_structures(tables: Tables) -> Figure:
     """Draw how the four structures do in each condition, and where each one's criterion looks.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The library's tables.
-
-    Returns
-    -------
-    Figure
-        Three panels, one row a condition, one mark a structure.
+    Three panels, one row a condition, one mark a structure.
     """
     found = tables["structures"]
     margins = Margins(left=BESIDE_CONDITIONS.left, top=0.65)
@@ -63,14 +55,8 @@ def draw_structures(tables: Tables) -> Figure:
     return figure
 
 
-def draw_library(tables: Tables) -> Figure:
-    """Draw the gain of the library's models with 95 % bands over that of Table 6.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The library's tables.
-    """
+def _draw_library(tables: Tables) -> Figure:
+    """Draw the gain of the library's models with 95 % bands over that of Table 6."""
     responses = tables["responses"]
     margins = Margins(left=0.75, top=0.65, down=0.35, across=0.25)
     figure, axes = panels("Gain from motor speed to velocity", 3, 3, 6.4, margins, sharex=True, sharey=True)
@@ -87,18 +73,10 @@ def draw_library(tables: Tables) -> Figure:
     return figure
 
 
-def draw_orders(tables: Tables) -> Figure:
+def _draw_orders(tables: Tables) -> Figure:
     """Draw singular values over the noise floor, and what each order adds to the fit.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The library's tables.
-
-    Returns
-    -------
-    Figure
-        Two panels, one row a condition.
+    Two panels, one row a condition.
     """
     orders = tables["orders"]
     margins = Margins(left=BESIDE_CONDITIONS.left, top=0.65)
@@ -121,14 +99,8 @@ def draw_orders(tables: Tables) -> Figure:
     return figure
 
 
-def draw_clocks(tables: Tables) -> Figure:
-    """Draw how certain each test's clock makes the gain, by frequency.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The library's tables.
-    """
+def _draw_clocks(tables: Tables) -> Figure:
+    """Draw how certain each test's clock makes the gain, by frequency."""
     clocks = tables["clocks"].sort_values("at_25_hz")
     columns = [name for name in clocks.columns if name.startswith("at_")]
     frequencies = [float(name.split("_")[1]) for name in columns]
@@ -144,8 +116,8 @@ def draw_clocks(tables: Tables) -> Figure:
 
 
 LIBRARY_FIGURES: Drawings = {
-    "library": draw_library,
-    "structures": draw_structures,
-    "orders": draw_orders,
-    "clocks": draw_clocks,
+    "library": _draw_library,
+    "structures": _draw_structures,
+    "orders": _draw_orders,
+    "clocks": _draw_clocks,
 }

@@ -23,14 +23,8 @@ def _marked(axis: Axes, rows: pd.DataFrame, across: str, up: str) -> None:
         axis.plot(part[across], part[up], mark, color=colour, markersize=5, label=READING_WORDS[str(name)])
 
 
-def draw_residuals(tables: Tables) -> Figure:
-    """Draw residuals over deformation, velocity and predicted flow, as Figures 10, 15 and 16 do.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-    """
+def _draw_residuals(tables: Tables) -> Figure:
+    """Draw residuals over deformation, velocity and predicted flow, as Figures 10, 15 and 16 do."""
     rows = tables["regression residuals"]
     title = "Residuals of the regression: six rows, three readings"
     figure, axes = panels(title, 1, 3, 3.6, Margins(left=0.75, top=0.75, across=0.4), sharey=True)
@@ -45,18 +39,10 @@ def draw_residuals(tables: Tables) -> Figure:
     return figure
 
 
-def draw_line_fits(tables: Tables) -> Figure:
+def _draw_line_fits(tables: Tables) -> Figure:
     """Draw flow and its prediction over deformation and velocity, and normal probability: Figures 11, 13, 14.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Four panels, of the reading that Figure 12 has.
+    Four panels, of the reading that Figure 12 has.
     """
     rows = tables["regression residuals"]
     rows = rows[rows["reading"] == "anova"]
@@ -82,18 +68,10 @@ def draw_line_fits(tables: Tables) -> Figure:
     return figure
 
 
-def draw_circle(tables: Tables) -> Figure:
+def _draw_circle(tables: Tables) -> Figure:
     """Draw why the regression is circular: flow over unloaded velocity, and over what the text claims.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        One bar a pair, by R².
+    One bar a pair, by R².
     """
     table = tables["circularity"].iloc[::-1]
     title = "R² of a straight line through pairs of Table 2's columns, physical reading"
@@ -109,4 +87,4 @@ def draw_circle(tables: Tables) -> Figure:
     return figure
 
 
-REGRESSION_FIGURES: Drawings = {"residuals": draw_residuals, "line_fits": draw_line_fits, "circle": draw_circle}
+REGRESSION_FIGURES: Drawings = {"residuals": _draw_residuals, "line_fits": _draw_line_fits, "circle": _draw_circle}

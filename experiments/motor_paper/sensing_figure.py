@@ -15,14 +15,8 @@ MILLI = 1e3
 SHOWN = ("A3, A4, A5, as the paper wants", "A4 and drive voltage")
 
 
-def draw_velocity(tables: Tables) -> Figure:
-    """Draw velocity fitted from sensing voltages over the motor's own.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-    """
+def _draw_velocity(tables: Tables) -> Figure:
+    """Draw velocity fitted from sensing voltages over the motor's own."""
     title = "Velocity from sensing voltages, thirty drives and loads at 480 Hz"
     figure, axes = panels(title, 1, 2, 3.9, Margins(left=0.65, top=0.75, across=0.5), sharey=True)
     rows = tables["sensing predictions"]
@@ -38,19 +32,8 @@ def draw_velocity(tables: Tables) -> Figure:
     return figure
 
 
-def draw_faults(tables: Tables) -> Figure:
-    """Draw by how much the regressions are off when one part fails.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        One pair of bars a fault.
-    """
+def _draw_faults(tables: Tables) -> Figure:
+    """Draw by how much the regressions are off when one part fails. One pair of bars a fault."""
     table = tables["sensing faults"].iloc[::-1]
     title = "What a regression fitted to the healthy motor says of a faulty one, less its velocity (200 V, 10 N)"
     figure, (axis,) = panels(title, 1, 1, 3.4, Margins(left=2.3, top=0.45))
@@ -62,14 +45,8 @@ def draw_faults(tables: Tables) -> Figure:
     return figure
 
 
-def draw_spectra(tables: Tables) -> Figure:
-    """Draw the harmonics of the motor's signals at 200 V, as Figure 21 does.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-    """
+def _draw_spectra(tables: Tables) -> Figure:
+    """Draw the harmonics of the motor's signals at 200 V, as Figure 21 does."""
     rows = tables["motor spectra"]
     rows = rows[(rows["peak_to_peak_v"] == 200.0) & (rows["harmonic"] > 0)]
     groups = list(rows.groupby("signal", sort=False))
@@ -83,4 +60,4 @@ def draw_spectra(tables: Tables) -> Figure:
     return figure
 
 
-SENSING_FIGURES: Drawings = {"sensing": draw_velocity, "sensing_faults": draw_faults, "spectra": draw_spectra}
+SENSING_FIGURES: Drawings = {"sensing": _draw_velocity, "sensing_faults": _draw_faults, "spectra": _draw_spectra}

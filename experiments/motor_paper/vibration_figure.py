@@ -42,19 +42,8 @@ def _nyquist(axis: Axes, rows: pd.DataFrame) -> None:
     axis.set(xlabel="real part", ylabel="imaginary part")
 
 
-def draw_bode(tables: Tables) -> Figure:
-    """Draw gain and phase from force to displacement, as Figure 22 does.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Two panels over one frequency axis.
-    """
+def _draw_bode(tables: Tables) -> Figure:
+    """Draw gain and phase from force to displacement, as Figure 22 does. Two panels over one frequency axis."""
     margins = Margins(left=0.75, top=0.45)
     figure, (gain, phase) = panels("From force to displacement", 2, 1, 5.2, margins, sharex=True)
     _bode(gain, phase, tables["vibration responses"])
@@ -64,18 +53,10 @@ def draw_bode(tables: Tables) -> Figure:
     return figure
 
 
-def draw_poles(tables: Tables) -> Figure:
+def _draw_poles(tables: Tables) -> Figure:
     """Draw poles and the Nyquist curve, as Figures 23 and 24 do.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Slow poles on the left, Nyquist's curves on the right.
+    Slow poles on the left, Nyquist's curves on the right.
     """
     title = "Poles, and Nyquist's curves of the models with a gain of 1 at rest"
     figure, (left, right) = panels(title, 1, 2, 4.2, Margins(left=0.75, top=0.55, across=0.8))
@@ -95,18 +76,10 @@ def draw_poles(tables: Tables) -> Figure:
     return figure
 
 
-def draw_loop(tables: Tables) -> Figure:
+def _draw_loop(tables: Tables) -> Figure:
     """Draw the step under P, PI and PID, and the spectrum of what they ask for, as Figures 19 and 20 do.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Displacement on the left, spectra on the right.
+    Displacement on the left, spectra on the right.
     """
     title = "A step under three controllers, with noise and a delay of 50 µs"
     figure, (left, right) = panels(title, 1, 2, 3.8, Margins(left=0.65, across=0.8))
@@ -124,18 +97,10 @@ def draw_loop(tables: Tables) -> Figure:
     return figure
 
 
-def draw_hysteresis(tables: Tables) -> Figure:
+def _draw_hysteresis(tables: Tables) -> Figure:
     """Draw hysteresis loops by both laws, as Figures 27 and 34 do.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        The law with rates on the left, as printed on the right.
+    The law with rates on the left, as printed on the right.
     """
     title = "Hysteresis at 100 V: one loop at every frequency, or one that vanishes"
     figure, axes = panels(title, 1, 2, 3.8, Margins(left=0.65, top=0.65, across=0.6), sharey=True)
@@ -152,14 +117,8 @@ def draw_hysteresis(tables: Tables) -> Figure:
     return figure
 
 
-def draw_linearised(tables: Tables) -> Figure:
-    """Draw Bode, Nyquist and impulse response of the linearised equation 20: Figures 31, 32 and 35.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-    """
+def _draw_linearised(tables: Tables) -> Figure:
+    """Draw Bode, Nyquist and impulse response of the linearised equation 20: Figures 31, 32 and 35."""
     margins = Margins(left=0.75, top=0.5, across=0.8, down=0.55)
     figure, (gain, nyquist, phase, impulse) = panels("Equation 20 for small voltages", 2, 2, 5.6, margins)
     rows = tables["hysteresis response"]
@@ -171,14 +130,8 @@ def draw_linearised(tables: Tables) -> Figure:
     return figure
 
 
-def draw_fractional(tables: Tables) -> Figure:
-    """Draw integrals and derivatives of t², and the resonance with dampers of three orders: Figures 7 to 9.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-    """
+def _draw_fractional(tables: Tables) -> Figure:
+    """Draw integrals and derivatives of t², and the resonance with dampers of three orders: Figures 7 to 9."""
     title = "Orders 0.5, 1 and 1.5: lines exact, dots sampled or by Oustaloup's states"
     figure, (left, middle, right) = panels(title, 1, 3, 3.7, Margins(left=0.6, top=0.75, across=0.6))
     for order, rows in tables["figures 7 to 9"].groupby("order"):
@@ -201,10 +154,10 @@ def draw_fractional(tables: Tables) -> Figure:
 
 
 VIBRATION_FIGURES: Drawings = {
-    "bode": draw_bode,
-    "poles": draw_poles,
-    "loop": draw_loop,
-    "hysteresis_loops": draw_hysteresis,
-    "linearised": draw_linearised,
-    "fractional": draw_fractional,
+    "bode": _draw_bode,
+    "poles": _draw_poles,
+    "loop": _draw_loop,
+    "hysteresis_loops": _draw_hysteresis,
+    "linearised": _draw_linearised,
+    "fractional": _draw_fractional,
 }

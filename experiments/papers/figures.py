@@ -13,14 +13,8 @@ RISING = LinearSegmentedColormap.from_list("rising", (VERMILION, "#f7f7f7", BLUE
 """Colours of what falls, rests and rises."""
 
 
-def draw_table_4(tables: Tables) -> Figure:
-    """Draw flow and displacement of Table 4 over frequency, with its errors: Figures 36, 37, 49 and 50.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-    """
+def _draw_table_4(tables: Tables) -> Figure:
+    """Draw flow and displacement of Table 4 over frequency, with its errors: Figures 36, 37, 49 and 50."""
     margins = Margins(left=0.75, top=0.5, across=0.8, down=0.55)
     figure, (flow, stroke, error, both) = panels("Table 4 of the diaphragm-motor paper", 2, 2, 5.6, margins)
     rows = tables["table 4"]
@@ -40,14 +34,8 @@ def draw_table_4(tables: Tables) -> Figure:
     return figure
 
 
-def draw_table_5(tables: Tables) -> Figure:
-    """Draw velocity and force of Table 5's actuators over their working frequency: Figure 46.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-    """
+def _draw_table_5(tables: Tables) -> Figure:
+    """Draw velocity and force of Table 5's actuators over their working frequency: Figure 46."""
     margins = Margins(left=0.75, top=0.5, across=0.8)
     figure, (speed, force) = panels("Table 5 of the diaphragm-motor paper: six actuators", 1, 2, 3.6, margins)
     rows = tables["table 5"]
@@ -60,14 +48,8 @@ def draw_table_5(tables: Tables) -> Figure:
     return figure
 
 
-def draw_modes(tables: Tables) -> Figure:
-    """Draw the frequencies of the dry plate's first six modes: Figure 44.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-    """
+def _draw_modes(tables: Tables) -> Figure:
+    """Draw the frequencies of the dry plate's first six modes: Figure 44."""
     figure, (axis,) = panels("First six modes of the dry plate", 1, 1, 3.6, Margins(left=0.75, top=0.5))
     rows = tables["dry modes"]
     axis.plot(range(1, len(rows) + 1), 1e-3 * rows["frequency_hz"], "o-", color=BLUE)
@@ -76,14 +58,8 @@ def draw_modes(tables: Tables) -> Figure:
     return figure
 
 
-def draw_bent_plate(tables: Tables) -> Figure:
-    """Draw how the diaphragm bends at a voltage and under a pressure: Figure 42.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-    """
+def _draw_bent_plate(tables: Tables) -> Figure:
+    """Draw how the diaphragm bends at a voltage and under a pressure: Figure 42."""
     figure, (axis,) = panels("Deflection of the dry diaphragm along a radius", 1, 1, 3.6, Margins(left=0.75, top=0.5))
     rows = tables["bent plate"]
     axis.plot(1e3 * rows["radius_m"], 1e6 * rows["at_100_v_m"], color=BLUE, label="100 V, no pressure")
@@ -93,14 +69,8 @@ def draw_bent_plate(tables: Tables) -> Figure:
     return figure
 
 
-def draw_mode_shapes(tables: Tables) -> Figure:
-    """Draw the shapes of the dry plate's first six modes: Figure 43.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-    """
+def _draw_mode_shapes(tables: Tables) -> Figure:
+    """Draw the shapes of the dry plate's first six modes: Figure 43."""
     margins = Margins(left=0.3, top=0.75, across=0.4, down=0.5, bottom=0.2)
     figure, axes = panels("Shapes of the dry plate's first six modes: blue rises while red falls", 2, 3, 5.4, margins)
     for axis, (number, rows) in zip(axes, tables["mode shapes"].groupby("mode"), strict=True):
@@ -112,14 +82,8 @@ def draw_mode_shapes(tables: Tables) -> Figure:
     return figure
 
 
-def draw_poles(tables: Tables) -> Figure:
-    """Draw the poles of equation 20 for small voltages; it has no zeros: Figure 33.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-    """
+def _draw_poles(tables: Tables) -> Figure:
+    """Draw the poles of equation 20 for small voltages; it has no zeros: Figure 33."""
     figure, (axis,) = panels("Poles of equation 20 for small voltages", 1, 1, 3.6, Margins(left=0.75, top=0.5))
     poles = tables["poles"]
     rows = poles[poles["model"] == "equation 20, small voltages"]
@@ -131,11 +95,11 @@ def draw_poles(tables: Tables) -> Figure:
 
 
 PAPERS_FIGURES: Drawings = {
-    "table_4": draw_table_4,
-    "table_5": draw_table_5,
-    "bent_plate": draw_bent_plate,
-    "mode_shapes": draw_mode_shapes,
-    "dry_modes": draw_modes,
-    "poles": draw_poles,
+    "table_4": _draw_table_4,
+    "table_5": _draw_table_5,
+    "bent_plate": _draw_bent_plate,
+    "mode_shapes": _draw_mode_shapes,
+    "dry_modes": _draw_modes,
+    "poles": _draw_poles,
 }
 """Figures by name."""

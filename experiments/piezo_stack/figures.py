@@ -39,18 +39,10 @@ CYCLE: Sequence[Course] = (
 STAGE_COLOURS = {"compression": ORANGE, "discharge": SKY, "expansion": GREY, "intake": GREEN}
 
 
-def draw_loops(tables: Tables) -> Figure:
+def _draw_loops(tables: Tables) -> Figure:
     """Draw displacement against voltage, as Figure 10 does.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Loops on the left, their width over frequency on the right.
+    Loops on the left, their width over frequency on the right.
     """
     title = "Stack without load, 100 V peak to peak: its loop widens with frequency"
     figure, (left, right) = panels(title, 1, 2, 3.8, Margins(left=0.65, across=0.8))
@@ -77,18 +69,10 @@ def _quoted(axis: Axes, flow: float) -> None:
     diamonds(axis, 275.0, flow, "quoted by the paper")
 
 
-def draw_no_load(tables: Tables) -> Figure:
+def _draw_no_load(tables: Tables) -> Figure:
     """Draw flow without load over frequency, as Figures 11 and 12 do.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Two bias pressures on the left, two voltages on the right.
+    Two bias pressures on the left, two voltages on the right.
     """
     title = "Output flow without load"
     figure, (left, right) = panels(title, 1, 2, 3.8, Margins(left=0.65, top=0.65, across=0.6), sharey=True)
@@ -101,18 +85,10 @@ def draw_no_load(tables: Tables) -> Figure:
     return figure
 
 
-def draw_loaded(tables: Tables) -> Figure:
+def _draw_loaded(tables: Tables) -> Figure:
     """Draw flow under load over frequency and over load, as Figures 13 and 14 do.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Fixed weights on the left, rising load on the right.
+    Fixed weights on the left, rising load on the right.
     """
     title = "Output flow under load, 140 V and 1.0 MPa"
     figure, (left, right) = panels(title, 1, 2, 3.8, Margins(left=0.65, top=0.65, across=0.6), sharey=True)
@@ -128,18 +104,10 @@ def draw_loaded(tables: Tables) -> Figure:
     return figure
 
 
-def draw_cycle(tables: Tables) -> Figure:
+def _draw_cycle(tables: Tables) -> Figure:
     """Draw two pump cycles: pressures, reeds and flow, with the four stages behind (Figure 2).
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Three panels over one time axis.
+    Three panels over one time axis.
     """
     cycle = tables["pump cycle"]
     time = MILLI * cycle["time_s"]
@@ -160,18 +128,10 @@ def _stage_bands(axis: Axes, time: np.ndarray, stage: np.ndarray) -> None:
             say(axis, stage[first], (0.5 * (time[first] + time[last]), 1.0), (0, 3), xycoords=above, **look)
 
 
-def draw_maps(tables: Tables) -> Figure:
+def _draw_maps(tables: Tables) -> Figure:
     """Draw output flow over frequency and load, and over frequency and voltage, at both bias pressures.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        Four contour plots on one colour scale.
+    Four contour plots on one colour scale.
     """
     design = tables["design map"]
     title = "Output flow [L/min]: above over load at the highest voltage, below over voltage without load"
@@ -195,19 +155,8 @@ def draw_maps(tables: Tables) -> Figure:
     return figure
 
 
-def draw_limits(tables: Tables) -> Figure:
-    """Draw by how much the flow answers to each part.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    Figure
-        One pair of bars a part, the strongest on top.
-    """
+def _draw_limits(tables: Tables) -> Figure:
+    """Draw by how much the flow answers to each part. One pair of bars a part, the strongest on top."""
     table = tables["what limits the flow"]
     order = table[["percent_up", "percent_down"]].abs().max(axis=1).sort_values().index
     table = table.loc[order]
@@ -221,10 +170,10 @@ def draw_limits(tables: Tables) -> Figure:
 
 
 STACK_FIGURES: Drawings = {
-    "figure_10": draw_loops,
-    "figures_11_and_12": draw_no_load,
-    "figures_13_and_14": draw_loaded,
-    "pump_cycle": draw_cycle,
-    "design_maps": draw_maps,
-    "limits": draw_limits,
+    "figure_10": _draw_loops,
+    "figures_11_and_12": _draw_no_load,
+    "figures_13_and_14": _draw_loaded,
+    "pump_cycle": _draw_cycle,
+    "design_maps": _draw_maps,
+    "limits": _draw_limits,
 }
