@@ -19,7 +19,6 @@ NAMES = (
     "filters.robustness",
     "filters.efficiency",
     "diagnosis.coverage",
-    "filters.convergence",
     "filters.chamber_filter",
     "identification.identification",
     "identification.identification_tests",

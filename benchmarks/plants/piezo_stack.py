@@ -22,7 +22,6 @@ from benchmarks.plants.bouc_wen_oscillator import (
     linear_start,
     simulate_oscillator,
 )
-from benchmarks.plants.piezo_stack_filter import filter_stack
 from benchmarks.targets import misses, say, timed
 from estimation.finding import NORMAL_95
 from estimation.piezo_stack.bouc_wen import LOOP, fit_stack_loop
@@ -187,18 +186,6 @@ def estimation(seeds: int) -> None:
         say(f"{name.replace('_', ' ')}, RMSE over the Cramér-Rao bound", rmse / deviation, 1.3)
     say("95 % intervals that cover [%]", 100.0 * float(np.mean(covered)), 90.0, most=False)
     say("time of a 0.1 s log, median [s]", float(np.median(seconds)), 1.0)
-    filtered(worn, min(seeds, 5))
-
-
-def filtered(worn: PiezoStackParameters, seeds: int) -> None:
-    """Follow the same unknowns by the extended Kalman filter."""
-    bounds = {"air_fraction": 1.0, "chamber_leakage": 10.0, "crossport_leakage": 10.0, "coulomb_friction": 5.0}
-    logs = [log_of(worn, seed) for seed in range(seeds)]
-    runs = [timed(lambda one=log: filter_stack(one, HEALTHY)) for log in logs]
-    for name, bound in bounds.items():
-        errors = [abs(track.final(HEALTHY)[name][0] / getattr(worn, name) - 1.0) for _, track in runs]
-        say(f"filter, {name.replace('_', ' ')}, worst of {seeds} [%]", 100.0 * max(errors), bound)
-    say("filter, time of a 0.1 s log, median [s]", float(np.median([took for took, _ in runs])), 1.0)
 
 
 def mismatch(seeds: int) -> None:

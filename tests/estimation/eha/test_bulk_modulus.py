@@ -208,7 +208,7 @@ def test_a_constant_does_not_pass_for_an_estimate_of_the_foreign_logs(shared: Pa
 @pytest.mark.slow
 @EVERY_CONDITION
 def test_every_start_of_the_study_converges(name: str) -> None:
-    seed = list(CONDITIONS).index(name)  # another one each; `benchmarks convergence` runs more
+    seed = list(CONDITIONS).index(name)  # another one each; `benchmarks bulk_modulus` runs more
     reduced = bench_log.__wrapped__("reduced", "sine", name, seed)
     assert largest_error(reduced, name, "acceleration", WIDE_STARTS) < 0.03
     for drive in ("sine", "steps"):
