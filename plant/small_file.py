@@ -19,8 +19,6 @@ def small_file(path: Path, most: int = LARGEST) -> bytes:
 
     Parameters
     ----------
-    path : Path
-        The file.
     most : int
         Bytes that it may have.
 
@@ -39,11 +37,6 @@ def small_file(path: Path, most: int = LARGEST) -> bytes:
 
 def small_toml(path: Path) -> dict[str, Any]:
     """Return the content of a small TOML file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
 
     Returns
     -------

@@ -94,8 +94,6 @@ def unlike(p: CircuitParameters, rng: np.random.Generator) -> CircuitParameters:
 
     Parameters
     ----------
-    p : CircuitParameters
-        The actuator.
     rng : numpy.random.Generator
         Source of the draw.
 

@@ -87,8 +87,6 @@ def draw(root: Path, folders: Sequence[str], sample: int, seed: int) -> list[Mut
 
     Parameters
     ----------
-    root : Path
-        The project.
     folders : sequence of str
         Folders or files, from there.
     sample : int

@@ -96,8 +96,6 @@ def mutants_of(path: str, text: str, chosen: Sequence[int]) -> Iterator[Mutant]:
 
     Parameters
     ----------
-    path : str
-        The file.
     text : str
         Its source.
     chosen : sequence of int
@@ -201,8 +199,6 @@ def mirrored(root: Path, path: str) -> list[str]:
 
     Parameters
     ----------
-    root : Path
-        The project.
     path : str
         A file, from there.
 

@@ -133,8 +133,6 @@ def simulate_oscillator(
         Drive [N], band-limited.
     sample_time : float
         Seconds between samples [s].
-    parameters : OscillatorParameters
-        The oscillator.
     periodic : bool
         As in `fit_oscillator`.
 

@@ -218,8 +218,6 @@ def false_alarms(running: CircuitStream, watch: Watch, hours: float) -> list[Ala
 
     Parameters
     ----------
-    running : CircuitStream
-        The stream.
     watch : Watch
         Its watch, which has learnt.
     hours : float

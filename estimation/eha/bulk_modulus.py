@@ -111,8 +111,6 @@ def estimate_bulk_modulus(
 
     Parameters
     ----------
-    record : Record
-        The log.
     parameters : EhaParameters
         The actuator; its bulk modulus is where the bound is taken, and the default first guess.
     uncertainties : Mapping[str, float or Spread], optional
@@ -148,13 +146,6 @@ def estimate_bulk_modulus(
 def left_out(log: CleanLog, found: BulkModulusEstimate) -> tuple[Note, ...]:
     """Return what was left out of the channels that an estimate used.
 
-    Parameters
-    ----------
-    log : CleanLog
-        The log.
-    found : BulkModulusEstimate
-        The estimate.
-
     Returns
     -------
     tuple of Note
@@ -174,10 +165,6 @@ def estimate_clean(
 
     Parameters
     ----------
-    log : CleanLog
-        The log.
-    parameters : EhaParameters
-        The actuator.
     options : EstimateOptions
         How.
     uncertainties : Mapping[str, float or Spread], optional
@@ -282,8 +269,6 @@ def rigid_bound(log: CleanLog, parameters: EhaParameters) -> float:
     ----------
     log : CleanLog
         The log; its drive and sensors count, not what they show.
-    parameters : EhaParameters
-        The actuator.
 
     Returns
     -------

@@ -85,12 +85,8 @@ def estimate_by_filter(
 
     Parameters
     ----------
-    log : CleanLog
-        The log.
     parameters : EhaParameters
         The actuator; first guesses of what is estimated.
-    model : ProcessModel
-        The process model.
     guess, start_std : float
         First guess of bulk modulus and its standard deviation [Pa].
     options : FilterOptions
@@ -154,10 +150,6 @@ def chosen_method(record: Record, model: ProcessModel, tuned: bool) -> str:
 
     Parameters
     ----------
-    record : Record
-        The log.
-    model : ProcessModel
-        The process model.
     tuned : bool
         Whether its noise levels are those of the log.
 
@@ -231,10 +223,6 @@ def conclude(
 
     Parameters
     ----------
-    estimate : Estimate
-        The filtered log.
-    record : Record
-        The log.
     bound : float
         Relative Cramér-Rao bound of bulk modulus [fraction].
     form : str

@@ -114,8 +114,6 @@ def drive_noise(record: Record, p: EhaParameters, variances: Mapping[str, float]
     ----------
     record : Record
         The log, with motor speed.
-    p : EhaParameters
-        The actuator.
     variances : Mapping[str, float], optional
         Measurement variances of its channels [SI squared]; speed's is read off the log if not among them.
 

@@ -66,10 +66,6 @@ def estimated(log: CleanLog, rig: Rig, options: EstimateOptions) -> tuple[CleanL
 
     Parameters
     ----------
-    log : CleanLog
-        The log.
-    rig : Rig
-        The actuator.
     options : EstimateOptions
         How.
 
@@ -86,8 +82,6 @@ def finding_of(log: CleanLog, found: BulkModulusEstimate, rig: Rig) -> Finding:
 
     Parameters
     ----------
-    log : CleanLog
-        The log.
     found : BulkModulusEstimate
         Its estimate.
     rig : Rig
@@ -123,8 +117,6 @@ def explained(found: BulkModulusEstimate, parameters: EhaParameters) -> tuple[No
 
     Parameters
     ----------
-    found : BulkModulusEstimate
-        The estimate.
     parameters : EhaParameters
         The actuator, as its rig file has it.
 
@@ -139,11 +131,6 @@ def explained(found: BulkModulusEstimate, parameters: EhaParameters) -> tuple[No
 
 def absences(found: BulkModulusEstimate) -> tuple[Note, ...]:
     """Return what is lost where differential pressure is not used, nothing where it is.
-
-    Parameters
-    ----------
-    found : BulkModulusEstimate
-        The estimate.
 
     Returns
     -------
@@ -162,11 +149,6 @@ def refused(found: BulkModulusEstimate) -> tuple[Note, ...]:
 
     A form that is told leakage and friction may be refused because the actuator is not the one that it was told of;
     that is no objection to the log.
-
-    Parameters
-    ----------
-    found : BulkModulusEstimate
-        The estimate.
 
     Returns
     -------

@@ -56,8 +56,6 @@ def notes_of(found: Explanation, parameters: EhaParameters) -> tuple[Note, ...]:
     ----------
     found : Explanation
         The hypotheses that were accepted.
-    parameters : EhaParameters
-        The rig.
 
     Returns
     -------
@@ -245,8 +243,6 @@ def at_pump_speed(log: CleanLog, turning: Turning) -> CleanLog:
 
     Parameters
     ----------
-    log : CleanLog
-        The log.
     turning : Turning
         Teeth of the pump, and offset of the logged speed.
 
@@ -267,8 +263,6 @@ def set_right(log: CleanLog, found: Explanation) -> CleanLog:
 
     Parameters
     ----------
-    log : CleanLog
-        The log.
     found : Explanation
         What explains it.
 

@@ -16,11 +16,6 @@ def most_drained(p: EhaParameters) -> float:
 
     It is presumed a twentieth of the healthy leakage, and known to a factor of e: 97.5 % drain less than a third of it.
 
-    Parameters
-    ----------
-    p : EhaParameters
-        The actuator.
-
     Returns
     -------
     float

@@ -42,11 +42,6 @@ MOSTLY_RIG = 2.0
 def fitted_responses(fit: FormFit) -> Mapping[str, Responses]:
     """Return responses of what the flow form found, from the fit's own linear response.
 
-    Parameters
-    ----------
-    fit : FormFit
-        The fit.
-
     Returns
     -------
     Mapping[str, Responses]
@@ -66,8 +61,6 @@ def scaled_responses(
 
     Parameters
     ----------
-    parameters : EhaParameters
-        The actuator.
     found : Mapping[str, float]
         What was found of it, by parameter [SI].
     pressure : bool

@@ -87,8 +87,6 @@ def fit_equations(
 
     Parameters
     ----------
-    equations : Equations
-        The model.
     records : sequence of Record
         One log or several, with its inputs and outputs; each has initial states of its own.
     noise : Mapping[str, float], optional

@@ -30,8 +30,6 @@ def compile_equations(equations: Equations, scheme: str) -> Run:
 
     Parameters
     ----------
-    equations : Equations
-        The model.
     scheme : str
         One of `SCHEMES`.
 

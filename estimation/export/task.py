@@ -45,8 +45,6 @@ def filter_task(
     ----------
     record : Record
         A log of the bench: its rate, channels and sensor noise are those that the filter will meet.
-    parameters : EhaParameters
-        The actuator.
     form : str
         One of `EXPORTED_FORMS`.
     start : float, optional

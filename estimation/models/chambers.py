@@ -181,8 +181,6 @@ def chamber_belief(
 
     Parameters
     ----------
-    p : EhaParameters
-        The actuator.
     load : float
         Differential pressure that the log begins with [Pa].
     modulus : float

@@ -29,11 +29,6 @@ class FlowParameters(EhaParameters):
 def flow_parameters(p: EhaParameters) -> FlowParameters:
     """Return an actuator's parameters as the flow form takes them.
 
-    Parameters
-    ----------
-    p : EhaParameters
-        The actuator.
-
     Returns
     -------
     FlowParameters

@@ -84,8 +84,6 @@ def posterior_bound(
         Truth at the first sample, and how well it is known then [SI]; a variance of 0 is exact knowledge.
     record : Record
         The drive, on its clock; what it measured plays no part.
-    parameters : dataclass
-        The actuator.
     variances : Mapping[str, float]
         Variance of each channel measured [SI squared].
     noise : Mapping[str, float], optional

@@ -36,8 +36,6 @@ def doubted_breaks(rig: EhaParameters, low_v: float, high_v: float) -> tuple[flo
 
     Parameters
     ----------
-    rig : EhaParameters
-        The actuator.
     low_v, high_v : float
         Two input means [V].
 

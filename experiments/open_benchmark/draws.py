@@ -85,8 +85,6 @@ def course_of(setup: Setup, rng: np.random.Generator) -> Array:
 
     Parameters
     ----------
-    setup : Setup
-        The log.
     rng : numpy.random.Generator
         Source of the drive and of when friction grips.
 

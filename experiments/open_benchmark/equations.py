@@ -24,8 +24,6 @@ def stop_force(x: float, v: float, m: Machine) -> float:
     ----------
     x, v : float
         Position [m] and velocity [m/s].
-    m : Machine
-        The actuator.
     """
     over = abs(x) - 0.5 * m.stroke
     if over <= 0.0:
@@ -47,8 +45,6 @@ def rates(y: Array, stretch: Array, now: Array, demand: float, m: Machine, out: 
         A row of the course.
     demand : float
         Motor speed asked for [rad/s].
-    m : Machine
-        The actuator.
     """
     speed, angle, x, v, a, b, made_up = y[0], y[1], y[2], y[3], y[4], y[5], y[6]
     viscosity, wear, air, rough = now[1], now[2], now[3], now[4]

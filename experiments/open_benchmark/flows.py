@@ -45,8 +45,6 @@ def pump_flow(speed: float, angle: float, m: Machine) -> float:
         Of the motor [rad/s].
     angle : float
         Of its shaft [rad].
-    m : Machine
-        The actuator.
     """
     geometric = m.efficiency * m.displacement * speed * (1.0 + m.ripple * math.cos(m.teeth * angle))
     return math.copysign(max(abs(geometric) - m.flow_bias, 0.0), geometric)
@@ -61,8 +59,6 @@ def filling(pressure: float, air: float, m: Machine) -> float:
         Stretch pressure of the inlet, absolute [Pa].
     air : float
         At atmospheric pressure, a unit of oil [dimensionless].
-    m : Machine
-        The actuator.
     """
     return 1.0 if pressure >= m.vapour else specific_volume(m.vapour, air, m) / specific_volume(pressure, air, m)
 
@@ -76,8 +72,6 @@ def leakage_flow(drop: float, coefficient: float, m: Machine) -> float:
         Difference of pressures [Pa].
     coefficient : float
         Laminar leakage, or both at the reference pressure [m^3/(s Pa)].
-    m : Machine
-        The actuator.
     """
     laminar = (1.0 - m.turbulent) * coefficient * drop
     return laminar + m.turbulent * orifice_flow(drop, coefficient * math.sqrt(m.turbulent_pressure))
@@ -100,8 +94,6 @@ def oil_flows(
         By how many times the oil and wear let more through than the machine says [dimensionless].
     air : float
         At atmospheric pressure, a unit of oil [dimensionless].
-    m : Machine
-        The actuator.
     """
     supply = pressures[2]
     density_a, density_b = 1.0 / specific_volume(pressures[0], air, m), 1.0 / specific_volume(pressures[1], air, m)

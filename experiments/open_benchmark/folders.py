@@ -23,8 +23,6 @@ def truth_of(made: Made, split: str, index: int) -> dict[str, Any]:
 
     Parameters
     ----------
-    made : Made
-        The log.
     split : str
         One of `SPLITS`.
     index : int

@@ -24,8 +24,6 @@ def stretched(stretch: Array, moved: float, m: Machine, out: Array) -> None:
         Before and after [m].
     moved : float
         By how much [m].
-    m : Machine
-        The actuator.
     """
     for i in range(len(SLIPS)):
         most = SLIPS[i] * m.presliding
@@ -43,8 +41,6 @@ def steady_friction(speed: float, viscosity: float, m: Machine) -> tuple[float, 
         Of the piston, without sign [m/s].
     viscosity : float
         Over that at the start [dimensionless].
-    m : Machine
-        The actuator.
     """
     blocks = max(m.coulomb + min(m.linear, 0.0) * speed, 0.5 * m.coulomb)
     whole = m.coulomb + (m.linear * viscosity + m.quadratic * speed) * speed
@@ -62,8 +58,6 @@ def friction_force(velocity: float, stretch: Array, viscosity: float, rough: flo
         Of the springs [m].
     viscosity, rough : float
         Viscosity and grip of the blocks over those at the start [dimensionless].
-    m : Machine
-        The actuator.
     """
     blocks, film = steady_friction(abs(velocity), viscosity, m)
     share, sticking = 0.0, 0.0

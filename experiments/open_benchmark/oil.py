@@ -20,8 +20,6 @@ def air_space(pressure: float, air: float, m: Machine) -> float:
         Absolute [Pa].
     air : float
         At atmospheric pressure, a unit of oil [dimensionless].
-    m : Machine
-        The actuator.
     """
     return air * (ATMOSPHERE / pressure) ** (1.0 / m.polytropic) if air > 0.0 else 0.0
 
@@ -33,8 +31,6 @@ def stiffened(pressure: float, m: Machine) -> float:
     ----------
     pressure : float
         Stretch pressure, absolute [Pa].
-    m : Machine
-        The actuator.
     """
     return max(1.0 + m.stiffening * (pressure - ATMOSPHERE) / m.bulk_modulus, THINNEST)
 
@@ -62,8 +58,6 @@ def specific_volume(pressure: float, air: float, m: Machine) -> float:
         Stretch pressure, absolute [Pa].
     air : float
         At atmospheric pressure, a unit of oil [dimensionless].
-    m : Machine
-        The actuator.
     """
     return liquid_space(pressure, m) + air_space(max(pressure, m.vapour), air, m)
 
@@ -77,8 +71,6 @@ def stiffness(pressure: float, air: float, m: Machine) -> float:
         Stretch pressure, absolute [Pa].
     air : float
         At atmospheric pressure, a unit of oil [dimensionless].
-    m : Machine
-        The actuator.
     """
     oil = m.bulk_modulus * stiffened(pressure, m)
     if air <= 0.0:

@@ -37,8 +37,6 @@ def advance(y: Array, stretch: Array, now: Array, demand: float, m: Machine, ste
         A row of the course.
     demand : float
         Motor speed asked for [rad/s].
-    m : Machine
-        The actuator.
     step : float
         [s].
     work : ndarray, shape (4, 7)
@@ -60,8 +58,6 @@ def trajectory(m: Machine, course: Array, y: Array, stretch: Array, substeps: in
 
     Parameters
     ----------
-    m : Machine
-        The actuator.
     course : ndarray, shape (n, 5)
         `COURSE` at every `TICK`.
     y : ndarray, shape (7,)
@@ -114,8 +110,6 @@ def run(m: Machine, course: Array, start: Array | None = None, refine: int = 1) 
 
     Parameters
     ----------
-    m : Machine
-        The actuator.
     course : ndarray, shape (n, 5)
         `COURSE` at every `TICK`.
     start : ndarray, shape (7,), optional
@@ -141,8 +135,6 @@ def substeps_for(m: Machine, speed: float) -> int:
 
     Parameters
     ----------
-    m : Machine
-        The actuator.
     speed : float
         Highest motor speed [rad/s].
 

@@ -130,8 +130,6 @@ def watch_stream(out: Connection, server: int, task: StreamTask) -> None:
         To the server.
     server : int
         Process identity of the server, without which this one ends.
-    task : StreamTask
-        The stream.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     bind_to_server(server)

@@ -46,8 +46,6 @@ def metrics_offered(where: str, told: Watched) -> Generator[int]:
     ----------
     where : str
         As `endpoint` takes it; port 0 takes a free one.
-    told : Watched
-        The watch.
 
     Raises
     ------

@@ -41,8 +41,6 @@ def viewed(told: Watched, console: "Console | None" = None) -> Generator[None]:
 
     Parameters
     ----------
-    told : Watched
-        The watch.
     console : Console, optional
         Where instead.
     """
@@ -60,13 +58,7 @@ def lines_wanted(view: bool) -> bool:
 
 
 def drawn(told: Watched) -> "Group":
-    """Return one picture of a watch.
-
-    Parameters
-    ----------
-    told : Watched
-        The watch.
-    """
+    """Return one picture of a watch."""
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text

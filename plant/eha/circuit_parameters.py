@@ -133,11 +133,6 @@ _ROUNDING = 1e-9
 def oil_demand(p: CircuitParameters) -> float:
     """Return the oil that both chambers take up from the accumulator's pressure to one relief pressure above it.
 
-    Parameters
-    ----------
-    p : CircuitParameters
-        The circuit.
-
     Returns
     -------
     float
@@ -177,11 +172,6 @@ def circuit_of(p: EhaParameters) -> CircuitParameters:
     """Return the circuit around an actuator: itself if it is one, else with the paper's rest, scaled to fit.
 
     Leakage of the pump is at most its share of L_t; the accumulator grows with the compliance of the chambers.
-
-    Parameters
-    ----------
-    p : EhaParameters
-        The actuator.
 
     Returns
     -------

@@ -53,8 +53,6 @@ def one_sided(p: CircuitParameters, **faults: float) -> OneSidedParameters:
 
     Parameters
     ----------
-    p : CircuitParameters
-        The circuit.
     **faults : float
         Entries of `OneSidedParameters` [each in its unit].
     """

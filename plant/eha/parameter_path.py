@@ -61,11 +61,6 @@ class ParameterPath:
     def constant(cls, parameters: EhaParameters) -> "ParameterPath":
         """Return the path on which nothing changes.
 
-        Parameters
-        ----------
-        parameters : EhaParameters
-            The actuator.
-
         Returns
         -------
         ParameterPath

@@ -265,8 +265,6 @@ def run_plant(plant: Plant, speed: Array, sample_time: float, rows: Array) -> Ar
 
     Parameters
     ----------
-    plant : Plant
-        The plant.
     speed : ndarray, shape (n,)
         Motor speed at the samples [rad/s], linear between.
     sample_time : float

@@ -82,8 +82,6 @@ def plant_in_c(
     ----------
     plant : Plant
         One of `plant.eha.simulate.PLANTS`.
-    parameters : EhaParameters
-        The actuator.
     sample_time : float
         Seconds between samples [s].
     name : str

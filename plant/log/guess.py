@@ -231,8 +231,6 @@ def missing_channels(
         Channels; ``"position_m or velocity_m_s"`` is one of two.
     headings : sequence of Heading
         What the columns of the log are called.
-    source : str
-        The log.
     found : collection of str
         Channels that it has; the hint names the others that an estimate gains by, too.
     """
