@@ -14,6 +14,23 @@ from estimation.arrays import Array
 from estimation.models.model import OPENING, ProcessModel
 
 
+class Samples(NamedTuple):
+    """A log as a loop reads it.
+
+    Parameters
+    ----------
+    drives, measured : ndarray, shapes (samples, drives) and (samples, channels)
+        As in `FilterProblem` [SI].
+    substeps, every : int
+        Steps of the model a sample, and samples a row of the track.
+    """
+
+    drives: Array
+    measured: Array
+    substeps: int
+    every: int
+
+
 @dataclass(frozen=True, eq=False)
 class FilterProblem:
     """One filtering task in the model's scaled units, ready for a kernel.
@@ -63,6 +80,11 @@ class FilterProblem:
     keep_innovations: bool
     robust: str = "none"
     settings: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    @property
+    def samples(self) -> Samples:
+        """The log, as loops take it."""
+        return Samples(self.drives, self.measured, self.substeps, self.every)
 
     @property
     def opened(self) -> Array:

@@ -121,9 +121,8 @@ def interacting(
         constants[i, : len(row)] = row
     trace = empty_trace(first)
     history = np.empty((len(trace.track), len(bank)))
-    order, log = np.array([kinds.index(kind) for kind in each]), (first.drives, first.measured)
-    chain = (transitions, log_probability)
-    log_likelihood = kernel.run(states, constants, order, *chain, *log, first.substeps, first.every, history, trace)
+    order, chain = np.array([kinds.index(kind) for kind in each]), (transitions, log_probability)
+    log_likelihood = kernel.run(states, constants, order, *chain, first.samples, history, trace)
     return trace._replace(log_likelihood=log_likelihood), history
 
 

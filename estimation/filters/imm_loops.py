@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from estimation.arrays import Array, IntArray
-from estimation.engine.contract import Trace
+from estimation.engine.contract import Samples, Trace
 from estimation.engine.parts import rule_functions
 from estimation.engine.rule import Rule
 from estimation.models.model import ProcessModel
@@ -208,10 +208,7 @@ def run(
     kinds: IntArray,
     transitions: Array,
     log_probability: Array,
-    drives: Array,
-    measured: Array,
-    substeps: int,
-    every: int,
+    samples: Samples,
     history: Array,
     trace: Trace,
     *,
@@ -236,13 +233,10 @@ def run(
         Logarithms of the transitions.
     log_probability : ndarray, shape (modes,)
         Of the modes, before and after.
-    drives, measured : ndarray, shapes (samples, drives) and (samples, channels)
-        The log [SI].
-    substeps, every : int
-        Steps a sample, and samples a row of the track.
     history : ndarray, shape (rows, modes)
         Logarithms of the probabilities along the track.
     """
+    drives, measured, substeps, every = samples
     (n, channels), modes = measured.shape, states.shape[0]
     constants, seen = np.empty((modes, CONSTANTS)), np.empty((modes, 2, channels))
     terms, weights, shares, shift = np.empty(modes), np.empty(modes), np.empty(modes), np.empty(BELIEF)

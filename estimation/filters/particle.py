@@ -19,7 +19,7 @@ from typing import TypeAlias
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.engine.contract import FilterProblem, Trace, empty_trace
+from estimation.engine.contract import FilterProblem, Samples, Trace, empty_trace
 from estimation.engine.kalman import belief_symbols, bounded, moved, observed, process_noise
 from estimation.engine.layout import layout
 from estimation.engine.parts import data_places, function_source
@@ -54,11 +54,8 @@ def run(
     particles: Array,
     rows: Array,
     limits: Array,
-    drives: Array,
-    measured: Array,
     variances: Array,
-    substeps: int,
-    every: int,
+    samples: Samples,
     trace: Trace,
     *,
     WIDTH: int,
@@ -82,18 +79,15 @@ def run(
         The filter's constants.
     limits : ndarray, shape (2, n)
         Bounds of the states [scaled].
-    drives, measured : ndarray, shapes (samples, drives) and (samples, channels)
-        The log [SI].
     variances : ndarray, shape (channels,)
         Of the sensors [SI squared].
-    substeps, every : int
-        Steps a sample, and samples a row of the track.
 
     Returns
     -------
     float
         Log-likelihood [dimensionless].
     """
+    drives, measured, substeps, every = samples
     channels = measured.shape[1]
     size = particles.shape[0]
     others, weights, seen = np.empty_like(particles), np.empty(size), np.empty((size, channels))
@@ -275,7 +269,6 @@ def particle_filter(problem: FilterProblem, particles: int, rng: np.random.Gener
     trace = empty_trace(problem)
     limits = np.array([state.scaled_bounds for state in problem.model.states]).T.copy()
     cloud = rng.multivariate_normal(problem.mean, problem.covariance, size=particles, method="eigh")
-    log = (problem.drives, problem.measured, problem.variances, problem.substeps, problem.every)
     run_kernel = compile_particles(problem.model, problem.channels)
     cloud = np.clip(cloud, *limits)
     rows, log_likelihood = constant_row(problem, {}), 0.0
@@ -284,5 +277,5 @@ def particle_filter(problem: FilterProblem, particles: int, rng: np.random.Gener
     for first in range(0, len(problem.measured), taken):
         count = min(taken, len(problem.measured) - first)
         drawn = rng.standard_normal((count, *each)), rng.random(count)
-        log_likelihood += run_kernel(first, *drawn, cloud, rows, limits, *log, trace)
+        log_likelihood += run_kernel(first, *drawn, cloud, rows, limits, problem.variances, problem.samples, trace)
     return trace._replace(log_likelihood=log_likelihood)
