@@ -55,6 +55,15 @@ def test_every_decision_is_in_the_index() -> None:
     assert numbers == sorted(set(numbers))
 
 
+def test_every_decision_is_on_the_page_of_subjects() -> None:
+    index = script("decisions_index")
+    text, page = ((ROOT / "docs" / name).read_text("utf-8") for name in ("decisions.md", "decisions_by_theme.md"))
+    themes = tomllib.loads((ROOT / "docs" / "decision_themes.toml").read_text("utf-8"))
+    assert index.by_theme(text, themes) == page, "run: python docs/decisions_index.py"
+    assert {int(number) for number in re.findall(r"^- \[(\d+)\. ", page, re.MULTILINE)} == {*index.headings_of(text)}
+    assert all(int(number) < by for number, changes in themes["later"].items() for by, _ in changes)
+
+
 def test_an_anchor_is_what_a_page_of_markdown_gets() -> None:
     anchor = script("decisions_index").anchor_of('5. "Not observable" is Cramér-Rao\'s, not 3 %')
     assert anchor == "5-not-observable-is-cramér-raos-not-3-"
