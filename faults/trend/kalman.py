@@ -15,7 +15,7 @@ from itertools import product
 
 import numpy as np
 
-from faults.trend.kalman_loops import Index, fill_predicted, follow
+from faults.trend.kalman_loops import GridRows, Index, Steps, fill_predicted, follow
 from plant.arrays import Array
 
 BENDS = (0.0, 1e-3, 3e-3, 1e-2)
@@ -88,6 +88,11 @@ class Settings:
     def paced(self) -> Index:
         """Which of them each setting has, shape (g,)."""
         return np.repeat(np.arange(len(self.by_pace)), [own.stop - own.start for _, own in self.by_pace])
+
+    @property
+    def rows(self) -> GridRows:
+        """What the loops read of it."""
+        return GridRows(self.paced, self.bend, self.jerk, self.scatter)
 
     @cached_property
     def log_prior(self) -> Array:
@@ -171,9 +176,8 @@ def beliefs(times: Array, values: Array, stds: Array, grid: Settings) -> list[Be
     steps = np.diff(times, prepend=times[:1])
     made = [_step(step, grid.paces) for step in steps.tolist()]
     moves, bent, jerked = (np.array(one) for one in zip(*made, strict=True))
-    wandered = steps[:, None] * grid.wander**2
-    of_grid = grid.bend, grid.jerk, wandered, grid.scatter
-    follow(values, stds, GROSS, grid.paced, moves, bent, jerked, *of_grid, mean, covariance, evidence)
+    before = Steps(moves, bent, jerked, steps[:, None] * grid.wander**2)
+    follow(values, stds, GROSS, grid.rows, before, mean, covariance, evidence)
     return [Belief(mean[k], covariance[k], evidence[k]) for k in range(rows)]
 
 
@@ -187,10 +191,8 @@ def predict(now: Belief, step: float, grid: Settings) -> Belief:
     """
     moves, bent, jerked = _step(step, grid.paces)
     mean, covariance = np.empty_like(now.mean), np.empty_like(now.covariance)
-    wandered = grid.wander**2 * step
-    fill_predicted(
-        now.mean, now.covariance, grid.paced, moves, bent, jerked, grid.bend, grid.jerk, wandered, mean, covariance
-    )
+    ahead = Steps(moves[None], bent[None], jerked[None], (grid.wander**2 * step)[None])
+    fill_predicted(now.mean, now.covariance, grid.rows, ahead, 0, mean, covariance)
     return Belief(mean, covariance, now.evidence)
 
 

@@ -1,7 +1,7 @@
 """A step and a log of every setting of the grid of `faults.trend.kalman`, as plain loops that are compiled."""
 
 import math
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,17 +13,51 @@ Index: TypeAlias = NDArray[np.int64]
 """Places."""
 
 
+class GridRows(NamedTuple):
+    """What the settings of a grid say, a number each.
+
+    Parameters
+    ----------
+    paced : ndarray of int, shape (g,)
+        Which pace a setting has.
+    bend, jerk : ndarray, shape (g,)
+        Standard deviation that slope and curvature gain in a unit of time [1/log, 1/log^2].
+    scatter : ndarray, shape (g,)
+        Standard deviation from log to log beyond each log's own [dimensionless].
+    """
+
+    paced: Index
+    bend: Array
+    jerk: Array
+    scatter: Array
+
+
+class Steps(NamedTuple):
+    """What the time before each log does.
+
+    Parameters
+    ----------
+    moves, bent : ndarray, shape (n, paces, 3, 3)
+        What moves level, slope and curvature of each pace, and what unit white noise on the slope brings.
+    jerked : ndarray, shape (n, 3, 3)
+        What unit white noise on the curvature brings.
+    wandered : ndarray, shape (n, g)
+        Variance that the level gains [dimensionless].
+    """
+
+    moves: Array
+    bent: Array
+    jerked: Array
+    wandered: Array
+
+
 @natively()
 def fill_predicted(
     mean: Array,
     covariance: Array,
-    paced: Index,
-    moves: Array,
-    bent: Array,
-    jerked: Array,
-    bend: Array,
-    jerk: Array,
-    wandered: Array,
+    grid: GridRows,
+    steps: Steps,
+    place: int,
     next_mean: Array,
     next_covariance: Array,
 ) -> None:
@@ -35,24 +69,17 @@ def fill_predicted(
         Level, slope and curvature [dimensionless, 1/log, 1/log^2].
     covariance : ndarray, shape (g, 3, 3)
         Of the three [products of their units].
-    paced : ndarray of int, shape (g,)
-        Which pace a setting has.
-    moves, bent : ndarray, shape (paces, 3, 3)
-        What moves the three of each pace, and what unit white noise on the slope brings.
-    jerked : ndarray, shape (3, 3)
-        What unit white noise on the curvature brings.
-    bend, jerk : ndarray, shape (g,)
-        Size of either noise [1/log, 1/log^2].
-    wandered : ndarray, shape (g,)
-        Variance that the level gains [dimensionless].
+    place : int
+        Which of the steps it is.
     next_mean : ndarray, shape (g, 3)
         Room for the means.
     next_covariance : ndarray, shape (g, 3, 3)
         Room for the covariances.
     """
+    moves, bent, jerked, wandered = steps.moves[place], steps.bent[place], steps.jerked[place], steps.wandered[place]
     for k in range(mean.shape[0]):
-        move, noise = moves[paced[k]], bent[paced[k]]
-        slopes, jolts = bend[k] * bend[k], jerk[k] * jerk[k]
+        move, noise = moves[grid.paced[k]], bent[grid.paced[k]]
+        slopes, jolts = grid.bend[k] * grid.bend[k], grid.jerk[k] * grid.jerk[k]
         rise, bow, growth, turn = move[0, 1], move[0, 2], move[1, 1], move[1, 2]
         level, slope, curvature = mean[k, 0], mean[k, 1], mean[k, 2]
         next_mean[k, 0] = level + rise * slope + bow * curvature
@@ -118,14 +145,8 @@ def follow(
     values: Array,
     stds: Array,
     gross: float,
-    paced: Index,
-    moves: Array,
-    bent: Array,
-    jerked: Array,
-    bend: Array,
-    jerk: Array,
-    wandered: Array,
-    scatter: Array,
+    grid: GridRows,
+    steps: Steps,
     mean: Array,
     covariance: Array,
     evidence: Array,
@@ -138,18 +159,6 @@ def follow(
         What each log says, and its own standard deviation [dimensionless].
     gross : float
         See `take_in` [dimensionless].
-    paced : ndarray of int, shape (g,)
-        See `fill_predicted`, as all that follows.
-    moves, bent : ndarray, shape (n, paces, 3, 3)
-        Of the step before each log.
-    jerked : ndarray, shape (n, 3, 3)
-        The same.
-    bend, jerk : ndarray, shape (g,)
-        Size of either noise [1/log, 1/log^2].
-    wandered : ndarray, shape (n, g)
-        Variance that the level gains in the step before each log [dimensionless].
-    scatter : ndarray, shape (g,)
-        See `take_in` [dimensionless].
     mean : ndarray, shape (rows, g, 3)
         A row more than there are logs.
     covariance : ndarray, shape (rows, g, 3, 3)
@@ -158,19 +167,7 @@ def follow(
         The same.
     """
     for k in range(values.shape[0]):
-        fill_predicted(
-            mean[k],
-            covariance[k],
-            paced,
-            moves[k],
-            bent[k],
-            jerked[k],
-            bend,
-            jerk,
-            wandered[k],
-            mean[k + 1],
-            covariance[k + 1],
-        )
+        fill_predicted(mean[k], covariance[k], grid, steps, k, mean[k + 1], covariance[k + 1])
         for i in range(evidence.shape[1]):
             evidence[k + 1, i] = evidence[k, i]
-        take_in(mean[k + 1], covariance[k + 1], evidence[k + 1], values[k], stds[k], gross, scatter)
+        take_in(mean[k + 1], covariance[k + 1], evidence[k + 1], values[k], stds[k], gross, grid.scatter)
