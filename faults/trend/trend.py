@@ -1,4 +1,4 @@
-"""`trend_of(series) -> Trend`: whether a severity grows over an actuator's logs, and when it reaches its limit."""
+"""`trends(series)`: after each log, whether a severity grows over an actuator's logs, and when it reaches its limit."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -147,17 +147,6 @@ def trends(series: Series) -> Iterator[Trend]:
     parts = stretches(series.times / series.step, scaled, series.stds / abs(series.size), known, settings())
     for place, (begin, belief) in enumerate(parts):
         yield Trend(series, place, begin, belief)
-
-
-def trend_of(series: Series) -> Trend:
-    """Return what a series says after its last log.
-
-    Returns
-    -------
-    Trend
-        Level, growth, forecast and alarm.
-    """
-    return list(trends(series))[-1]
 
 
 def first_logs_after(times: Array, events: Iterable[float]) -> set[int]:

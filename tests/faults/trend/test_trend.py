@@ -7,9 +7,14 @@ import pytest
 
 from faults.trend.crossing import HORIZON, crossing
 from faults.trend.kalman import exponential_growth, first_belief
-from faults.trend.trend import Series, Trend, trend_of, trends
+from faults.trend.trend import Series, Trend, trends
 from plant.arrays import Array
 from tests.faults.trend.small_beliefs import one_setting
+
+
+def last_trend(series: Series) -> Trend:
+    """What a series says after its last log."""
+    return [*trends(series)][-1]
 
 
 def series_of(truth: Array, std: float = 0.04, seed: int = 0) -> Series:
@@ -28,14 +33,14 @@ def scaled_by(series: Series, size: float, healthy: float, stretch: float) -> Se
 
 
 def test_level_and_growth_of_a_steady_actuator_come_back() -> None:
-    found = trend_of(series_of(growth()))
+    found = last_trend(series_of(growth()))
     (level, level_std), (rate, rate_std) = found.level, found.growth
     assert abs(level - 0.78) < 3.0 * level_std < 0.15
     assert abs(rate - 0.02) < 3.0 * rate_std < 0.03
 
 
 def test_the_forecast_holds_the_crossing_and_its_intervals_are_nested() -> None:
-    found = trend_of(series_of(growth()))
+    found = last_trend(series_of(growth()))
     assert found.crossing is not None
     least, low, middle, high, most = found.crossing.quantiles
     assert least <= low <= middle <= high <= most
@@ -46,7 +51,7 @@ def test_the_forecast_holds_the_crossing_and_its_intervals_are_nested() -> None:
 @pytest.mark.parametrize(("size", "healthy", "stretch"), [(-4.1e7, 2.07e8, 7.0), (2.5, 1.1, 0.1)])
 def test_units_and_falling_severities_change_nothing(size: float, healthy: float, stretch: float) -> None:
     plain = series_of(growth())
-    one, other = trend_of(plain), trend_of(scaled_by(plain, size, healthy, stretch))
+    one, other = last_trend(plain), last_trend(scaled_by(plain, size, healthy, stretch))
     assert one.crossing is not None
     assert other.crossing is not None
     assert other.crossing.quantiles == pytest.approx(one.crossing.quantiles)
@@ -76,20 +81,20 @@ def test_an_actuator_that_began_past_its_limit_is_in_alarm_from_the_first_foreca
 
 def test_a_jump_begins_a_new_stretch_and_is_no_growth() -> None:
     truth = np.where(np.arange(40) < 25, 0.1, 0.6)
-    found = trend_of(series_of(truth, std=0.02))
+    found = last_trend(series_of(truth, std=0.02))
     assert 24 <= found.begin <= 26
     assert found.level[0] == pytest.approx(0.6, abs=0.05)
     assert not found.certain
 
 
 def test_steady_growth_is_one_stretch() -> None:
-    assert [trend_of(series_of(growth(60), seed=seed)).begin for seed in range(5)] == [0] * 5
+    assert [last_trend(series_of(growth(60), seed=seed)).begin for seed in range(5)] == [0] * 5
 
 
 def test_a_repair_resets_the_trend_even_where_it_makes_no_jump() -> None:
     truth = np.concatenate([growth(30, 0.01), np.full(15, 0.29)])
     series = series_of(truth)
-    found = trend_of(replace(series, maintained=(29.5, 99.0)))
+    found = last_trend(replace(series, maintained=(29.5, 99.0)))
     assert found.begin == 30
     assert not found.alarm
 
@@ -106,7 +111,7 @@ def test_what_is_said_after_a_log_does_not_depend_on_later_logs() -> None:
     def numbers(found: Trend) -> tuple[float, float]:
         return found.level[0], found.growing
 
-    assert numbers(trend_of(early)) == numbers([*trends(series)][19])
+    assert numbers(last_trend(early)) == numbers([*trends(series)][19])
 
 
 def test_a_known_slope_without_noise_crosses_at_a_known_time() -> None:
