@@ -11,7 +11,7 @@ from experiments.nine_conditions.transfer_functions import COEFFICIENTS
 from experiments.page.frames import cell
 from experiments.page.words import in_words
 from experiments.papers.parts import Evidence
-from experiments.papers.verdict import Ours, Row
+from experiments.papers.verdict import Ours, Row, number_row
 from experiments.published import as_printed
 from faults.conditions import CONDITIONS, LEVELS, parameters_for
 from faults.eha.physical import VOLTS_A, VOLTS_B
@@ -52,6 +52,10 @@ CELL_NOTE = (
 LETTER_NOTE = "Binary signal of 4 V clocked at 5 Hz, the output alone filtered at 30 Hz, second order, 1 ms."
 
 
+_given = partial(number_row, PAPER, accept="digits", basis="target")
+_predicted = partial(number_row, PAPER, basis="model", shown_by="hydrostate study")
+
+
 def eha_table_rows(found: Evidence) -> Iterator[Row]:
     """Yield a row for every cell of Tables 1 to 6.
 
@@ -78,18 +82,8 @@ def _throttles() -> Iterator[Row]:
         condition = CONDITIONS[row["condition"]]
         a, b = VOLTS_A[LEVELS.index(condition.leakage)], VOLTS_B[LEVELS.index(condition.friction)]
         for axis, column, volts in (("A", "throttle_a_v", a), ("B", "throttle_b_v", b)):
-            yield Row(
-                paper=PAPER,
-                where="Table 1",
-                claim=f"axis {axis} input, {in_words(row['condition'])}",
-                printed=row[column],
-                value=float(row[column]),
-                unit="V",
-                accept="digits",
-                basis="target",
-                ours=Ours(volts),
-                shown_by="hydrostate circuit",
-            )
+            claim = f"axis {axis} input, {in_words(row['condition'])}"
+            yield _given("Table 1", claim, row[column], "V", ours=Ours(volts), shown_by="hydrostate circuit")
 
 
 def _sizes() -> Iterator[Row]:
@@ -98,18 +92,9 @@ def _sizes() -> Iterator[Row]:
     for symbol in ("D_p", "A", "V_0"):
         printed, name = str(table.loc[symbol, "value"]), str(table.loc[symbol, "name"])
         assert name in names  # noqa: S101 - the table's names are those of the parameters
-        yield Row(
-            paper=PAPER,
-            where="Table 2",
-            claim=f"{symbol}, {name.replace('_', ' ')}",
-            printed=printed,
-            value=float(printed),
-            unit=str(table.loc[symbol, "unit"]).replace("^3", "³").replace("^2", "²"),
-            accept="digits",
-            basis="target",
-            ours=Ours(float(getattr(RIG, name))),
-            shown_by="hydrostate study",
-        )
+        unit = str(table.loc[symbol, "unit"]).replace("^3", "³").replace("^2", "²")
+        claim, ours = f"{symbol}, {name.replace('_', ' ')}", Ours(float(getattr(RIG, name)))
+        yield _given("Table 2", claim, printed, unit, ours=ours, shown_by="hydrostate study")
 
 
 def _taken_over(title: str, kind: str, names: Mapping[str, tuple[str, str, str]]) -> Iterator[Row]:
@@ -118,20 +103,9 @@ def _taken_over(title: str, kind: str, names: Mapping[str, tuple[str, str, str]]
         condition = next(c for c in CONDITIONS.values() if getattr(c, kind) == level)
         p = parameters_for(condition, RIG)
         for name, (column, unit, words) in names.items():
-            printed = str(table.loc[level, column])
-            yield Row(
-                paper=PAPER,
-                where=title,
-                claim=f"{words}, {OF_LEVEL[level]}",
-                printed=printed,
-                value=float(printed),
-                unit=unit,
-                accept="digits",
-                basis="target",
-                ours=Ours(float(getattr(p, name))),
-                shown_by="hydrostate study",
-                note="The condition's definition.",
-            )
+            claim, printed, ours = f"{words}, {OF_LEVEL[level]}", str(table.loc[level, column]), Ours(getattr(p, name))
+            note = "The condition's definition."
+            yield _given(title, claim, printed, unit, ours=ours, shown_by="hydrostate study", note=note)
 
 
 def _refitted(title: str, kind: str, names: Mapping[str, tuple[str, str, str]], refit: pd.DataFrame) -> Iterator[Row]:
@@ -139,22 +113,12 @@ def _refitted(title: str, kind: str, names: Mapping[str, tuple[str, str, str]], 
     figure = "Figure 8" if kind == "leakage" else "Figure 9"
     for row in refit.to_dict("records"):
         column, unit, words = names[row["coefficient"]]
-        printed = str(table.loc[row["level"], column])
-        yield Row(
-            paper=PAPER,
-            where=f"{title}, {figure}",
-            claim=f"{words}, {OF_LEVEL[row['level']]}, fitted anew to steady points of the circuit",
-            printed=printed,
-            value=float(printed),
-            unit=unit,
-            accept="digits",
-            basis="target",
-            ours=Ours(row["refitted"], row["low"], row["high"]),
-            shown_by="hydrostate circuit",
-            note=SETS_APART
-            if row["coefficient"] == "leakage_coefficient"
-            else "The circuit was given the printed value.",
-        )
+        printed, ours = str(table.loc[row["level"], column]), Ours(row["refitted"], row["low"], row["high"])
+        claim = f"{words}, {OF_LEVEL[row['level']]}, fitted anew to steady points of the circuit"
+        apart = row["coefficient"] == "leakage_coefficient"
+        note = SETS_APART if apart else "The circuit was given the printed value."
+        where = f"{title}, {figure}"
+        yield _given(where, claim, printed, unit, ours=ours, shown_by="hydrostate circuit", note=note)
 
 
 def _rmse(frame: pd.DataFrame) -> Iterator[Row]:
@@ -166,20 +130,9 @@ def _rmse(frame: pd.DataFrame) -> Iterator[Row]:
     for condition in CONDITIONS:
         for words, column, name in kinds:
             printed = str(table.loc[condition, column])
-            value = float(printed)
-            yield Row(
-                paper=PAPER,
-                where="Table 5",
-                claim=f"RMSE ({words}), {in_words(condition)}",
-                printed=printed,
-                value=value,
-                unit="m/s",
-                accept=f"{0.5 * value:g} to {2.0 * value:g}",
-                basis="model",
-                ours=_rmse_ours(ours, condition, name),
-                shown_by="hydrostate study",
-                note=RMSE_NOTE,
-            )
+            claim, found = f"RMSE ({words}), {in_words(condition)}", _rmse_ours(ours, condition, name)
+            accept = f"{0.5 * float(printed):g} to {2.0 * float(printed):g}"
+            yield _predicted("Table 5", claim, printed, "m/s", accept, found, note=RMSE_NOTE)
 
 
 def _rmse_ours(frame: pd.DataFrame, condition: str, name: str) -> Ours:
@@ -193,21 +146,10 @@ def _coefficients(frame: pd.DataFrame) -> Iterator[Row]:
     names = {"b0": "z² above", "b1": "z above", "b2": "1 above", "a1": "z below", "a2": "1 below"}
     for condition in CONDITIONS:
         for name in COEFFICIENTS:
-            printed = str(table.loc[condition, name])
+            claim, printed = f"coefficient of {names[name]}, {in_words(condition)}", str(table.loc[condition, name])
             value = cell(ours, condition, name)
-            yield Row(
-                paper=PAPER,
-                where="Table 6",
-                claim=f"coefficient of {names[name]}, {in_words(condition)}",
-                printed=printed,
-                value=float(printed),
-                unit="",
-                accept="digits",
-                basis="model",
-                ours=Ours(value, *interval_95(value, cell(ours, condition, f"{name}_std"))),
-                shown_by="hydrostate study",
-                note=CELL_NOTE,
-            )
+            found = Ours(value, *interval_95(value, cell(ours, condition, f"{name}_std")))
+            yield _predicted("Table 6", claim, printed, "", "digits", found, note=CELL_NOTE)
 
 
 def _to_the_letter(frame: pd.DataFrame) -> Iterator[Row]:

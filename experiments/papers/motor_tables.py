@@ -1,6 +1,7 @@
 """Tables 1, 2, 4 and 5 of the diaphragm-motor paper and the regression of its Figure 12, cell by cell."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ from experiments.diaphragm_motor.sweeps import SWING
 from experiments.motor_paper.tables import OBEYED_PERCENT
 from experiments.page.frames import Tables, cell
 from experiments.papers.parts import Evidence
-from experiments.papers.verdict import Basis, Ours, Row
+from experiments.papers.verdict import Ours, Row, number_row
 from experiments.published import as_printed
 from plant.diaphragm_motor.composite_plate import PlateParameters
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
@@ -36,33 +37,7 @@ def motor_table_rows(found: Evidence) -> Iterator[Row]:
     yield from _table_5(found["diaphragm-motor"], paper["table_2"])
 
 
-def _row(
-    where: str,
-    claim: str,
-    printed: str,
-    unit: str,
-    accept: str,
-    ours: Ours,
-    *,
-    basis: Basis = "computed",
-    errata: str = "",
-    note: str = "",
-    shown_by: str = VERB,
-) -> Row:
-    return Row(
-        paper=PAPER,
-        where=where,
-        claim=claim,
-        printed=printed,
-        value=float(printed),
-        unit=unit,
-        accept=accept,
-        basis=basis,
-        ours=ours,
-        errata=errata,
-        shown_by=shown_by,
-        note=note,
-    )
+_row = partial(number_row, PAPER, shown_by=VERB)
 
 
 def _sizes(table: pd.DataFrame) -> Iterator[Row]:

@@ -109,6 +109,37 @@ class Row:
     note: str = ""
 
 
+def number_row(
+    paper: str,
+    where: str,
+    claim: str,
+    printed: str,
+    unit: str,
+    accept: str,
+    ours: Ours,
+    *,
+    basis: Basis = "computed",
+    errata: str = "",
+    shown_by: str,
+    note: str = "",
+) -> Row:
+    """Return the row of a printed number; the arguments are those of `Row`."""
+    return Row(
+        paper=paper,
+        where=where,
+        claim=claim,
+        printed=printed,
+        value=float(printed),
+        unit=unit,
+        accept=accept,
+        basis=basis,
+        ours=ours,
+        errata=errata,
+        shown_by=shown_by,
+        note=note,
+    )
+
+
 def accepted(row: Row) -> tuple[float, float]:
     """Return the range in which ours counts as the printed value.
 
