@@ -66,30 +66,19 @@ def summary_tables(frame: pd.DataFrame) -> Mapping[str, pd.DataFrame]:
         ``classes``, ``logs``, ``failures``.
     """
     tables = {
-        "outcomes": outcome_table(frame),
+        "outcomes": _outcome_table(frame),
         "bulk modulus": bulk_modulus_table(frame),
-        "diagnosis": diagnosis_table(frame),
-        "confusion": confusion_table(frame),
-        "classes": class_table(frame),
+        "diagnosis": _diagnosis_table(frame),
+        "confusion": _confusion_table(frame),
+        "classes": _class_table(frame),
         "logs": frame.loc[frame["file"].notna(), LOG_COLUMNS].reset_index(drop=True),
         "failures": frame.loc[frame["outcome"] == "failed", FAILURE_COLUMNS].reset_index(drop=True),
     }
     return {name: table for name, table in tables.items() if len(table)}
 
 
-def outcome_table(frame: pd.DataFrame) -> pd.DataFrame:
-    """Count outcomes.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        From `frame_of`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row a method: counts of cases, and of each outcome.
-    """
+def _outcome_table(frame: pd.DataFrame) -> pd.DataFrame:
+    """Count outcomes. One row a method: counts of cases, and of each outcome."""
 
     def entries(group: pd.DataFrame) -> dict[str, object]:
         counts = group["outcome"].value_counts()
@@ -138,19 +127,11 @@ def _each(frame: pd.DataFrame, by: list[str], entries: Callable[[pd.DataFrame], 
     return pd.DataFrame(sorted(rows, key=lambda row: first.setdefault(tuple(row[name] for name in METHOD), len(first))))
 
 
-def diagnosis_table(frame: pd.DataFrame) -> pd.DataFrame:
+def _diagnosis_table(frame: pd.DataFrame) -> pd.DataFrame:
     """Return how often the class is right, where it is known.
 
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        From `frame_of`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row a method and condition: counts, share that is right [%], and the ratio of the best probability
-        to the runner-up's, at the median [dimensionless].
+    One row a method and condition: counts, share that is right [%], and the ratio of the best probability to
+    the runner-up's, at the median [dimensionless].
     """
 
     def entries(group: pd.DataFrame) -> dict[str, object]:
@@ -161,18 +142,10 @@ def diagnosis_table(frame: pd.DataFrame) -> pd.DataFrame:
     return _each(_classified(frame), [*METHOD, "condition"], entries)
 
 
-def confusion_table(frame: pd.DataFrame) -> pd.DataFrame:
+def _confusion_table(frame: pd.DataFrame) -> pd.DataFrame:
     """Count which class was found for which, over all methods.
 
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        From `frame_of`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row for each true condition, a column for each found one [count]; empty where no class is known.
+    A row for each true condition, a column for each found one [count]; empty where no class is known.
     """
     known = _classified(frame)
     known = known[known["found_condition"].notna()]
@@ -187,18 +160,10 @@ def _classified(frame: pd.DataFrame) -> pd.DataFrame:
     return frame[(frame["verb"] == "diagnose") & frame["known"]]
 
 
-def class_table(frame: pd.DataFrame) -> pd.DataFrame:
+def _class_table(frame: pd.DataFrame) -> pd.DataFrame:
     """Count the classes that were found in logs.
 
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        From `frame_of`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row a condition that was found, or ``none``: count of logs, and share [%].
+    One row a condition that was found, or ``none``: count of logs, and share [%].
     """
     logs = frame[frame["file"].notna() & (frame["verb"] == "diagnose")]
     counts = logs["found_condition"].fillna("none").value_counts()
