@@ -28,7 +28,7 @@ def stretches(where: BoolArray) -> tuple[IntArray, IntArray]:
 
 
 def in_long_stretches(where: BoolArray, least: float) -> BoolArray:
-    """Return which samples are in stretches of so many or more.
+    """Return which samples are in stretches of at least the given length.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ from plant.notes import Note
 
 
 class HydrostateError(ValueError):
-    """A user's input cannot be used; the message says what, what was wanted, and what came.
+    """A user's input cannot be used; the message says what was wanted and what was given.
 
     Parameters
     ----------
@@ -24,11 +24,11 @@ class HydrostateError(ValueError):
 
 
 class NoSuchNameError(HydrostateError, AttributeError):
-    """An attribute is asked for that is not there; the message has the nearest one."""
+    """An attribute does not exist; the message names the nearest one."""
 
 
 class NoSuchEntryError(HydrostateError, KeyError):
-    """An entry of a table is asked for that is not there; the message has the nearest one."""
+    """An entry of a table does not exist; the message names the nearest one."""
 
     def __str__(self) -> str:
         return Exception.__str__(self)  # a KeyError would put the sentence in quotation marks

@@ -66,7 +66,7 @@ WIDTH = (0.8, 1.3)
 
 @dataclass(frozen=True)
 class Case:
-    """One log, and what it is asked."""
+    """A log, and which estimate is made of it."""
 
     plant: str
     form: str
@@ -178,7 +178,7 @@ def summarised(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def cases_of(options: argparse.Namespace) -> list[Case]:
-    """Return what is asked of which logs."""
+    """Return the cases: each log with the estimate that is made of it."""
     forms = ["flow", *(["severities"] if options.severities else [])]
     cases: list[Case] = []
     for plant, rate in product(options.plants, options.rates):

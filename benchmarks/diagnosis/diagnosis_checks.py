@@ -186,7 +186,7 @@ def onset_checks(seeds: int) -> list[Check]:
 
 
 def stuck_checks() -> list[Check]:
-    """Diagnose a 10 Hz sine that leaves the piston stuck: leakage is right, friction open among what holds it."""
+    """Diagnose a 10 Hz sine that leaves the piston stuck: leakage is found, friction is left open."""
     right, widest = 0, 0.0
     for seed, (name, condition) in enumerate(CONDITIONS.items()):
         p = draw_parameters(name, np.random.default_rng([TEST, seed]), 0.0)

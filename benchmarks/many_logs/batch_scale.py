@@ -49,7 +49,7 @@ NIGHT_CASES, CASE_SECONDS = 1_000_000, (2.5e-4, 2.5e-3, 2.5e-2)
 
 
 def plan_of(cases: int, samples: int) -> Plan:
-    """Return a study of so many cases, of four conditions."""
+    """Return a study of the given number of cases, in four conditions."""
     seeds = cases // (len(NAMES) * len(STARTS))
     runs = {
         "plants": ["reduced"],

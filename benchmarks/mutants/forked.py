@@ -77,7 +77,7 @@ class Chosen:
 
 
 def ran(task: Mapping[str, Any]) -> dict[str, Any]:
-    """Run tests in a fork and return what came of it.
+    """Run tests in a fork and return their results.
 
     Parameters
     ----------

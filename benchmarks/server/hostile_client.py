@@ -212,7 +212,7 @@ def first_line(connection: socket.socket) -> bytes:
 
 
 def status_of(answer: bytes) -> str:
-    """Return the status of an answer, what else became of it, or ``closed``.
+    """Return the HTTP status of an answer, its first signs if it has none, or ``closed`` if it is empty.
 
     Examples
     --------

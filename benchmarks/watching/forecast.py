@@ -73,7 +73,7 @@ class Tally:
 
 
 def judge(kind: str, rng: np.random.Generator, tally: Tally) -> None:
-    """Watch one actuator until its limit is crossed, and add what came of it."""
+    """Watch one actuator until its limit is crossed, and add the result."""
     truth = level(kind, rng)
     crossed = _crossing(truth)
     alarm: int | None = None

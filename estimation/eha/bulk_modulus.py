@@ -77,7 +77,7 @@ class EstimateOptions:
 
     @property
     def filtering(self) -> bool:
-        """Whether something is asked for that only a filter does."""
+        """Whether an option is set that only a filter has."""
         return self.method not in ("auto", LEAST_SQUARES) or self.filter_options != FilterOptions()
 
     @property
@@ -292,7 +292,7 @@ def _impossible_delivery(fit: FormFit, parameters: EhaParameters) -> Note | None
 
 
 def _misread(log: CleanLog, form: str) -> BulkModulusEstimate:
-    """Return no number: of a log whose channels are not what they are called nothing follows."""
+    """Return no number, since the log's channels are not what their names say."""
     used = tuple(name for name in FLOW_CHANNELS if name in log.record)
     return without_number(Outcome.MISMATCH, log.mistakes, form, used)
 

@@ -1,4 +1,4 @@
-"""What a result owes to the rig file: how it would differ if an entry did, and the interval with all that is unknown.
+"""How a result depends on the rig file's entries, and the total interval that includes their uncertainty.
 
 A response is the relative change of a quantity per relative change of a rig entry. The flow form's fit gives its own;
 everything else takes the laws of dimension below. They are exact in what they say of scale:

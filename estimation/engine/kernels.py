@@ -30,7 +30,7 @@ def _width(halves: Halves, lanes: int) -> int:
 
 
 def kernel_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...], lanes: int) -> str:
-    """Write the kernel that runs so many filters side by side.
+    """Write the kernel that runs a number of filters side by side.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def kernel_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...], la
 def compile_kernel(
     rule: Rule, model: ProcessModel, channels: tuple[str, ...], lanes: int = 1, *, separate: bool = True
 ) -> NativeKernel:
-    """Generate and load the kernel that runs so many filters side by side.
+    """Generate and load the kernel that runs a number of filters side by side.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ def positive(name: str, default: float) -> Setting:
 
 @dataclass(frozen=True)
 class Rule:
-    """A filter that predicts, then updates: all that its file says of it; kernels are made of nothing else.
+    """A filter that predicts, then updates. Its file states a rule, and kernels are made of rules.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How far to believe a fit of own equations: covariance, what the logs do not tell, and what speaks against it."""
+"""How far to trust a fit of own equations: covariance, parameters that logs do not determine, failed checks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The extended Kalman filter linearised anew: it reads again what it has read, from where that has led it.
+"""The extended Kalman filter linearised anew: it filters the log again from its last result.
 
 One pass linearises the first samples about a guess that may be far off, counts them as if that had been right, and
 ends too sure of a value beside the truth. The next pass begins at the constants that the last one ended with and is

@@ -193,7 +193,7 @@ def grown_leakage(elapsed: Scalar, growth: Scalar, bend: Scalar, rise: Scalar) -
 
 
 def stepped_leakage(elapsed: Scalar, before: Scalar, at: Scalar, width: Scalar) -> Scalar:
-    """Return leakage over what it is after a step, which a seal that gives way or a valve that sticks makes of it.
+    """Return leakage over its value after a step, as when a seal fails or a valve sticks.
 
     Parameters
     ----------

@@ -131,7 +131,7 @@ def _left(group: Group, done: Collection[str]) -> Group:
 
 @dataclass(eq=False)
 class _Gathered:
-    """Cases gathered for a task of about so many seconds, which ends where it costs least.
+    """Cases gathered for a task of a wanted duration; it ends where a cut costs least.
 
     That is where the lanes of filters are full, or where a simulated motion ends that would be simulated again.
     """
@@ -259,7 +259,7 @@ def _steps(series: Series) -> float:
 
 
 def _seconds(steps: float, series: int, works: Collection[Work]) -> float:
-    """Return about what so many series of so many steps together cost on one core."""
+    """Return roughly how long a number of series takes together on one core [s]."""
     each = [COSTS[work.verb] for work in works]
     return steps * (SERIES_COST + sum(step for _, step in each)) + series * sum(alone for alone, _ in each)
 

@@ -61,7 +61,7 @@ class Lanes:
 
 
 def write_filtered(rows: Rows, ran: Sequence[Waiting], traces: Sequence[Trace]) -> None:
-    """Write what came of filters of one model and length.
+    """Write the results of filters of one model and length.
 
     Parameters
     ----------

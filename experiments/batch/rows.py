@@ -1,4 +1,4 @@
-"""One row a case: what it was, and what came of it. Nothing in it depends on when or where it was run.
+"""One row a case: its settings and its result. Nothing in it depends on when or where it was run.
 
 A task's rows are kept column by column. What a case is stands once a series and once a work, and is laid out over the
 rows at the end; what came of a case is written to its place.

@@ -159,7 +159,7 @@ def _drained(batch: _Batch, executor: Executor, width: int) -> bool:
 
 
 def _launch(batch: _Batch, executor: Executor, flying: dict[Future[Part], Task], most: int) -> bool:
-    """Submit tasks up to so many in flight; False where the executor is broken."""
+    """Submit tasks until a number are in flight; False where the executor is broken."""
     while len(flying) < most:
         task = batch.next_task()
         if task is None:

@@ -285,7 +285,7 @@ def shipped_studies() -> tuple[str, ...]:
 
 
 def _sentence(error: Any) -> str:
-    """Say which field, what was wanted, and what came."""
+    """Say which field is wrong, what was wanted, and what was given."""
     where = ""
     for part in error["loc"]:
         if isinstance(part, int):

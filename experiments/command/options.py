@@ -239,7 +239,7 @@ def refuse_given(options: Mapping[str, object], why: str) -> None:
 
 
 def load_actuator(plant: str | None, path: Path | None) -> "tuple[ActuatorKind, Rig[Any]]":
-    """Return the kind of actuator that is asked for, and its rig.
+    """Return the kind of actuator that the options name, and its rig.
 
     Parameters
     ----------

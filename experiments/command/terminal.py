@@ -49,7 +49,7 @@ def visible(text: str) -> str:
 
 
 def sparkline(values: "Sequence[float]", width: int) -> str:
-    """Return a small plot in one line: the mean of each of so many parts, from low to high.
+    """Return a small plot in one line, from the means of equal parts of the values.
 
     Parameters
     ----------

@@ -119,7 +119,7 @@ def checked_experiment(options: Mapping[str, Any]) -> dict[str, str]:
 
 
 def within_limits(options: Mapping[str, Any], look: Callable[[str], T]) -> dict[str, T]:
-    """Look at one drive, or at all that are within the actuator's limits.
+    """Return what `look` says of one drive, or of each drive within the actuator's limits.
 
     Parameters
     ----------

@@ -88,7 +88,7 @@ def actuator_page(row: ActuatorRow, log: str | None, fleet: str = "../index.html
 
 
 def _restarts(outlooks: Sequence[Outlook], maintained: Sequence[float]) -> list[str]:
-    """Return from which logs on trends are followed, a sentence for all that start with one."""
+    """Return a sentence for each log at which trends start again."""
     together: dict[str, list[Outlook]] = {}
     for one in outlooks:
         if one.trend.begin > 0:

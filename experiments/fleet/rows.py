@@ -147,7 +147,7 @@ def _row(row: Mapping[str, Any], named: Named, limits: Mapping[str, float]) -> L
 
 
 def _between(text: str | None) -> dict[str, float]:
-    """Return leakage and friction of a log against which nothing speaks but that they lie between two conditions."""
+    """Return leakage and friction of a log that is unknown only because they lie between two conditions."""
     against = json.loads(text or "[]")
     return against[0]["data"] if [one["code"] for one in against] == [BETWEEN] else {}
 

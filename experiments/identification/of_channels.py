@@ -49,7 +49,7 @@ NOTHING: Result = {
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelFit:
-    """What a fit between two channels is asked for.
+    """Options of a fit between two channels.
 
     Parameters
     ----------

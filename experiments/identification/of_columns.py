@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ColumnFit:
-    """What a fit between any columns is asked for.
+    """Options of a fit between any columns.
 
     Parameters
     ----------

@@ -170,7 +170,7 @@ def _half_turn(p: VibrationParameters) -> tuple[float, float]:
 
 @stacked
 def spectrum_table(runs: pd.DataFrame) -> Frames:
-    """Return the amplitude spectra of the commands while the reference rests: what becomes of noise, Figures 19 and 20.
+    """Return the amplitude spectra that noise gives the commands while the reference rests, Figures 19 and 20.
 
     Parameters
     ----------

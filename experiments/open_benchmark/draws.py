@@ -81,7 +81,7 @@ def draw_plain(condition: str, drive: str, rng: np.random.Generator, base: EhaPa
 
 
 def course_of(setup: Setup, rng: np.random.Generator) -> Array:
-    """Return what is asked of an actuator and what changes in it over a log.
+    """Return an actuator's drive and how its parameters change over a log.
 
     Parameters
     ----------

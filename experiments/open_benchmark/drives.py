@@ -1,4 +1,4 @@
-"""What is asked of the motor, or of the position loop, at every tick; each keeps the piston within its travel."""
+"""Commands to the motor, or to the position loop, at every tick; each keeps the piston within its travel."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

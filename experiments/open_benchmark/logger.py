@@ -1,4 +1,4 @@
-"""Sensors and logger: what stands in the file of a run, with all that a bench adds."""
+"""Sensors and logger: the file of a run, with noise, delays and other errors of a bench."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -99,7 +99,7 @@ class Sensor:
 
 
 def _lagged(values: Array, records: float) -> Array:
-    """Return values behind a first-order lag of so many records."""
+    """Return values behind a first-order lag, given in records."""
     from scipy.signal import lfilter
 
     pole = np.exp(-1.0 / records)

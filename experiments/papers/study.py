@@ -106,7 +106,7 @@ def _limits(row: Row) -> str:
 
 
 def _tolerance(accept: str) -> str:
-    """Return what a row accepts as a reader wants it: ranges in few digits, and no word of the rule's own."""
+    """Return what a row accepts in a reader's words, with ranges in few digits."""
     if accept == "digits":
         return "half a unit of the last digit"
     words = accept.split()

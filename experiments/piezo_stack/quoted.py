@@ -1,4 +1,4 @@
-"""What the piezo-stack paper's text quotes of its figures, beside ours: all that is left of them (errata P17)."""
+"""Numbers that the piezo-stack paper's text quotes from its figures, beside ours (the figures are lost, errata P17)."""
 
 from collections.abc import Mapping
 

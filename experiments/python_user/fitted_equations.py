@@ -40,7 +40,7 @@ class FittedGreyBox(Shown):
 
     @property
     def believed(self) -> bool:
-        """Whether nothing speaks against the values."""
+        """Whether the values pass every check."""
         return self.fit.finding.gate.passed
 
     @property

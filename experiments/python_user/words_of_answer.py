@@ -1,4 +1,4 @@
-"""How an answer is shown, found anew by the names of actuator and verb, so that an answer can be pickled."""
+"""How an answer is shown. It is looked up by the names of actuator and verb, so that answers can be pickled."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -43,7 +43,7 @@ class PatientProtocol(H11Protocol):
         self._look()
 
     def data_received(self, data: bytes) -> None:
-        """Take what came."""
+        """Take bytes that the client sent."""
         if self.transport.is_closing():
             return
         super().data_received(data)

@@ -77,7 +77,7 @@ class Stream:
         return self._count, self._fresh
 
     def since(self, number: int) -> list[dict[str, Any]]:
-        """Return the gauges after that number, each with its ``number``; all that are kept for 0."""
+        """Return the kept gauges whose ``number`` is higher; 0 returns all."""
         with self._lock:
             new = min(self._count - number, len(self._gauges))
             return list(self._gauges)[len(self._gauges) - new :] if new > 0 else []

@@ -1,4 +1,4 @@
-"""What stands behind the requests: the folder of a server, its store, its work, and what is asked of them."""
+"""The server behind its requests: its folder, its store and its jobs."""
 
 import asyncio
 import fcntl
@@ -42,7 +42,7 @@ class Service:
         self._fleet: tuple[str, asyncio.Future[str]] | None = None
 
     def open(self) -> None:
-        """Open the folder and take up what is unfinished.
+        """Open the folder and resume unfinished work.
 
         Raises
         ------
@@ -163,7 +163,7 @@ class Service:
         return path
 
     def delete(self, identity: str) -> None:
-        """Delete a log with all that came of it.
+        """Delete a log with its results.
 
         Raises
         ------

@@ -173,7 +173,7 @@ class Store:
         entries: Mapping[str, Any] | None = None,
         said: str = "",
     ) -> None:
-        """Keep what came of a log; a log that was deleted meanwhile stays so.
+        """Keep the result of a log; a log that was deleted meanwhile stays deleted.
 
         Parameters
         ----------
@@ -195,7 +195,7 @@ class Store:
             )
 
     def result(self, identity: str) -> dict[str, Any] | None:
-        """Return what came of a log as entries of the JSON contract, None where there is nothing yet."""
+        """Return the result of a log as entries of the JSON contract, None before it is there."""
         rows = self._asked("SELECT result FROM logs WHERE id = ?", identity)
         return json.loads(rows[0][0]) if rows and rows[0][0] else None
 

@@ -1,4 +1,4 @@
-"""A watch with all its outputs: each event goes to every one, and how it stands is known meanwhile."""
+"""A watch with all its outputs: every event goes to each output, and the watch's state can be asked for."""
 
 import threading
 import time
@@ -20,7 +20,7 @@ Sink = Callable[[Mapping[str, Any]], None]
 
 
 class Watched(WatchEvents):
-    """What a watch tells, sent to every output, and how it stands meanwhile.
+    """Sends the events of a watch to every output, and knows its state.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Watched(WatchEvents):
         self._seen = last, time.time(), {name: float(values[-1]) for name, values in channels.items() if len(values)}
 
     def state(self) -> dict[str, Any]:
-        """Return how it stands: ``name``, ``state``, ``gauges``, as `experiments.serve.live.Stream.state` does."""
+        """Return the state: ``name``, ``state``, ``gauges``, as `experiments.serve.live.Stream.state` does."""
         if self.watch is None or self._seen is None:
             return {"name": self.source, "state": self.doing, "gauges": None}
         last, received, values = self._seen

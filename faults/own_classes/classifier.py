@@ -242,7 +242,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
         return np.asarray(checked, dtype=np.float64)
 
     def _reported(self, label: Any) -> Any:
-        """Return what a label is reported as; one that was not learnt stands for itself."""
+        """Return the name that a label is reported under; a label that was not learnt keeps its own."""
         known = np.flatnonzero(self.learnt_classes_ == label)
         return self.classes_[self._merged[known[0]]] if known.size else label
 

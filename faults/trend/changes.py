@@ -83,6 +83,6 @@ def jumps(values: Array, stds: Array, length: int) -> "np.ndarray[tuple[int], np
 
 
 def _medians(values: Array, length: int) -> Array:
-    """Return the median of so many neighbours from each one on; `numpy.median` takes ten times as long over a few."""
+    """Return the median of each value and its next neighbours; `numpy.median` takes ten times as long over a few."""
     ranked = np.sort(sliding_window_view(values, length), axis=1)
     return 0.5 * (ranked[:, (length - 1) // 2] + ranked[:, length // 2])

@@ -226,7 +226,7 @@ def end_span(memory: Memory) -> bool:
 
 
 def drop_span(memory: Memory) -> None:
-    """Begin a span anew."""
+    """Begin a new span."""
     memory.known[BLOCKS] = 0.0
     memory.work[:] = 0.0
     memory.lag[:] = 0.0

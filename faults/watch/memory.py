@@ -1,4 +1,4 @@
-"""What a watch remembers, what it goes by, and how long its arrays are."""
+"""The memory of a watch, its settings, and the sizes of its arrays."""
 
 from typing import NamedTuple
 
@@ -91,7 +91,7 @@ class Memory(NamedTuple):
 
 
 class WatchSetting(NamedTuple):
-    """What a watch goes by.
+    """Settings of a watch.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A watch kept over a restart: all that it remembers in one file, from which it continues to the last bit."""
+"""A watch kept over a restart: its memory in one file, from which it continues to the last bit."""
 
 from pathlib import Path
 

@@ -42,7 +42,7 @@ def eliminated_jacobian(outputs: Sequence[Expression], inputs: Sequence[Expressi
 
 
 def _local_edges(outputs: Sequence[Expression], inputs: Sequence[Expression]) -> tuple[Edges, Edges]:
-    """Return what depends on what, for all that depends on an input; output i is the node -1 - i."""
+    """Return the edges between nodes that depend on an input; output i is the node -1 - i."""
     operands: Edges = {id(item): {} for item in inputs}
     uses: Edges = {id(item): {} for item in inputs}
     sources = set(operands)

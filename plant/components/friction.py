@@ -67,7 +67,7 @@ def velocity_under_friction(push: Scalar, resistance: Scalar, quadratic: Scalar,
 
 
 def sliding(push: Scalar, resistance: Scalar, quadratic: Scalar, coulomb: Scalar) -> tuple[Scalar, Scalar]:
-    """Solve what `velocity_under_friction` solves, and say how far the velocity gives way.
+    """Return the velocity of `velocity_under_friction`, and half the force that a change of velocity takes.
 
     Source: the root of the quadratic in the velocity, differentiated by the force.
 

@@ -112,7 +112,7 @@ def buckling_rod(force: float, stroke: float) -> float:
 
 
 def cylinder_circuit(duty: Duty, bore: float, rod: float) -> CylinderCircuit:
-    """Return what a cylinder of given diameters needs and gives, be it enough for its duty or not (section 5.1).
+    """Return what a cylinder of given diameters needs and gives, even if it is too small for its duty (section 5.1).
 
     Parameters
     ----------

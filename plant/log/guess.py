@@ -1,4 +1,4 @@
-"""Which column is which channel, guessed by what it is called and in what unit; what it does is looked at later."""
+"""Which column is which channel, guessed by name and unit; its values are looked at later."""
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -146,7 +146,7 @@ _SUFFIX = re.compile(
 
 
 def unit_of(heading: Heading) -> str | None:
-    """Return the unit of a column, that which its name ends in where nothing else says one.
+    """Return the unit of a column: the one given for it, or else the one that its name ends in.
 
     Examples
     --------

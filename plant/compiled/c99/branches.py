@@ -74,7 +74,7 @@ def _apart(order: Sequence[Expression]) -> list[list[Expression]]:
 
 
 def _alone(uses: Mapping[int, int], wanted: set[int], sides: Sequence[Expression]) -> list[Expression]:
-    """Return the operations that serve one side of the choices and nothing else: all their uses are found from it."""
+    """Return the operations that only one side of the choices uses."""
     alone: list[Expression] = []
     found, waiting = Counter[int](), [*sides]
     while waiting:

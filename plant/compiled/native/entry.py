@@ -1,4 +1,4 @@
-"""A compiled kernel as Python calls it: what is given is checked and laid out, what comes back is copied out."""
+"""A compiled kernel as Python calls it: arguments are checked and laid out, results are copied out."""
 
 import ctypes
 import struct
@@ -208,7 +208,7 @@ class Entry:
             laid.arrays.append((name, address, address + size, changed))
 
     def _apart(self, laid: _Given) -> None:
-        """Make sure that what is changed is nothing else's memory, for the machine code takes it so."""
+        """Check that arrays that are changed share no memory with others, as the machine code assumes."""
         for name, begin, end, changed in laid.arrays:
             if not changed:
                 continue

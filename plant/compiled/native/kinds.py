@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 
 class KernelError(Exception):
-    """A kernel that cannot be compiled: it names the line, what was wanted and what came."""
+    """A kernel cannot be compiled; the message names the line, what was wanted and what was found."""
 
     placed = False
 

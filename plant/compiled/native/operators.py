@@ -34,7 +34,7 @@ COMPARED: Mapping[type[ast.cmpop], tuple[str, str]] = {
 
 
 def convert(scope: Scope, value: Held, kind: AnyKind) -> Held:
-    """Return a value as another kind that holds it."""
+    """Return a value converted to a wider kind."""
     if value.kind == kind:
         return value
     match value.kind, kind:

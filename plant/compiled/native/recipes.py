@@ -27,7 +27,7 @@ def trust_sources() -> None:
 
 
 def recipe(name: str, made_of: object, machine: str) -> str | None:
-    """Return a hash of all that a kernel's text follows from, or None where it cannot be known.
+    """Return a hash of everything that determines a kernel's text, or None if that cannot be known.
 
     Parameters
     ----------

@@ -105,7 +105,7 @@ class Scope:
         return name
 
     def fresh(self, name: str) -> str:
-        """Return a name that nothing else has."""
+        """Return an unused name."""
         self._count += 1
         return f"{name}{self._count}"
 
@@ -218,7 +218,7 @@ class Scope:
         return self.op(f"{operation} nsw i64 {a}, {b}")
 
     def instructions(self) -> list[str]:
-        """Return all that was written, less what is stored and never read."""
+        """Return the instructions, without stores that are never read."""
         read = {*self._read, self.owner} if self.keeps and not self.heap else self._read
         kept = [one if isinstance(one, str) else one[1] for one in self.body if isinstance(one, str) or one[0] in read]
         return [*self.begin, *kept]

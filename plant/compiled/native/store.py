@@ -35,7 +35,7 @@ def path_of(name: str, key: str) -> Path:
 
 
 def recalled(name: str, key: str) -> tuple[Mapping[str, Any], bytes] | None:
-    """Return description and machine code of a kernel, or None where they are to be made anew.
+    """Return description and machine code of a kernel, or None if they must be made.
 
     A file that is empty, cut off, damaged, of another kernel, no regular file, or another user's, is as good as none.
 

@@ -166,7 +166,7 @@ FINEST_QUANTUM = 1e-12
 
 
 def _on_quanta(found: Array, measured: Array) -> Array:
-    """Round to the quantum of a sensor where all that it measured is a whole number of them."""
+    """Round to a sensor's quantum if every measured value is a multiple of it."""
     steps = np.abs(np.diff(measured))
     quantum = float(np.min(steps[steps > 0.0], initial=np.inf))
     from_first = measured - measured[0]

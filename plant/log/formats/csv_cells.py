@@ -234,7 +234,7 @@ class _Body:
         return {one: np.delete(values[:taken], sorted(timeless)) for one, values in found.items()}, notes
 
     def _may_leave_out(self) -> bool:
-        """Return whether each row has a time of its own, or the rows are only shown."""
+        """Return whether rows may be left out: each has a time of its own, or they are only shown."""
         channels = [one.channel for one in self.columns]
         return TIME in channels or all(one.startswith(TRUTH) for one in channels)
 

@@ -240,7 +240,7 @@ class _Block:
 
     @property
     def score(self) -> float:
-        """How much reads as numbers: rows count, and columns; blanks only where nothing else will do."""
+        """How much of a layout reads as numbers, by rows and columns; blanks separate only if nothing else does."""
         wide = sum(self.numeric)
         likes = 0.5 if self.delimiter in (BLANKS, "|") else 1.0
         if not self.rows or (wide < 2 and len(self.numeric) > 1):

@@ -37,7 +37,7 @@ def _whole(held: mmap.mmap, place: int) -> int:
 
 
 class RingWriter:
-    """Writes rows into a ring; it begins anew where there is one.
+    """Writes rows into a ring file; an older file is replaced.
 
     Parameters
     ----------
