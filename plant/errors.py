@@ -112,7 +112,7 @@ class DriveError(HydrostateError):
 
 
 class ModelError(HydrostateError, TypeError):
-    """The equations of a model ask for what cannot be differentiated and compiled; the message says what to write."""
+    """A model's equations cannot be differentiated and compiled; the message says what to write instead."""
 
 
 class LogWarning(UserWarning):

@@ -66,7 +66,7 @@ def bench_log(path: Path, seconds: float = 4.0) -> bytes:
 
 @dataclass(frozen=True)
 class Attacked:
-    """What became of a server under attack.
+    """The state of a server after an attack.
 
     Parameters
     ----------

@@ -62,7 +62,7 @@ def measured(truth: Array, rng: np.random.Generator) -> Series:
 
 @dataclass
 class Tally:
-    """What came of the actuators of one kind."""
+    """Results of the actuators of one kind."""
 
     logs: int = 0
     false: int = 0

@@ -43,7 +43,7 @@ FITTED: Mapping[str, tuple[Callable[..., FormFit], tuple[str, ...]]] = {
 
 @dataclass(frozen=True)
 class EstimateOptions:
-    """How bulk modulus is estimated.
+    """Options of an estimate of bulk modulus.
 
     Parameters
     ----------

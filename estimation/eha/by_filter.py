@@ -45,7 +45,7 @@ count. On our lumped plant at 10 kHz one step a sample was 0.01 % off, two 0.003
 
 @dataclass(frozen=True)
 class FilterOptions:
-    """How a log is filtered.
+    """Options of a filter.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ FORMAT = "hydrostate filter 2"
 
 @dataclass(frozen=True)
 class Asked:
-    """Which filter a stream gets.
+    """The options of a stream's filter.
 
     Parameters
     ----------

@@ -97,7 +97,7 @@ class FilterProblem:
 
 
 class Trace(NamedTuple):
-    """What a method returns, in the model's scaled units.
+    """The result of a method, in the model's scaled units.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ class Lines(NamedTuple):
 
 
 class Log(NamedTuple):
-    """What the kernel reads; only the spread is changed, where outliers count for less.
+    """A log and a model's constants; the loops change the spread alone, to weigh outliers.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ OnBelief: TypeAlias = Callable[[Array, Array, Array], None]
 
 
 class Log(NamedTuple):
-    """What a kernel reads and never changes.
+    """A log and a filter's constants, which the loops read and never change.
 
     Parameters
     ----------

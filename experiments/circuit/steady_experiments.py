@@ -189,7 +189,7 @@ def points_table(
 
 @tabled
 def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
-    """Return Table 3 refitted from steady points by equations 5.7 and 5.8, beside what went in and what is published.
+    """Return Table 3 refitted from steady points by equations 5.7 and 5.8, beside the plant's and the published values.
 
     What went in is the circuit's settled leakage: with make-up open the drain counts whole (errata E17).
 
@@ -211,7 +211,7 @@ def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
 
 @tabled
 def friction_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
-    """Return Table 4 refitted from steady points by equation 5.11, beside what went in and what is published.
+    """Return Table 4 refitted from steady points by equation 5.11, beside the plant's and the published values.
 
     Returns
     -------

@@ -42,7 +42,7 @@ Screen: TypeAlias = Callable[[Sequence[Result]], Iterable["RenderableType"]]
 
 @dataclass(frozen=True)
 class Batch:
-    """What came of several logs.
+    """The results of several logs.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ def take_plainly(parameters: Iterable[Any]) -> None:
 
 
 class _Taken:
-    """What turns a parameter's values into what a command takes, as Typer's own does."""
+    """Converts a parameter's values for a command, as Typer's own converter does."""
 
     def __init__(self, checked: Any, path: Any) -> None:
         self._checked, self._path = checked, path

@@ -11,7 +11,7 @@ from plant.arrays import Array
 
 @dataclass(frozen=True)
 class Room:
-    """What a drive may use.
+    """Limits of a drive.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ def truth_of(made: Made, split: str, index: int) -> dict[str, Any]:
 
 
 def rig_text(name: str, note: str, entries: Mapping[str, float]) -> str:
-    """Return a rig file that says no more than it must.
+    """Return a rig file with the given entries only.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ def names_of(option: str, given: Any) -> list[str]:
 
 
 class Shown:
-    """What prints itself, and says what it has where an attribute is misspelt."""
+    """An object that prints itself, and names the nearest attribute if one is misspelt."""
 
     def __repr__(self) -> str:
         return str(self)
@@ -86,7 +86,7 @@ class Shown:
 
 
 class Named(dict[str, Any]):
-    """What stands under names, which says what it has where one is misspelt."""
+    """Entries by name; a misspelt name brings an error with the nearest one."""
 
     def __missing__(self, name: str) -> NoReturn:
         from plant.errors import NoSuchEntryError

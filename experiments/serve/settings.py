@@ -20,7 +20,7 @@ PORT = 8765
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What a server is told.
+    """Settings of a server.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Worked:
-    """What came of a log.
+    """The result of a log.
 
     Parameters
     ----------

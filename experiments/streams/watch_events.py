@@ -28,7 +28,7 @@ BALANCES: Mapping[str, str] = {
 
 
 class WatchEvents:
-    """What is told of a watch, one entry after the other, and what has been so far, for the last one.
+    """Tells the events of a watch as entries, and counts samples, gaps and alarms for the last event.
 
     Parameters
     ----------

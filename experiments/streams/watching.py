@@ -29,7 +29,7 @@ need not import."""
 
 @dataclass(frozen=True)
 class WatchSettings:
-    """How a stream is to be watched.
+    """Settings of a watch on a stream.
 
     Parameters
     ----------

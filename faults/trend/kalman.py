@@ -91,7 +91,7 @@ class Settings:
 
     @property
     def rows(self) -> GridRows:
-        """What the loops read of it."""
+        """Its settings, as the loops take them."""
         return GridRows(self.paced, self.bend, self.jerk, self.scatter)
 
     @cached_property
@@ -198,7 +198,7 @@ def predict(now: Belief, step: float, grid: Settings) -> Belief:
 
 @lru_cache(maxsize=64)
 def _step(step: float, paces: tuple[float, ...]) -> tuple[Array, Array, Array]:
-    """Return what moves means, and what noise on slope and curvature adds, the first two of each pace."""
+    """Return transitions of the mean, and covariances that unit noise on slope (each per pace) and curvature adds."""
     moves = np.tile([[1.0, step, 0.5 * step**2], [0.0, 1.0, step], [0.0, 0.0, 1.0]], (len(paces), 1, 1))
     bent, jerked = np.tile(_gained(step, 2), (len(paces), 1, 1)), _gained(step, 3)
     for move, turned, pace in zip(moves, bent, paces, strict=True):
@@ -208,7 +208,7 @@ def _step(step: float, paces: tuple[float, ...]) -> tuple[Array, Array, Array]:
 
 
 def exponential_growth(step: float, pace: float) -> tuple[Array, Array]:
-    """Return what a slope of 1 becomes that grows by a pace, and what unit white noise on it brings in a time.
+    """Return how a growing slope of 1 moves level and slope, and the covariance that unit white noise on it adds.
 
     Parameters
     ----------

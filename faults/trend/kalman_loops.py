@@ -14,7 +14,7 @@ Index: TypeAlias = NDArray[np.int64]
 
 
 class GridRows(NamedTuple):
-    """What the settings of a grid say, a number each.
+    """The settings of a grid, a number each.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class GridRows(NamedTuple):
 
 
 class Steps(NamedTuple):
-    """What the time before each log does.
+    """Transitions of the belief over the time before each log.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ class Series:
 
 @dataclass(frozen=True, eq=False)
 class Trend:
-    """What a series says after a log.
+    """The trend of a series after a log.
 
     Parameters
     ----------

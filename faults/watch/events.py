@@ -57,7 +57,7 @@ class Alarm:
 
 @dataclass(frozen=True)
 class Change:
-    """What changed with an alarm, from some running after it.
+    """What changed with an alarm, judged by samples after it.
 
     Parameters
     ----------

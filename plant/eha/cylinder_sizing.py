@@ -27,7 +27,7 @@ LARGEST_ROD_SHARE = 0.75
 
 @dataclass(frozen=True, kw_only=True)
 class Duty:
-    """What the cylinder shall do, and with what.
+    """The cylinder's task: forces, speeds, stroke and pressures.
 
     Raises
     ------

@@ -60,7 +60,7 @@ def one_sided(p: CircuitParameters, **faults: float) -> OneSidedParameters:
 
 
 def one_sided_derivative(state: CircuitState, command: Scalar, p: OneSidedParameters) -> CircuitState:
-    """Return the rates of the circuit with what a stuck valve does not let in, and what a leaking seat lets through.
+    """Return the rates of the circuit if a make-up valve is stuck shut or its seat leaks.
 
     Parameters
     ----------

@@ -210,7 +210,7 @@ class _Body:
         return values, bad
 
     def judged(self) -> tuple[dict[Column, Array], list[Note]]:
-        """Return the columns without what is no data, and what was left out; refuse where that is much."""
+        """Return the columns without garbage, and what was left out; refuse a log that has much of it."""
         for column, cells in self.columns.items():
             if cells.pointed and cells.only_thousands:
                 raise thousands_error(column.name, cells.pointed, self.source)

@@ -37,7 +37,7 @@ next question [s], and questions [count]: a bench that lost its power closes no 
 
 @dataclass
 class Received:
-    """What became of the batches of a stream.
+    """Counts of the batches of a stream: read, late, lost, dropped.
 
     Parameters
     ----------
