@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -109,9 +109,9 @@ def posterior_bound(
     h = record.sample_time / substeps
     told = model.noise_densities(noise) * record.sample_time / substeps, np.array([*variances.values()], np.float64)
     drives = np.column_stack([bridged(record[drive]) for drive in model.drives])
-    row, start = parameter_row(parameters, model.parameters), (scaled.mean.copy(), scaled.covariance.copy())
+    course = Course(drives, parameter_row(parameters, model.parameters), h, substeps, every)
     run_kernel = _compile(model, tuple(variances)).run
-    covariance = run_kernel(*start, *told, drives, row, h, substeps, every, mean, std)
+    covariance = run_kernel(scaled.mean.copy(), scaled.covariance.copy(), *told, course, mean, std)
     physical, slope = model.to_si(mean)
     finite = bool(np.all(np.isfinite(physical)) and np.all(np.isfinite(covariance)))
     spread = np.outer(slope[-1], slope[-1])
@@ -135,16 +135,34 @@ Look: TypeAlias = Callable[[Array, Array, Array], None]
 """``look(state, parameters, H)``: derivative of each channel by the state."""
 
 
+class Course(NamedTuple):
+    """The run of the model along which a bound is taken.
+
+    Parameters
+    ----------
+    drives : ndarray, shape (n, drives)
+        Drives at the samples [SI].
+    parameters : ndarray, shape (parameters,)
+        The actuator's row.
+    h : float
+        Length of a step [s].
+    substeps, every : int
+        Steps a sample, and samples a row of the track.
+    """
+
+    drives: Array
+    parameters: Array
+    h: float
+    substeps: int
+    every: int
+
+
 def run(
     state: Array,
     P: Array,
     noise: Array,
     variances: Array,
-    drives: Array,
-    parameters: Array,
-    h: float,
-    substeps: int,
-    every: int,
+    course: Course,
     track: Array,
     deviations: Array,
     *,
@@ -167,17 +185,10 @@ def run(
         Variance that process noise adds in a step.
     variances : ndarray, shape (channels,)
         Of the channels [SI squared].
-    drives : ndarray, shape (n, drives)
-        Drives at the samples [SI].
-    parameters : ndarray, shape (parameters,)
-        The actuator's row.
-    h : float
-        Length of a step [s].
-    substeps, every : int
-        Steps a sample, and samples a row of the track.
     track, deviations : ndarray, shape (rows, states)
         Filled with the states and their deviations.
     """
+    drives, parameters, h, substeps, every = course
     F, FP, H, PH = np.empty(SLOPES), np.empty((WIDTH, WIDTH)), np.zeros((len(variances), WIDTH)), np.empty(WIDTH)
     for k in range(drives.shape[0]):
         if k > 0:
