@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.targets import Check, keep
-from estimation.eha.online import Asked, begun, load_filter, save_filter
+from estimation.eha.online import StreamFilterOptions, begin_filter, load_filter, save_filter
 from estimation.export.task import EXPORTED_FORMS
 from estimation.filters.online import RULES, OnlineFilter
 from plant.eha.drives import sine
@@ -52,8 +52,8 @@ def main(arguments: list[str]) -> int:
         path = Path(folder) / "filter.npz"
         for form in EXPORTED_FORMS:
             for method in RULES:
-                asked = Asked(p, form, method)
-                whole, ours = begun(asked, record), begun(asked, record)
+                asked = StreamFilterOptions(p, form, method)
+                whole, ours = begin_filter(asked, record), begin_filter(asked, record)
                 filter_on(whole, record, 0, len(record))
                 places = [0, *sorted(rng.integers(1, len(record), RESTARTS).tolist()), len(record)]
                 for begin, end in pairwise(places):

@@ -19,7 +19,7 @@ import numpy as np
 from faults.watch.watch import Watch
 from plant.eha.model import EhaParameters
 from plant.log.stream.csv_rows import CsvStream
-from plant.log.stream.source import Received, batch, stream_lines
+from plant.log.stream.source import BatchCounts, batch, stream_lines
 
 RATE, ROWS = 10_000, 1000
 TOPIC = "bench/rows"
@@ -70,7 +70,7 @@ def main(arguments: list[str]) -> int:
             time.sleep(1.0)
             sender = multiprocessing.Process(target=publish, args=(port, seconds), daemon=True)
             sender.start()
-            received = Received()
+            received = BatchCounts()
             stream = CsvStream(stream_lines(f"mqtt://127.0.0.1:{port}/{TOPIC}", received), source="broker")
             watch = Watch(EhaParameters(), stream.sample_time)
             begin, busy, count, missing, late = time.monotonic(), time.process_time(), 0, 0, list[float]()

@@ -28,7 +28,7 @@ FORMAT = "hydrostate filter 2"
 
 
 @dataclass(frozen=True)
-class Asked:
+class StreamFilterOptions:
     """The options of a stream's filter.
 
     Parameters
@@ -50,7 +50,7 @@ class Asked:
     tuned: bool = False
 
 
-def begun(asked: Asked, first: Record, like: Record | None = None) -> OnlineFilter:
+def begin_filter(asked: StreamFilterOptions, first: Record, like: Record | None = None) -> OnlineFilter:
     """Return a filter before its first sample.
 
     Parameters
@@ -118,7 +118,7 @@ def samples_of(filtered: OnlineFilter, channels: Mapping[str, Array]) -> tuple[A
     return columns[:, :split], columns[:, split:]
 
 
-def save_filter(path: Path, asked: Asked, filtered: OnlineFilter, last: float) -> None:
+def save_filter(path: Path, asked: StreamFilterOptions, filtered: OnlineFilter, last: float) -> None:
     """Write task and memory of a filter, whole or not at all.
 
     Parameters
@@ -143,7 +143,7 @@ def save_filter(path: Path, asked: Asked, filtered: OnlineFilter, last: float) -
     write_kept(path, FORMAT, {**about, **numbers, **filtered.remembered()})
 
 
-def load_filter(path: Path, asked: Asked) -> tuple[OnlineFilter, float]:
+def load_filter(path: Path, asked: StreamFilterOptions) -> tuple[OnlineFilter, float]:
     """Return a filter that continues where a saved one was.
 
     Parameters

@@ -29,7 +29,7 @@ NEVER = 1 << 62
 
 
 @dataclass(frozen=True, eq=False)
-class Now:
+class CurrentBelief:
     """What a filter believes after its last sample, in SI.
 
     Parameters
@@ -117,12 +117,12 @@ class OnlineFilter:
             raise HydrostateError(f"the first sample of a stream must have every drive ({names}), got one missing")
         return np.ascontiguousarray(held, np.float64)
 
-    def now(self) -> Now:
+    def now(self) -> CurrentBelief:
         """Return what is believed after the last sample."""
         (trace,) = read_off(self._places, [self.problem], self._work, self._logs, [empty_trace(self.problem)])
         values, slope = self.problem.model.to_si(trace.mean)
         deviations = np.sqrt(np.maximum(np.diag(trace.covariance), 0.0)) * slope
-        return Now(values, deviations, trace.nis, trace.count, trace.log_likelihood)
+        return CurrentBelief(values, deviations, trace.nis, trace.count, trace.log_likelihood)
 
     def remembered(self) -> dict[str, Array]:
         """Return all that the filter remembers, for `resume`.

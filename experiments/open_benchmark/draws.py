@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from experiments.open_benchmark.drives import CLOSED, DRIVES, Room
+from experiments.open_benchmark.drives import CLOSED, DRIVES, DriveLimits
 from experiments.open_benchmark.machine import Machine, machine_of
 from experiments.open_benchmark.run import TICK
 from experiments.open_benchmark.setup import Setup
@@ -96,7 +96,7 @@ def course_of(setup: Setup, rng: np.random.Generator) -> Array:
     """
     m, change = setup.machine, setup.change
     glide = 0.75 * m.efficiency * m.displacement / max(m.area_a, m.area_b)
-    room = Room(setup.duration + setup.logger.begin, setup.rated_speed, setup.travel, glide)
+    room = DriveLimits(setup.duration + setup.logger.begin, setup.rated_speed, setup.travel, glide)
     along = np.linspace(0.0, 1.0, room.ticks)
     rough = np.ones(room.ticks)
     for begin in rng.uniform(0.05, 0.9, change.bursts):

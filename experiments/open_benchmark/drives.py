@@ -10,7 +10,7 @@ from plant.arrays import Array
 
 
 @dataclass(frozen=True)
-class Room:
+class DriveLimits:
     """Limits of a drive.
 
     Parameters
@@ -36,7 +36,7 @@ class Room:
         return round(self.duration / TICK)
 
 
-def _held(room: Room, move: Callable[[float], tuple[float, float]]) -> Array:
+def _held(room: DriveLimits, move: Callable[[float], tuple[float, float]]) -> Array:
     """Return speeds that are held; `move` hears where the piston may be [m] and returns for how long [s] which speed.
 
     A speed that would lead too far is turned.
@@ -53,7 +53,7 @@ def _held(room: Room, move: Callable[[float], tuple[float, float]]) -> Array:
     return speed
 
 
-def steps(room: Room, rng: np.random.Generator) -> Array:
+def steps(room: DriveLimits, rng: np.random.Generator) -> Array:
     """Return steps of 30 to 100 % of the rated speed with short pauses; shape (n,) [rad/s]."""
     longest = np.clip(room.travel / (room.glide * room.rated), 0.4, 3.0)
 
@@ -65,7 +65,7 @@ def steps(room: Room, rng: np.random.Generator) -> Array:
     return _held(room, move)
 
 
-def prbs(room: Room, rng: np.random.Generator) -> Array:
+def prbs(room: DriveLimits, rng: np.random.Generator) -> Array:
     """Return a binary signal held 20 to 100 ms, drawn towards one random place after the other; shape (n,) [rad/s]."""
     hold, amplitude = float(rng.choice((0.02, 0.05, 0.1))), rng.uniform(0.5, 1.0) * room.rated
     goals = list(rng.uniform(-room.travel, room.travel, 4 * room.ticks))
@@ -79,7 +79,7 @@ def prbs(room: Room, rng: np.random.Generator) -> Array:
     return _held(room, move)
 
 
-def multisine(room: Room, rng: np.random.Generator) -> Array:
+def multisine(room: DriveLimits, rng: np.random.Generator) -> Array:
     """Return twelve sines from 0.2 to 25 Hz of random phase, weaker the faster; shape (n,) [rad/s]."""
     time = TICK * np.arange(room.ticks)
     lowest = np.clip(0.5 * room.glide * room.rated / (2.0 * np.pi * room.travel), 0.05, 1.0)
@@ -89,7 +89,7 @@ def multisine(room: Room, rng: np.random.Generator) -> Array:
     return rng.uniform(0.8, 1.0) * room.rated * signal / np.max(np.abs(signal))
 
 
-def sines(room: Room, rng: np.random.Generator) -> Array:
+def sines(room: DriveLimits, rng: np.random.Generator) -> Array:
     """Return a slow sine that uses the travel, and a faster one on it; shape (n,) [rad/s]."""
     time = TICK * np.arange(room.ticks)
     slow = np.clip(0.6 * room.glide * room.rated / (2.0 * np.pi * room.travel), 0.05, 1.0)
@@ -97,7 +97,7 @@ def sines(room: Room, rng: np.random.Generator) -> Array:
     return room.rated * (0.6 * np.sin(2.0 * np.pi * (slow * time + phase)) + 0.4 * np.sin(2.0 * np.pi * fast * time))
 
 
-def position_steps(room: Room, rng: np.random.Generator) -> Array:
+def position_steps(room: DriveLimits, rng: np.random.Generator) -> Array:
     """Return positions that are held until the loop may have reached them; shape (n,) [m]."""
     asked, at, last = np.zeros(room.ticks), 0, 0.0
     while at < room.ticks:
@@ -108,7 +108,7 @@ def position_steps(room: Room, rng: np.random.Generator) -> Array:
     return asked
 
 
-def tracking(room: Room, rng: np.random.Generator) -> Array:
+def tracking(room: DriveLimits, rng: np.random.Generator) -> Array:
     """Return a position that follows four sines, at up to 80 % of the rated speed; shape (n,) [m]."""
     time = TICK * np.arange(room.ticks)
     signal = np.zeros(room.ticks)
@@ -119,7 +119,7 @@ def tracking(room: Room, rng: np.random.Generator) -> Array:
     return signal * min(fastest, room.travel / np.max(np.abs(signal)))
 
 
-Draw = Callable[[Room, np.random.Generator], Array]
+Draw = Callable[[DriveLimits, np.random.Generator], Array]
 
 OPEN: Mapping[str, Draw] = {"steps": steps, "multisine": multisine, "prbs": prbs, "sines": sines}
 """Drives that ask for a motor speed."""

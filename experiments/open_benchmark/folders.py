@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from experiments.open_benchmark.kinds import VERSION, Made, make, seed_of
+from experiments.open_benchmark.kinds import VERSION, MadeLog, make, seed_of
 from experiments.open_benchmark.machine import Machine
 from faults.conditions import CONDITIONS
 from plant.atomic import replacing
@@ -18,7 +18,7 @@ TRUTH = "truth.csv"
 RIG = "rig.toml"
 
 
-def truth_of(made: Made, split: str, index: int) -> dict[str, Any]:
+def truth_of(made: MadeLog, split: str, index: int) -> dict[str, Any]:
     """Return the row of `truth.csv` for a log: coefficients are those in the middle of it.
 
     Parameters

@@ -37,7 +37,7 @@ STRIDE = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
+class MadeLog:
     """One log and what was true.
 
     Parameters
@@ -120,7 +120,7 @@ def seed_of(kind: str, split: str, index: int) -> list[int]:
     return [zlib.crc32(kind.encode()), SPLITS.index(split), index]
 
 
-def make(kind: str, split: str, index: int) -> Made:
+def make(kind: str, split: str, index: int) -> MadeLog:
     """Return a log; the same kind, split and index give the same bits.
 
     Parameters
@@ -140,7 +140,7 @@ def make(kind: str, split: str, index: int) -> Made:
     course = course_of(setup, driving)
     states = run(setup.machine, course)
     states[:, 4:6] = np.maximum(states[:, 4:6], setup.machine.vapour)
-    return Made(one, setup, setup.logger.log(states, logging), states, _stiffnesses(setup, states, course[:, 3]))
+    return MadeLog(one, setup, setup.logger.log(states, logging), states, _stiffnesses(setup, states, course[:, 3]))
 
 
 def _stiffnesses(setup: Setup, states: NDArray[np.float64], air: NDArray[np.float64]) -> tuple[float, float]:

@@ -5,12 +5,12 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field
 
 from experiments.serve.jobs import Jobs
-from experiments.serve.store import UNFINISHED, Kept
+from experiments.serve.store import UNFINISHED, StoredLog
 
 Verb = Literal["diagnose", "estimate", "inspect"]
 
 
-class Said(BaseModel):
+class Refusal(BaseModel):
     """Why a request was not done."""
 
     detail: str
@@ -98,7 +98,7 @@ class StreamHistory(StreamState):
     events: list[dict[str, Any]]
 
 
-def log_of(kept: Kept, jobs: Jobs) -> Log:
+def log_of(kept: StoredLog, jobs: Jobs) -> Log:
     """Return a log as it is answered."""
     unfinished = kept.state == UNFINISHED
     phase = jobs.phase(kept.id) if unfinished else None

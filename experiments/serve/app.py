@@ -19,7 +19,7 @@ from starlette.routing import Match, Route
 from starlette.types import Scope
 
 from experiments.command.terminal import note, unexpected
-from experiments.serve.answers import Comparison, Health, Log, Logs, Said, StreamHistory, StreamState, Verb, log_of
+from experiments.serve.answers import Comparison, Health, Log, Logs, Refusal, StreamHistory, StreamState, Verb, log_of
 from experiments.serve.comparison import compared
 from experiments.serve.events import MOST_LOOKING, event_stream
 from experiments.serve.limits import (
@@ -35,7 +35,7 @@ from experiments.serve.pages import home_page, live_page, policy_of, policy_of_f
 from experiments.serve.refusals import POLICY, refusal_page, wants_page
 from experiments.serve.service import Service
 from experiments.serve.settings import Settings
-from experiments.serve.store import Kept
+from experiments.serve.store import StoredLog
 from plant.errors import HydrostateError
 
 Identity = Annotated[str, Path(pattern=r"^[0-9a-f]{16}$", description="The id from the list of logs.")]
@@ -63,9 +63,9 @@ _CONTROLS = re.compile(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff\u202a-\u202e\u2066-\u2
 
 def why(*more: int, page: bool = False) -> dict[int | str, dict[str, Any]]:
     """Return how a request may be refused, for OpenAPI; that of a page is refused as JSON too, but to a browser."""
-    schema = {"$ref": "#/components/schemas/Said"}
+    schema = {"$ref": "#/components/schemas/Refusal"}
     kinds = {"application/json": {"schema": schema}, "text/html": {"schema": {"type": "string"}}}
-    said: dict[str, Any] = {"content": kinds} if page else {"model": Said}
+    said: dict[str, Any] = {"content": kinds} if page else {"model": Refusal}
     return {one: {"description": WHY[one], **said} for one in sorted((400, 401, 403, 405, 408, 421, 429, *more))}
 
 
@@ -212,7 +212,7 @@ def _offer_logs(app: FastAPI, service: Service) -> None:
         service.delete(id)
 
 
-async def _received(request: Request, service: Service, name: str, verb: Verb) -> Kept:
+async def _received(request: Request, service: Service, name: str, verb: Verb) -> StoredLog:
     """Receive the file that a request carries, and put it into the queue."""
     if request.headers.get("content-type", "").lower().startswith("multipart/"):
         raise RefusedError(415, "the body must be the file itself, not a form: curl --data-binary @run.csv")

@@ -13,8 +13,8 @@ from pebble import ProcessExpired, ProcessPool
 
 from experiments.command.terminal import note, unexpected
 from experiments.serve.settings import MB, Settings
-from experiments.serve.store import DONE, FAILED, INTERRUPTED, Kept, Store
-from experiments.serve.work import NO_MEMORY, Task, Worked, begin_worker, work_on
+from experiments.serve.store import DONE, FAILED, INTERRUPTED, Store, StoredLog
+from experiments.serve.work import NO_MEMORY, LogResult, Task, begin_worker, work_on
 from plant.errors import HydrostateError
 
 MOST_TRIES = 3
@@ -81,7 +81,7 @@ class Jobs:
             if left.suffix == ".part":
                 left.unlink(missing_ok=True)
 
-    def submit(self, log: Kept) -> None:
+    def submit(self, log: StoredLog) -> None:
         """Put a log into the queue."""
         settings = self._settings
         phase_file(settings, log.id).unlink(missing_ok=True)
@@ -147,7 +147,7 @@ class Jobs:
         for pool in (self._pool, self._drawing):
             pool.join()
 
-    def _ended(self, log: Kept, future: "Future[Any]") -> None:
+    def _ended(self, log: StoredLog, future: "Future[Any]") -> None:
         if self._closing:
             return
         with self._lock:
@@ -156,7 +156,7 @@ class Jobs:
             self._forget(log.id)
             return
         try:
-            worked: Worked = future.result()
+            worked: LogResult = future.result()
         except CancelledError:
             worked = self._lost("it was cancelled", log)
         except TimeoutError:
@@ -177,9 +177,9 @@ class Jobs:
             with self._lock:
                 self._waiting.pop(log.id, None)
 
-    def _lost(self, message: str, log: Kept) -> Worked:
+    def _lost(self, message: str, log: StoredLog) -> LogResult:
         entries = {"outcome": "failed", "reason": message} if log.verb == "diagnose" else None
-        return Worked({"file": log.name, "outcome": "failed", "message": message}, entries)
+        return LogResult({"file": log.name, "outcome": "failed", "message": message}, entries)
 
     def _forget(self, identity: str) -> None:
         for path in (log_file, page_file, phase_file):

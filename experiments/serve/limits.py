@@ -204,7 +204,7 @@ class _Exchange:
             return
 
 
-class Room:
+class FreeSpace:
     """How much the folder of a server may still take.
 
     Parameters

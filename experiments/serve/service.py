@@ -13,10 +13,10 @@ from experiments.running.refusal import refused
 from experiments.serve.comparison import compare_view
 from experiments.serve.fleet_view import Repairs, actuator_view, fleet_view
 from experiments.serve.jobs import BusyError, Jobs, log_file, page_file, phase_file
-from experiments.serve.limits import RefusedError, Room
+from experiments.serve.limits import FreeSpace, RefusedError
 from experiments.serve.live import Stream, Streams
 from experiments.serve.settings import Settings
-from experiments.serve.store import FAILED, INTERRUPTED, UNFINISHED, Kept, Store
+from experiments.serve.store import FAILED, INTERRUPTED, UNFINISHED, Store, StoredLog
 from plant.errors import HydrostateError
 
 LOCK = "in-use"
@@ -34,7 +34,7 @@ class Service:
     store: Store
     jobs: Jobs
     streams: Streams
-    room: Room
+    room: FreeSpace
     _lock: TextIO
 
     def __init__(self, settings: Settings) -> None:
@@ -64,7 +64,7 @@ class Service:
         with ExitStack() as undone:  # what is open already is closed where the rest cannot be had
             undone.callback(self._lock.close)
             self.store = undone.enter_context(closing(Store(settings.database)))
-            self.room = Room(settings)
+            self.room = FreeSpace(settings)
             delete_orphans(settings, self.store)
             self.jobs = undone.enter_context(closing(Jobs(settings, self.store)))
             self.jobs.resume()
@@ -90,7 +90,7 @@ class Service:
         if self.jobs.waiting + self.room.uploads >= self.settings.waiting:
             raise RefusedError(429, f"{self.settings.waiting} logs are waiting, try again later")
 
-    def take_in(self, identity: str, part: Path, name: str, verb: str, size: int) -> Kept:
+    def take_in(self, identity: str, part: Path, name: str, verb: str, size: int) -> StoredLog:
         """Keep a log that has come, and put it into the queue.
 
         Parameters
@@ -121,7 +121,7 @@ class Service:
         self.jobs.submit(kept)
         return kept
 
-    def known(self, identity: str) -> Kept:
+    def known(self, identity: str) -> StoredLog:
         """Return a log.
 
         Raises

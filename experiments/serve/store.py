@@ -40,7 +40,7 @@ UNFINISHED, DONE, FAILED, INTERRUPTED = "unfinished", "done", "failed", "interru
 
 
 @dataclass(frozen=True)
-class Kept:
+class StoredLog:
     """What is known of a log.
 
     Parameters
@@ -116,7 +116,7 @@ class Store:
         with self._lock:
             self._connection.close()
 
-    def add(self, identity: str, name: str, verb: str, size: int) -> Kept:
+    def add(self, identity: str, name: str, verb: str, size: int) -> StoredLog:
         """Keep a log that came, to be worked on.
 
         Parameters
@@ -134,12 +134,12 @@ class Store:
             raise HydrostateError(f"{name}: was deleted while it came")
         return found
 
-    def get(self, identity: str) -> Kept | None:
+    def get(self, identity: str) -> StoredLog | None:
         """Return what is known of a log, None where there is none of that identity."""
         rows = self._asked("SELECT * FROM kept WHERE id = ?", identity)
-        return Kept(*rows[0]) if rows else None
+        return StoredLog(*rows[0]) if rows else None
 
-    def latest(self, most: int, before: int | None = None) -> list[Kept]:
+    def latest(self, most: int, before: int | None = None) -> list[StoredLog]:
         """Return logs, the latest first.
 
         Parameters
@@ -149,12 +149,12 @@ class Store:
         """
         below = before if before is not None else 1 << 62
         rows = self._asked("SELECT * FROM kept WHERE number < ? ORDER BY number DESC LIMIT ?", below, most)
-        return [Kept(*row) for row in rows]
+        return [StoredLog(*row) for row in rows]
 
-    def unfinished(self) -> list[Kept]:
+    def unfinished(self) -> list[StoredLog]:
         """Return the logs that are to be worked on, the first first."""
         rows = self._asked("SELECT * FROM kept WHERE state = ? ORDER BY number", UNFINISHED)
-        return [Kept(*row) for row in rows]
+        return [StoredLog(*row) for row in rows]
 
     def counts(self) -> dict[str, int]:
         """Return how many logs are in each state."""

@@ -68,7 +68,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Worked:
+class LogResult:
     """The result of a log.
 
     Parameters
@@ -105,12 +105,12 @@ def begin_worker(server: int, memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def work_on(task: Task) -> Worked:
+def work_on(task: Task) -> LogResult:
     """Say what a log holds and write its page.
 
     Returns
     -------
-    Worked
+    LogResult
         With the outcome ``failed`` where the log cannot be used. Where memory is wanting, the process ends with
         `NO_MEMORY` instead.
     """
@@ -130,10 +130,10 @@ def work_on(task: Task) -> Worked:
             worked = _failed(task, blank, unexpected(error))
     result = plain({"file": task.name, **with_remarks(worked.result, said)})
     said = worked.said or plain_words(result) or sentence(str(result.get("message") or ""))
-    return Worked(_without_path(result, task), plain(worked.entries), _without_path(said, task))
+    return LogResult(_without_path(result, task), plain(worked.entries), _without_path(said, task))
 
 
-def _found(task: Task) -> Worked:
+def _found(task: Task) -> LogResult:
     kind, bench, chosen, rig, prepared = _prepared(task.plant, task.rig, task.verb)
     with overheard() as said:
         record = read_log(task.log, bench.columns, dict(task.columns), kind.required)
@@ -143,15 +143,15 @@ def _found(task: Task) -> Worked:
     task.phase.write_text(WRITING, encoding="utf-8")
     _write(task, page_of(chosen, with_remarks({"file": task.name, **result}, said), found, record))
     if task.verb != "diagnose":
-        return Worked(result, None)
+        return LogResult(result, None)
     if kind.name == "eha":
         from experiments.batch.diagnosis import class_row as row
     else:
         from experiments.batch.other_actuators import row_of as row
-    return Worked(result, dict(row(found)))
+    return LogResult(result, dict(row(found)))
 
 
-def _inspected(task: Task) -> Worked:
+def _inspected(task: Task) -> LogResult:
     from experiments.log_pages.inspect_page import inspect_page
     from experiments.log_pages.inspected import looked_into
 
@@ -159,7 +159,7 @@ def _inspected(task: Task) -> Worked:
     found, tables = looked_into(task.log, kind, bench)
     task.phase.write_text(WRITING, encoding="utf-8")
     _write(task, inspect_page({"file": task.name, **found}, tables))
-    return Worked({"outcome": "ok", **found}, None, GUESSED[bool(found["reads"])])
+    return LogResult({"outcome": "ok", **found}, None, GUESSED[bool(found["reads"])])
 
 
 @cache
@@ -182,9 +182,9 @@ def _blank(task: Task) -> Mapping[str, Any]:
     return {**chosen.blank, "plant": kind.name, "rig": bench.name}
 
 
-def _failed(task: Task, blank: Mapping[str, Any], message: str) -> Worked:
+def _failed(task: Task, blank: Mapping[str, Any], message: str) -> LogResult:
     entries = {"outcome": "failed", "reason": message} if task.verb == "diagnose" else None
-    return Worked({**blank, "outcome": "failed", "message": clauses([message])}, entries)
+    return LogResult({**blank, "outcome": "failed", "message": clauses([message])}, entries)
 
 
 def _write(task: Task, page: str) -> None:

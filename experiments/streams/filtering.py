@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from estimation.eha.online import Asked
+    from estimation.eha.online import StreamFilterOptions
     from estimation.filters.online import OnlineFilter
     from plant.log.record import Record
     from plant.log.stream.csv_rows import CsvStream
@@ -38,7 +38,7 @@ class Filtering:
     ----------
     say : callable
         Takes the entries of a line.
-    asked : Asked
+    asked : StreamFilterOptions
         The filter.
     columns : tuple of two Mapping[str, str]
         Foreign column by channel, from the rig file and from the command line.
@@ -53,7 +53,7 @@ class Filtering:
     """
 
     say: Callable[[dict[str, Any]], None]
-    asked: "Asked"
+    asked: "StreamFilterOptions"
     columns: tuple[Mapping[str, str], Mapping[str, str]]
     every: float
     like: "Record | None" = None
@@ -124,7 +124,7 @@ class Filtering:
 
     def _ready(self, stream: "CsvStream", rows: "NDArray[np.float64]", last: float, gap: bool) -> "OnlineFilter":
         """Return the filter; it begins, goes on from its state, or begins again after a gap."""
-        from estimation.eha.online import begun
+        from estimation.eha.online import begin_filter
         from plant.log.record import Record
 
         T = stream.sample_time
@@ -135,7 +135,7 @@ class Filtering:
                 note(f"{self.source}: warning: rows are missing before {last:g} s, so the filter restarts")
             record = Record(T, dict(zip(stream.channels, rows.T, strict=True)))
             try:
-                self.filtered, self._sums = begun(self.asked, record, self.like), None
+                self.filtered, self._sums = begin_filter(self.asked, record, self.like), None
             except LogError as error:
                 raise LogError(error.message, self.source) from error
             self._start(self.filtered, "begun")

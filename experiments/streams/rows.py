@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from experiments.command.logs import noted, with_rig_columns
 from experiments.command.terminal import note
-from plant.log.stream.source import Received, bounded_lines
+from plant.log.stream.source import BatchCounts, bounded_lines
 
 if TYPE_CHECKING:
     from plant.log.stream.csv_rows import CsvStream
@@ -78,7 +78,7 @@ def warn_if_cut(stream: "CsvStream", source: str) -> None:
         note(f"{source}: warning: the last row is incomplete and was left out")
 
 
-def warn_of_lost(address: str, received: Received) -> None:
+def warn_of_lost(address: str, received: BatchCounts) -> None:
     """Say what became of the batches of a network stream, where one is missing."""
     for count, fate in (
         (received.lost, "never came"),

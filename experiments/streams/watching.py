@@ -12,7 +12,7 @@ from experiments.streams.rows import garbage_told, open_rows, warn_if_cut, warn_
 from experiments.streams.state_file import require_same_rate, state_kept
 from experiments.streams.watch_events import WatchEvents
 from plant.errors import LogError
-from plant.log.stream.source import Received, stream_lines
+from plant.log.stream.source import BatchCounts, stream_lines
 
 if TYPE_CHECKING:
     import numpy as np
@@ -121,7 +121,7 @@ def watch_network(told: WatchEvents, address: str, settings: WatchSettings, stat
     HydrostateError
         If nobody answers there, or what comes cannot be watched.
     """
-    received = Received()
+    received = BatchCounts()
     try:
         watch_rows(told, stream_lines(address, received), settings, address, state)
     finally:

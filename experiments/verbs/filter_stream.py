@@ -27,7 +27,7 @@ from experiments.streams.broker import published
 from experiments.streams.endings import end_told, say_line, stop_at_sigterm
 from experiments.streams.filtering import Filtering
 from experiments.streams.rows import STANDARD_INPUT, stream_input, warn_of_lost
-from plant.log.stream.source import Received, bounded_lines, is_stream, stream_lines
+from plant.log.stream.source import BatchCounts, bounded_lines, is_stream, stream_lines
 
 commands = typer.Typer()
 
@@ -90,17 +90,17 @@ def filter_stream(
             sink(shown)
 
     stop_at_sigterm()
-    from estimation.eha.online import Asked
+    from estimation.eha.online import StreamFilterOptions
 
     with ExitStack() as outputs:
         bench, named = load_rig(rig), load_columns(columns)
-        asked = Asked(bench.parameters, form, method, listed(states), tune)
+        asked = StreamFilterOptions(bench.parameters, form, method, listed(states), tune)
         log = None if like is None else read_log(like, bench.columns, named)
         source = STANDARD_INPUT if stream == "-" else stream
         told = Filtering(say, asked, (bench.columns, named), every, log, state, source)
         if publish is not None:
             sinks.append(outputs.enter_context(published(publish)))
-        received = Received()
+        received = BatchCounts()
         with end_told(told):
             try:
                 told.follow(_lines(stream, received))
@@ -108,7 +108,7 @@ def filter_stream(
                 warn_of_lost(stream, received)
 
 
-def _lines(stream: str, received: Received) -> Iterator[str]:
+def _lines(stream: str, received: BatchCounts) -> Iterator[str]:
     if is_stream(stream):
         yield from stream_lines(stream, received)
     elif stream == "-":

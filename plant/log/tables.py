@@ -21,7 +21,7 @@ Chosen = Sequence[tuple[Table, tuple[Column, ...]]]
 
 
 @dataclass(frozen=True, eq=False)
-class Gathered:
+class LogTables:
     """What is in the tables of a log.
 
     Parameters
@@ -45,7 +45,7 @@ def gathered(
     required: Collection[str],
     source: str,
     sample_time: float | None = None,
-) -> Gathered:
+) -> LogTables:
     """Return the channels of a log, converted to SI.
 
     Parameters
@@ -63,7 +63,7 @@ def gathered(
 
     Returns
     -------
-    Gathered
+    LogTables
         Channels on one time.
 
     Raises
@@ -89,7 +89,7 @@ def gathered(
     timed = [_timed(table, values, parts, sample_time, source) for table, values in parts]
     together = merged(timed, source)
     columns, began = _from_start(together.channels)
-    return Gathered(columns, began, (*_overlooked(chosen, tables), *notes, *together.notes))
+    return LogTables(columns, began, (*_overlooked(chosen, tables), *notes, *together.notes))
 
 
 def _without_text(

@@ -36,7 +36,7 @@ next question [s], and questions [count]: a bench that lost its power closes no 
 
 
 @dataclass
-class Received:
+class BatchCounts:
     """Counts of the batches of a stream: read, late, lost, dropped.
 
     Parameters
@@ -64,7 +64,7 @@ class Received:
 
         Examples
         --------
-        >>> received = Received()
+        >>> received = BatchCounts()
         >>> [received.takes(number) for number in (7, 8, 8, 11)], received.late, received.lost
         ([True, True, False, True], 1, 2)
         """
@@ -81,14 +81,14 @@ def is_stream(address: str) -> bool:
     return urlsplit(address).scheme in SCHEMES or "://" in address
 
 
-def stream_lines(address: str, received: Received) -> Iterator[str]:
+def stream_lines(address: str, received: BatchCounts) -> Iterator[str]:
     """Yield header and rows of a stream as they come.
 
     Parameters
     ----------
     address : str
         ``tcp://HOST:PORT``, ``mqtt://HOST[:PORT]/TOPIC`` or ``ring:PATH``, see `plant.log.stream.ring`.
-    received : Received
+    received : BatchCounts
         Receives what became of batches.
 
     Raises
@@ -186,7 +186,7 @@ def connect(client: Any, host: str, port: int, address: str) -> None:
     client.loop_start()
 
 
-def _ring(address: str, received: Received) -> Iterator[str]:
+def _ring(address: str, received: BatchCounts) -> Iterator[str]:
     received.what = "rows"
 
     def count(taken: int, lost: int) -> None:
@@ -255,7 +255,7 @@ def batch(number: int, header: str, rows: Sequence[str]) -> str:
     return "\n".join([f"rows {number}", header, *rows]) + "\n"
 
 
-def _mqtt(host: str, port: int, topic: str, address: str, received: Received) -> Iterator[str]:
+def _mqtt(host: str, port: int, topic: str, address: str, received: BatchCounts) -> Iterator[str]:
     mqtt, version = broker_package(address)
     waiting: queue.Queue[str] = queue.Queue(QUEUED)
 

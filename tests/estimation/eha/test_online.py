@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation.eha.online import Asked, begun, load_filter, samples_of, save_filter
+from estimation.eha.online import StreamFilterOptions, begin_filter, load_filter, samples_of, save_filter
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import LUMPED, simulate
@@ -16,7 +16,7 @@ from plant.sensors.sensors import BENCH
 
 P = EhaParameters()
 PRESSURE = "differential_pressure_pa"
-ASKED = Asked(P, "pressure", "ekf")
+ASKED = StreamFilterOptions(P, "pressure", "ekf")
 
 
 def stream(seed: int = 0) -> Record:
@@ -31,18 +31,18 @@ def chambers(record: Record) -> Record:
 
 def test_noise_is_that_of_another_log_of_the_same_bench() -> None:
     first, like = stream(), stream(1)
-    own, told = begun(ASKED, first), begun(ASKED, first, like)
-    np.testing.assert_array_equal(told.problem.variances, begun(ASKED, like).problem.variances)
+    own, told = begin_filter(ASKED, first), begin_filter(ASKED, first, like)
+    np.testing.assert_array_equal(told.problem.variances, begin_filter(ASKED, like).problem.variances)
     assert np.any(told.problem.variances != own.problem.variances)
     np.testing.assert_array_equal(told.problem.mean, own.problem.mean)
     for other in (like.replace(velocity_m_s=None), replace(like, sample_time=2e-3)):
         with pytest.raises(LogError, match=r"the log must have the stream's channels .* at its rate, 1000 Hz"):
-            begun(ASKED, first, other)
+            begin_filter(ASKED, first, other)
 
 
 def test_samples_of_a_stream_are_drives_and_measurements_in_the_filters_order() -> None:
     record = stream()
-    filtered = begun(ASKED, record)
+    filtered = begin_filter(ASKED, record)
     split = chambers(record)
     known = {name: split[name] for name in split}
     drives, measured = samples_of(filtered, known)
@@ -55,7 +55,7 @@ def test_samples_of_a_stream_are_drives_and_measurements_in_the_filters_order() 
 
 def test_a_saved_filter_goes_on_where_it_was_and_for_nothing_else(tmp_path: Path) -> None:
     record, path = stream(), tmp_path / "filter.npz"
-    filtered = begun(ASKED, record)
+    filtered = begin_filter(ASKED, record)
     save_filter(path, ASKED, filtered, 0.25)
     again, last = load_filter(path, ASKED)
     assert last == 0.25

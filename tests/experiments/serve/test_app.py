@@ -192,9 +192,9 @@ def test_what_is_not_done_yet_is_neither_a_result_nor_a_page(served: Served, mon
 
 
 def test_two_logs_are_compared_and_the_fleet_has_both(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    from experiments.serve.work import Worked
+    from experiments.serve.work import LogResult
 
-    def stand_in(task: Any) -> Worked:
+    def stand_in(task: Any) -> LogResult:
         value = 1.0 if task.name == "A_1.csv" else 3.0
         one = {"value": value, "unit": "L/min", "std": 0.1, "ci95": [value - 0.2, value + 0.2], "ci95_total": None}
         severity = {"leakage_flow": one}
@@ -202,7 +202,7 @@ def test_two_logs_are_compared_and_the_fleet_has_both(served: Served, monkeypatc
         row["quantities"] = f'{{"leakage_flow": {{"value": {value}, "ci95": [{value - 0.2}, {value + 0.2}], '
         row["quantities"] += '"unit": "L/min", "healthy": 0.0, "limit": 2.0}}'
         result = {"file": task.name, "outcome": "ok", "message": "it is so", "severity": severity}
-        return Worked(result, row)
+        return LogResult(result, row)
 
     monkeypatch.setattr("experiments.serve.jobs.work_on", stand_in)
     client = served(pattern="{actuator}_{date}.csv")
@@ -279,13 +279,13 @@ def test_a_browser_without_the_token_reads_what_to_do(served: Served) -> None:
 
 
 def test_the_page_of_an_actuator_is_served(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    from experiments.serve.work import Worked
+    from experiments.serve.work import LogResult
 
     row = {"outcome": "ok", "found_condition": "normal"}
     said = "the verdict of its page"
     monkeypatch.setattr(
         "experiments.serve.jobs.work_on",
-        lambda task: Worked({"file": task.name, "outcome": "ok", "message": "it is so"}, row, said),
+        lambda task: LogResult({"file": task.name, "outcome": "ok", "message": "it is so"}, row, said),
     )
     client = served(pattern="{actuator}_{date}.csv")
     logs = [dropped(client, f"A_{day}.csv", b"a", "diagnose") for day in (1, 2)]

@@ -13,8 +13,8 @@ from pebble import ProcessExpired
 from experiments.serve.jobs import MOST_TRIES, MOST_VIEWS, BusyError, Jobs, log_file, page_file, phase_file
 from experiments.serve.service import Service
 from experiments.serve.settings import MB, Settings
-from experiments.serve.store import Kept, Store
-from experiments.serve.work import NO_MEMORY, Worked
+from experiments.serve.store import Store, StoredLog
+from experiments.serve.work import NO_MEMORY, LogResult
 from plant.errors import HydrostateError
 
 
@@ -51,7 +51,7 @@ class Ending:
     def join(self) -> None: ...
 
 
-def added(store: Store, settings: Settings, identity: str) -> Kept:
+def added(store: Store, settings: Settings, identity: str) -> StoredLog:
     log_file(settings, identity).write_bytes(b"a,b\n1,2\n2,3\n")
     return store.add(identity, f"{identity}.csv", "inspect", 12)
 
@@ -114,7 +114,7 @@ def test_work_that_is_lost_is_told_so(
 def test_a_result_that_cannot_be_kept_is_noted_and_its_log_is_worked_on_again_later(
     settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    worked = Worked({"outcome": "ok", "message": "x" * 100_000}, None)
+    worked = LogResult({"outcome": "ok", "message": "x" * 100_000}, None)
     monkeypatch.setattr(Ending, "ends", staticmethod(lambda future: future.set_result(worked)), raising=False)
     monkeypatch.setattr("experiments.serve.jobs.ProcessPool", Ending)
     jobs, log = Jobs(settings, store), added(store, settings, "a")
@@ -134,8 +134,8 @@ def pending(monkeypatch: pytest.MonkeyPatch) -> list["Future[Any]"]:
     return futures
 
 
-def worked(outcome: str = "ok") -> Worked:
-    return Worked({"file": "a.csv", "outcome": outcome, "message": "said"}, None)
+def worked(outcome: str = "ok") -> LogResult:
+    return LogResult({"file": "a.csv", "outcome": outcome, "message": "said"}, None)
 
 
 def files_of(settings: Settings, identity: str) -> list[Path]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimation.eha import online
-from estimation.eha.online import Asked
+from estimation.eha.online import StreamFilterOptions
 from estimation.trust.consistency import LARGEST_NIS, MISMATCH_NIS
 from experiments.streams.filtering import FEWEST, Filtering
 from experiments.streams.state_file import SAVED_EVERY
@@ -45,7 +45,7 @@ def filtered(
     lines: list[str], every: float = 1.0, form: str = "pressure", **changes: Any
 ) -> tuple[list[dict[str, Any]], Filtering]:
     told: list[dict[str, Any]] = []
-    one = Filtering(told.append, Asked(P, form, "ekf"), ({}, {}), every, **changes)
+    one = Filtering(told.append, StreamFilterOptions(P, form, "ekf"), ({}, {}), every, **changes)
     one.follow(lines)
     return told, one
 
@@ -172,7 +172,9 @@ def test_a_state_is_not_continued_without_a_channel_it_was_begun_with(bench: Rec
 def test_a_column_of_the_rig_that_the_stream_has_not_is_said(bench: Record, capsys: pytest.CaptureFixture[str]) -> None:
     told: list[dict[str, Any]] = []
     rig = {"pressure_a_pa": "PA:bar"}
-    Filtering(told.append, Asked(P, "pressure", "ekf"), (rig, {}), 1.0, source="bench").follow(lines_of(bench)[:401])
+    Filtering(told.append, StreamFilterOptions(P, "pressure", "ekf"), (rig, {}), 1.0, source="bench").follow(
+        lines_of(bench)[:401]
+    )
     (said,) = capsys.readouterr().err.splitlines()
     assert said.startswith("bench: warning: ")
     assert "PA:bar" in said

@@ -17,7 +17,7 @@ from faults.watch.saved import load_state
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
 from plant.errors import HydrostateError, LogError
-from plant.log.stream.source import Received
+from plant.log.stream.source import BatchCounts
 
 T = 0.01
 SPEED = 50.0
@@ -219,20 +219,20 @@ def test_a_healthy_log_without_the_pressure_of_the_stream_is_refused(tmp_path: P
 
 
 def test_batches_that_are_missing_are_counted_by_their_fate(capsys: pytest.CaptureFixture[str]) -> None:
-    warn_of_lost("mqtt://bench/press", Received(batches=7, late=1, lost=2, dropped=3))
+    warn_of_lost("mqtt://bench/press", BatchCounts(batches=7, late=1, lost=2, dropped=3))
     assert capsys.readouterr().err.splitlines() == [
         "mqtt://bench/press: warning: 2 batches never came beside 7 that were read",
         "mqtt://bench/press: warning: 1 batches came late or twice beside 7 that were read",
         "mqtt://bench/press: warning: 3 batches found no room to wait beside 7 that were read",
     ]
-    warn_of_lost("mqtt://bench/press", Received(batches=7))
+    warn_of_lost("mqtt://bench/press", BatchCounts(batches=7))
     assert capsys.readouterr().err == ""
 
 
 def test_what_is_missing_is_told_even_if_the_stream_ends_in_an_error(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def lines(_: str, received: Received) -> Any:
+    def lines(_: str, received: BatchCounts) -> Any:
         received.lost = 4
         yield HEADER + "\n"
         yield "nothing\n"

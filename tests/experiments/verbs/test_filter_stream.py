@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from estimation.eha.online import Asked, begun
+from estimation.eha.online import StreamFilterOptions, begin_filter
 from experiments.cli import app
 from plant.eha.drives import sine
 from plant.eha.model import EhaParameters
@@ -76,9 +76,9 @@ def test_after_a_long_gap_it_begins_again_and_says_so(log: Path, tmp_path: Path)
 
 def test_noise_of_another_log_is_taken_where_one_is_named(log: Path) -> None:
     record = bench()
-    asked = Asked(P, "pressure", "ekf")
+    asked = StreamFilterOptions(P, "pressure", "ekf")
     loud = record.replace(position_m=record["position_m"] + 1e-4 * np.random.default_rng(0).normal(size=len(record)))
-    own, other = begun(asked, record).problem, begun(asked, record, loud).problem
+    own, other = begin_filter(asked, record).problem, begin_filter(asked, record, loud).problem
     assert other.variances[0] > 100.0 * own.variances[0]
     code, told, _ = run(log, "--like", log, "--every", "10")
     assert (code, len(told)) == (0, 3)

@@ -9,7 +9,7 @@ from plant.log.clock.stamps import is_stamp, read_stamps
 from plant.log.formats import csv_layout, layouts_seen
 from plant.log.formats.csv_layout import layout_of_lines
 from plant.log.stream.csv_rows import CsvStream
-from plant.log.stream.source import Received, broker_of, stream_lines
+from plant.log.stream.source import BatchCounts, broker_of, stream_lines
 from tests.numbers import Numbers, or_refused
 
 NUMBERS = Numbers(__file__)
@@ -233,17 +233,17 @@ def addresses_of_streams() -> dict[str, Any]:
         "tcp://bench/a",
         "mqtt:///a",
     )
-    received = Received()
+    received = BatchCounts()
     took = [received.takes(number) for number in (3, 4, 4, 2, 9, 10)]
     return {
         "brokers": [or_refused(lambda one=one: list(broker_of(one))) for one in addresses],
         "refused": [
-            or_refused(lambda one=one: str(type(stream_lines(one, Received()))))
+            or_refused(lambda one=one: str(type(stream_lines(one, BatchCounts()))))
             for one in ("tcp://here", "tcp://:9", "ring:", "ring:/x", "foo://a", "mqtt://a", "tcp://a:99999999")
         ],
         "taken": took,
         "received": [received.batches, received.late, received.lost, received.dropped],
-        "unless told": [Received().batches, Received().late, Received().lost, Received().dropped],
+        "unless told": [BatchCounts().batches, BatchCounts().late, BatchCounts().lost, BatchCounts().dropped],
     }
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from plant.errors import HydrostateError, LogError
 from plant.log.stream.ring import MOST, RingReader, RingWriter
-from plant.log.stream.source import Received, is_stream, stream_lines
+from plant.log.stream.source import BatchCounts, is_stream, stream_lines
 
 HEADER = "time_s,motor_speed_rad_s,position_m"
 
@@ -18,7 +18,7 @@ def rows(begin: int, end: int) -> np.ndarray:
 
 
 def test_a_writer_that_waits_loses_no_row_and_no_bit(tmp_path: Path) -> None:
-    path, count, received = tmp_path / "ring", 3 * MOST, Received()
+    path, count, received = tmp_path / "ring", 3 * MOST, BatchCounts()
     writer = RingWriter(path, HEADER, 100)
 
     def write() -> None:
@@ -59,7 +59,7 @@ def test_a_reader_that_is_started_again_goes_on_at_the_next_row(tmp_path: Path) 
 def test_a_missing_value_is_an_empty_cell(tmp_path: Path) -> None:
     with RingWriter(tmp_path / "ring", HEADER, 10) as writer:
         writer.write(np.array([[0.5, np.nan, 2.0]]))
-    assert list(stream_lines(f"ring:{tmp_path / 'ring'}", Received())) == [f"{HEADER}\n", "0.5,,2.0\n"]
+    assert list(stream_lines(f"ring:{tmp_path / 'ring'}", BatchCounts())) == [f"{HEADER}\n", "0.5,,2.0\n"]
     assert is_stream("ring:/dev/shm/bench")
 
 
@@ -74,6 +74,6 @@ def test_what_is_no_ring_is_refused(tmp_path: Path) -> None:
         with pytest.raises(LogError, match=said):
             RingReader(tmp_path / name)
     with pytest.raises(HydrostateError, match=r"a stream must be .* or ring:PATH"):
-        list(stream_lines("ring:", Received()))
+        list(stream_lines("ring:", BatchCounts()))
     with pytest.raises(HydrostateError, match="two slots or more"):
         RingWriter(tmp_path / "small", HEADER, 1)

@@ -8,7 +8,7 @@ import pytest
 
 from plant.errors import HydrostateError, LogError
 from plant.log.stream import source as stream_source
-from plant.log.stream.source import Received, batch, broker_of, is_stream, stream_lines
+from plant.log.stream.source import BatchCounts, batch, broker_of, is_stream, stream_lines
 
 HEADER = "time_s,position_m"
 
@@ -42,8 +42,8 @@ def publish(port: int, topic: str, messages: list[str]) -> None:
         client.loop_stop()
 
 
-def through_broker(port: int, topic: str, messages: list[str]) -> tuple[list[str], Received]:
-    received = Received()
+def through_broker(port: int, topic: str, messages: list[str]) -> tuple[list[str], BatchCounts]:
+    received = BatchCounts()
     lines: list[str] = []
     reader = threading.Thread(
         target=lambda: lines.extend(stream_lines(f"mqtt://127.0.0.1:{port}/{topic}", received)), daemon=True
@@ -75,7 +75,7 @@ def test_a_sender_that_never_ends_its_line_is_refused_before_it_fills_the_memory
 ) -> None:
     monkeypatch.setattr(stream_source, "LONGEST_LINE", 1000)
     with socket.create_server(("127.0.0.1", 0)) as server:
-        lines = stream_lines(address := f"tcp://127.0.0.1:{server.getsockname()[1]}", Received())
+        lines = stream_lines(address := f"tcp://127.0.0.1:{server.getsockname()[1]}", BatchCounts())
 
         def serve() -> None:
             connection, _ = server.accept()
@@ -102,7 +102,7 @@ def test_a_bench_that_lost_its_power_is_noticed_within_a_minute_or_two(monkeypat
 
     monkeypatch.setattr(socket, "create_connection", connected)
     with socket.create_server(("127.0.0.1", 0)) as server:
-        lines = stream_lines(f"tcp://127.0.0.1:{server.getsockname()[1]}", Received())
+        lines = stream_lines(f"tcp://127.0.0.1:{server.getsockname()[1]}", BatchCounts())
 
         def serve() -> None:
             connection, _ = server.accept()
@@ -136,7 +136,7 @@ def test_rows_of_a_tcp_connection_wait_at_the_sender_until_they_are_read() -> No
 
         sender = threading.Thread(target=serve, daemon=True)
         sender.start()
-        lines = stream_lines(f"tcp://127.0.0.1:{port}", Received())
+        lines = stream_lines(f"tcp://127.0.0.1:{port}", BatchCounts())
         assert next(lines) == f"{HEADER}\n"
         sender.join(1.0)
         assert sender.is_alive()
@@ -151,13 +151,13 @@ def test_what_is_no_stream_is_refused_in_a_sentence() -> None:
     assert is_stream("http://here:1/x")  # an address, though none that is read
     for address in ("http://here:1/x", "tcp://here", "tcp://:99", "mqtt://here", "tcp://here:99999999"):
         with pytest.raises(HydrostateError, match="a stream must be tcp://HOST:PORT, mqtt://"):
-            stream_lines(address, Received())
+            stream_lines(address, BatchCounts())
     with pytest.raises(LogError, match="no answer"):
-        next(stream_lines(f"tcp://127.0.0.1:{free_port()}", Received()))
+        next(stream_lines(f"tcp://127.0.0.1:{free_port()}", BatchCounts()))
 
 
 def test_a_message_that_is_no_batch_ends_the_stream_with_an_error(broker: int) -> None:
-    received, raised = Received(), list[LogError]()
+    received, raised = BatchCounts(), list[LogError]()
 
     def read() -> None:
         try:
