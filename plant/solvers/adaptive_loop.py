@@ -76,7 +76,7 @@ def run_controlled(
     slots, vectors = work.ctypes.data, range(0, 8 * kernel.LANES, 8 * kernel.VECTOR)
     lay(kernel, work, 0, initial, kernel.WIDTH)
     share(kernel, work, 6 * block, weights)
-    keep(kernel, work, 0, states, 0)
+    _keep(kernel, work, 0, states, 0)
     begin = end = lost = 0
     start = reach = place = lift = ramp = curvature = 0.0
     size, taken, row, sample = longest, 1.0, -1, 1
@@ -88,7 +88,7 @@ def run_controlled(
                 share(kernel, work, shared, (*driven, taken * sample_time, taken * sample_time))
                 for first in vectors:
                     kernel.stages_at(slots + first, 0.0)
-                sample = fill(kernel, work, states, sample, end, start, taken)
+                sample = _fill(kernel, work, states, sample, end, start, taken)
             begin, place = end, 0.0
             end, lift, ramp, curvature = smooth(drive, parameters, begin, bend, bulge)
             reach = float(end - begin)
@@ -104,21 +104,21 @@ def run_controlled(
         for first in vectors:
             kernel.stages_at(slots + first, 0.0)
         here = begin + place
-        sample = fill(kernel, work, states, sample, here, start, taken)
+        sample = _fill(kernel, work, states, sample, here, start, taken)
         if left <= 0.0:
             break
-        error = largest(kernel, work, 7 * block, lost)
+        error = _largest(kernel, work, 7 * block, lost)
         if not error <= 1.0 and size > shortest:
             size = max(size * (0.5 if error < 64.0 else 0.25), shortest)
             continue
         if error == np.inf:  # no shorter step brings a run back that has no numbers: the others go on without it
-            lost = unknown(kernel, work, 7 * block)
+            lost = _unknown(kernel, work, 7 * block)
         start, taken = here, size
         place = reach if size == left else place + size
-        accept(work, block)
+        _accept(work, block)
         near = begin + int(place + 0.5)
         if abs(begin + place - near) < TINY:
-            keep(kernel, work, 0, states, near)
+            _keep(kernel, work, 0, states, near)
             if sample == near:
                 sample += 1
         size = max(size * growth(error), shortest)
@@ -195,40 +195,17 @@ def growth(error: float) -> float:
     return 0.9 if error > 0.5 else 1.0
 
 
-def largest(kernel: ControlledKernel, work: Array, place: int, lost: int) -> float:
-    """Return the largest error of the runs, infinite where more runs have none than were lost before.
-
-    Parameters
-    ----------
-    work : ndarray, shape (numbers,)
-        All numbers.
-    place : int
-        Where the errors stand.
-    lost : int
-        How many runs have no numbers any more.
-
-    Returns
-    -------
-    float
-        The error [dimensionless].
-    """
+def _largest(kernel: ControlledKernel, work: Array, place: int, lost: int) -> float:
+    """Return the largest of the errors at a place, infinite where more runs have none than were lost before."""
     error = 0.0
     for lane in range(kernel.LANES):
         if work[place + lane] > error:
             error = work[place + lane]
-    return error if unknown(kernel, work, place) <= lost else np.inf
+    return error if _unknown(kernel, work, place) <= lost else np.inf
 
 
-def unknown(kernel: ControlledKernel, work: Array, place: int) -> int:
-    """Return how many runs have an error that is not a number.
-
-    Parameters
-    ----------
-    work : ndarray, shape (numbers,)
-        All numbers.
-    place : int
-        Where the errors stand.
-    """
+def _unknown(kernel: ControlledKernel, work: Array, place: int) -> int:
+    """Return how many of the errors at a place are not numbers."""
     count = 0
     for lane in range(kernel.LANES):
         if work[place + lane] != work[place + lane]:
@@ -236,62 +213,31 @@ def unknown(kernel: ControlledKernel, work: Array, place: int) -> int:
     return count
 
 
-def accept(work: Array, block: int) -> None:
-    """Make a step's new states the states, and those before with their rates the old ones.
-
-    Parameters
-    ----------
-    work : ndarray, shape (numbers,)
-        All numbers.
-    block : int
-        How many numbers the states are.
-    """
+def _accept(work: Array, block: int) -> None:
+    """Make a step's new states the states, and those before with their rates the old ones; each is a block."""
     for i in range(block):
         work[3 * block + i] = work[i]
         work[4 * block + i] = work[2 * block + i]
         work[i] = work[block + i]
 
 
-def fill(
+def _fill(
     kernel: ControlledKernel, work: Array, states: Array, sample: int, here: float, start: float, taken: float
 ) -> int:
     """Copy the states at the samples within the last step, and return the first sample that is left.
 
-    Parameters
-    ----------
-    kernel : ControlledKernel
-        How states between are found.
-    work : ndarray, shape (numbers,)
-        All numbers.
-    states : ndarray, shape (n, states, up to lanes)
-        Room for them.
-    sample : int
-        First sample of which no state is kept.
-    here, start, taken : float
-        Where the last step ended and began, and its length [count of samples].
+    The step began at ``start``, ended at ``here`` and took ``taken`` samples; ``sample`` is the first that is not kept.
     """
     while sample < here - TINY:
         for first in range(0, 8 * kernel.LANES, 8 * kernel.VECTOR):
             kernel.between_at(work.ctypes.data + first, (sample - start) / taken)
-        keep(kernel, work, 5 * kernel.WIDTH * kernel.LANES, states, sample)
+        _keep(kernel, work, 5 * kernel.WIDTH * kernel.LANES, states, sample)
         sample += 1
     return sample
 
 
-def keep(kernel: ControlledKernel, work: Array, place: int, states: Array, sample: int) -> None:
-    """Copy states to a sample's row.
-
-    Parameters
-    ----------
-    kernel : ControlledKernel
-        Sizes, and how lanes are copied.
-    work : ndarray, shape (numbers,)
-        All numbers.
-    place : int
-        Where the states stand.
-    states : ndarray, shape (n, states, up to lanes)
-        Room for them.
-    """
+def _keep(kernel: ControlledKernel, work: Array, place: int, states: Array, sample: int) -> None:
+    """Copy the states at a place to a sample's row."""
     count = states.shape[2]
     for i in range(kernel.WIDTH):
         if count == kernel.LANES:
@@ -301,5 +247,5 @@ def keep(kernel: ControlledKernel, work: Array, place: int, states: Array, sampl
                 states[sample, i, lane] = work[place + kernel.LANES * i + lane]
 
 
-INNER = (lay, share, same, slope_at, within, along, growth, unknown, largest, accept, keep, fill)
+INNER = (lay, share, same, slope_at, within, along, growth, _unknown, _largest, _accept, _keep, _fill)
 """Parts of the loop and of `smooth`, compiled as if they stood there."""
