@@ -155,36 +155,3 @@ def compiled_model(derivative: Derivative, width: int, parameter_class: type[Par
     title = f"rates of {derivative.__name__} and their Jacobian"
     entries = {one.__name__: signature_of(one, states=width) for one in ENTRIES}
     return load_native(f"model_{derivative.__name__}", kernel_text(title, *parts), entries)
-
-
-def compile_model(
-    derivative: Derivative, width: int, parameter_class: type[Parameters]
-) -> tuple[Callable[[Array, float, Array], Array], Callable[[Array, float, Array], Array]]:
-    """Generate a derivative and its analytic Jacobian by the state.
-
-    Parameters
-    ----------
-    derivative : callable
-        ``derivative(state, speed, parameters)``.
-    width : int
-        Count of states.
-    parameter_class : type
-        What a parameter row holds, field by field.
-
-    Returns
-    -------
-    tuple of callable
-        ``rates(state (states,), speed [rad/s], parameter row)``, shape (states,), and ``slopes`` of the same, shape
-        (states, states).
-    """
-    kernel = compiled_model(derivative, width, parameter_class)
-
-    def of(entry: Callable[..., None], *shape: int) -> Callable[[Array, float, Array], Array]:
-        def found(state: Array, u: float, parameters: Array) -> Array:
-            result = np.empty(shape)
-            entry(state, u, parameters, result)
-            return result
-
-        return found
-
-    return of(kernel.rates, width), of(kernel.slopes, width, width)

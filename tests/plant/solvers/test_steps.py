@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from benchmarks.peers.compiled_model import compile_model
 from benchmarks.peers.stiff_solvers import reference_trajectory
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.arrays import Array
@@ -18,6 +17,7 @@ from plant.eha.simulate import LUMPED, REDUCED
 from plant.errors import HydrostateError
 from plant.solvers.steps import parameter_names, parameter_row, parameter_symbols, rk4_step, ros2_step, solve_linear
 from plant.solvers.trajectory import Trajectory, compile_trajectory
+from tests.plant.solvers.compiled_rates import rates_and_slopes
 
 MILLISECOND = 1e-3
 EVERY_CONDITION = pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
@@ -116,7 +116,7 @@ def test_l_stability_damps_what_explicit_steps_blow_up(reduced: Trajectory, expl
 @EVERY_CONDITION
 def test_the_analytic_slopes_are_the_numerical_ones(condition: Condition) -> None:
     p = parameters_for(condition)
-    _, slopes = compile_model(reduced_derivative, 3, EhaParameters)
+    _, slopes = rates_and_slopes(reduced_derivative, 3, EhaParameters)
     for state in ((0.1, 0.03, 1.0), (-0.1, -0.01, 3.0)):
         x = np.array(state)
         numerical = np.empty((3, 3))

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.peers.compiled_model import compile_model
 from benchmarks.peers.stiff_solvers import Method, reference_trajectory
 from plant.eha.circuit import circuit_derivative, circuit_scales
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.drives import sine
 from plant.eha.simulate import CIRCUIT
 from plant.solvers.steps import parameter_row
+from tests.plant.solvers.compiled_rates import rates_and_slopes
 
 PAPER = CircuitParameters()
 ROW = parameter_row(PAPER)
@@ -33,14 +33,14 @@ def test_the_solvers_agree(method: Method) -> None:
 
 def test_the_compiled_rates_are_the_plain_functions() -> None:
     state = START + np.array([50.0, 0.5, 1e-3, 0.02, 2e-6, -2e-6, 1e-6])
-    rates, _ = compile_model(circuit_derivative, 7, CircuitParameters)
+    rates, _ = rates_and_slopes(circuit_derivative, 7, CircuitParameters)
     plain = np.array(circuit_derivative(tuple(state), 60.0, PAPER), dtype=np.float64)  # type: ignore[arg-type]
     np.testing.assert_allclose(rates(state, 60.0, ROW), plain, rtol=1e-12)
 
 
 def test_the_analytic_slopes_are_the_numerical_ones() -> None:
     state = START + np.array([50.0, 0.5, 1e-3, 0.02, 2e-6, -2e-6, 1e-6])
-    rates, slopes = compile_model(circuit_derivative, 7, CircuitParameters)
+    rates, slopes = rates_and_slopes(circuit_derivative, 7, CircuitParameters)
     found = slopes(state, 60.0, ROW)
     for j in range(7):
         step = np.zeros(7)
