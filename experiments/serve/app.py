@@ -39,7 +39,7 @@ from experiments.serve.store import StoredLog
 from plant.errors import HydrostateError
 
 Identity = Annotated[str, Path(pattern=r"^[0-9a-f]{16}$", description="The id from the list of logs.")]
-Asked = Annotated[str, Query(pattern=r"^[0-9a-f]{16}$", description="The id of a finished log.")]
+LogId = Annotated[str, Query(pattern=r"^[0-9a-f]{16}$", description="The id of a finished log.")]
 Name = Annotated[str, Query(min_length=1, max_length=200, description="Name of the file.")]
 StreamName = Annotated[str, Path(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
 
@@ -250,7 +250,7 @@ def _offer_state(app: FastAPI, service: Service) -> None:
 
 def _offer_comparison(app: FastAPI, service: Service) -> None:
     @app.get("/api/compare", responses=why(404, 409, 422), tags=["logs"])
-    def compare(first: Asked, second: Asked) -> Comparison:
+    def compare(first: LogId, second: LogId) -> Comparison:
         """Return what differs between two logs, second less first."""
         pair = [service.result(one) for one in (first, second)]
         logs = [log_of(service.known(one), service.jobs) for one in (first, second)]
@@ -314,7 +314,7 @@ def _offer_pages(app: FastAPI, service: Service) -> None:
         return shown(await service.actuator(name))
 
     @app.get("/compare", response_class=HTMLResponse, responses=why(404, 409, 422, page=True), tags=["pages"])
-    async def comparison(first: Asked, second: Asked) -> HTMLResponse:
+    async def comparison(first: LogId, second: LogId) -> HTMLResponse:
         """Return the page of two logs side by side."""
         return shown(await service.comparison(first, second))
 
