@@ -159,7 +159,8 @@ def read(
     columns : Mapping[str, str], optional
         Columns under other names, with their units: ``{"position_m": "POS_MM:mm"}``.
     plant : str, optional
-        Kind of actuator, one of `actuators`; the gear-pump actuator unless told.
+        Kind of actuator, one of `actuators`; the one that the columns' names tell if not given, else the gear-pump
+        actuator.
     sample_time : float, optional
         Time between rows [s] of a log that has no time.
     beside : str, Path or sequence of them
@@ -183,7 +184,7 @@ def read(
     Traceback (most recent call last):
     plant.errors.LogError: none.csv: there is no such file
     """
-    from experiments.actuators import DEFAULT, actuator
+    from experiments.actuators import DEFAULT, actuator, kinds_by_columns
     from experiments.command.logs import read_log
     from experiments.python_user.log import ANY
     from experiments.python_user.reading import read_whole_or_sparse
@@ -215,9 +216,12 @@ def read(
                 partial(read_log, file, bench.columns, dict(columns or {}), kind.required, **more)
             )
         name = kind.name
-    except NoChannelError:
+    except NoChannelError as error:
         if rig is not None or columns is not None or plant is not None or others:
             raise
+        kinds = kinds_by_columns(error.columns)
+        if len(kinds) == 1:
+            return read(path, plant=kinds[0], sample_time=sample_time)
         found, name = read_whole_or_sparse(partial(read_any, file, sample_time=sample_time)), ANY
     kept: dict[str, Any] = {"sparse": found.sparse, "refusal": found.refusal}
     kept |= {"name": file.name} if isinstance(file, Path) else {}

@@ -1,6 +1,6 @@
 """The kinds of actuator, each registered by one line; they are imported when one is asked for."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -8,6 +8,7 @@ from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
     from experiments.actuator_kind import ActuatorKind
+    from plant.errors import NoChannelError
 
 ACTUATORS: Mapping[str, str] = {
     "eha": "experiments.eha.kind:EHA",
@@ -56,6 +57,67 @@ def actuators() -> "Iterator[ActuatorKind]":
     yield from (_loaded(name, place) for name, place in ACTUATORS.items())
     installed = {one.name: one.value for one in entry_points(group=ENTRY_POINTS)}
     yield from (_loaded(name, place) for name, place in installed.items() if name not in ACTUATORS)
+
+
+def kinds_by_columns(columns: Collection[str]) -> tuple[str, ...]:
+    """Return the kinds of actuator of which a log has the most channels, under the channels' own names.
+
+    A log that has what the gear-pump actuator needs is one of it.
+
+    Parameters
+    ----------
+    columns : collection of str
+        Names of the log's columns.
+
+    Returns
+    -------
+    tuple of str
+        One name; several where kinds share these channels; none where the log lacks what every kind needs.
+
+    Examples
+    --------
+    >>> kinds_by_columns(["time_s", "drive_voltage_v", "electrode_1_v"])
+    ('diaphragm-motor',)
+    >>> kinds_by_columns(["time_s", "drive_voltage_v", "position_m"])
+    ('piezo-stack', 'diaphragm-motor')
+    """
+    from plant.log.checks import alternatives
+
+    def lacks(kind: "ActuatorKind") -> bool:
+        return any(not set(alternatives(wanted)) & set(columns) for wanted in kind.required)
+
+    if not lacks(_loaded(DEFAULT, ACTUATORS[DEFAULT])):
+        return (DEFAULT,)
+    shared = {kind.name: len(kind.channels.keys() & set(columns)) for kind in actuators() if not lacks(kind)}
+    return tuple(name for name, count in shared.items() if count == max(shared.values()))
+
+
+def kind_meant(error: "NoChannelError", plant: str | None, rig: object) -> str:
+    """Return the kind of actuator that a log is of, which lacks the channels of the gear-pump actuator.
+
+    Parameters
+    ----------
+    error : NoChannelError
+        What reading it as one of the gear-pump actuator brought up.
+    plant : str or None
+        Kind of actuator that was asked for.
+    rig : object
+        Rig that was given; None where none was.
+
+    Raises
+    ------
+    NoChannelError
+        If a kind or a rig was given, no kind has these channels, or several have them: then it says how to name one.
+    """
+    from plant.errors import NoChannelError
+
+    kinds = kinds_by_columns(error.columns) if plant is None and rig is None else ()
+    if len(kinds) == 1:
+        return kinds[0]
+    if kinds:
+        told = f"; these may be columns of {' or '.join(kinds)}: name the kind with --plant"
+        raise NoChannelError(error.bare, error.source, f"{told}{error.hint}", error.columns) from error
+    raise error
 
 
 def _loaded(name: str, place: str) -> "ActuatorKind":

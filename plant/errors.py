@@ -89,14 +89,16 @@ class NoChannelError(LogError):
         What is missing, and what is there.
     hint : str
         What to do on a command line, as clauses, each after a semicolon.
+    columns : tuple of str
+        Names of the log's columns: they may be the channels of another kind of actuator.
     """
 
-    def __init__(self, message: str, source: str | None = None, hint: str = "") -> None:
+    def __init__(self, message: str, source: str | None = None, hint: str = "", columns: tuple[str, ...] = ()) -> None:
         super().__init__(f"{message}{hint}", source)
-        self.bare, self.hint = message, hint
+        self.bare, self.hint, self.columns = message, hint, columns
 
     def __reduce__(self) -> tuple[object, ...]:
-        return type(self), (self.bare, self.source, self.hint)
+        return type(self), (self.bare, self.source, self.hint, self.columns)
 
 
 class SparseLogError(LogError):

@@ -117,7 +117,15 @@ def covariance(slopes: Array) -> Array:
         Covariance [dimensionless]; very large where nothing is known.
     """
     size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
-    return np.linalg.pinv((slopes / size).T @ (slopes / size), rcond=1e-14) / np.outer(size, size)
+    known, axes = np.linalg.eigh((slopes / size).T @ (slopes / size))
+    return (axes / np.maximum(known, _LEAST_KNOWN * known[-1])) @ axes.T / np.outer(size, size)
+
+
+def _newton_step(slopes: Array, residuals: Array) -> Array:
+    """Return the step of Gauss and Newton, none along what the channels do not show."""
+    size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
+    known = np.linalg.pinv((slopes / size).T @ (slopes / size), rcond=_LEAST_KNOWN)
+    return -known @ (slopes.T @ residuals / size) / size
 
 
 def stack_bounds(
@@ -164,7 +172,7 @@ def _descended(runs: StackRuns, measured: Array, start: Array) -> tuple[Array, A
     known = covariance(slopes)
     residuals = found - measured
     for _ in range(_MOST_EXACT):
-        changes = np.outer(_SHORTENED, -known @ (slopes.T @ residuals))
+        changes = np.outer(_SHORTENED, _newton_step(slopes, residuals))
         change, tried = _best(runs, measured, theta, changes, LONGEST_STEP)
         if float(tried @ tried) >= float(residuals @ residuals):
             break
@@ -205,6 +213,9 @@ def _share(change: NDArray[Any], known: Array) -> float:
     """Return the largest change over its standard deviation."""
     return float(np.max(np.abs(change) / np.sqrt(np.diag(known))))
 
+
+_LEAST_KNOWN = 1e-14
+"""Least information along a combination of unknowns, over the largest, that is more than rounding [dimensionless]."""
 
 _MOST_STEPS = 30
 _NEAR = 3.0

@@ -33,6 +33,7 @@ UNKNOWNS: Mapping[str, Unknown] = {
     "inlet_reed_stiffness": Unknown(("inlet_reed_stiffness",), unit="N/m"),
     "outlet_reed_gap": Unknown(("outlet_reed_gap",), 1e-4, unit="m"),
     "inlet_reed_gap": Unknown(("inlet_reed_gap",), 1e-4, unit="m"),
+    "bias_pressure": Unknown(("bias_pressure",), unit="Pa"),
     "viscous_friction": Unknown(("viscous_friction",), unit="N s/m"),
     "delivery_length": Unknown(("delivery_length", "return_length", "intake_length")),
     "discharge_coefficient": Unknown(("discharge_coefficient",)),

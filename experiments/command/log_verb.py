@@ -1,22 +1,27 @@
 """The body of `estimate` and `diagnose`, the same for every kind of actuator."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 
+from experiments.actuators import kind_meant
 from experiments.command.json_output import Result, prepare_output, write_whole
 from experiments.command.logs import finish, overheard, read_log, run_logs, with_remarks
 from experiments.command.options import load_actuator, load_columns, understood
 from experiments.command.output_paths import own_paths, page_place, pages_sentence, require_place
 from experiments.command.terminal import clauses, note
-from plant.errors import HydrostateError, require_known
+from plant.errors import HydrostateError, NoChannelError, require_known
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from estimation.finding import Finding
     from experiments.actuator_kind import LogVerb
+    from plant.eha.rig import Rig
     from plant.log.record import Record
 
 COMMON = frozenset({"logs", "plant", "rig", "columns", "report", "out", "seed", "as_json", "sample_time", "beside"})
@@ -44,6 +49,50 @@ class _Pages:
         return [*([pages_sentence(self.written)] if self.written else []), *self.unwritten]
 
 
+@dataclass(frozen=True)
+class _Question:
+    """A verb as it is asked of the logs of one kind of actuator.
+
+    Parameters
+    ----------
+    options : Mapping[str, Any]
+        Options as the kind understands them.
+    rig, prepared : Rig, Any
+        What the kind made of its rig and of these options.
+    about : Mapping[str, Any]
+        Entries that all logs have.
+    """
+
+    chosen: "LogVerb"
+    options: Mapping[str, Any]
+    rig: "Rig[Any]"
+    prepared: Any
+    read: "Callable[..., Record]"
+    about: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, context: typer.Context, verb: str, asked: Mapping[str, Any], plant: str | None) -> "_Question":
+        """Return the question for a kind of actuator; raises a HydrostateError if an option does not go with it."""
+        diagnosing = verb == "diagnose"
+        kind, bench = load_actuator(plant, asked["rig"])
+        options = understood(context, asked, kind, verb, COMMON | ({"condition"} if diagnosing else set()))
+        require_place("--figure", options.get("figure"), ".png")
+        expected: str | None = asked["condition"] if diagnosing else None
+        if expected is not None:
+            require_known("--condition", expected, kind.conditions)
+        columns, sample_time = load_columns(asked["columns"]), asked.get("sample_time")
+        read = partial(
+            read_log, rig_columns=bench.columns, columns=columns, required=kind.required, sample_time=sample_time
+        )
+        if options.get("healthy") is not None:
+            options["healthy"] = read(options["healthy"])
+        chosen: LogVerb = getattr(kind, verb)
+        rig, prepared = chosen.prepare(bench, {**options, "seed": asked["seed"]})
+        about = {"plant": kind.name, "rig": bench.name, "seed": asked["seed"], "expected": expected}
+        about |= {"condition": options["condition"]} if "condition" in options else {}
+        return cls(chosen, options, rig, prepared, read, about)
+
+
 def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[str, Any]) -> NoReturn:
     """Find what logs say, print it, and leave with the exit code.
 
@@ -59,52 +108,53 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     HydrostateError
         If an option is unknown, does not go with the kind of actuator, or is not usable.
     """
-    diagnosing = verb == "diagnose"
-    kind, bench = load_actuator(asked["plant"], asked["rig"])
-    options = understood(context, asked, kind, verb, COMMON | ({"condition"} if diagnosing else set()))
-    require_place("--figure", options.get("figure"), ".png")
-    chosen: LogVerb = getattr(kind, verb)
+    question = _Question.of(context, verb, asked, asked["plant"])
     logs, beside = asked["logs"], asked.get("beside") or ()
-    read = partial(
-        read_log,
-        rig_columns=bench.columns,
-        columns=load_columns(asked["columns"]),
-        required=kind.required,
-        sample_time=asked.get("sample_time"),
-    )
-    expected: str | None = asked["condition"] if diagnosing else None
-    report = page_place(asked.get("report"))
-    if expected is not None:
-        require_known("--condition", expected, kind.conditions)
     if beside and len(logs) > 1:
         raise HydrostateError("--with goes with one log, got several")
-    if options.get("healthy") is not None:
-        options["healthy"] = read(options["healthy"])
-    rig, prepared = chosen.prepare(bench, {**options, "seed": asked["seed"]})
+    report = page_place(asked.get("report"))
     prepare_output(asked["out"])
-    figures, pages = own_paths(options.get("figure"), logs), _Pages(own_paths(report, logs))
-    about = {"plant": kind.name, "rig": bench.name, "seed": asked["seed"], "expected": expected}
-    about |= {"condition": options["condition"]} if "condition" in options else {}
+    figures, pages = own_paths(question.options.get("figure"), logs), _Pages(own_paths(report, logs))
+    questions = {question.about["plant"]: question}
+
+    def read(log: Path) -> "tuple[_Question, Record]":
+        try:
+            return question, question.read(log, beside=beside)
+        except NoChannelError as error:
+            name = kind_meant(error, asked["plant"], asked["rig"])
+            note(f"{log}: read as a log of a {name} actuator, by its columns; --plant names another kind")
+            other = questions.get(name) or _Question.of(context, verb, asked, name)
+            return questions.setdefault(name, other), other.read(log, beside=beside)
 
     def work(log: Path) -> Result:
         with overheard() as said:
-            record = read(log, beside=beside)
-        found = chosen.run(record, rig, prepared)
-        result: dict[str, Any] = {**chosen.blank, **about, **chosen.entries(found)}
+            of, record = read(log)
+        found = of.chosen.run(record, of.rig, of.prepared)
+        result: dict[str, Any] = {**of.chosen.blank, **of.about, **of.chosen.entries(found)}
         result["message"] = clauses([result["message"], *_agreement(result, found)])
-        if log in figures and chosen.figure is not None:
-            chosen.figure(found, log.name, figures[log])
+        if log in figures and of.chosen.figure is not None:
+            of.chosen.figure(found, log.name, figures[log])
         if log in pages.places:
-            pages.write(log, page_of(chosen, with_remarks({"file": str(log), **result}, said), found, record))
+            pages.write(log, page_of(of.chosen, with_remarks({"file": str(log), **result}, said), found, record))
         return result
 
-    batch = run_logs(logs, work, {**chosen.blank, **about}, doing)
-    for remark in chosen.remarks(batch.results):
-        note(remark)
+    def of_each_kind(results: Sequence[Result]) -> "Iterator[tuple[_Question, list[Result]]]":
+        for name, one in questions.items():
+            if own := [result for result in results if result["plant"] == name]:
+                yield one, own
+
+    batch = run_logs(logs, work, {**question.chosen.blank, **question.about}, doing)
+    for one, results in of_each_kind(batch.results):
+        for remark in one.chosen.remarks(results):
+            note(remark)
     for sentence in pages.told():
         note(sentence)
-    form: dict[str, Any] = {"as_json": asked["as_json"], "out": asked["out"], "lost": bool(pages.unwritten)}
-    finish(batch, lambda results: chosen.screen(results, options), **form)
+
+    def screen(results: Sequence[Result]) -> "Iterator[RenderableType]":
+        for one, own in of_each_kind(results):
+            yield from one.chosen.screen(own, one.options)
+
+    finish(batch, screen, as_json=asked["as_json"], out=asked["out"], lost=bool(pages.unwritten))
 
 
 def _agreement(result: Result, found: "Finding") -> list[str]:

@@ -14,6 +14,8 @@ from experiments.actuator_kind import ActuatorKind, Experiment, LogVerb, Options
 from experiments.command.json_output import Result
 from experiments.command.terminal import short_names, table
 from experiments.log_pages.entries import BLANK, finding_entries, quantity_entry
+from experiments.page.numbers import percent_text
+from experiments.page.sentences import sentence
 from faults.diaphragm_motor.diagnose import Match
 from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS, motor_with_fault
 from faults.diaphragm_motor.finding import motor_fault_finding, severity_of
@@ -129,9 +131,11 @@ def _faults_shown(results: Sequence[Result], options: Options) -> "Iterable[Rend
             cells = ("-", "-", "-")
             if size is not None:
                 cells = (f"{size['value']:.3g}", f"{size['ci95'][0]:.3g} to {size['ci95'][1]:.3g}", size["unit"])
-            shown.add_row(name, one["fault"].replace("_", " "), f"{100.0 * one['probability']:.1f}", *cells)
+            shown.add_row(name, one["fault"].replace("_", " "), percent_text(one["probability"]), *cells)
     yield shown
-    yield from (f"{result['file']}: {result['message']}" for result in results)
+    for result in results:
+        yield f"{result['file']}: {result['message']}"
+        yield from (f"  next  {sentence(one)}" for one in result["advice"])
 
 
 OF_A_LOG: Any = {"prepare": _prepared, "options": {"load": None, "healthy": None}, "blank": {**BLANK, **OWN}}

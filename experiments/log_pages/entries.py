@@ -1,9 +1,10 @@
 """A finding as entries of the JSON contract, whatever the actuator; later versions add entries and rename none."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.terminal import clauses
+from experiments.page.condition_names import in_words
 
 if TYPE_CHECKING:
     from estimation.finding import Finding, Gate, Quantity
@@ -75,6 +76,32 @@ def gate_entry(gate: "Gate") -> dict[str, Any]:
     return {"passed": gate.passed, "reasons": [str(note) for note in gate.reasons]}
 
 
+SOUND: Mapping[str, str] = {"normal": "leakage and friction are normal", "healthy": "no fault"}
+"""Conditions of a sound actuator, in words."""
+
+
+def either(named: Sequence[str]) -> str:
+    """Return the condition and those that are not told from it, as a sentence says them.
+
+    Examples
+    --------
+    >>> either(["minor_leakage_minor_friction", "normal"])
+    'minor leakage + minor friction or normal'
+    """
+    return " or ".join(map(in_words, named))
+
+
+def _named(found: "Finding") -> Iterator[str]:
+    """Yield what is wrong, each fault beside the condition before a condition that is sound."""
+    faults = [str(note) for note in found.faults]
+    if len(found.named) == 1 and found.named[0] in SOUND:
+        yield from (*faults, SOUND[found.named[0]])
+    else:
+        told = either(found.named)
+        yield from () if any(fault.startswith(f"{told}:") for fault in faults) else (told,)
+        yield from faults
+
+
 def message_of(found: "Finding") -> str:
     """Return a finding in one sentence.
 
@@ -87,8 +114,8 @@ def message_of(found: "Finding") -> str:
 
     doubts = [str(note) for note in distinct((*found.against, *found.gate.reasons))]
     named = found.condition is not None and not found.unknown
-    said = [" or ".join(found.named)] if named else doubts
-    said += map(str, (*found.not_told, *(() if found.unknown else found.faults)))
+    said = [*_named(found)] if named else [*doubts, *(() if found.unknown else map(str, found.faults))]
+    said += map(str, found.not_told)
     if named and not found.gate.passed:
         said.append(f"not to be relied on: {clauses(doubts)}")
     return clauses(said or [ALL_TOLD])

@@ -9,6 +9,8 @@ import pandas as pd
 from estimation.notes import ChannelCode
 from experiments.command.terminal import clauses
 from experiments.log_pages.channel_charts import channel_charts
+from experiments.log_pages.entries import SOUND, either
+from experiments.page.condition_names import in_words
 from experiments.page.numbers import MISSING, number, percent_text, pretty_unit, shop_unit
 from experiments.page.render import render_page
 from experiments.page.sentences import left_unread, sentence
@@ -75,7 +77,7 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
         "notes": [one for one in noted if one not in (*to_do, *map(sentence, against))],
         "quantities": pd.DataFrame([_row(name, one) for name, one in shown.items()]),
         "probabilities": pd.DataFrame(
-            [(name.replace("_", " "), percent_text(share)) for name, share in shares if share >= LEAST_SHARE],
+            [(in_words(name), percent_text(share)) for name, share in shares if share >= LEAST_SHARE],
             columns=["condition", "percent"],
         ),
         "charts": {"measured": channel_charts(record, found, Path(file).stem)},
@@ -101,8 +103,10 @@ def _title(found: "Finding") -> str:
         return "No verdict: columns of the log are not what they are called."
     if found.unknown:
         return "No verdict: the log does not fit any known condition."
+    if len(found.named) == 1 and found.named[0] in SOUND:
+        return sentence(f"Found: {found.faults[0]}" if found.faults else SOUND[found.named[0]])
     if found.named:
-        return f"Found: {' or '.join(found.named).replace('_', ' ')}."
+        return f"Found: {either(found.named)}."
     if any(one.value is not None for one in found.quantities.values()):
         passed = "which passed the consistency check" if found.gate.passed else "but do not rely on them"
         return f"Estimated values, {passed}."

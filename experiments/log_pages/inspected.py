@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from experiments.actuators import DEFAULT, actuator, kinds_by_columns
 from experiments.command.json_output import Result
 from experiments.command.logs import caught, read_log
 from experiments.command.terminal import sparkline
@@ -13,22 +14,23 @@ from plant.errors import HydrostateError
 if TYPE_CHECKING:
     from estimation.log_checks.channel_guess import ChannelGuess
     from experiments.actuator_kind import ActuatorKind
-    from plant.eha.rig import Rig
     from plant.log.inspection import ColumnFacts, TableFacts
 
-BLANK: Result = dict.fromkeys(("tables", "columns", "options", "reads"))
+BLANK: Result = dict.fromkeys(("plant", "tables", "columns", "options", "reads"))
 
 PLOTTED = 24
 """Characters of a plot on the terminal."""
 
 
 def looked_into(
-    log: Path, kind: "ActuatorKind", rig: "Rig[Any]", sample_time: float | None = None, beside: Sequence[Path] = ()
+    log: Path, plant: str | None, sample_time: float | None = None, beside: Sequence[Path] = ()
 ) -> "tuple[dict[str, Any], list[TableFacts]]":
     """Return what a log holds, as entries of the JSON contract, and its tables.
 
     Parameters
     ----------
+    plant : str or None
+        Kind of actuator; the one that the names of the columns tell if not given, else the gear-pump actuator.
     sample_time : float, optional
         Time between rows [s] of a log that has no time.
     beside : sequence of Path
@@ -36,32 +38,37 @@ def looked_into(
 
     Raises
     ------
-    LogError
-        If a file cannot be opened.
+    HydrostateError
+        If a file cannot be opened, or there is no such kind.
     """
+    from plant.log.formats.detect import open_tables
     from plant.log.guess import in_order
+    from plant.log.inspection import inspect_table
 
-    tables, guesses = _looked_at([log, *beside], kind, rig)
+    tables = [inspect_table(one) for path in [log, *beside] for one in open_tables(path)]
+    kind = actuator(plant or _kind_told(tables))
+    guesses = _guessed(tables, kind)
     sure = {one.guess.channel: one.guess.spec for one in guesses if one.guess.sure >= 0.5}
     columns = {channel: sure[channel] for channel in in_order(sure)}
     reads = _reads(log, columns, kind, sample_time, beside)
     found = _entries(tables, guesses, columns) | {"reads": reads["reads"], "message": reads["message"]}
-    found["options"] = _options(columns, sample_time, beside)
-    return found, tables
+    found["options"] = _options(columns, kind.name, sample_time, beside)
+    return {"plant": kind.name, **found}, tables
 
 
-def _looked_at(
-    paths: Sequence[Path], kind: "ActuatorKind", rig: "Rig[Any]"
-) -> "tuple[list[TableFacts], list[ChannelGuess]]":
-    """Return what the files hold, and the surest guess of each channel over all their tables."""
+def _kind_told(tables: "Sequence[TableFacts]") -> str:
+    kinds = kinds_by_columns([column.heading.name for facts in tables for column in facts.columns])
+    return kinds[0] if len(kinds) == 1 else DEFAULT
+
+
+def _guessed(tables: "Sequence[TableFacts]", kind: "ActuatorKind") -> "list[ChannelGuess]":
+    """Return the surest guess of each channel over all tables."""
     from estimation.log_checks.channel_guess import guess_channels
     from plant.eha.model import EhaParameters
     from plant.log.columns import TIME
-    from plant.log.formats.detect import open_tables
-    from plant.log.inspection import inspect_table
 
-    p = rig.parameters if isinstance(rig.parameters, EhaParameters) else EhaParameters()
-    tables = [inspect_table(one) for path in paths for one in open_tables(path)]
+    healthy = kind.parameters()
+    p = healthy if isinstance(healthy, EhaParameters) else EhaParameters()
     best: dict[str, ChannelGuess] = {}
     for facts in tables:
         headings = [one.heading for one in facts.columns]
@@ -69,7 +76,7 @@ def _looked_at(
             known = best.get(one.guess.channel)
             if known is None or one.guess.sure > known.guess.sure:
                 best[one.guess.channel] = one
-    return tables, list(best.values())
+    return list(best.values())
 
 
 def _reads(
@@ -131,13 +138,14 @@ def _column_entries(column: "ColumnFacts", guess: "ChannelGuess | None") -> dict
     }
 
 
-def _options(columns: Mapping[str, str], sample_time: float | None, beside: Sequence[Path]) -> str:
+def _options(columns: Mapping[str, str], plant: str, sample_time: float | None, beside: Sequence[Path]) -> str:
     """Return the options that read the log as the block does."""
     import shlex
 
     parts = [shlex.quote(f"{channel}={spec}") for channel, spec in columns.items()]
     told = [f"--columns {part}" for part in parts] + [f"--with {shlex.quote(str(one))}" for one in beside]
-    return " ".join(told + ([] if sample_time is None else [f"--sample-time {sample_time:g}"]))
+    kind = [] if plant == DEFAULT else [f"--plant {plant}"]
+    return " ".join(kind + told + ([] if sample_time is None else [f"--sample-time {sample_time:g}"]))
 
 
 def block_of(columns: Mapping[str, str]) -> str:

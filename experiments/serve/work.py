@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from experiments.actuators import kind_meant
 from experiments.command.json_output import plain
 from experiments.command.log_verb import page_of
 from experiments.command.logs import caught, overheard, read_log, with_remarks
@@ -136,7 +137,12 @@ def work_on(task: Task) -> LogResult:
 def _found(task: Task) -> LogResult:
     kind, bench, chosen, rig, prepared = _prepared(task.plant, task.rig, task.verb)
     with overheard() as said:
-        record = read_log(task.log, bench.columns, dict(task.columns), kind.required)
+        try:
+            record = read_log(task.log, bench.columns, dict(task.columns), kind.required)
+        except NoChannelError as error:
+            meant = kind_meant(error, task.plant, task.rig)
+            kind, bench, chosen, rig, prepared = _prepared(meant, None, task.verb)
+            record = read_log(task.log, bench.columns, dict(task.columns), kind.required)
     task.phase.write_text(WORKING, encoding="utf-8")
     found = chosen.run(record, rig, prepared)
     result = {**chosen.blank, "plant": kind.name, "rig": bench.name, **chosen.entries(found)}
@@ -155,8 +161,7 @@ def _inspected(task: Task) -> LogResult:
     from experiments.log_pages.inspect_page import inspect_page
     from experiments.log_pages.inspected import looked_into
 
-    kind, bench = load_actuator(task.plant, None)
-    found, tables = looked_into(task.log, kind, bench)
+    found, tables = looked_into(task.log, task.plant)
     task.phase.write_text(WRITING, encoding="utf-8")
     _write(task, inspect_page({"file": task.name, **found}, tables))
     return LogResult({"outcome": "ok", **found}, None, GUESSED[bool(found["reads"])])

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from experiments.actuators import actuator
 from experiments.command.json_output import Result, prepare_output, write_whole
 from experiments.command.logs import finish, run_logs
-from experiments.command.options import Beside, Json, Out, Plant, SampleTime, argument, load_actuator, option
+from experiments.command.options import Beside, Json, Out, Plant, SampleTime, argument, option
 from experiments.command.output_paths import own_paths, page_place, pages_sentence, require_place
 from experiments.command.terminal import note, table, visible
 from experiments.log_pages.inspected import BLANK, block_of, looked_into
@@ -53,10 +54,11 @@ def inspect(
     motion. Each guess has a probability and reasons. Copy the block at the end into a rig file (or use --write), or add
     the printed options to one command. Check every unit that is marked as guessed.
     """
-    kind, rig = load_actuator(plant, None)
+    if plant is not None:
+        actuator(plant)
 
     def work(log: Path) -> Result:
-        found, tables = looked_into(log, kind, rig, sample_time, beside or ())
+        found, tables = looked_into(log, plant, sample_time, beside or ())
         if log in pages:
             from experiments.log_pages.inspect_page import inspect_page
 
@@ -67,7 +69,7 @@ def inspect(
             except HydrostateError as error:  # what was found is shown all the same
                 unwritten.append(str(error))
         if write is not None:
-            _write_rig(write, found["columns"], kind)
+            _write_rig(write, found["columns"], actuator(found["plant"]))
             note(f"{write}: check units and parameters, then run: hydrostate diagnose {log} --rig {write}")
         return {"outcome": "ok", **found}
 

@@ -2,6 +2,7 @@
 
 from estimation.diaphragm_motor.signature import DRIVE, POSITION, Signature
 from estimation.finding import Finding, Gate, Outcome, Quantity
+from faults.cylinder_advice import CylinderAdviceCode
 from faults.diaphragm_motor.diagnose import Match, MotorDiagnosis, diagnose_motor
 from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
@@ -23,7 +24,22 @@ class MotorFaultCode(Code):
     )
     ROD_STANDS = "the rod moves at {velocity_mm_s:.2g} mm/s: it is stalled, or at its end stop"
     LOOKS_LIKE = "from the electrodes' fundamentals alone, it could also be {faults}"
-    FAULT_FOUND = "{fault}: {meaning}: {severity:.3g}{unit}, 95 % interval {low:.3g} to {high:.3g}{unit}"
+    FAULT_FOUND = "{fault}: {severity:.3g}{unit} (95 % interval {low:.3g} to {high:.3g}{unit}), {meaning}"
+
+
+class MotorAdviceCode(Code):
+    """What to do about a fault of the diaphragm motor."""
+
+    CLEAN_VALVE = "clean valve {place} and its seat; replace the valve if it still leaks"
+    FREE_VALVE = "clean valve {place} and its port"
+    POLARISE_DIAPHRAGM = "polarise diaphragm {place} again; replace it if its stroke stays short"
+    CHECK_ELECTRODE = "check the cable and the amplifier of electrode {place}"
+    BLEED_CHAMBER = "bleed chamber {place}, then find where gas gets in"
+    BLEED_MOTOR = "bleed the motor, then find where gas gets in"
+    CHECK_CLAMP = "check how the diaphragms are clamped"
+    CHECK_LOAD = "check the load on the rod, and give it with --load"
+    CLEAN_PORTS = "clean the ports, and check the oil for dirt"
+    LOOK_AT_VALVES = "check the valves for dirt, and the oil for its viscosity"
 
 
 def motor_fault_finding(
@@ -67,7 +83,10 @@ def motor_fault_finding(
         unknown=found.unknown,
         against=(MotorFaultCode.NO_FAULT_FITS.note(),) if found.unknown else (),
         faults=tuple(_fault(match) for match in found.group if match.name != HEALTHY and not found.unknown),
-        not_told=(MotorFaultCode.LOOKS_LIKE.note(faults=" or ".join(others)),) if others and not found.unknown else (),
+        advice=() if found.unknown else tuple(_remedy(match) for match in found.group if match.name != HEALTHY),
+        not_told=(MotorFaultCode.LOOKS_LIKE.note(faults=" or ".join(others).replace("_", " ")),)
+        if others and not found.unknown
+        else (),
         evidence=found,
     )
 
@@ -98,6 +117,35 @@ def _against(found: MotorDiagnosis) -> tuple[Note, ...]:
     if abs(found.signature.velocity) < STANDING:
         reasons.append(MotorFaultCode.ROD_STANDS.note(velocity_mm_s=1e3 * found.signature.velocity))
     return tuple(reasons)
+
+
+def _remedy(match: Match) -> Note:
+    fault = MOTOR_FAULTS[match.name]
+    match fault.kind:
+        case "valve_leak":
+            return MotorAdviceCode.CLEAN_VALVE.note(place=fault.place)
+        case "valve_blocked":
+            return MotorAdviceCode.FREE_VALVE.note(place=fault.place)
+        case "depolarised":
+            return MotorAdviceCode.POLARISE_DIAPHRAGM.note(place=fault.place)
+        case "gain":
+            return MotorAdviceCode.CHECK_ELECTRODE.note(place=fault.place)
+        case "gas":
+            return MotorAdviceCode.BLEED_CHAMBER.note(place=fault.place)
+        case "gas_everywhere":
+            return MotorAdviceCode.BLEED_MOTOR.note()
+        case "soft_clamp":
+            return MotorAdviceCode.CHECK_CLAMP.note()
+        case "cylinder_leakage":
+            return CylinderAdviceCode.LOOK_AT_PISTON_SEAL.note()
+        case "friction":
+            return CylinderAdviceCode.LOOK_AT_ROD.note()
+        case "load":
+            return MotorAdviceCode.CHECK_LOAD.note()
+        case "clogged_ports":
+            return MotorAdviceCode.CLEAN_PORTS.note()
+        case _:
+            return MotorAdviceCode.LOOK_AT_VALVES.note()
 
 
 def _fault(match: Match) -> Note:

@@ -1,7 +1,8 @@
 """From what a piezo-stack log says to a class: the nine conditions, and every other fault by name and size."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from math import log
 
 from estimation.finding import Finding, Gate, Outcome
 from estimation.piezo_stack.estimate import StackEstimate, estimate_stack
@@ -9,6 +10,7 @@ from estimation.piezo_stack.finding import missed, stack_quantities
 from estimation.piezo_stack.runs import STACK_CHANNELS
 from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS
 from faults.conditions import CONDITIONS
+from faults.cylinder_advice import CylinderAdviceCode
 from faults.piezo_stack.faults import ADDED_FRICTION, CROSSPORT_LEAKAGE
 from plant.log.record import Record
 from plant.notes import Code, Note
@@ -16,10 +18,13 @@ from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.trajectory import NAME
 
 GAPS = ("outlet_reed_gap", "inlet_reed_gap")
-"""Unknowns that are tried where the others leave a misfit."""
 
-GAP_STARTS: tuple[Mapping[str, float], ...] = ({}, *({name: gap} for gap in (0.3, 1.5) for name in GAPS))
-"""First guesses for them, scaled as `estimation.piezo_stack.estimate.UNKNOWNS`."""
+SELDOM: tuple[tuple[tuple[str, ...], tuple[Mapping[str, float], ...]], ...] = (
+    (GAPS, ({}, *({name: gap} for gap in (0.3, 1.5) for name in GAPS))),
+    (("bias_pressure",), tuple({"bias_pressure": log(share)} for share in (0.8, 0.6, 0.4, 1.5))),
+)
+"""Unknowns that are tried in turn where all others leave a misfit, with first guesses as in
+`estimation.piezo_stack.unknowns.STARTS`."""
 
 CALIBRATED = (
     "air_fraction",
@@ -51,13 +56,16 @@ REED_CHANGED = 0.2
 LEAST_GAP = 5e-6
 """Gap below a reed from which it is a fault [m] (judged)."""
 
+BIAS_CHANGED = 0.05
+"""Change of the bias pressure from which it is a fault [fraction] (judged)."""
+
 
 class StackFaultCode(Code):
     """Notes on a diagnosis of the piezo-stack actuator."""
 
     ANOTHER_ACTUATOR = (
-        "the model misses {channel} by {ratio:.3g} times its noise: this is another actuator; calibrate on a healthy "
-        "run"
+        "the model misses {channel} by {ratio:.3g} times its noise: the actuator or its load is not as the rig file "
+        "says; calibrate on a healthy run (--healthy)"
     )
     LEAKAGE_AND_FRICTION = "these sensors cannot separate leakage from friction: log the stack's displacement"
     AIR_IN_OIL = "air in the oil: {percent:.2f} %, {ratio:.3g} times the healthy share"
@@ -66,6 +74,19 @@ class StackFaultCode(Code):
     REED_SOFT = "{reed} reed soft: {ratio:.3g} times the healthy stiffness"
     REED_STIFF = "{reed} reed stiff or jammed: {ratio:.3g} times the healthy stiffness"
     REED_OPEN = "{reed} reed does not shut: a gap of {gap_um:.0f} um"
+    BIAS_OFF = "bias pressure {found_mpa:.3g} MPa where the rig file says {wanted_mpa:.3g} MPa"
+
+
+class StackAdviceCode(Code):
+    """What to do about a fault of the piezo-stack actuator."""
+
+    BLEED_OIL = "bleed the oil, then find where air gets in"
+    LOOK_AT_CHAMBER = "inspect the joints and the membrane of the pump chamber"
+    POLARISE = "polarise the stack again; replace it if the stroke stays short"
+    REPLACE_REED = "inspect the {reed} reed for a crack, and replace it"
+    FREE_REED = "clean the {reed} reed and its stop"
+    CLEAN_SEAT = "clean the seat of the {reed} reed; replace the reed if the gap stays"
+    SET_BIAS = "set the bias pressure, then check the accumulator; give --bias-pressure if it was meant"
 
 
 def diagnose_stack(
@@ -91,10 +112,11 @@ def diagnose_stack(
         If the log cannot be used.
     """
     found = estimate_stack(record, healthy, channels=channels)
-    if missed(found):
-        unknowns, starts = (*DEFAULT_UNKNOWNS, *GAPS), (*STARTS, *GAP_STARTS)
-        wider = estimate_stack(record, healthy, unknowns=unknowns, channels=channels, starts=starts)
-        found = min(found, wider, key=lambda one: max(one.misfit.values()))
+    for seldom, guesses in SELDOM:
+        if missed(found):
+            unknowns, starts = (*DEFAULT_UNKNOWNS, *seldom), (*STARTS, *guesses)
+            wider = estimate_stack(record, healthy, unknowns=unknowns, channels=channels, starts=starts)
+            found = min(found, wider, key=lambda one: max(one.misfit.values()))
     against = tuple(
         StackFaultCode.ANOTHER_ACTUATOR.note(channel=name, ratio=ratio) for name, ratio in missed(found).items()
     )
@@ -103,7 +125,7 @@ def diagnose_stack(
     condition = next((n for n, c in CONDITIONS.items() if (c.leakage, c.friction) == (leakage, friction)), None)
     reasons = against if condition is not None else (*against, StackFaultCode.LEAKAGE_AND_FRICTION.note())
     told = Outcome.NOT_OBSERVABLE if condition is None else Outcome.OK
-    faults = () if reasons else (_fault(name, found, healthy) for name in found.values)
+    faults = () if reasons else tuple(n for n in (_fault(name, found, healthy) for name in found.values) if n)
     return Finding(
         actuator=NAME,
         outcome=Outcome.MISMATCH if against else told,
@@ -113,9 +135,35 @@ def diagnose_stack(
         condition=condition,
         unknown=bool(against),
         against=against,
-        faults=tuple(note for note in faults if note is not None),
+        faults=faults,
+        advice=() if reasons or condition is None else (*_advice(condition), *map(_remedy, faults)),
         evidence=found,
     )
+
+
+def _advice(condition: str) -> Iterator[Note]:
+    if CONDITIONS[condition].leakage != "none":
+        yield CylinderAdviceCode.LOOK_AT_PISTON_SEAL.note()
+    if CONDITIONS[condition].friction != "none":
+        yield CylinderAdviceCode.LOOK_AT_ROD.note()
+
+
+def _remedy(fault: Note) -> Note:
+    match fault.code:
+        case StackFaultCode.AIR_IN_OIL:
+            return StackAdviceCode.BLEED_OIL.note()
+        case StackFaultCode.CHAMBER_LEAKS:
+            return StackAdviceCode.LOOK_AT_CHAMBER.note()
+        case StackFaultCode.STACK_DEPOLARISED:
+            return StackAdviceCode.POLARISE.note()
+        case StackFaultCode.REED_SOFT:
+            return StackAdviceCode.REPLACE_REED.note(reed=fault.data["reed"])
+        case StackFaultCode.REED_STIFF:
+            return StackAdviceCode.FREE_REED.note(reed=fault.data["reed"])
+        case StackFaultCode.REED_OPEN:
+            return StackAdviceCode.CLEAN_SEAT.note(reed=fault.data["reed"])
+        case _:
+            return StackAdviceCode.SET_BIAS.note()
 
 
 def _level(found: StackEstimate, name: str, healthy: float, levels: Mapping[str, float]) -> str | None:
@@ -142,6 +190,8 @@ def _fault(name: str, found: StackEstimate, healthy: PiezoStackParameters) -> No
         return code.note(reed=reed, ratio=value / base)
     if part == "gap" and value - base > max(LEAST_GAP, sure):
         return StackFaultCode.REED_OPEN.note(reed=reed, gap_um=1e6 * value)
+    if name == "bias_pressure" and abs(value - base) > max(BIAS_CHANGED * base, sure):
+        return StackFaultCode.BIAS_OFF.note(found_mpa=1e-6 * value, wanted_mpa=1e-6 * base)
     return None
 
 

@@ -109,7 +109,7 @@ def _present(columns: Channels, required: Collection[str], source: str) -> None:
     missing = [wanted for wanted in required if not any(name in columns for name in alternatives(wanted))]
     if missing:
         known = ", ".join(columns) or "none that is known"
-        raise NoChannelError(f"{absent(missing)}; the log has {known}", source)
+        raise NoChannelError(f"{absent(missing)}; the log has {known}", source, columns=tuple(columns))
     if set(columns) <= {TIME}:
         raise NoChannelError(f"at least one channel is needed beside {TIME}, the log has none that is known", source)
 

@@ -234,11 +234,11 @@ def missing_channels(
     found : collection of str
         Channels that it has; the hint names the others that an estimate gains by, too.
     """
-    names = listed([one.name for one in headings])
+    names = tuple(one.name for one in headings)
     asked = [name for one in wanted for name in one.split(" or ")]
     more = [name for name in _gained_by(found) if name not in asked]
     hint = hint_of(asked, headings, more)
-    return NoChannelError(f"{absent(wanted)}; the log has {names}", source, hint)
+    return NoChannelError(f"{absent(wanted)}; the log has {listed(names)}", source, hint, names)
 
 
 def absent(wanted: Sequence[str]) -> str:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from experiments import actuators
-from experiments.actuators import actuator, offered
-from plant.errors import HydrostateError
+from experiments.actuators import actuator, kind_meant, kinds_by_columns, offered
+from plant.errors import HydrostateError, NoChannelError
 
 
 def test_a_kind_is_found_by_its_name_and_by_each_of_its_plants() -> None:
@@ -26,3 +26,20 @@ def test_a_verb_that_a_kind_does_not_offer_is_refused_by_both_names() -> None:
     assert offered(kind, "diagnose") is kind.diagnose
     with pytest.raises(HydrostateError, match="estimate is not there for piezo-stack, "):
         offered(kind, "estimate")
+
+
+def test_the_columns_of_a_log_tell_its_kind_where_one_alone_has_them() -> None:
+    stack = ("time_s", "drive_voltage_v", "position_m", "chamber_pressure_pa")
+    assert kinds_by_columns(stack) == ("piezo-stack",)
+    assert kinds_by_columns(("motor_speed_rad_s", "position_m", *stack)) == ("eha",)
+    assert kinds_by_columns(("time_s", "speed")) == ()
+
+
+def test_columns_of_several_kinds_are_refused_with_the_option_that_names_one() -> None:
+    both = NoChannelError("column motor_speed_rad_s is missing", "run.csv", "; more", ("drive_voltage_v", "position_m"))
+    with pytest.raises(NoChannelError, match="columns of piezo-stack or diaphragm-motor: name the kind with --plant"):
+        kind_meant(both, None, None)
+    stack = NoChannelError("column motor_speed_rad_s is missing", "run.csv", "", ("drive_voltage_v", "stack_force_n"))
+    assert kind_meant(stack, None, None) == "piezo-stack"
+    with pytest.raises(NoChannelError, match=r"is missing$"):
+        kind_meant(stack, "eha", None)

@@ -14,7 +14,6 @@ import numpy as np
 
 from experiments.command.json_output import plain
 from experiments.command.logs import read_log
-from experiments.command.options import load_actuator
 from experiments.log_pages.inspected import looked_into
 from tests.fuzz.guard import limited
 from tests.fuzz.mutations import CELLS, mutated
@@ -30,7 +29,7 @@ def read(path: Path) -> None:
 
 def inspect(path: Path) -> None:
     """Inspect a file as the command does."""
-    found, _ = looked_into(path, *load_actuator(None, None))
+    found, _ = looked_into(path, None)
     json.dumps(plain(found), allow_nan=False)
 
 

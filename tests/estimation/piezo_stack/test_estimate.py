@@ -1,11 +1,12 @@
 """What a log of the piezo-stack actuator says, and how sure."""
 
+import warnings
 from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
-from estimation.piezo_stack.estimate import estimate_stack, stack_bounds
+from estimation.piezo_stack.estimate import covariance, estimate_stack, stack_bounds
 from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, UNKNOWNS
 from plant.errors import HydrostateError, LogError
 from plant.log.record import Record
@@ -84,3 +85,12 @@ def test_a_log_that_cannot_be_used_is_refused(worn: Record, change: dict[str, np
 def test_an_unknown_that_is_not_known_is_refused(worn: Record) -> None:
     with pytest.raises(HydrostateError, match="an unknown must be one of"):
         estimate_stack(worn, HEALTHY, unknowns=("colour",))
+
+
+def test_what_no_channel_shows_is_unknown_rather_than_known() -> None:
+    slopes = np.random.default_rng(3).standard_normal((50, 3)) * [1.0, 1e-3, 0.0]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        deviations = np.sqrt(np.diag(covariance(slopes)))
+    np.testing.assert_allclose(deviations[:2], np.sqrt(np.diag(np.linalg.inv(slopes[:, :2].T @ slopes[:, :2]))))
+    assert deviations[2] > 1e12

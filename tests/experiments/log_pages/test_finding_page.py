@@ -58,7 +58,7 @@ def test_a_condition_that_the_gate_doubts_is_said_with_the_doubt() -> None:
     named = {"condition": "minor_leakage", "probabilities": {"minor_leakage": 0.9}}
     assert "not to be relied on" not in message_of(found(**named))
     said = message_of(found(**named, gate=DOUBTED))
-    assert said.startswith("minor_leakage")
+    assert said.startswith("minor leakage")
     assert f"not to be relied on: {EstimateCode.DIVERGED.note()}" in said
 
 

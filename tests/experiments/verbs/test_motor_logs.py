@@ -59,7 +59,8 @@ def test_friction_and_load_are_named_together_on_screen(tmp_path: Path) -> None:
     done = RUN.invoke(app, ["diagnose", "--plant", "diaphragm-motor", "--load", "10", str(log)])
     words = " ".join(done.stdout.split())
     assert "friction or load" in words
-    assert "it could also be clogged_ports" in words
+    assert "it could also be clogged ports" in words
+    assert "next Inspect the rod seals" in words
 
 
 def test_leakage_and_load_are_estimated_and_bulk_modulus_is_not(tmp_path: Path) -> None:

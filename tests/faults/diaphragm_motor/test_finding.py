@@ -8,8 +8,8 @@ import pytest
 from estimation.finding import Outcome
 from faults.diaphragm_motor import finding
 from faults.diaphragm_motor.diagnose import Match
-from faults.diaphragm_motor.faults import HEALTHY
-from faults.diaphragm_motor.finding import STANDING, MotorFaultCode, _against, motor_fault_finding
+from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS
+from faults.diaphragm_motor.finding import STANDING, MotorFaultCode, _against, _remedy, motor_fault_finding
 
 
 def diagnosis(velocity: float, *, unknown: bool) -> Any:
@@ -67,6 +67,18 @@ def test_a_finding_names_the_faults_of_the_nearest_and_measures_the_first(
     assert (said.outcome, said.gate.passed, bool(said.against)) == (
         (Outcome.MISMATCH, False, True) if unknown else (Outcome.OK, True, False)
     )
+    told = {"friction": "rod seals", "valve 1 leak": "clean valve 1 and its seat", "load": "--load"}
+    assert all(told[name] in str(note) for name, note in zip(names, said.advice, strict=True))
     assert [note.data["faults"] for note in said.not_told] == ([others] if others else [])
     for one in said.quantities.values():
         assert (one.value, one.ci95) == (0.5, pytest.approx((0.5 - 0.196, 0.5 + 0.196), abs=1e-4))
+
+
+def test_every_kind_of_fault_has_a_remedy_of_its_own_at_its_own_place() -> None:
+    remedies = {fault.kind: _remedy(Match(name, 0.5, 0.1, 9.0, 0.3)) for name, fault in MOTOR_FAULTS.items()}
+    assert len({note.code for note in remedies.values()}) == len(remedies)
+    assert {kind: str(note) for kind, note in remedies.items() if kind in {"valve_blocked", "gas", "slow_valves"}} == {
+        "valve_blocked": "clean valve 8 and its port",
+        "gas": "bleed chamber 7, then find where gas gets in",
+        "slow_valves": "check the valves for dirt, and the oil for its viscosity",
+    }

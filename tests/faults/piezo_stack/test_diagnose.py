@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS
-from faults.piezo_stack.diagnose import calibrated_stack, diagnose_stack
+from faults.piezo_stack.diagnose import StackAdviceCode, calibrated_stack, diagnose_stack
 from faults.piezo_stack.faults import stack_in_condition, stack_with_fault
 from plant.log.record import Record
 from plant.piezo_stack.parameters import PiezoStackParameters
@@ -34,25 +34,32 @@ def test_a_condition_is_named() -> None:
     name = "major_leakage_minor_friction"
     found = diagnose_stack(log_of(stack_in_condition(HEALTHY, name)), HEALTHY)
     assert (found.condition, found.faults, found.gate.reasons) == (name, (), ())
+    assert [str(note) for note in found.advice] == [
+        "inspect the seal of the cylinder's piston",
+        "inspect the rod seals, the guide and its alignment",
+    ]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("fault", "said"),
+    ("fault", "said", "code"),
     [
-        ("air_doubled", "2 times the healthy share"),
-        ("chamber_leakage_minor", "the pump chamber leaks: 5e-12"),
-        ("depolarised_10_percent", "10 % of its stroke is lost"),
-        ("inlet_reed_soft", "inlet reed soft: 0.5"),
-        ("inlet_reed_gap", "inlet reed does not shut: a gap of 30 um"),
-        ("inlet_reed_jammed", "inlet reed stiff or jammed"),
+        ("air_doubled", "2 times the healthy share", StackAdviceCode.BLEED_OIL),
+        ("chamber_leakage_minor", "the pump chamber leaks: 5e-12", StackAdviceCode.LOOK_AT_CHAMBER),
+        ("depolarised_10_percent", "10 % of its stroke is lost", StackAdviceCode.POLARISE),
+        ("inlet_reed_soft", "inlet reed soft: 0.5", StackAdviceCode.REPLACE_REED),
+        ("inlet_reed_gap", "inlet reed does not shut: a gap of 30 um", StackAdviceCode.CLEAN_SEAT),
+        ("inlet_reed_jammed", "inlet reed stiff or jammed", StackAdviceCode.FREE_REED),
+        ("bias_lost", "bias pressure 0.6 MPa where the rig file says 1 MPa", StackAdviceCode.SET_BIAS),
     ],
 )
-def test_every_other_fault_is_named_with_its_size(fault: str, said: str) -> None:
+def test_every_other_fault_is_named_with_its_size(fault: str, said: str, code: StackAdviceCode) -> None:
     found = diagnose_stack(log_of(stack_with_fault(HEALTHY, fault)), HEALTHY)
     assert found.condition == "normal"
     (note,) = found.faults
     assert said in str(note)
+    (advice,) = found.advice
+    assert advice.code is code
 
 
 @pytest.mark.slow

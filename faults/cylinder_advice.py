@@ -1,0 +1,10 @@
+"""What to do about the cylinder of a piezo actuator, whatever pumps into it."""
+
+from plant.notes import Code
+
+
+class CylinderAdviceCode(Code):
+    """Advice on a cylinder that leaks or whose rod moves hard."""
+
+    LOOK_AT_PISTON_SEAL = "inspect the seal of the cylinder's piston"
+    LOOK_AT_ROD = "inspect the rod seals, the guide and its alignment"
