@@ -1,7 +1,6 @@
 """Channels averaged over blocks, and how two of them move together: what physics of the channels is judged by."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -75,13 +74,13 @@ def channel_blocks(record: Record, p: EhaParameters, length: float) -> ChannelBl
     span = size * record.sample_time
 
     def mean(name: str) -> Array | None:
-        whole = _whole(record, name)
+        values = whole(record, name)
         count = (len(record) - 1) // size
-        return None if whole is None else whole[: count * size].reshape(count, size).mean(axis=1)
+        return None if values is None else values[: count * size].reshape(count, size).mean(axis=1)
 
     def slope(name: str) -> Array | None:
-        whole = _whole(record, name)
-        return None if whole is None else np.diff(whole[::size][: (len(record) - 1) // size + 1]) / span
+        values = whole(record, name)
+        return None if values is None else np.diff(values[::size][: (len(record) - 1) // size + 1]) / span
 
     speed = mean(SPEED)
     return ChannelBlocks(
@@ -96,7 +95,8 @@ def channel_blocks(record: Record, p: EhaParameters, length: float) -> ChannelBl
     )
 
 
-def _whole(record: Record, name: str) -> Array | None:
+def whole(record: Record, name: str) -> Array | None:
+    """Return a channel with its gaps bridged, None where it is not logged [its unit]."""
     if name not in record or not np.any(np.isfinite(record[name])):
         return None
     return bridged(record[name])
@@ -167,78 +167,3 @@ def gone_together(piston: Array | None, pumped: Array | None) -> tuple[float, fl
     drift = np.linalg.qr(np.column_stack([np.ones_like(ramp), ramp, ramp**2]))[0]
     sums = (np.cumsum(one) for one in (piston, pumped))
     return alike(*(one - drift @ (drift.T @ one) for one in sums))
-
-
-class FlowBalance(NamedTuple):
-    """What the pumped flow goes into, by least squares: motion, leakage, flow bias and compression.
-
-    Parameters
-    ----------
-    swept : float
-        Times the piston's own flow that are pumped to move it; 1 for a sound log [dimensionless].
-    swept_std : float
-        Its standard deviation [dimensionless].
-    compressed : float
-        Times the rig's compressibility [dimensionless].
-    compressed_std : float
-        Its standard deviation [dimensionless].
-    explained : float
-        Share of the pumped flow's variance that is explained [fraction].
-    moving : float
-        The piston's own flow over the pumped flow, both about their means, root mean square [fraction].
-    """
-
-    swept: float
-    swept_std: float
-    compressed: float
-    compressed_std: float
-    explained: float
-    moving: float
-
-    @property
-    def contradicts_rig(self) -> float:
-        """What the piston's flow would have to differ by, over what the balance leaves unexplained [dimensionless].
-
-        A piston that hardly moves under a pump that leaks it all lets motion stand for whatever the balance leaves out.
-        """
-        return abs(self.swept - 1.0) * self.moving / max(1.0 - self.explained, 1e-12) ** 0.5
-
-
-def flow_balance(blocks: ChannelBlocks, p: EhaParameters) -> FlowBalance | None:
-    """Return what the pumped flow goes into; None where pump, piston or pressure is not logged, or the pump rests.
-
-    Parameters
-    ----------
-    blocks : ChannelBlocks
-        The log.
-    p : EhaParameters
-        The actuator.
-
-    Returns
-    -------
-    FlowBalance or None
-        The balance.
-    """
-    flow, piston, pressure, slope = blocks.pumped, blocks.piston, blocks.pressure, blocks.pressure_slope
-    if flow is None or piston is None or pressure is None or slope is None or len(flow) < FEWEST_BLOCKS:
-        return None
-    compliance = p.chamber_volume / p.bulk_modulus
-    parts = [p.piston_area * piston, compliance * slope, pressure, np.sign(flow), np.ones_like(flow)]
-    columns = np.column_stack(parts)
-    sizes = np.linalg.norm(columns, axis=0)
-    if np.ptp(flow) == 0.0:
-        return None
-    absent = sizes == 0.0
-    sizes[absent] = 1.0
-    scaled = columns / sizes
-    inverse = np.linalg.pinv(scaled.T @ scaled)
-    found = inverse @ (scaled.T @ flow)
-    rest = flow - scaled @ found
-    left = float(np.var(rest))
-    lasting = float(np.clip(alike(rest[1:], rest[:-1])[0], 0.0, 0.99))
-    variance = left * (1.0 + lasting) / (1.0 - lasting)  # as many blocks fewer as neighbours repeat each other
-    open_by = np.where(absent, np.inf, np.maximum(np.diag(inverse), 0.0))  # of what stands still nothing is known
-    value, std = found / sizes, np.sqrt(variance * open_by) / sizes
-    told = [float(one[k]) for k in (0, 1) for one in (value, std)]
-    moving = p.piston_area * float(np.std(piston)) / float(np.std(flow))
-    return FlowBalance(told[0], told[1], told[2], told[3], 1.0 - left / float(np.var(flow)), moving)

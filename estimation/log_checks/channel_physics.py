@@ -11,14 +11,13 @@ import numpy as np
 
 from estimation.log_checks.channel_blocks import (
     ChannelBlocks,
-    FlowBalance,
     alike,
     channel_blocks,
-    flow_balance,
     gone_together,
     power_of,
 )
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
+from estimation.log_checks.flow_balance import FlowBalance, flow_balance
 from estimation.log_checks.measurement_noise import position_variance
 from estimation.notes import ChannelCode
 from plant.eha.model import EhaParameters
@@ -86,11 +85,6 @@ REFUTED = 2.0
 """Times what a balance leaves unexplained by which the piston's flow must differ from the rig's before a slip of units
 is seen in it [dimensionless]."""
 
-LEAST_SWEPT = 0.25
-"""Share of the pumped flow that a piston must take up once a slip is set right, for a balance to see the slip
-[fraction]; judged: eight training logs in rpm have 0.38 or more, while a piston that mostly yields on its seals under a
-quick sine has 0.2 at most, and was accused."""
-
 HELD = 0.7
 """Share of the rig's Coulomb friction up to which pressure moves no piston [fraction]; judged. The oil that a stuck one
 takes with its seals was a tenth of what a sliding one takes, and told as rpm read as rad/s."""
@@ -123,7 +117,7 @@ def channel_mistakes(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     found = _swapped(short) or _motions_disagree(short, long, p)
     if found:
         return tuple(_or_of_time(one, record.sample_time) for one in found)
-    balance = flow_balance(middle, p)
+    balance = flow_balance(record, p, MIDDLE)
     if balance is not None and balance.explained < EXPLAINED:
         balance = None
     units = tuple(_or_of_time(one, record.sample_time) for one in _pump_units(record, long, p, balance))
@@ -217,7 +211,7 @@ def _reversed(record: Record, long: ChannelBlocks, balance: FlowBalance | None) 
     opposed = with_pressure = False
     if balance is not None:
         power = power_of(long.pressure, long.pumped, long.piston)
-        opposed = power < 0.0 and balance.compressed < -TOLD * balance.compressed_std
+        opposed = power * len(long.pumped) ** 0.5 < -REFUTED and balance.compressed < -TOLD * balance.compressed_std
         with_pressure = balance.compressed > TOLD * balance.compressed_std
         apart = apart or (together < 0.0 and balance.swept < -max(TOLD * balance.swept_std, 0.3))
         with_pump = with_pump or balance.swept > max(TOLD * balance.swept_std, 0.3)
@@ -241,8 +235,7 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
     turn = length = None
     believed, alike = (False, False), set[float]()
     told = balance if balance is not None and 0.0 < balance.swept_std < KNOWN * balance.swept else None
-    takes_up = told is not None and (far or told.swept * told.moving > LEAST_SWEPT)
-    if told is not None and takes_up and told.contradicts_rig > REFUTED and (far or _slides(record, p)):
+    if told is not None and told.contradicts_rig > REFUTED and (far or _slides(record, p)):
         times = 1.0 / told.swept
         far = far and times > 1.0
         turn, length = (_near(times, slips, 1.0 / MOST, 1.0 / (LOST if far else LEAST)) for slips in (TURNS, LENGTHS))

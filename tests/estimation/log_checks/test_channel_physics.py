@@ -15,8 +15,8 @@ from estimation.eha.estimate import estimate_log
 from estimation.finding import Outcome
 from estimation.fits.explaining.form_fit import FormFit
 from estimation.log_checks import channel_physics
-from estimation.log_checks.channel_blocks import FlowBalance
 from estimation.log_checks.channel_physics import channel_mistakes
+from estimation.log_checks.flow_balance import FlowBalance
 from estimation.notes import ChannelCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.diagnose import diagnose_log
@@ -227,12 +227,9 @@ def test_a_balance_that_explains_little_of_the_flow_is_not_believed(monkeypatch:
     assert seen[1] is not None
 
 
-@pytest.mark.parametrize(("share", "told"), [(0.45, True), (0.2, False), (0.006, False)])
+@pytest.mark.parametrize(("share", "told"), [(0.45, True), (0.006, False)])
 def test_a_piston_that_hardly_moves_is_no_proof_of_a_unit(share: float, *, told: bool) -> None:
-    """What a balance leaves unexplained of a leaky actuator looks like ten times the motion that there is.
-
-    A sound piston that mostly yields on its seals under a quick sine was accused of a speed in rpm.
-    """
+    """What a balance leaves unexplained of a leaky actuator looks like ten times the motion that there is."""
     rng = np.random.default_rng(2)
     held = np.repeat(rng.choice([-1.0, 1.0], 6000), 20) * np.repeat(rng.uniform(20.0, 120.0, 6000), 20)
     flow = HEALTHY.pump_displacement * held

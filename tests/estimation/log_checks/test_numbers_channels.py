@@ -9,14 +9,13 @@ import pytest
 from estimation.log_checks import channel_physics
 from estimation.log_checks.channel_blocks import (
     ChannelBlocks,
-    FlowBalance,
     alike,
     channel_blocks,
-    flow_balance,
     gone_together,
     power_of,
 )
 from estimation.log_checks.channel_physics import LENGTHS, TURNS, channel_mistakes
+from estimation.log_checks.flow_balance import FlowBalance, flow_balance
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
@@ -109,10 +108,9 @@ def what_pumped_flow_goes_into() -> dict[str, Any]:
         "no pressure": {PRESSURE: np.zeros(N)},
     }
     for name, change in changes.items():
-        made = flow_balance(channel_blocks(record.replace(**change), HEALTHY, 0.02), HEALTHY)
+        made = flow_balance(record.replace(**change), HEALTHY, 0.02)
         found[name] = None if made is None else {**made._asdict(), "contradicts": made.contradicts_rig}
-    few = channel_blocks(made_log(210), HEALTHY, 0.02)
-    found["of a few blocks"] = [len(few.pumped if few.pumped is not None else ()), flow_balance(few, HEALTHY) is None]
+    found["of a few blocks"] = [flow_balance(made_log(count), HEALTHY, 0.02) is None for count in (200, 201)]
     found["perfect"] = FlowBalance(1.2, 0.0, 1.0, 0.0, 1.0, 0.5).contradicts_rig
     return found
 

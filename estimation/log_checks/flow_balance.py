@@ -1,0 +1,187 @@
+"""What the pumped flow goes into: motion, leakage, flow bias and compression, by least squares over blocks of a log."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.log_checks.channel_blocks import FEWEST_BLOCKS, alike, whole
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
+from estimation.log_checks.measurement_noise import position_variance, struck_variance
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+FEWEST_SAMPLES = 8
+"""Samples in a block at least, since those at its ends count little [count]."""
+
+MOST_LOST = 0.25
+"""Share of the flow at rated speed that is the largest flow bias [fraction]; judged: a fifth under major leakage."""
+
+
+class FlowBalance(NamedTuple):
+    """What the pumped flow goes into, by least squares: motion, leakage, flow bias and compression.
+
+    Parameters
+    ----------
+    swept : float
+        Times the piston's own flow that are pumped to move it; 1 for a sound log [dimensionless].
+    swept_std : float
+        Its standard deviation [dimensionless].
+    compressed : float
+        Times the rig's compressibility [dimensionless].
+    compressed_std : float
+        Its standard deviation [dimensionless].
+    explained : float
+        Share of the pumped flow's variance that is explained [fraction].
+    moving : float
+        The piston's own flow over the pumped flow, both about their means, root mean square [fraction].
+    """
+
+    swept: float
+    swept_std: float
+    compressed: float
+    compressed_std: float
+    explained: float
+    moving: float
+
+    @property
+    def contradicts_rig(self) -> float:
+        """What the piston's flow would have to differ by, over what the balance leaves unexplained [dimensionless].
+
+        A piston that hardly moves under a pump that leaks it all lets motion stand for whatever the balance leaves out.
+        """
+        return abs(self.swept - 1.0) * self.moving / max(1.0 - self.explained, 1e-12) ** 0.5
+
+
+def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance | None:
+    """Return what the pumped flow goes into; None where pump, piston or pressure is not logged, or the pump rests.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    p : EhaParameters
+        The actuator.
+    length : float
+        Length of the blocks over which flows are balanced [s].
+
+    Returns
+    -------
+    FlowBalance or None
+        The balance.
+    """
+    found = {name: whole(record, name) for name in (SPEED, PRESSURE, POSITION, VELOCITY)}
+    moved = POSITION if found[POSITION] is not None else VELOCITY
+    speed, pressure, piston = found[SPEED], found[PRESSURE], found[moved]
+    size = max(FEWEST_SAMPLES, round(length / record.sample_time))
+    if speed is None or pressure is None or piston is None or (len(record) - 1) // size < FEWEST_BLOCKS:
+        return None
+    window = _Window(size, record.sample_time)
+    noise_p = _noise(pressure)
+    noise_x = position_variance(piston) if moved == POSITION else _noise(piston)
+    compliance = p.chamber_volume / p.bulk_modulus
+    swept, spread = (window.slope, window.of_slope) if moved == POSITION else (window.mean, window.of_mean)
+    flow = p.pump_displacement * window.mean(speed)
+    parts = [p.piston_area * swept(piston), compliance * window.slope(pressure), window.mean(pressure)]
+    parts += [np.ones_like(flow), window.mean(np.sign(speed))]  # a block in which the pump turns round has both signs
+    noises = [p.piston_area**2 * spread * noise_x, compliance**2 * window.of_slope * noise_p]
+    noises += [window.of_mean * noise_p, 0.0, 0.0]
+    return _with_a_likely_bias(flow, parts, np.array(noises), MOST_LOST * p.pump_displacement * p.rated_speed)
+
+
+def _noise(values: Array) -> float:
+    """Return the variance of a channel's noise [its unit squared], zero where the log does not show it."""
+    found = struck_variance(values)
+    return found if np.isfinite(found) else 0.0
+
+
+class _Window:
+    """Means and slopes of a signal over blocks, weighted by a parabola that is zero at both ends of a block.
+
+    The slope of a signal, weighted so, is the signal itself weighted by the parabola's slope: all samples of a block
+    share in it (Shinbrot, On the analysis of linear and nonlinear systems, 1957). The variances of a mean and of a
+    slope are those of a sample's noise times `of_mean` [dimensionless] and `of_slope` [1/s^2].
+    """
+
+    def __init__(self, size: int, sample_time: float) -> None:
+        middles = (np.arange(size) + 0.5) / size
+        weights = middles * (1.0 - middles)
+        self._weights = weights / weights.sum()
+        self._sample_time = sample_time
+        self.of_mean = float(np.sum(self._weights**2))
+        self.of_slope = float(np.sum(np.diff(self._weights, prepend=0.0, append=0.0) ** 2)) / sample_time**2
+
+    def mean(self, signal: Array) -> Array:
+        """Return the mean over each block [unit of the signal]."""
+        return self._over_blocks(0.5 * (signal[1:] + signal[:-1]))
+
+    def slope(self, signal: Array) -> Array:
+        """Return the slope over each block [unit of the signal over s]."""
+        return self._over_blocks(np.diff(signal) / self._sample_time)
+
+    def _over_blocks(self, between: Array) -> Array:
+        size = len(self._weights)
+        count = len(between) // size
+        return between[: count * size].reshape(count, size) @ self._weights
+
+
+def _with_a_likely_bias(flow: Array, parts: Sequence[Array], noises: Array, most: float) -> FlowBalance | None:
+    """Return the balance of a flow by its parts, the last of which is the pump's sign; its factor is the flow bias.
+
+    A pump that turns at one speed pumps what its sign says, so a bias would take up all flow where pressure is noisy.
+    It is none of a pump's below zero and above `most` [m^3/s]; of a speed in another unit all flows are as many times
+    too large as the piston's.
+    """
+    if np.ptp(flow) == 0.0:
+        return None
+    balance, bias = _balanced(flow, parts, noises)
+    if 0.0 <= bias <= most * max(1.0, balance.swept):
+        return balance
+    *others, sign = parts
+    lost = most * sign if bias > 0.0 else np.zeros_like(flow)
+    balance, _ = _balanced(flow - lost, others, noises[:-1])
+    if bias > 0.0 and balance.swept > 1.0:
+        balance, _ = _balanced(flow, [others[0] + lost, *others[1:]], noises[:-1])
+    return balance._replace(moving=float(np.std(parts[0])) / float(np.std(flow)))
+
+
+def _balanced(flow: Array, parts: Sequence[Array], noises: Array) -> tuple[FlowBalance, float]:
+    """Return the balance of a flow by its parts, and the factor of the last.
+
+    Noise in a part draws its factor towards zero, and those of parts that move like it elsewhere: by the inverse of the
+    normal equations times the variance of noise, times the factor, once, squared and so on. Two orders are corrected,
+    and deviations hold the second, so that where the series does not converge nothing is known.
+    """
+    columns = np.column_stack(parts)
+    sizes = np.linalg.norm(columns, axis=0)
+    absent = sizes == 0.0
+    sizes[absent] = 1.0
+    scaled = columns / sizes
+    inverse = np.linalg.pinv(scaled.T @ scaled)
+    found = inverse @ (scaled.T @ flow)
+    rest = flow - scaled @ found
+    left = float(np.var(rest))
+    variance = left * _blocks_that_repeat(rest)
+    open_by = np.where(absent, np.inf, np.maximum(np.diag(inverse), 0.0))  # of what stands still nothing is known
+    drawing = inverse * (len(flow) * noises / sizes**2)
+    first = drawing @ found
+    second = drawing @ first
+    value, std = (found + first + second) / sizes, np.sqrt(variance * open_by + second**2) / sizes
+    (swept, compressed), (swept_std, compressed_std) = (map(float, one[:2]) for one in (value, std))
+    moving = float(np.std(parts[0])) / float(np.std(flow))
+    explained = 1.0 - left / float(np.var(flow))
+    return FlowBalance(swept, swept_std, compressed, compressed_std, explained, moving), float(value[-1])
+
+
+def _blocks_that_repeat(rest: Array) -> float:
+    """Return of how many blocks each holds what the others do not [dimensionless, 1 or more].
+
+    Neighbours of a slow remainder repeat each other, and so do the periods of a sine: what a model leaves of each is
+    the same. Blocks are then worth as many as their spectrum has lines (Welch's equivalent degrees of freedom, 1947).
+    """
+    lasting = float(np.clip(alike(rest[1:], rest[:-1])[0], 0.0, 0.99))
+    power = np.abs(np.fft.rfft(rest - rest.mean())[1:]) ** 2
+    total = float(power.sum())
+    lines = 2.0 * total**2 / float(power @ power) if total > 0.0 else np.inf
+    return max((1.0 + lasting) / (1.0 - lasting), 0.5 * len(rest) / lines)

@@ -1,0 +1,39 @@
+"""What the pumped flow goes into where the piston hardly moves, and where one motor speed hides the flow bias."""
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.channel_physics import MIDDLE, channel_mistakes
+from estimation.log_checks.flow_balance import flow_balance
+from faults.conditions import CONDITIONS, parameters_for
+from plant.eha.drives import make_drive
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+from tests.estimation.log_checks.made_logs import HEALTHY, POSITION, PRESSURE, SPEED
+
+
+def test_a_piston_that_yields_on_its_seals_under_a_quick_sine_takes_up_its_own_flow_within_the_deviation() -> None:
+    """The balance made 6 to 45 times of its motion, at 3 to 33 deviations from the one that is true."""
+    p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(5)
+    log = simulate(CIRCUIT, make_drive("sine", 1.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    found = flow_balance(log, HEALTHY, MIDDLE)
+    assert found is not None
+    assert abs(found.swept - 1.0) < 4.0 * found.swept_std
+    assert found.compressed == pytest.approx(1.0, abs=0.3)
+    assert channel_mistakes(log, HEALTHY) == ()
+
+
+@pytest.mark.parametrize("times", [1.0, 9.55])
+def test_a_pump_of_one_speed_loses_no_more_than_any_flow_bias(times: float) -> None:
+    """Its sign says what it pumps, so that a bias explained all flow where noise hides what the piston does."""
+    rng = np.random.default_rng(1)
+    speed = np.repeat(rng.choice([-100.0, 100.0], 300), 30) + rng.normal(0.0, 0.05, 9000)
+    lost = 0.2 * HEALTHY.pump_displacement * HEALTHY.rated_speed * np.sign(speed)
+    velocity = 0.9 * (HEALTHY.pump_displacement * speed - lost) / HEALTHY.piston_area
+    way = 1e-3 * np.cumsum(velocity) + rng.normal(0.0, 2e-5, 9000)
+    pressure = rng.normal(0.0, 5e4, 9000)
+    log = Record(1e-3, {SPEED: times * speed, POSITION: way, PRESSURE: pressure})
+    found = flow_balance(log, HEALTHY, MIDDLE)
+    assert found is not None
+    assert 0.8 * times < found.swept < 1.3 * times
