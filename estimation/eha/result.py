@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 from estimation.eha.rig_share import Responses, rig_notes, with_total
 from estimation.filters.run import Estimate
-from estimation.finding import Gate, Outcome, Quantity, interval_95
+from estimation.finding import Gate, Outcome, Quantity, positive_interval_95
 from estimation.fits.explaining.tried import Explanation
 from estimation.fits.greybox.teeth import EVENLY, Turning
 from estimation.notes import EstimateCode
@@ -114,7 +114,7 @@ class BulkModulusEstimate:
         """The 95 % interval if the rig file is right [Pa], or None where there is no value."""
         if self.value is None or self.std is None:
             return None
-        return interval_95(self.value, self.std)
+        return positive_interval_95(self.value, self.std)
 
 
 def too_wide(bound: float) -> Note:

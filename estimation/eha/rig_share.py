@@ -18,7 +18,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
-from estimation.finding import NORMAL_95, Quantity
+from estimation.finding import LARGE, NORMAL_95, Quantity
 from estimation.fits.explaining.form_fit import FormFit
 from estimation.notes import EstimateCode, RigCode
 from plant.eha.doubts import PRESSURE_GAIN, Spread
@@ -103,7 +103,8 @@ def with_total(
     """Return a quantity with its total interval: noise and every entry of the rig, taken as independent.
 
     An entry's logarithm is normal, so its ends are ``value * exp(-1.96 s)`` and ``value * exp(1.96 s)``; distances of
-    the ends from the value add in squares.
+    the ends from the value add in squares. Those of logarithms do for an
+    interval of a logarithm.
 
     Parameters
     ----------
@@ -128,9 +129,22 @@ def with_total(
     down, up = (abs(one.value if size is None else size) * math.hypot(*ends) for ends in zip(*reaches, strict=True))
     low = one.value - math.hypot(one.value - one.ci95[0], down) if down else one.ci95[0]
     high = one.value + math.hypot(one.ci95[1] - one.value, up) if up else one.ci95[1]
-    if size is None and one.value > 0.0:
+    if one.value > 0.0 and one.ci95[0] > 0.0 and _of_logarithm(one.value, one.ci95):
+        low = one.value * math.exp(-math.hypot(math.log(one.value / one.ci95[0]), _log_ratio(one.value, -down)))
+        high = one.value * math.exp(math.hypot(math.log(one.ci95[1] / one.value), _log_ratio(one.value, up)))
+    elif size is None and one.value > 0.0:
         low = max(low, min(one.ci95[0], 0.0))
     return replace(one, ci95_total=(low, high))
+
+
+def _of_logarithm(value: float, ends: tuple[float, float]) -> bool:
+    """Return whether an interval is wide, and lies evenly about the logarithm of its value (`positive_interval_95`)."""
+    return ends[0] < value * math.exp(-NORMAL_95 * LARGE) and math.isclose(ends[0] * ends[1], value**2, rel_tol=1e-9)
+
+
+def _log_ratio(value: float, more: float) -> float:
+    """Return the logarithm of a value with something more over it, where that leaves at least a hundredth of it."""
+    return math.log1p(max(more / value, -0.99))
 
 
 def wear_left_open(remarks: Sequence[Note]) -> float:

@@ -136,6 +136,8 @@ def severities(
         stretch = 1.0 if widths is None else widths.get(name, 1.0)
         least = unresolved.get(name, 0.0)
         ends = value - stretch * (value - low) - least, value + stretch * (high - value) + least
+        if name == "bulk_modulus" and stretch != 1.0:  # never negative, however wide
+            ends = value * (low / value) ** stretch, value * (high / value) ** stretch
         found[name] = Quantity(value, UNITS[name], ends)
     return found | {"entrained_air": _with_air(found["entrained_air"], found["bulk_modulus"], actuator)}
 

@@ -10,7 +10,7 @@ import pytest
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.eha.estimate import estimate_log
 from estimation.eha.rig_share import delivery_left_open, fitted_responses, scaled_responses, with_total, with_wear
-from estimation.finding import Quantity
+from estimation.finding import Quantity, positive_interval_95
 from estimation.fits.explaining.left_open import wear_open
 from estimation.fits.explaining.promises import Promise
 from estimation.fits.flow.fit import fit_flow
@@ -112,6 +112,18 @@ def test_a_law_of_scale_makes_the_interval_of_a_logarithm() -> None:
 def test_what_goes_against_an_entry_turns_its_sides_about() -> None:
     one = with_total(quantity(1.0, 0.0), {"moving_mass": -1.0}, {"moving_mass": Spread(0.1, 0.4)})
     assert one.ci95_total == pytest.approx((math.exp(-1.96 * 0.4), math.exp(1.96 * 0.1)), rel=1e-4)
+
+
+@pytest.mark.parametrize(("std", "doubt"), [(0.04, 0.0), (0.3, 0.15), (1.5, 0.5), (200.0, 0.5)])
+def test_a_positive_quantity_has_positive_intervals_however_little_a_log_tells(std: float, doubt: float) -> None:
+    """Bulk modulus was -300 to 700 MPa where its check had refused it."""
+    one = Quantity(2e8, "Pa", positive_interval_95(2e8, std * 2e8), std * 2e8)
+    one = with_total(one, {"moving_mass": 1.0}, {"moving_mass": Spread.of(doubt)} if doubt else {})
+    assert one.ci95 is not None
+    assert one.ci95_total is not None
+    assert 0.0 < one.ci95_total[0] <= one.ci95[0] * (1.0 + 1e-12) < 2e8 < one.ci95[1] <= one.ci95_total[1] * (1 + 1e-12)
+    assert math.log(one.ci95[1] / 2e8) == pytest.approx(math.log(2e8 / one.ci95[0]))
+    assert math.isfinite(one.ci95_total[1])
 
 
 def test_a_small_difference_of_flows_may_be_nothing_but_not_less() -> None:
