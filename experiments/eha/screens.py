@@ -8,7 +8,7 @@ from experiments.command.json_output import Result
 from experiments.command.options import PRESSURE
 from experiments.command.terminal import short_names, table
 from experiments.eha.entries import costs
-from experiments.eha.verdict_words import margin_word, verdict_lines
+from experiments.eha.verdict_words import equally_likely, margin_word, verdict_lines
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -87,9 +87,12 @@ def _summary(results: Sequence[Result]) -> "RenderableType":
     for name, result in zip(short_names(results), results, strict=True):
         margin, shares = result["margin"], result["probabilities"]
         words = "-" if margin is None or result["condition"] is None else f"{margin:.2f}, {margin_word(margin)}"
-        share = "-" if shares is None else f"{100.0 * shares[result['condition']]:.1f}"
+        alike: list[str] = [] if shares is None else equally_likely(result)
+        share = "-" if shares is None else f"{100.0 * sum(shares[one] for one in alike):.1f}"
+        named = " or ".join(alike) if len(alike) > 1 else result["condition"] or "-"
         believe = "UNKNOWN" if result["unknown"] else "-" if shares is None else "yes"
-        shown.add_row(name, result["condition"] or "-", share, result["runner_up"] or "-", words, believe)
+        second = "-" if result["runner_up"] in alike else result["runner_up"] or "-"
+        shown.add_row(name, named, share, second, words, believe)
     return shown
 
 

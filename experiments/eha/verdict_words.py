@@ -21,8 +21,15 @@ SHOWN = {
 MARGINS = ((1.05, "too close to call"), (1.25, "narrow"), (2.0, "clear"), (math.inf, "wide"))
 """Words for the ratio of the runner-up's score to the best, up to each bound [dimensionless]."""
 
+LEVELS_IN_WORDS = {"none": "normal", "minor": "minor", "major": "major"}
+"""What each level of leakage or of friction is called."""
+
 MOST_DECIMALS = 3
 """Decimals that a severity is given at most [count]."""
+
+ALIKE = 0.99
+"""Share of the likeliest condition's probability from which another is as likely [fraction]: the log tells nothing that
+would set them apart, and calibrated probabilities are not known better."""
 
 NEAREST = "UNKNOWN: none of the nine conditions fits; the nearest is "
 """How a verdict begins that something speaks against."""
@@ -58,19 +65,69 @@ def headline(result: Mapping[str, Any]) -> str:
     Returns
     -------
     str
-        Condition and probability, or that it is unknown; and since when.
+        Condition and probability, or that it is unknown; and since when. Of conditions that the log does not tell
+        apart, what they share, and that the rest cannot be told.
+
+    Examples
+    --------
+    >>> alike = {"normal": 0.314, "minor_friction": 0.314, "major_friction": 0.314, "minor_leakage": 0.0}
+    >>> headline({"probabilities": alike, "unknown": False, "condition": "normal", "since_s": None})
+    'normal leakage, probability 94.2 %; friction cannot be told: normal, minor or major friction equally likely'
     """
     ranked = sorted(result["probabilities"].items(), key=lambda item: -item[1])
     (best, first), (second, other) = ranked[:2]
     if result["unknown"]:
         nearest = f"{in_words(best)} ({percent_text(first)} % if it had to be one of them)"
         return f"{NEAREST}{nearest}, then {in_words(second)} ({percent_text(other)} %)"
+    if len(as_likely := equally_likely(result)) > 1:
+        parts = [*_what_is_told(as_likely, result["probabilities"]), since(result)]
+        return "; ".join(part for part in parts if part)
     parts = [
         f"{in_words(best)}, probability {percent_text(first)} %",
         since(result),
         f"second most likely {in_words(second)}, {percent_text(other)} %",
     ]
     return "; ".join(part for part in parts if part)
+
+
+def equally_likely(result: Mapping[str, Any]) -> list[str]:
+    """Return the conditions that are as likely as the likeliest, which no log tells apart that shows no more.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of a diagnosis with probabilities.
+
+    Returns
+    -------
+    list[str]
+        In the order of `CONDITIONS`; the likeliest alone where a log tells it from the others.
+    """
+    from faults.conditions import CONDITIONS  # here, since an estimate needs nothing of it
+
+    shares = result["probabilities"]
+    least = ALIKE * max(shares.values())
+    return [name for name in CONDITIONS if shares.get(name, 0.0) >= least]
+
+
+def _what_is_told(conditions: Sequence[str], shares: Mapping[str, float]) -> list[str]:
+    """Return what equally likely conditions share, with its probability, and what they leave open."""
+    from faults.conditions import CONDITIONS  # here, since an estimate needs nothing of it
+
+    levels = {axis: [getattr(CONDITIONS[one], axis) for one in conditions] for axis in ("leakage", "friction")}
+    told = {axis: LEVELS_IN_WORDS[found[0]] for axis, found in levels.items() if len(set(found)) == 1}
+    if not told:
+        among = _or([in_words(one) for one in conditions])
+        return [f"leakage and friction cannot be told: {among} equally likely"]
+    ((axis, level),) = told.items()
+    (other,) = set(levels) - {axis}
+    among = _or([LEVELS_IN_WORDS[one] for one in levels[other]])
+    percent = percent_text(sum(shares[one] for one in conditions))
+    return [f"{level} {axis}, probability {percent} %", f"{other} cannot be told: {among} {other} equally likely"]
+
+
+def _or(words: Sequence[str]) -> str:
+    return " or ".join([*([", ".join(words[:-1])] if len(words) > 1 else []), words[-1]])
 
 
 def since(result: Mapping[str, Any]) -> str:

@@ -80,6 +80,29 @@ def test_a_headline_begins_with_the_condition(condition: str) -> None:
 AGAINST = (AgainstCode.SPEED_BIAS.note(bias_rad_s=3.0), AgainstCode.OIL_SOFT.note(share=0.4))
 
 
+@pytest.mark.parametrize(
+    ("alike", "said"),
+    [
+        (
+            ("minor_leakage", "minor_leakage_minor_friction"),
+            "minor leakage, probability 96.0 %; friction cannot be",
+        ),
+        (("major_friction", "minor_leakage_major_friction"), "leakage cannot be told: normal or minor leakage equally"),
+        (("normal", "minor_leakage_minor_friction"), "leakage and friction cannot be told: normal or minor leakage + "),
+    ],
+)
+def test_conditions_that_a_log_does_not_tell_apart_are_not_told_as_one_that_was_found(
+    alike: tuple[str, ...], said: str
+) -> None:
+    """Three equal percentages read as if the first had been found."""
+    shares = {**dict.fromkeys(CONDITIONS, 0.04 / (9 - len(alike))), **dict.fromkeys(alike, 0.96 / len(alike))}
+    result = {**diagnosis_entries(found_as(alike[0])), "probabilities": shares}
+    assert said in headline(result)
+    assert "second most likely" not in headline(result)
+    unlike = {**result, "probabilities": {**shares, alike[0]: 0.97 / len(alike)}}
+    assert "second most likely" in headline(unlike)
+
+
 def test_a_verdict_that_something_speaks_against_says_so_first_and_why() -> None:
     entries = diagnosis_entries(found_as("minor_leakage", against=AGAINST))
     assert headline(entries).startswith("UNKNOWN: none of the nine conditions fits; the nearest is minor leakage")
