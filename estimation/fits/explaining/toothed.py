@@ -143,6 +143,7 @@ def toothed(
         plain, shifted = shifted or plain, None
         plain = plain._replace(remarks=_told_offset(plain.log.speed_offset, plain.best.speed_offset.std))
     worth = plain.best.cost - TEETH_WORTH
+    found = None
     for begun in (plain,) if shifted is None else (shifted, plain):
         found = _with_teeth(log, begun, fitted)
         if found is not None and found.best.cost < worth and explains(found.best):
@@ -152,7 +153,13 @@ def toothed(
             offset = begun.log.speed_offset
             told = _told_offset(offset, begun.best.speed_offset.std)
             return begun._replace(log=replace(begun.log, counts=()), remarks=told)
-    return plain._replace(left=_left(plain))
+    return plain._replace(left=() if found is not None and _by_chance(plain.best, found.best) else _left(plain))
+
+
+def _by_chance(plain: GreyBoxFit, with_them: GreyBoxFit) -> bool:
+    """Return whether a fit with teeth kept what residuals promised of them, and gained no more than chance does."""
+    promised = max(one.gain for one in plain.teeth.values())
+    return KEPT * promised < plain.cost - with_them.cost < TEETH_WORTH
 
 
 def asked_for_teeth(log: GreyBoxLog) -> GreyBoxLog:
