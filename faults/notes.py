@@ -68,7 +68,8 @@ class ClassCode(Code):
         "or a wrong rig file); the conditions were compared around that"
     )
     NOT_EXCLUDED = (
-        "without differential_pressure_pa, other faults are not excluded: {faults} would explain the log about as well"
+        "without differential_pressure_pa, other faults are not excluded: {faults} would explain the log about as "
+        "well; {condition}"
     )
     WEAR_NOT_TOLD = (
         "the log does not tell a worn pump from a sound one: that the pump delivers less than {limit:.0f} % of its "

@@ -16,7 +16,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from estimation.finding import LARGE, NORMAL_95, Quantity
 from estimation.fits.explaining.form_fit import FormFit
@@ -164,7 +164,24 @@ def wear_left_open(remarks: Sequence[Note]) -> float:
     return 0.005 * float(said["percent"]) if said else 0.0
 
 
-def delivery_left_open(remarks: Sequence[Note]) -> tuple[float, float] | None:
+class OpenDelivery(NamedTuple):
+    """What a log says of the pump's delivery where it does not tell wear from leakage.
+
+    Parameters
+    ----------
+    size, deviation : float
+        Logarithm of the delivery over the displacement, and its standard deviation, with what is presumed of a pump
+        [dimensionless].
+    least : float
+        Below which nothing would leak, but the other way [dimensionless].
+    """
+
+    size: float
+    deviation: float
+    least: float = -math.inf
+
+
+def delivery_left_open(remarks: Sequence[Note]) -> OpenDelivery | None:
     """Return what a log says of the pump's delivery, where it does not tell wear from leakage.
 
     Parameters
@@ -174,15 +191,16 @@ def delivery_left_open(remarks: Sequence[Note]) -> tuple[float, float] | None:
 
     Returns
     -------
-    tuple of float, or None
-        Logarithm of the delivery over the displacement, and its standard deviation, with what is presumed of a pump
-        [dimensionless]; None where the log tells, or a worn pump was found.
+    OpenDelivery or None
+        The delivery; None where the log tells, or a worn pump was found.
     """
     said = _said_of_wear(remarks)
     if said is None:
         return None
     width, less = float(said["half_width"]), float(said["percent"])
-    return 0.01 * (width - less), 0.005 * width
+    if "most" in said:
+        return OpenDelivery(0.01 * float(said["likeliest"]), 0.005 * width, -0.01 * float(said["most"]))
+    return OpenDelivery(0.01 * (width - less), 0.005 * width)
 
 
 def _said_of_wear(remarks: Sequence[Note]) -> Mapping[str, Any] | None:

@@ -1,10 +1,16 @@
-"""`valves_unseen(fit)`, `wear_open(promise)`: what a fit leaves open that would pass for a sound actuator."""
+"""`valves_unseen(fit)`, `wear_open(promise, most)`: what a fit leaves open that would pass for a sound actuator."""
+
+import math
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from estimation.fits.explaining.promises import Promise
 from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.log_checks.channel_names import PRESSURE, SPEED
 from estimation.models.completed_flow import CRACKS
+from estimation.models.flow import FLOW_FORM
 from estimation.notes import RigCode
 from plant.notes import Note
 
@@ -16,6 +22,22 @@ LEAST_WORN = 0.03
 """How far it must likeliest lie below for a worn pump not to be excluded where two deviations exclude a sound one
 [dimensionless]: slopes promise too little of a pump that is far from sound. None of 88 sound training logs at one speed
 promised as much without being open already."""
+
+LOSE_FLOW = frozenset(
+    {
+        "leakage_growth",
+        "leakage_rise",
+        "leakage_step",
+        "leakage_turbulent",
+        "makeup_blocked",
+        "port_a_drains",
+        "port_b_drains",
+        "pump_compresses",
+        "relief_low",
+        "single_rod",
+    }
+)
+"""Hypotheses under which flow is lost, or swept, that is neither leakage of one coefficient nor a flow bias."""
 
 
 def valves_unseen(fit: GreyBoxFit) -> tuple[Note, ...]:
@@ -38,13 +60,49 @@ def valves_unseen(fit: GreyBoxFit) -> tuple[Note, ...]:
     return (RigCode.MAKEUP_UNSEEN.note(side=unseen[0]),) if len(unseen) == 1 else ()
 
 
-def wear_open(delivery: Promise) -> tuple[Note, ...]:
+def share_lost(
+    log: GreyBoxLog, values: Mapping[str, float], displacement: float, strange: Collection[str] = ()
+) -> float:
+    """Return how far the logarithm of a pump's delivery may lie below that of a sound one, if nothing leaks backwards.
+
+    Oil that a worn pump does not deliver is oil that a fit with a sound one takes for leakage and flow bias. Slopes do
+    not know that neither of the two is less than nothing.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as a flow form sees it.
+    values : Mapping[str, float]
+        What a fit with a sound pump found [SI].
+    displacement : float
+        Of that pump [m^3/rad].
+    strange : collection of str
+        Hypotheses that explain the log.
+
+    Returns
+    -------
+    float
+        Logarithm of what is pumped over what is left of it, in the mean of the log [dimensionless]; infinite where all
+        is lost, where the fit tells neither, and where flow is lost in yet another way.
+    """
+    if LOSE_FLOW & set(strange) or not {"flow_bias", "leakage_coefficient"} <= set(values):
+        return math.inf
+    pumped = displacement * float(np.nanmean(np.abs(log.drives[:, FLOW_FORM.drives.index(SPEED)])))
+    pressure = float(np.nanmean(np.abs(log.measured[:, FLOW_FORM.outputs.index(PRESSURE)])))
+    lost = values["flow_bias"] + values["leakage_coefficient"] * pressure
+    return -math.log1p(-lost / pumped) if lost < pumped else math.inf
+
+
+def wear_open(delivery: Promise, most: float = math.inf) -> tuple[Note, ...]:
     """Return a note where a log does not tell a worn pump from leakage or from a flow bias.
 
     Parameters
     ----------
     delivery : Promise
         What a delivery of its own promises beside all that is fitted.
+    most : float
+        How far the logarithm of the delivery may lie below that of a sound pump at most, see `share_lost`
+        [dimensionless].
 
     Returns
     -------
@@ -54,6 +112,9 @@ def wear_open(delivery: Promise) -> tuple[Note, ...]:
     width = 2.0 * delivery.deviation
     less = width - delivery.size
     sound = delivery.size >= -max(width, LEAST_WORN)
-    if sound and not less > OPEN_DELIVERY:
+    if sound and not min(less, most) > OPEN_DELIVERY:
         return ()
+    if most < less:
+        ends = {"likeliest": 100.0 * delivery.size, "most": 100.0 * most}
+        return (RigCode.WEAR_NOT_EXCLUDED.note(percent=100.0 * most, half_width=100.0 * width, **ends),)
     return (RigCode.WEAR_NOT_EXCLUDED.note(percent=100.0 * less, half_width=100.0 * width),)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 
 from estimation.fits.explaining.explain import WORTH
-from estimation.fits.explaining.left_open import wear_open
+from estimation.fits.explaining.left_open import share_lost, wear_open
 from estimation.fits.explaining.objections import doubted, fit_explains
 from estimation.fits.explaining.promises import Promise, promised, promised_each, slopes_of
 from estimation.fits.explaining.settled import VANISHED
@@ -110,7 +110,7 @@ def asked_of(
     tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays), (SPEED_LATE, behind)
     asked = tuple(one for one, worthwhile in tried if worthwhile)
     asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > WORTH)
-    remarks = wear_open(delivery)
+    remarks = wear_open(delivery, share_lost(log, swinging.values, parameters.pump_displacement))
     if not moving:
         return HYPOTHESES if not log.passes_on and doubted(swinging) else asked, remarks
     # chambers shut in far above the accumulator take no make-up for seconds, and a search from rest ends without any

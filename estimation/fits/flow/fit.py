@@ -9,7 +9,7 @@ import numpy as np
 from estimation.fits.explaining.delivery import contradicted
 from estimation.fits.explaining.explain import WORTH, explain
 from estimation.fits.explaining.form_fit import DISCRETISED, FormFit, weighed, with_structure
-from estimation.fits.explaining.left_open import valves_unseen, wear_open
+from estimation.fits.explaining.left_open import share_lost, valves_unseen, wear_open
 from estimation.fits.explaining.objections import doubted, fit_explains_all, limits, objections
 from estimation.fits.explaining.speed_instead import speed_instead
 from estimation.fits.explaining.toothed import asked_for_teeth
@@ -271,6 +271,7 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
         left, shown = float(np.hypot(FILTERED if traits.filtered else STRUCTURE, untaken)), play_left(one.play, sensed)
     if AIR_MIDWAY.name in strange.names:
         left = float(np.hypot(left, BUBBLES))
+    most = share_lost(plain.log, one.values, plain.start.parameters.pump_displacement, strange.names)
     return FormFit(
         parameters=with_structure(with_small_teeth(strange.values, one.small_teeth), left),
         bound=bound,
@@ -278,7 +279,7 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
         reasons=(*shown, *contradicted(strange, plain.start.parameters)),
         rig_slopes=one.rig_slopes,
         explanation=strange,
-        remarks=(*plain.teeth, *wear_open(strange.delivery_open), *open_play),
+        remarks=(*plain.teeth, *wear_open(strange.delivery_open, most), *open_play),
         turning=plain.turning,
     )
 

@@ -8,7 +8,7 @@ the best of several sound circuits is taken.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -17,13 +17,20 @@ import numpy as np
 from estimation.eha.rig_share import DELIVERY_ENTRY
 from estimation.fits.hypotheses import PRESUMED
 from faults.conditions import CONDITIONS
+from faults.diagnosis.beyond_nine.left_open import (
+    WORTH_SAYING,
+    OpenFault,
+    not_excluded,
+    odds_of_hidden_relief,
+    probabilities_of,
+)
 from faults.diagnosis.beyond_nine.sound_circuit import Tried, sound_circuit
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.circuits.class_fit import LASTING, PointFit, misfit, nominal_runs
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes, is_stuck
-from faults.notes import AgainstCode, ClassCode
+from faults.notes import AgainstCode
 from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.one_sided import one_sided
@@ -53,9 +60,6 @@ LIKELIER = 10.0
 """How many times likelier than a sound pump a well worn one must be to be believed [dimensionless]: evidence is called
 strong from there on (Jeffreys, Theory of Probability, 1961, appendix B). Of 16 sound training logs under major leakage
 and friction none comes to more than 1.4."""
-
-WORTH_SAYING = 0.01
-"""Probability of a fault from which it is said beside its name [probability]."""
 
 WELL_WORN = 0.8
 """Share up to which a pump is a worn one whatever the rig file's displacement is worth [dimensionless]: an entry may be
@@ -134,11 +138,12 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
         return Outside()
     runs = nominal_runs(blocks, actuator)
     sound = sound_circuit(blocks, fits, actuator, runs)
-    gains, worn = dict[str, float](), list[Tried]()
+    gains, likeliest, worn = dict[str, float](), dict[str, Array](), list[Tried]()
     found: tuple[float, _Fault, Tried] | None = None
     for fault, tried in _with_each(blocks, sound, runs):
         gain = tried.score - sound.score + fault.presumed
-        gains[fault.name] = max(gain, gains.get(fault.name, gain))
+        if gain >= gains.get(fault.name, gain):
+            gains[fault.name], likeliest[fault.name] = gain, tried.fits.scores
         worn += [tried] if fault.name == WORN else []
         if found is None or gain > found[0]:
             found = gain, fault, tried
@@ -159,11 +164,16 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     odds = {name: gain - GAIN for name, gain in gains.items() if gain > NOT_EXCLUDED}
     if WORN in odds:
         odds[WORN] = wear
+    pressure = largest_pressure(blocks, sound.fits.best, sound.actuator)
+    hidden = odds_of_hidden_relief(pressure, sound.actuator.circuit.relief_pressure) - GAIN
+    odds[EARLY] = float(np.logaddexp(odds.get(EARLY, -math.inf), hidden))
     chances = probabilities_of(odds)
-    # a setting just under the largest pressure leaves no trace: no log excludes it, and saying so tells nothing
-    open_ = {name: chance for name, chance in chances.items() if name != EARLY or chance > WORTH_SAYING}
+    # a log that comes near the rig file's setting leaves but a few settings above, and saying so tells little
+    told = {name: chance for name, chance in chances.items() if name != EARLY or chance > WORTH_SAYING}
+    above = {EARLY: f"{EARLY}, above {1e-5 * pressure:.2g} bar"}
+    open_ = [OpenFault(above.get(name, name), chance, likeliest.get(name, best)) for name, chance in told.items()]
     scores = np.array([best, *(one.fits.scores for one in worn)]) if WORN in odds else None
-    return Outside((), _not_excluded(open_), scores, sum(chances.values()))
+    return Outside((), not_excluded(open_, best), scores, sum(chances.values()))
 
 
 def circuits_with_faults(
@@ -198,36 +208,6 @@ def _with_each(blocks: Blocks, sound: Tried, runs: Array, behind: float = HOPELE
     """Yield each fault, and the circuit with it that explains a log best."""
     for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best, sound.actuator)):
         yield fault, _with(fault, blocks, sound, runs, behind)
-
-
-def _not_excluded(faults: Mapping[str, float]) -> tuple[Note, ...]:
-    """Return a note that names the faults that a log does not exclude, each with its probability."""
-    named = [f"{one} ({100.0 * chance:.0f} %)" if chance > WORTH_SAYING else one for one, chance in faults.items()]
-    return (ClassCode.NOT_EXCLUDED.note(faults=", ".join(named)),) if named else ()
-
-
-def probabilities_of(odds: Mapping[str, float]) -> dict[str, float]:
-    """Return the probability of each of several faults, of which at most one is there.
-
-    Parameters
-    ----------
-    odds : Mapping[str, float]
-        How much likelier each is than none: logarithms of ratios, by name [dimensionless].
-
-    Returns
-    -------
-    dict[str, float]
-        Probability by name [probability]; what is left is that of none.
-
-    Examples
-    --------
-    >>> {name: round(chance, 2) for name, chance in probabilities_of({"one": 0.0, "other": 0.0}).items()}
-    {'one': 0.33, 'other': 0.33}
-    >>> probabilities_of({"one": -math.inf})
-    {'one': 0.0}
-    """
-    together = np.logaddexp.reduce([0.0, *odds.values()])
-    return {name: math.exp(one - together) for name, one in odds.items()}
 
 
 def odds_of_wear(scores: Sequence[float], sound: float) -> float:

@@ -19,8 +19,9 @@ from estimation.eha.rig_share import delivery_left_open, wear_left_open
 from estimation.finding import NORMAL_95
 from estimation.fits.hypotheses import OFFSET
 from estimation.notes import RigCode
+from faults.diagnosis.beyond_nine.left_open import WORTH_SAYING
 from faults.diagnosis.beyond_nine.near_enough import lies_beside, only_beside
-from faults.diagnosis.beyond_nine.other_faults import DELIVERIES, WORTH_SAYING, faults_outside, presumed_of_wear
+from faults.diagnosis.beyond_nine.other_faults import DELIVERIES, faults_outside, presumed_of_wear
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator
@@ -70,7 +71,7 @@ def whatever_the_pump_delivers(
         found = probabilities_over_wear(diagnosis.scoreboard, actuator, estimate.remarks, shipped_calibration())
         told = diagnosis if found is None else replace(diagnosis, probabilities=found)
     chance = chance_of_wear((*estimate.remarks, *strange))
-    if chance < WORTH_SAYING and not wear_left_open(estimate.remarks):
+    if chance == 0.0 or (chance < WORTH_SAYING and not wear_left_open(estimate.remarks)):
         return told
     note = ClassCode.WEAR_NOT_TOLD.note(percent=100.0 * chance, limit=100.0 * WORN)
     left = {name: (1.0 - chance) * share for name, share in told.probabilities.items()}
@@ -88,15 +89,24 @@ def chance_of_wear(said: Sequence[Note]) -> float:
     Returns
     -------
     float
-        Of a normal distribution, with what is presumed of a pump, `SUREST` at most [probability]; zero where a worn
-        pump was found, which speaks against all nine conditions, and where wear is excluded.
+        Of a normal distribution, with what is presumed of a pump, of which nothing lies where oil would leak
+        backwards; `SUREST` at most [probability]. Zero where a worn pump was found, which speaks against all nine
+        conditions, and where wear is excluded.
     """
     if (left := delivery_left_open(said)) is not None:
-        return min(_below(math.log(WORN), *left), SUREST)
+        return min(_between(left.least, math.log(WORN), left.size, left.deviation), SUREST)
     for note in said:
         if note.code is RigCode.AREA_TO_DISPLACEMENT:
             return _below(100.0 * WORN, note.data["percent"], note.data["half_width"] / NORMAL_95)
     return 0.0
+
+
+def _between(least: float, limit: float, mean: float, std: float) -> float:
+    """Return the probability that a normal variable that is not below the least is below a limit."""
+    if limit <= least:
+        return 0.0
+    above = 1.0 - _below(least, mean, std)
+    return 1.0 if above <= 0.0 else 1.0 - (1.0 - _below(limit, mean, std)) / above
 
 
 def _below(limit: float, mean: float, std: float) -> float:
@@ -190,8 +200,9 @@ def probabilities_over_wear(
     left = delivery_left_open(remarks)
     if board.blocks.pressure is None or left is None:
         return None
-    size, deviation = left
-    likely = -0.5 * ((np.log([1.0, *DELIVERIES]) - size) / deviation) ** 2
+    deliveries = np.log([1.0, *DELIVERIES])
+    likely = -0.5 * ((deliveries - left.size) / left.deviation) ** 2
+    likely[deliveries < left.least] = -math.inf
     likely -= np.max(likely)
     healthy, scores, kept = actuator.circuit, [board.fits.scores], [likely[0]]
     for share, one in zip(DELIVERIES, likely[1:], strict=True):

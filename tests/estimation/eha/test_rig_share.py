@@ -197,5 +197,5 @@ def test_wear_that_is_not_excluded_opens_displacement_downwards_alone() -> None:
 
 def test_what_is_left_open_of_a_delivery_is_where_it_likeliest_is_and_how_well_that_is_known() -> None:
     (noted,) = wear_open(Promise(1.0, -0.04, 0.05))
-    assert delivery_left_open((noted,)) == (pytest.approx(-0.04), pytest.approx(0.05))
+    assert delivery_left_open((noted,)) == (pytest.approx(-0.04), pytest.approx(0.05), -math.inf)
     assert delivery_left_open(()) is None

@@ -1,14 +1,16 @@
 """A make-up valve that never opened in a log is told of, and wear of the pump that a log does not exclude."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from estimation.fits.explaining.left_open import OPEN_DELIVERY, valves_unseen, wear_open
+from estimation.eha.rig_share import delivery_left_open
+from estimation.fits.explaining.left_open import OPEN_DELIVERY, share_lost, valves_unseen, wear_open
 from estimation.fits.explaining.promises import NOTHING_PROMISED, Promise
 from estimation.notes import RigCode
-from tests.estimation.fits.short_logs import made_fit
+from tests.estimation.fits.short_logs import PAPER, log, made_fit, seen
 
 FELT, UNFELT = 900.0, np.inf
 
@@ -49,3 +51,21 @@ def test_wear_is_open_where_two_deviations_below_what_is_likeliest_come_to_the_l
     said = wear_open(Promise(1.0, size, deviation))
     assert [note.data["percent"] for note in said] == ([] if percent is None else [pytest.approx(percent)])
     assert wear_open(NOTHING_PROMISED) == ()
+
+
+def test_a_pump_delivers_no_less_than_what_leaks_would_take() -> None:
+    """Slopes called the pump of three sound logs worn, with 53 to 97 %: it would have had to leak backwards."""
+    plain = seen(log(0.2))
+    plain = replace(plain, drives=np.full_like(plain.drives, 100.0), measured=np.full_like(plain.measured, -5e5))
+    values = {"flow_bias": 2.36e-6, "leakage_coefficient": 4.78e-12}
+    most = share_lost(plain, values, PAPER.pump_displacement)
+    assert most == pytest.approx(-math.log(1.0 - 0.0853), rel=2e-3)
+    assert share_lost(plain, values, PAPER.pump_displacement, ["air"]) == most
+    assert share_lost(plain, values, PAPER.pump_displacement, ["air", "leakage_step"]) == math.inf
+    assert share_lost(plain, {}, PAPER.pump_displacement) == math.inf
+    slopes = Promise(1.0, -0.12, 0.12)
+    assert wear_open(slopes, most) == ()
+    (noted,) = wear_open(slopes, 0.2)
+    assert noted.data["percent"] == pytest.approx(20.0)
+    assert delivery_left_open((noted,)) == (pytest.approx(-0.12), pytest.approx(0.12), pytest.approx(-0.2))
+    assert delivery_left_open(wear_open(slopes, 0.5)) == delivery_left_open(wear_open(slopes))

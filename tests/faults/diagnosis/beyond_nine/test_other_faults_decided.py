@@ -139,7 +139,7 @@ def test_a_valve_that_is_not_excluded_is_as_likely_as_not_where_it_would_be_beli
     assert found.open[0].data["faults"] == f"a make-up valve that is stuck shut{said}"
 
 
-@pytest.mark.parametrize(("gain", "named", "said"), [(6.6, True, False), (6.4, False, True), (0.0, False, False)])
+@pytest.mark.parametrize(("gain", "named", "said"), [(6.6, True, False), (6.4, False, True), (0.0, False, True)])
 def test_a_low_relief_valve_gains_over_all_settings_that_it_may_have(
     gain: float, named: bool, said: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -264,3 +264,39 @@ def test_a_diagnosis_asks_every_circuit_whether_a_log_is_outside(near: float, mo
     clean = clean_log(log().replace(**{PRESSURE: None}), PAPER)
     codes = {note.code for note in by_circuits.diagnose_clean(clean, ACTUATOR).against}
     assert bool(codes & {AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS}) == (near < -100.0)
+
+
+@pytest.mark.parametrize(("pressure", "percent"), [(3.4e5, "2"), (8e5, "1"), (3e6, None), (5e6, None)])
+def test_a_low_relief_valve_that_opens_nowhere_in_a_log_keeps_what_was_presumed_of_it(
+    pressure: float, percent: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It had a tenth of that: the settings just below the largest pressure alone were counted."""
+    found, _ = looked(monkeypatch, lambda one: 0.0 if one == SOUND else -20.0, pressure)
+    hidden = np.exp(-4.0) * np.clip(np.log10(SOUND.relief_pressure / pressure), 0.0, 1.0)
+    assert found.faulty == pytest.approx(hidden / (1.0 + hidden))
+    said = [str(note.data["faults"]) for note in found.open]
+    above = f"{other_faults.EARLY}, above {1e-5 * pressure:.2g} bar ({percent} %)"
+    assert said == ([] if percent is None else [above])
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_what_the_condition_would_be_beside_a_fault_that_is_not_excluded_is_said(
+    moves: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def ahead(*, first: bool) -> Any:
+        scores = np.array([0.0, -9.0] if first else [-9.0, 0.0])
+        return SimpleNamespace(scores=scores, best=SimpleNamespace(coordinates=np.zeros(7)))
+
+    def fitted(_: Any, actuator: Any, **__: Any) -> Any:
+        leaks = getattr(actuator.circuit, "seat_leakage_a", 0.0) > 0.0
+        return ahead(first=moves) if leaks else ahead(first=False) if actuator.circuit == SOUND else fits(-9.0)
+
+    for module in (other_faults, sound_circuit):
+        monkeypatch.setattr(module, "fit_classes", fitted)
+    monkeypatch.setattr(other_faults, "nominal_runs", lambda *_: np.zeros((9, 1, 1)))
+    monkeypatch.setattr(other_faults, "misfit", lambda *_: 0.0)
+    monkeypatch.setattr(other_faults, "largest_pressure", lambda *_: np.nan)
+    (note,) = faults_outside(LOG, ahead(first=False), ACTUATOR).open
+    same = "the condition would be the same"
+    leaky = "with a make-up valve that leaks it would be normal"
+    assert note.data["condition"] == (f"{same}, but {leaky}" if moves else same)

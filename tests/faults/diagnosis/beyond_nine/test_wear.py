@@ -136,6 +136,8 @@ def test_a_circuit_may_doubt_the_pump_where_the_balance_leaves_wear_open(board: 
     [
         (RigCode.WEAR_NOT_EXCLUDED.note(percent=30.0, half_width=30.0), 0.2412),
         (RigCode.WEAR_NOT_EXCLUDED.note(percent=100.0 * (0.08 - np.log(0.9)), half_width=8.0), 0.5),
+        (RigCode.WEAR_NOT_EXCLUDED.note(percent=9.0, half_width=24.0, likeliest=-11.5, most=9.0), 0.0),
+        (RigCode.WEAR_NOT_EXCLUDED.note(percent=20.0, half_width=24.0, likeliest=-11.5, most=20.0), 0.3847),
         (RigCode.AREA_TO_DISPLACEMENT.note(percent=92.0, half_width=NORMAL_95), 0.02275),
         (RigCode.PUMP_WORN.note(percent=80.0, half_width=1.0), 0.0),
         (AgainstCode.PUMP_OFF.note(percent=-15.0), 0.0),

@@ -1,0 +1,127 @@
+"""Faults outside the nine conditions that a log without pressure does not exclude: how likely, and what they change.
+
+Some leave no trace in motion: a relief valve that would open at a pressure that the log never reaches, a make-up valve
+that never had to open. They keep what was presumed of them before the log was seen.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from faults.conditions import CONDITIONS
+from faults.notes import ClassCode
+from plant.arrays import Array
+from plant.notes import Note
+
+WORTH_SAYING = 0.01
+"""Probability of a fault from which it is said beside its name [probability]."""
+
+LOWEST = 0.1
+"""Setting of a relief valve over the rig file's, to which it may be low [fraction]: no piston slides below."""
+
+STAYS = 0.5
+"""Probability of a condition, beside a fault, from which it is the same as without [probability]."""
+
+
+class OpenFault(NamedTuple):
+    """A fault that a log does not exclude.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    chance : float
+        How likely it is [probability].
+    scores : ndarray, shape (9,)
+        How well each condition holds the log beside it: log-likelihoods [dimensionless].
+    """
+
+    name: str
+    chance: float
+    scores: Array
+
+
+def odds_of_hidden_relief(pressure: float, setting: float) -> float:
+    """Return the log-likelihood, before a log is seen, that a low relief valve opens nowhere in it.
+
+    Parameters
+    ----------
+    pressure : float
+        Largest pressure in the log [Pa].
+    setting : float
+        Of a sound relief valve [Pa].
+
+    Returns
+    -------
+    float
+        Logarithm of the share of low settings, all alike in their logarithm, that lie above that pressure
+        [dimensionless].
+
+    Examples
+    --------
+    >>> odds_of_hidden_relief(3.4e5, 3.4e6), odds_of_hidden_relief(3.4e6, 3.4e6)
+    (0.0, -inf)
+    """
+    if not 0.0 < pressure < setting:
+        return -math.inf
+    return math.log(min(math.log(setting / pressure) / -math.log(LOWEST), 1.0))
+
+
+def probabilities_of(odds: Mapping[str, float]) -> dict[str, float]:
+    """Return the probability of each of several faults, of which at most one is there.
+
+    Parameters
+    ----------
+    odds : Mapping[str, float]
+        How much likelier each is than none: logarithms of ratios, by name [dimensionless].
+
+    Returns
+    -------
+    dict[str, float]
+        Probability by name [probability]; what is left is that of none.
+
+    Examples
+    --------
+    >>> {name: round(chance, 2) for name, chance in probabilities_of({"one": 0.0, "other": 0.0}).items()}
+    {'one': 0.33, 'other': 0.33}
+    >>> probabilities_of({"one": -math.inf})
+    {'one': 0.0}
+    """
+    together = np.logaddexp.reduce([0.0, *odds.values()])
+    return {name: math.exp(one - together) for name, one in odds.items()}
+
+
+def not_excluded(faults: Sequence[OpenFault], sound: Array) -> tuple[Note, ...]:
+    """Return a note that names the faults that a log does not exclude, and what the condition would be beside them.
+
+    Parameters
+    ----------
+    faults : sequence of OpenFault
+        They.
+    sound : ndarray, shape (9,)
+        How well each condition holds the log without a fault: log-likelihoods [dimensionless].
+
+    Returns
+    -------
+    tuple of Note
+        One at most.
+    """
+    if not faults:
+        return ()
+    named = [f"{one.name} ({100.0 * one.chance:.0f} %)" if one.chance > WORTH_SAYING else one.name for one in faults]
+    names, likeliest = list(CONDITIONS), int(np.argmax(sound))
+    moved = [one for one in faults if one.chance > WORTH_SAYING and _share(one.scores, likeliest) < STAYS]
+    others = {one.name: names[int(np.argmax(one.scores))] for one in moved}
+    beside = ", and ".join(f"with {name} it would be {_in_words(one)}" for name, one in others.items())
+    condition = f"the condition would be the same, but {beside}" if beside else "the condition would be the same"
+    return (ClassCode.NOT_EXCLUDED.note(faults=", ".join(named), condition=condition),)
+
+
+def _share(scores: Array, place: int) -> float:
+    return float(np.exp(scores[place] - np.logaddexp.reduce(scores)))
+
+
+def _in_words(condition: str) -> str:
+    return condition.replace("leakage_", "leakage and ").replace("_", " ")
