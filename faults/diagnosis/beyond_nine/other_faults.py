@@ -166,11 +166,12 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
         odds[WORN] = wear
     pressure = largest_pressure(blocks, sound.fits.best, sound.actuator)
     hidden = odds_of_hidden_relief(pressure, sound.actuator.circuit.relief_pressure) - GAIN
+    likeliest[EARLY] = likeliest[EARLY] if odds.get(EARLY, -math.inf) > hidden else best  # none moves what it hides in
     odds[EARLY] = float(np.logaddexp(odds.get(EARLY, -math.inf), hidden))
     chances = probabilities_of(odds)
     # a log that comes near the rig file's setting leaves but a few settings above, and saying so tells little
     told = {name: chance for name, chance in chances.items() if name != EARLY or chance > WORTH_SAYING}
-    above = {EARLY: f"{EARLY}, above {1e-5 * pressure:.2g} bar"}
+    above = {EARLY: f"{EARLY}, above {1e-5 * pressure:.2g} bar"} if likeliest[EARLY] is best else {}
     open_ = [OpenFault(above.get(name, name), chance, likeliest.get(name, best)) for name, chance in told.items()]
     scores = np.array([best, *(one.fits.scores for one in worn)]) if WORN in odds else None
     return Outside((), not_excluded(open_, best), scores, sum(chances.values()))

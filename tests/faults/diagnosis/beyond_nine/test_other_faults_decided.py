@@ -288,6 +288,8 @@ def test_what_the_condition_would_be_beside_a_fault_that_is_not_excluded_is_said
         return SimpleNamespace(scores=scores, best=SimpleNamespace(coordinates=np.zeros(7)))
 
     def fitted(_: Any, actuator: Any, **__: Any) -> Any:
+        if actuator.circuit.relief_pressure < SOUND.relief_pressure:  # excluded, but not above the log's pressures
+            return SimpleNamespace(scores=np.array([-20.0, -29.0]), best=ahead(first=True).best)
         leaks = getattr(actuator.circuit, "seat_leakage_a", 0.0) > 0.0
         return ahead(first=moves) if leaks else ahead(first=False) if actuator.circuit == SOUND else fits(-9.0)
 
@@ -295,7 +297,7 @@ def test_what_the_condition_would_be_beside_a_fault_that_is_not_excluded_is_said
         monkeypatch.setattr(module, "fit_classes", fitted)
     monkeypatch.setattr(other_faults, "nominal_runs", lambda *_: np.zeros((9, 1, 1)))
     monkeypatch.setattr(other_faults, "misfit", lambda *_: 0.0)
-    monkeypatch.setattr(other_faults, "largest_pressure", lambda *_: np.nan)
+    monkeypatch.setattr(other_faults, "largest_pressure", lambda *_: 5e5)
     (note,) = faults_outside(LOG, ahead(first=False), ACTUATOR).open
     same = "the condition would be the same"
     leaky = "with a make-up valve that leaks it would be normal"
