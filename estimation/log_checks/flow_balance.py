@@ -16,7 +16,8 @@ FEWEST_SAMPLES = 8
 """Samples in a block at least, since those at its ends count little [count]."""
 
 MOST_LOST = 0.25
-"""Share of the flow at rated speed that is the largest flow bias [fraction]; judged: a fifth under major leakage."""
+"""Share of the flow at rated speed that is the largest flow bias [fraction]; judged: the leakiest actuator of the paper
+loses a fifth."""
 
 
 class FlowBalance(NamedTuple):
