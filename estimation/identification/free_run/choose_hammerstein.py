@@ -6,15 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.free_run.choose_linear import (
-    BLOCKS,
-    CLEARLY,
-    Candidate,
-    block_error,
-    criteria,
-    pooled,
-    surely_better,
-)
+from estimation.identification.free_run.choose_linear import CLEARLY, Candidate, criteria
 from estimation.identification.free_run.data import Channels, Scaling, blocks
 from estimation.identification.free_run.hammerstein_fit import (
     HammersteinFit,
@@ -22,6 +14,7 @@ from estimation.identification.free_run.hammerstein_fit import (
     fit_hammerstein,
     refitted,
 )
+from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled, surely_better
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.transfer_function import linear_model

@@ -5,21 +5,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation.arrays import Array, BoolArray
-from estimation.identification.free_run.data import Channels, blocks, halves
-from estimation.identification.free_run.linear_dynamics import LinearDynamics
-from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem, extended, fit_linear, quick_fit
-from estimation.progress import tell
+from estimation.arrays import Array
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.held_back import BLOCKS, NEAR, held_back_blocks, pooled
+from estimation.identification.free_run.integrating import fit_integrating
+from estimation.identification.free_run.linear_fit import extended, fit_linear, quick_fit
+from estimation.identification.free_run.linear_problem import Form, LinearFit
 
-BLOCKS = 4
-"""Blocks of every log, each held back once."""
-
-CLEARLY, NEAR = 0.01, 1e-6
-"""Share by which a larger model must do better on what was held back, and share of the cost that two steps of a descent
-in a row must gain each while forms are compared: the chosen one is fitted on."""
+CLEARLY = 0.01
+"""Share by which a larger model must do better on what was held back."""
 
 DEAD_TIME = 0.03
 """Share by which a dead time of more than one sample must do better."""
+
+INTEGRATING = 0.7
+"""A pole at one is believed where it leaves less than this share of the best other model's held-back error."""
 
 PATIENCE = 2
 """Orders without gain after which no higher one is tried."""
@@ -91,126 +91,10 @@ def slowest_pole(f: Array) -> float:
     return float(np.abs(np.roots(f)).max()) if f.size > 1 else 0.0
 
 
-def held_back_blocks(fit: LinearFit, data: Channels) -> tuple[float, ...]:
-    """Return the root-mean-square free-run error of each block held back, simulated by a fit to the others.
-
-    Parameters
-    ----------
-    fit : LinearFit
-        Of all data; each fit begins at it.
-    data : Channels
-        Scaled.
-
-    Returns
-    -------
-    tuple of float
-        Over the output's deviation, one a block.
-    """
-    target = np.concatenate(data.y)
-    errors: list[float] = []
-    tell("linear models")
-    for masks in blocks(data, BLOCKS):
-        mask = np.concatenate(masks) & np.isfinite(target)
-        part = fit_linear(fit.form, data.without(masks), [fit.f], bounded=fit.bounded, least_gain=NEAR)
-        errors.append(block_error(Problem(fit.form, data).jacobian(part.theta)[0] - target, mask))
-    return tuple(errors)
-
-
-def block_error(error: Array, mask: BoolArray) -> float:
-    """Return the root mean square of an error where a block was held back; NaN where the block holds nothing.
-
-    Parameters
-    ----------
-    error : ndarray, shape (n,)
-        Simulated less measured.
-    mask : ndarray of bool, shape (n,)
-        Where it was held back.
-
-    Returns
-    -------
-    float
-        In the error's unit.
-    """
-    return float(np.sqrt(np.mean(error[mask] ** 2))) if mask.any() else float("nan")
-
-
-def pooled(errors: Sequence[float]) -> float:
-    """Return the root mean square over blocks; infinite where there are none.
-
-    Parameters
-    ----------
-    errors : sequence of float
-        One a block [dimensionless].
-
-    Returns
-    -------
-    float
-        Likewise.
-
-    Examples
-    --------
-    >>> round(pooled([3.0, 4.0, float("nan")]) ** 2, 6)
-    12.5
-    """
-    known = [error**2 for error in errors if not np.isnan(error)]
-    return float(np.sqrt(np.mean(known))) if known else float("inf")
-
-
-def surely_better(errors: Sequence[float], others: Sequence[float]) -> bool:
-    """Return whether a model beats another on the same blocks by more than the blocks scatter: one standard error.
-
-    Parameters
-    ----------
-    errors, others : sequence of float
-        Root-mean-square errors of the model and of the other, one a block; NaN where one holds nothing [dimensionless].
-
-    Returns
-    -------
-    bool
-        Of one block alone, whether it is better there.
-
-    Examples
-    --------
-    >>> surely_better([1.0, 1.0, 1.0], [2.0, 2.1, 1.9]), surely_better([1.0, 1.0, 1.0], [0.9, 0.9, 2.0])
-    (True, False)
-    """
-    gains = np.square(others) - np.square(errors)
-    known = gains[~np.isnan(gains)]
-    scatter = float(known.std(ddof=1)) / np.sqrt(known.size) if known.size > 1 else 0.0
-    return known.size > 0 and bool(known.mean() > scatter)
-
-
-def halves_error(fit: LinearFit, data: Channels) -> float:
-    """Return the error of a free run over each half of every log by a fit to the other halves, root mean square.
-
-    A block lies between outputs that are fitted, and they pin a slow pole there; a half has only an initial state.
-
-    Parameters
-    ----------
-    fit : LinearFit
-        Of all data; each fit begins at it.
-    data : Channels
-        Scaled.
-
-    Returns
-    -------
-    float
-        Over the output's deviation; NaN where a half has too few outputs.
-    """
-    first, second = halves(data)
-    if min(first.n_samples, second.n_samples) < 2 * fit.theta.size:
-        return float("nan")
-    squares = list[Array]()
-    for part, other in ((first, second), (second, first)):
-        dynamics = LinearDynamics.of(fit_linear(fit.form, part, [fit.f], bounded=fit.bounded, least_gain=NEAR))
-        squares += [(dynamics.run(u, y) - y) ** 2 for u, y in zip(other.u, other.y, strict=True)]
-    return float(np.sqrt(np.nanmean(np.concatenate(squares))))
-
-
 def candidate(fit: LinearFit, data: Channels) -> Candidate:
     """Return a fit with its held-back error, criteria, and what is doubtful in it."""
     # a dead time that was searched is one more value
-    values = fit.theta.size + sum(delay > 1 for delay in fit.form.delays)
+    values = fit.theta.size + sum(delay > 1 for delay in fit.form.delays) - fit.integrates
     errors = held_back_blocks(fit, data)
     return Candidate(fit, pooled(errors), errors, *criteria(fit.cost, values, data.n_samples), doubt_of(fit, data))
 
@@ -293,15 +177,24 @@ def linear_candidates(
         forms = _forms(order, late, m, sizes)
         fits = [_best_start(form, data, previous) for form in (forms if delays is None else forms[:1])]
         tried = [candidate(fit, data) for fit in fits]
-        tried += [_within_record(one, data) for one in tried if one.doubt == "time_constant"]
+        beyond = [one for one in tried if one.doubt == "time_constant"]
+        tried += [_within_record(one, data) for one in beyond]
+        tried += [other for one in beyond for other in _integrating(one, data)]
         found += tried
         previous = [start for fit in fits for start in extended(fit)]
-        now = min((one.held_back for one in tried if not one.doubt), default=np.inf)
+        now = _least(found)
         idle = 0 if now < (1.0 - CLEARLY) * best else idle + 1
         best = min(best, now)
         if idle >= PATIENCE:
             break
     return found
+
+
+def _least(candidates: Sequence[Candidate]) -> float:
+    """Return the least held-back error of models that may be taken: of those with a pole at 1, if one is believed."""
+    sound = min((one.held_back for one in candidates if not one.doubt), default=np.inf)
+    integrating = min((one.held_back for one in candidates if one.fit.integrates), default=np.inf)
+    return integrating if integrating < INTEGRATING * sound else sound
 
 
 def _best_start(form: Form, data: Channels, previous: Sequence[Array]) -> LinearFit:
@@ -314,6 +207,12 @@ def _best_start(form: Form, data: Channels, previous: Sequence[Array]) -> Linear
 def _within_record(one: Candidate, data: Channels) -> Candidate:
     """Return the best model of the same form whose time constants the record can hold."""
     return candidate(fit_linear(one.form, data, [one.fit.f], bounded=True), data)
+
+
+def _integrating(one: Candidate, data: Channels) -> list[Candidate]:
+    """Return the best model of the same form with a pole at 1; none where it cannot be written."""
+    fit = fit_integrating(one.form, data, [one.fit.f], search=True, least_gain=NEAR)
+    return [candidate(fit, data)] if np.isfinite(fit.cost) else []
 
 
 def _forms(order: int, late: tuple[int, ...], m: int, sizes: int | None) -> list[Form]:

@@ -10,10 +10,12 @@ from functools import partial
 
 import numpy as np
 
-from estimation.identification.free_run.choose_linear import BLOCKS, Candidate, block_error, criteria, pooled
+from estimation.identification.free_run.choose_linear import Candidate, criteria
 from estimation.identification.free_run.data import Channels, blocks
 from estimation.identification.free_run.dense_polynomial import Asked, Judged, Recipe, forms_tried, judged_recipes
-from estimation.identification.free_run.linear_fit import LinearFit, fit_linear
+from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_problem import LinearFit
 from estimation.identification.free_run.other_orders import disagreement, is_wild
 from estimation.identification.free_run.output_friction import continued, fit_with_friction
 from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs

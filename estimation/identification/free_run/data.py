@@ -6,10 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.arrays import Array, BoolArray
+from estimation.identification.signals.period import common_period
 from plant.errors import HydrostateError
 
 FEWEST = 20
 """Samples of an output that a fit needs at least."""
+
+SHORTEST = 20
+"""Samples of a block that is held back in every period at least; a shorter period has too little in it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +162,8 @@ def in_scale(data: Channels, by: Scaling) -> Channels:
 def blocks(data: Channels, count: int) -> list[list[BoolArray]]:
     """Return masks that hold back one block of every log after the other, but for the first.
 
-    The first block is never held back: nothing else tells the initial state.
+    The first block is never held back: nothing else tells the initial state. Where the inputs repeat themselves, a
+    block is the same part of every period: a block of the log would hold back nothing that other periods do not tell.
 
     Parameters
     ----------
@@ -170,7 +175,12 @@ def blocks(data: Channels, count: int) -> list[list[BoolArray]]:
     list of list of ndarray of bool, shape (n,)
         One mask a log, for each block.
     """
-    return [[np.arange(y.size) * (count + 1) // max(y.size, 1) == 1 + index for y in data.y] for index in range(count)]
+    places: list[Array] = []
+    for u, y in zip(data.u, data.y, strict=True):
+        period = common_period(u) or y.size
+        period = max(period if period >= SHORTEST * (count + 1) else y.size, 1)
+        places.append(np.arange(y.size) % period * (count + 1) // period)
+    return [[place == 1 + index for place in places] for index in range(count)]
 
 
 def halves(data: Channels) -> tuple[Channels, Channels]:

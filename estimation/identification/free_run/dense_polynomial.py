@@ -12,9 +12,11 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from estimation.arrays import IntArray
-from estimation.identification.free_run.choose_linear import CLEARLY, block_error, pooled
+from estimation.identification.free_run.choose_linear import CLEARLY
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.linear_fit import COARSE, Form, LinearFit
+from estimation.identification.free_run.held_back import block_error, pooled
+from estimation.identification.free_run.linear_fit import COARSE
+from estimation.identification.free_run.linear_problem import Form, LinearFit
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, variables_of
 from estimation.identification.free_run.polynomial_moments import Moments, moments, one_step_values
 from estimation.identification.free_run.polynomial_variables import Variables

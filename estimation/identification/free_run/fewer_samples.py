@@ -5,7 +5,8 @@ from dataclasses import replace
 
 from estimation.identification.free_run.choose_linear import Candidate, candidate
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.linear_fit import fit_coarsely
+from estimation.identification.free_run.integrating import refitted_linear
+from estimation.identification.free_run.linear_fit import COARSE
 
 
 def on_fewer(
@@ -31,8 +32,7 @@ def on_fewer(
     if fewer.n_samples == part.n_samples:
         return part, list(linear), best
     judged = [
-        replace(candidate(fit_coarsely(one.form, fewer, [one.fit.f], bounded=one.fit.bounded), fewer), doubt=one.doubt)
-        for one in linear
+        replace(candidate(refitted_linear(one.fit, fewer, least_gain=COARSE), fewer), doubt=one.doubt) for one in linear
     ]
     own = next(other for one, other in zip(linear, judged, strict=True) if one.fit is best.fit)
     return fewer, judged, replace(own, doubt=best.doubt)

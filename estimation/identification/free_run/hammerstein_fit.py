@@ -10,8 +10,9 @@ from estimation.fits.greybox.covariance import automatic_lags, least_squares_cov
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.free_run.least_squares import Counted
-from estimation.identification.free_run.linear_fit import COARSE, Form, LinearFit, Problem, fit_linear
+from estimation.identification.free_run.linear_fit import COARSE, fit_linear
 from estimation.identification.free_run.linear_kernel import decay_rows, settles
+from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
 from estimation.identification.search.levenberg import levenberg
 
 TOLERANCE, MOST_STEPS = 1e-9, 60

@@ -15,14 +15,7 @@ from estimation.identification.free_run.choose_hammerstein import (
     hammerstein_candidates,
     worthwhile,
 )
-from estimation.identification.free_run.choose_linear import (
-    BLOCKS,
-    Candidate,
-    chosen,
-    halves_error,
-    linear_candidates,
-    surely_better,
-)
+from estimation.identification.free_run.choose_linear import INTEGRATING, Candidate, chosen, linear_candidates
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate, polynomial_candidates
 from estimation.identification.free_run.data import Channels, Scaling, blocks, scaled, section
 from estimation.identification.free_run.dense_polynomial import Asked
@@ -30,8 +23,10 @@ from estimation.identification.free_run.fallback import Fallback
 from estimation.identification.free_run.fewer_samples import on_fewer
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.hammerstein_fit import deviations, finished, refitted
+from estimation.identification.free_run.held_back import BLOCKS, halves_error, surely_better
+from estimation.identification.free_run.integrating import refitted_linear
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
-from estimation.identification.free_run.linear_fit import LinearFit, fit_linear
+from estimation.identification.free_run.linear_problem import LinearFit
 from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
 from estimation.identification.free_run.other_orders import wanders
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
@@ -66,10 +61,6 @@ CLEAR_MARGIN = 0.15
 
 NEARLY_AS_GOOD = 0.02
 """Share of held-back error that is given up for a model without cancelling or undetermined parts."""
-
-INTEGRATING = 0.7
-"""A pole at one is believed where it leaves less than this share of the best other model's held-back error."""
-
 
 BELIEVED = 0.5
 """Likewise, of the output's deviation, where no other model may be taken."""
@@ -262,10 +253,17 @@ def _believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) ->
     notes: list[Note] = []
     best = chosen(candidates)
     # a time constant held at the record's length does nearly what an integrator does, and is no other explanation
-    free = [one for one in candidates if not one.fit.bounded]
-    tempting, other = min(free, key=lambda one: one.held_back), chosen(free)
+    free = [one for one in candidates if not (one.fit.bounded or one.fit.integrates)]
+    other = chosen(free or candidates)
     bar = BELIEVED if other.doubt else INTEGRATING * other.held_back
-    if tempting.doubt == "time_constant" and tempting.held_back < bar and not wanders(tempting.fit, data):
+    integrating = [one for one in candidates if one.fit.integrates and one.doubt != "no_fit"]
+    tempting = chosen(integrating) if integrating else None
+    if tempting is not None and tempting.held_back < bar and not wanders(tempting.fit, data):
+        # a pole that is estimated beyond the record is believed beside one at 1 alone, and where it is surely better
+        beyond = [one for one in free if one.doubt == "time_constant"]
+        leaky = chosen(beyond) if beyond else tempting
+        surely = surely_better(leaky.block_errors, tempting.block_errors) and not wanders(leaky.fit, data)
+        tempting = leaky if surely else tempting
         return replace(tempting, doubt=""), [IdentificationCode.INTEGRATES.note(output=data.output)]
     if best.doubt == "time_constant":
         radius = float(np.abs(np.roots(best.fit.f)).max())
@@ -332,7 +330,7 @@ def _refitted(found: PolynomialCandidate, whole: Channels) -> PolynomialDynamics
 
 def _continued(linear: Candidate, data: Channels) -> LinearFit:
     """Return a linear model fitted to other data."""
-    return fit_linear(linear.form, data, [linear.fit.f], bounded=linear.fit.bounded)
+    return refitted_linear(linear.fit, data)
 
 
 def _fallback(taken: PolynomialCandidate, linear: Candidate, part: Channels, whole: Channels) -> Fallback:

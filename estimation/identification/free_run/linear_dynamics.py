@@ -9,7 +9,7 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.dynamics import OutputErrorDynamics
-from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem
+from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
-from estimation.identification.free_run.linear_fit import LinearFit
+from estimation.identification.free_run.linear_problem import LinearFit
 from estimation.identification.free_run.polynomial_fit import FARTHEST, PolynomialFit, Runs
 
 WILD = 0.003

@@ -6,10 +6,10 @@ import numpy as np
 
 from estimation.arrays import Array, BoolArray
 from estimation.identification.choose import fit_structure
-from estimation.identification.free_run.choose_linear import block_error
 from estimation.identification.free_run.data import Channels, Scaling, in_scale
+from estimation.identification.free_run.held_back import block_error
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
-from estimation.identification.free_run.linear_fit import Form, Problem
+from estimation.identification.free_run.linear_problem import Form, Problem
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.structure_names import STRUCTURE_NAMES
 from plant.errors import HydrostateError

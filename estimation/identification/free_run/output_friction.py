@@ -11,7 +11,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.linear_fit import LinearFit, Problem
+from estimation.identification.free_run.linear_problem import LinearFit, Problem
 from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs, variables_of
 
 LEVELS = (0.02, 0.1, 0.3, 0.6)

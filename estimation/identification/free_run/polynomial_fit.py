@@ -6,7 +6,7 @@ import numpy as np
 
 from estimation.arrays import Array, BoolArray, IntArray
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.linear_fit import LinearFit
+from estimation.identification.free_run.linear_problem import LinearFit
 from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_variables import BEYOND, Variables
 from estimation.identification.search.levenberg import levenberg

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.arrays import Array, IntArray
-from estimation.identification.free_run.choose_linear import block_error
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.dense_polynomial import STEPS, Asked, Judged, every_term, late_by
-from estimation.identification.free_run.linear_fit import COARSE, Form, LinearFit
+from estimation.identification.free_run.held_back import block_error
+from estimation.identification.free_run.linear_fit import COARSE
+from estimation.identification.free_run.linear_problem import Form, LinearFit
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, variables_of
 from estimation.identification.free_run.polynomial_moments import moments
 from estimation.identification.free_run.polynomial_variables import Variables

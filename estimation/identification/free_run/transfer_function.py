@@ -8,7 +8,7 @@ from estimation.identification.fit.fitted import COLOURED
 from estimation.identification.fit.residual_tests import ljung_box
 from estimation.identification.fit.validate import estimate_initial_state
 from estimation.identification.free_run.data import Channels, Scaling
-from estimation.identification.free_run.linear_fit import LinearFit, Problem
+from estimation.identification.free_run.linear_problem import LinearFit, Problem
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.experiments import Experiments, data_hash
 

@@ -12,7 +12,8 @@ from collections.abc import Callable
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.hammerstein_fit import HammersteinFit, refitted
-from estimation.identification.free_run.linear_fit import LinearFit, fit_linear
+from estimation.identification.free_run.integrating import refitted_linear
+from estimation.identification.free_run.linear_problem import LinearFit
 from estimation.identification.free_run.other_orders import reordered
 
 ORDERS = 19
@@ -52,7 +53,7 @@ def linear_explains(fit: LinearFit, data: Channels) -> bool:
     data : Channels
         Scaled.
     """
-    return explains(fit.cost, lambda other: fit_linear(fit.form, other, [fit.f], bounded=fit.bounded).cost, data)
+    return explains(fit.cost, lambda other: refitted_linear(fit, other).cost, data)
 
 
 def bend_explains(fit: HammersteinFit, data: Channels) -> bool:

@@ -8,10 +8,8 @@ from scipy.special import stdtrit
 
 from estimation.arrays import Array, BoolArray, IntArray
 from estimation.identification.signals.local_polynomial import ComplexArray, FrequencyResponse, without_gaps
+from estimation.identification.signals.period import find_period
 from plant.errors import HydrostateError
-
-REPEATS = 1e-4
-"""Power of an input's change over a period, over its own, up to which it repeats itself [fraction]."""
 
 EXCITED = 1e-3
 """Amplitude of a line over the largest, from which it is driven [fraction]."""
@@ -154,40 +152,6 @@ class Distortion:
         # lines of one multisine are complex normal: their powers scatter by as much as they are
         lost = float(np.sum(power**2)) / 2.0 / float(power.sum()) ** 2 * (1.0 - count / int(lines.sum()))
         return float(power.mean()) * float(np.sqrt(share + lost))
-
-
-def find_period(u: ArrayLike) -> int | None:
-    """Return after how many samples an input repeats itself; None where it does not within half of the log.
-
-    Parameters
-    ----------
-    u : array_like, shape (n,)
-        Input [any unit].
-
-    Returns
-    -------
-    int or None
-        The period [samples].
-
-    Examples
-    --------
-    >>> find_period(np.tile([0.0, 1.0, 3.0, 2.0], 5)), find_period(np.arange(20.0))
-    (4, None)
-    """
-    values = np.asarray(u, dtype=np.float64)
-    values = values - values.mean()
-    n = len(values)
-    total = float(values @ values)
-    if not total > 0.0 or not np.isfinite(total):
-        return None
-    spectrum = np.fft.rfft(values, 2 * n)
-    likeness = np.fft.irfft(np.abs(spectrum) ** 2)[:n]
-    squares = np.concatenate([[0.0], np.cumsum(values**2)])
-    lags = np.arange(1, n // 2 + 1)
-    # the power of u[k + lag] - u[k] over the samples that both have
-    change = (squares[n] - squares[lags]) + squares[n - lags] - 2.0 * likeness[lags]
-    same = lags[change <= 2.0 * REPEATS * (squares[n] - squares[lags])]
-    return int(same[0]) if len(same) else None
 
 
 def _silent(excited: BoolArray, kind: BoolArray) -> BoolArray:

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.signals.distortion import Distortion, best_linear_approximation, find_period
+from estimation.identification.signals.distortion import Distortion, best_linear_approximation
 from estimation.identification.signals.local_polynomial import FrequencyResponse, local_polynomial_response
+from estimation.identification.signals.period import find_period
 from plant.errors import HydrostateError
 
 SETTLING, FEWEST_PERIODS = 1, 2

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimation.identification.free_run.choose_linear import CLEARLY, pooled
+from estimation.identification.free_run.choose_linear import CLEARLY
 from estimation.identification.free_run.data import Channels, scaled, section
+from estimation.identification.free_run.held_back import pooled
 from estimation.identification.free_run.identify import (
     MOST_CHOSEN,
     MOST_FITTED,

@@ -12,7 +12,7 @@ from estimation.export.c_model import model_in_c
 from estimation.export.mat_model import model_in_mat
 from estimation.identification.free_run.data import Scaling
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
-from estimation.identification.free_run.linear_fit import Form
+from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
 from tests.c_compiler import compiled, ran
 

@@ -8,7 +8,8 @@ import pytest
 from estimation.arrays import Array
 from estimation.identification.free_run.data import channels_from, scaled
 from estimation.identification.free_run.input_nonlinearity import play
-from estimation.identification.free_run.linear_fit import Form, fit_linear
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_fit import Runs
 from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, one_more

@@ -21,11 +21,12 @@ from estimation.identification.free_run import (
     hammerstein_fit,
     identify,
     linear_fit,
+    linear_problem,
     polynomial_fit,
     polynomial_terms,
 )
 from estimation.identification.free_run.data import Channels, channels_from, scaled
-from estimation.identification.free_run.linear_fit import Form, LinearFit
+from estimation.identification.free_run.linear_problem import Form, LinearFit
 from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_fit import Runs
 from estimation.identification.search import pole_search
@@ -169,15 +170,15 @@ def other_fits() -> dict[str, Any]:
 def free_runs() -> dict[str, Any]:
     told: dict[str, Any] = {}
     form = Form(2, (2,), (1,))
-    with watched(linear_fit, "levenberg", options) as asked:
+    with watched(linear_problem, "levenberg", options) as asked:
         found = linear_fit.fit_linear(form, channels())
     told["linear"] = asked
-    problem = linear_fit.Problem(form, channels())
+    problem = linear_problem.Problem(form, channels())
     costs = [(1.0, 0), (1.0 + 0.9e-7, 1), (1.0 + 1.1e-7, 2), (2.0, 3), (3.0, 4)]
     given = iter(costs)
     with (
-        watched(linear_fit.Problem, "profiled", lambda *_: 0, lambda *_: (next(given)[0], found.theta)),
-        watched(linear_fit.Problem, "descend", lambda *_, **__: 0, lambda *_, **__: found) as descended,
+        watched(linear_problem.Problem, "profiled", lambda *_: 0, lambda *_: (next(given)[0], found.theta)),
+        watched(linear_problem.Problem, "descend", lambda *_, **__: 0, lambda *_, **__: found) as descended,
     ):
         linear_fit.fit_linear(form, channels(), [found.f] * 5)
     told["linear, descended"] = len(descended)
@@ -186,15 +187,15 @@ def free_runs() -> dict[str, Any]:
     for name, size in (("searched", n - 1), ("not searched", n)):
         two = channels_from([one[:size] for one in logs], [np.resize(answer(), size)] * 2, 0.1, ("a",), "y")
         with watched(linear_fit, "descend_from", lambda *_: 0, lambda *_: (0.0, np.zeros(9))) as asked:
-            linear_fit._searched(linear_fit.Problem(form, two))
+            linear_fit._searched(linear_problem.Problem(form, two))
         told[name] = len(asked)
     swinging = iter(np.tile([0.1, 0.2], 99))
     with watched(linear_fit, "least_squares", lambda *_: 0, lambda *_: (np.full(5, next(swinging)), 0.0)) as asked:
-        linear_fit._steiglitz_mcbride(problem)
+        linear_fit.steiglitz_mcbride(problem)
     told["passes at most"] = len(asked)
     creeping = iter(0.1 + np.cumsum([0.1, 0.1, 0.9e-6, 0.1, 0.1]))
     with watched(linear_fit, "least_squares", lambda *_: 0, lambda *_: (np.full(5, next(creeping)), 0.0)) as asked:
-        linear_fit._steiglitz_mcbride(problem)
+        linear_fit.steiglitz_mcbride(problem)
     told["passes that settle"] = len(asked)
     begun = polynomial_terms.begun(found, channels())
     assert begun is not None

@@ -15,7 +15,7 @@ from estimation.identification.free_run.choose_hammerstein import (
     chosen_hammerstein,
 )
 from estimation.identification.free_run.choose_linear import CLEARLY
-from estimation.identification.free_run.linear_fit import Form
+from estimation.identification.free_run.linear_problem import Form
 
 NONE: Any = None
 

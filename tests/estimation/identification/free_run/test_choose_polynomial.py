@@ -10,7 +10,7 @@ import pytest
 from estimation.identification.free_run import choose_polynomial
 from estimation.identification.free_run.choose_polynomial import _best_grown, _dense, _fitted, _with_friction
 from estimation.identification.free_run.dense_polynomial import Asked, Recipe
-from estimation.identification.free_run.linear_fit import Form
+from estimation.identification.free_run.linear_problem import Form
 
 DATA: Any = SimpleNamespace(n_samples=400, y=(np.zeros(400),), without=lambda mask: mask)
 

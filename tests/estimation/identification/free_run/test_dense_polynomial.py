@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from estimation.arrays import Array
-from estimation.identification.free_run.choose_linear import BLOCKS, linear_candidates
+from estimation.identification.free_run.choose_linear import linear_candidates
 from estimation.identification.free_run.choose_polynomial import polynomial_candidates
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
 from estimation.identification.free_run.dense_polynomial import Asked, Recipe, every_term, forms_tried, judged_recipes
+from estimation.identification.free_run.held_back import BLOCKS
 from estimation.identification.free_run.identify import identify_channels
-from estimation.identification.free_run.linear_fit import Form
+from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.other_orders import disagreement, reordered
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import Runs

@@ -12,7 +12,7 @@ from estimation.identification.free_run.fallback import Fallback, jackknife
 from estimation.identification.free_run.identify import Identified, identify_channels
 from estimation.identification.free_run.input_range import linear_instead
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
-from estimation.identification.free_run.linear_fit import Form
+from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 

@@ -18,13 +18,14 @@ from estimation.identification.free_run.choose_hammerstein import (
     hammerstein_candidates,
     worthwhile,
 )
-from estimation.identification.free_run.choose_linear import linear_candidates, pooled
+from estimation.identification.free_run.choose_linear import linear_candidates
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.hammerstein_fit import HammersteinFit, HammersteinProblem, fit_hammerstein
+from estimation.identification.free_run.held_back import pooled
 from estimation.identification.free_run.identify import Identified, identify_channels
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES, play
-from estimation.identification.free_run.linear_fit import Form, LinearFit
+from estimation.identification.free_run.linear_problem import Form, LinearFit
 from estimation.identification.free_run.model import FreeRunModel
 from plant.errors import HydrostateError
 

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.identification.free_run import choose_linear, identify, linear_fit
+from estimation.identification.free_run import choose_linear, held_back, identify, linear_fit
 from estimation.identification.free_run.choose_linear import Candidate
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.least_squares import least_squares
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
-from estimation.identification.free_run.linear_fit import Form, LinearFit, Problem, fit_linear
+from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_kernel import decay_rows
+from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
 from estimation.identification.free_run.model import FreeRunModel, _fit
 from estimation.identification.free_run.other_structures import adopt
 from estimation.identification.free_run.transfer_function import linear_model
@@ -57,7 +58,7 @@ def problems() -> dict[str, Any]:
                 "rows": [some(one, 3) for one in linear_fit.columns_of(form, U[:, : len(form.sizes)]).T],
                 "before": problem.first_columns(1),
                 "quick": linear_fit.quick_fit(form, problem.data),
-                "starts": linear_fit._steiglitz_mcbride(problem),
+                "starts": linear_fit.steiglitz_mcbride(problem),
             }
     told["lagged beyond the log"] = linear_fit.columns_of(Form(1, (3,), (2,)), U[:3, :1])
     told["no inputs"] = list(linear_fit.columns_of(Form(1, (), ()), U[:3, :0]).shape)
@@ -131,7 +132,7 @@ def choices() -> dict[str, Any]:
         told[f"{name}, chosen"] = [choose_linear.chosen(found).form.order, choose_linear.chosen(found).price]
     told["sizes that are given"] = [one.form.sizes for one in choose_linear.linear_candidates(data(), [2], (1,), 3)]
     fit = fit_linear(FORMS["one input"], data(lost=True))
-    told["blocks"] = list(choose_linear.held_back_blocks(fit, data(lost=True)))
+    told["blocks"] = list(held_back.held_back_blocks(fit, data(lost=True)))
     one = choose_linear.candidate(fit, data(lost=True))
     told["criteria"] = [one.bic, one.aic, one.held_back]
     late = fit_linear(Form(2, (2,), (2,)), data(lost=True))
@@ -165,9 +166,9 @@ def choices() -> dict[str, Any]:
         )
     ]
     told["doubts without poles"] = choose_linear.doubt_of(LinearFit(Form(0, (1,), (1,)), np.zeros(2), 1.0), base)
-    told["pooled"] = [choose_linear.pooled(one) for one in ([3.0, 4.0, np.nan], [], [np.nan])]
-    none = choose_linear.block_error(np.ones(3), np.zeros(3, dtype=bool))
-    told["block errors"] = [choose_linear.block_error(np.array([3.0, 4.0, 9.0]), np.array([True, True, False])), none]
+    told["pooled"] = [held_back.pooled(one) for one in ([3.0, 4.0, np.nan], [], [np.nan])]
+    none = held_back.block_error(np.ones(3), np.zeros(3, dtype=bool))
+    told["block errors"] = [held_back.block_error(np.array([3.0, 4.0, 9.0]), np.array([True, True, False])), none]
     return told
 
 
@@ -175,9 +176,9 @@ def choices() -> dict[str, Any]:
 def believed() -> dict[str, Any]:
     """Which candidate is believed, on either side of every bar."""
     base, by = scaled(channels())
-    integrator = LinearFit(Form(1, (1,), (1,)), np.array([0.5, -0.9999, 0.0, 0.0, 0.0]), 1.0)
+    integrator = LinearFit(Form(1, (1,), (1,)), np.array([0.5, -0.9999, 0.0, 0.0, 0.0]), 1.0, integrates=True)
     beyond = LinearFit(Form(1, (1,), (1,)), np.array([0.5, -1.0, 0.0, 0.0, 0.0]), 1.0)
-    held = replace(integrator, bounded=True)
+    held = replace(integrator, bounded=True, integrates=False)
     slow_one = partial(made, bic=0.0, doubt="time_constant")
     rows: dict[str, list[Candidate]] = {
         "integrates": [made(1.0, 0.0), slow_one(0.69, fit=integrator)],

@@ -22,13 +22,14 @@ def data_that_are_cut() -> dict[str, Any]:
     one = channels(lost=True)
     whole, by = scaled(one)
     lively = replace(one, u=tuple(u * np.linspace(0.1, 3.0, len(u))[:, None] for u in one.u))
+    few = replace(one, u=(one.u[0][:3],), y=(NOISE[:3],))
     told: dict[str, Any] = {
         "counts": [one.n_samples, one.longest, one.duration],
         "scaling": [by.u_mean, by.u_std, by.y_mean, by.y_std],
         "scaled": [some(part, 3) for part in (*whole.u, *whole.y)],
         "back in scale": some(in_scale(one, by).y[1], 3),
         "blocks": [[np.flatnonzero(mask)[[0, -1]] for mask in masks] for masks in blocks(one, 4)],
-        "blocks of few": [mask.tolist() for masks in blocks(replace(one, y=(NOISE[:3],)), 2) for mask in masks],
+        "blocks of few": [mask.tolist() for masks in blocks(few, 2) for mask in masks],
     }
     for most in (100, 299, 300, 3):
         part = section(lively, most)

@@ -25,7 +25,8 @@ from estimation.identification.free_run.hammerstein_fit import HammersteinProble
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES, _inner, _outer, _widths, play
 from estimation.identification.free_run.input_range import inputs_beyond
-from estimation.identification.free_run.linear_fit import Form, LinearFit, fit_linear
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_problem import Form, LinearFit
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics

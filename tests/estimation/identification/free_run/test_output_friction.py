@@ -13,7 +13,8 @@ from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.factored_kernel import run_factored, slopes_of
 from estimation.identification.free_run.identify import Identified, identify_channels
-from estimation.identification.free_run.linear_fit import Form, fit_linear
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.output_friction import continued, fit_with_friction

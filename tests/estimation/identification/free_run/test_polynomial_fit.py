@@ -14,7 +14,8 @@ from estimation.identification.free_run import identify
 from estimation.identification.free_run.choose_polynomial import _pruned
 from estimation.identification.free_run.data import Channels, channels_from, scaled, section
 from estimation.identification.free_run.identify import identify_channels
-from estimation.identification.free_run.linear_fit import Form, fit_linear
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.other_orders import is_wild

@@ -5,7 +5,8 @@ import pytest
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.linear_fit import Form, fit_linear
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.output_friction import _first_outputs
 from estimation.identification.free_run.polynomial_fit import Runs, first_values, variables_of
 from estimation.identification.free_run.polynomial_variables import BEYOND, Variables

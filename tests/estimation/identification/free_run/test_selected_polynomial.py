@@ -5,10 +5,11 @@ import pytest
 
 from estimation.arrays import Array
 from estimation.identification.free_run import choose_polynomial
-from estimation.identification.free_run.choose_linear import BLOCKS, linear_candidates
+from estimation.identification.free_run.choose_linear import linear_candidates
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
 from estimation.identification.free_run.dense_polynomial import Asked
-from estimation.identification.free_run.linear_fit import Form
+from estimation.identification.free_run.held_back import BLOCKS
+from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.selected_polynomial import (

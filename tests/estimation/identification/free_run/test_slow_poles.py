@@ -8,17 +8,17 @@ import pytest
 from estimation.arrays import Array
 from estimation.identification.free_run import identify
 from estimation.identification.free_run.choose_linear import (
-    BLOCKS,
     Candidate,
     candidate,
     chosen,
-    halves_error,
     linear_candidates,
     slowest_pole,
 )
 from estimation.identification.free_run.data import Channels, channels_from, halves, scaled
+from estimation.identification.free_run.held_back import BLOCKS, halves_error
 from estimation.identification.free_run.identify import _believable
-from estimation.identification.free_run.linear_fit import Form, LinearFit, fit_linear
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_problem import Form, LinearFit
 from estimation.identification.free_run.other_orders import wanders
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode

@@ -5,9 +5,10 @@ import pytest
 
 from benchmarks.identification.frequency_response import DAMPED, NUMERATOR, PERIOD, PERIODS, bent, multisine, odd_lines
 from estimation.identification.model.recursion import filtered
-from estimation.identification.signals.distortion import best_linear_approximation, find_period
+from estimation.identification.signals.distortion import best_linear_approximation
 from estimation.identification.signals.local_polynomial import local_polynomial_response
 from estimation.identification.signals.measured_response import measured_response
+from estimation.identification.signals.period import find_period
 from plant.errors import HydrostateError
 
 DENOMINATOR = [1.0, -1.6, 0.75]

@@ -10,10 +10,11 @@ import pytest
 
 from estimation.identification.signals import automatic_window, etfe
 from estimation.identification.signals.automatic_window import automatic_response
-from estimation.identification.signals.distortion import Distortion, best_linear_approximation, find_period
+from estimation.identification.signals.distortion import Distortion, best_linear_approximation
 from estimation.identification.signals.etfe import checked_signals, etfe_welch
 from estimation.identification.signals.local_polynomial import local_polynomial_response
 from estimation.identification.signals.measured_response import measured_response
+from estimation.identification.signals.period import find_period
 from estimation.identification.signals.preprocess import detrend, resample, zero_phase_filter
 from plant.arrays import Array
 from tests.numbers import Numbers, refused, some, warned

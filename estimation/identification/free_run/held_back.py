@@ -1,0 +1,135 @@
+"""Errors of free runs on what was held back: blocks between outputs that are fitted, and halves."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from estimation.arrays import Array, BoolArray
+from estimation.identification.free_run.data import Channels, blocks, halves
+from estimation.identification.free_run.integrating import refitted_linear
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
+from estimation.identification.free_run.linear_problem import LinearFit, Problem
+from estimation.progress import tell
+
+BLOCKS = 4
+"""Blocks of every log, each held back once."""
+
+NEAR = 1e-6
+"""Share of the cost that two steps of a descent in a row must gain each while forms are compared: the chosen one is
+fitted on."""
+
+
+def held_back_blocks(fit: LinearFit, data: Channels) -> tuple[float, ...]:
+    """Return the root-mean-square free-run error of each block held back, simulated by a fit to the others.
+
+    Parameters
+    ----------
+    fit : LinearFit
+        Of all data; each fit begins at it.
+    data : Channels
+        Scaled.
+
+    Returns
+    -------
+    tuple of float
+        Over the output's deviation, one a block.
+    """
+    target = np.concatenate(data.y)
+    errors: list[float] = []
+    tell("linear models")
+    for masks in blocks(data, BLOCKS):
+        mask = np.concatenate(masks) & np.isfinite(target)
+        part = refitted_linear(fit, data.without(masks), least_gain=NEAR)
+        errors.append(block_error(Problem(fit.form, data).jacobian(part.theta)[0] - target, mask))
+    return tuple(errors)
+
+
+def block_error(error: Array, mask: BoolArray) -> float:
+    """Return the root mean square of an error where a block was held back; NaN where the block holds nothing.
+
+    Parameters
+    ----------
+    error : ndarray, shape (n,)
+        Simulated less measured.
+    mask : ndarray of bool, shape (n,)
+        Where it was held back.
+
+    Returns
+    -------
+    float
+        In the error's unit.
+    """
+    return float(np.sqrt(np.mean(error[mask] ** 2))) if mask.any() else float("nan")
+
+
+def pooled(errors: Sequence[float]) -> float:
+    """Return the root mean square over blocks; infinite where there are none.
+
+    Parameters
+    ----------
+    errors : sequence of float
+        One a block [dimensionless].
+
+    Returns
+    -------
+    float
+        Likewise.
+
+    Examples
+    --------
+    >>> round(pooled([3.0, 4.0, float("nan")]) ** 2, 6)
+    12.5
+    """
+    known = [error**2 for error in errors if not np.isnan(error)]
+    return float(np.sqrt(np.mean(known))) if known else float("inf")
+
+
+def surely_better(errors: Sequence[float], others: Sequence[float]) -> bool:
+    """Return whether a model beats another on the same blocks by more than the blocks scatter: one standard error.
+
+    Parameters
+    ----------
+    errors, others : sequence of float
+        Root-mean-square errors of the model and of the other, one a block; NaN where one holds nothing [dimensionless].
+
+    Returns
+    -------
+    bool
+        Of one block alone, whether it is better there.
+
+    Examples
+    --------
+    >>> surely_better([1.0, 1.0, 1.0], [2.0, 2.1, 1.9]), surely_better([1.0, 1.0, 1.0], [0.9, 0.9, 2.0])
+    (True, False)
+    """
+    gains = np.square(others) - np.square(errors)
+    known = gains[~np.isnan(gains)]
+    scatter = float(known.std(ddof=1)) / np.sqrt(known.size) if known.size > 1 else 0.0
+    return known.size > 0 and bool(known.mean() > scatter)
+
+
+def halves_error(fit: LinearFit, data: Channels) -> float:
+    """Return the error of a free run over each half of every log by a fit to the other halves, root mean square.
+
+    A block lies between outputs that are fitted, and they pin a slow pole there; a half has only an initial state.
+
+    Parameters
+    ----------
+    fit : LinearFit
+        Of all data; each fit begins at it.
+    data : Channels
+        Scaled.
+
+    Returns
+    -------
+    float
+        Over the output's deviation; NaN where a half has too few outputs.
+    """
+    first, second = halves(data)
+    if min(first.n_samples, second.n_samples) < 2 * fit.theta.size:
+        return float("nan")
+    squares = list[Array]()
+    for part, other in ((first, second), (second, first)):
+        dynamics = LinearDynamics.of(refitted_linear(fit, part, least_gain=NEAR))
+        squares += [(dynamics.run(u, y) - y) ** 2 for u, y in zip(other.u, other.y, strict=True)]
+    return float(np.sqrt(np.nanmean(np.concatenate(squares))))

@@ -1,0 +1,131 @@
+"""Linear models that integrate: one pole is at 1, and what is fitted is the rest of the model on summed inputs.
+
+A pole that is estimated near 1 decays over a few records, so that a run over new data drifts off; and its descent goes
+along a curved valley, where offset, initial state and pole give one ramp together. With the pole given, the inputs are
+summed, the ramp is a column, and the other poles are as easy to fit as those of a plant that settles.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.linear_fit import fit_linear, steiglitz_mcbride
+from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
+
+RECORDS = 1e3
+"""Time constant of the pole that is written for 1 [records]: a run begins at rest, which a pole at 1 does not have."""
+
+
+LOST = 0.01
+"""Share of the cost by which what is written may differ from what was fitted: beside other poles close to 1, sums of
+the denominator's coefficients are rounding."""
+
+
+def fit_integrating(
+    form: Form, data: Channels, starts: Sequence[Array], *, search: bool = False, least_gain: float = 0.0
+) -> LinearFit:
+    """Return the best linear model of one form that has a pole at 1.
+
+    Parameters
+    ----------
+    form : Form
+        Of order one or more, the pole at 1 among them.
+    data : Channels
+        Scaled.
+    starts : sequence of ndarray, shape (n + 1,)
+        Denominators to begin at; the pole nearest to 1 is taken out of each.
+    search : bool
+        Whether others are tried beside them.
+    least_gain : float
+        As `levenberg` takes it [dimensionless].
+
+    Returns
+    -------
+    LinearFit
+        Its pole has a time constant of `RECORDS` records. The cost is infinite where such a model cannot be written.
+    """
+    summed, scales = _summed(data)
+    inner = Form(
+        form.order - 1, (*form.sizes, *[1] * (len(summed.inputs) - len(form.sizes))), (*form.delays, *_no_delays(data))
+    )
+    if inner.order == 0:
+        cost, theta = Problem(inner, summed).profiled(np.ones(1))
+        found = LinearFit(inner, theta, cost)
+    else:
+        begun = [_without_slowest(f) for f in starts]
+        begun += steiglitz_mcbride(Problem(inner, summed)) if search else []
+        found = fit_linear(inner, summed, begun, least_gain=least_gain)
+    return _written(form, data, found, scales)
+
+
+def refitted_linear(fit: LinearFit, data: Channels, *, least_gain: float = 0.0) -> LinearFit:
+    """Return a fit of the same kind to other data, begun where it has ended.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    least_gain : float
+        As `levenberg` takes it [dimensionless].
+    """
+    if fit.integrates:
+        return fit_integrating(fit.form, data, [fit.f], least_gain=least_gain)
+    return fit_linear(fit.form, data, [fit.f], bounded=fit.bounded, least_gain=least_gain)
+
+
+def _no_delays(data: Channels) -> list[int]:
+    return [0] * (2 * len(data.u) - 1)
+
+
+def _summed(data: Channels) -> tuple[Channels, Array]:
+    """Return summed inputs with a ramp in every log, and a level in every log but the first; and how inputs are scaled.
+
+    What an input stood at before a log goes into the ramp, so that sums are at rest before it.
+    """
+    sums = [np.cumsum(u - u[0], axis=0) for u in data.u]
+    scales = np.maximum(np.sqrt(np.mean(np.concatenate(sums) ** 2, axis=0)), 1e-300)
+    logs = len(data.u)
+    columns = list[Array]()
+    for index, one in enumerate(sums):
+        ramps, levels = np.zeros((len(one), logs)), np.zeros((len(one), logs - 1))
+        ramps[:, index] = np.arange(len(one)) / data.longest
+        if index:
+            levels[:, index - 1] = 1.0
+        columns.append(np.column_stack([one / scales, ramps, levels]))
+    names = (*data.inputs, *(f"ramp {k}" for k in range(logs)), *(f"level {k}" for k in range(1, logs)))
+    return replace(data, inputs=names, u=tuple(columns)), scales
+
+
+def _without_slowest(f: Array) -> Array:
+    """Return a denominator without its root nearest to 1; what would be left complex of a pair becomes real."""
+    roots = np.roots(f)
+    kept = np.delete(roots, int(np.argmin(np.abs(roots - 1.0))))
+    if abs(float(np.poly(kept).imag.max() if np.iscomplexobj(np.poly(kept)) else 0.0)) > 1e-9:
+        kept = kept.real
+    return np.real(np.poly(kept))
+
+
+def _written(form: Form, data: Channels, found: LinearFit, scales: Array) -> LinearFit:
+    """Return a fit to summed inputs as one of the inputs themselves, its initial states by least squares."""
+    b = [numerator / scale for numerator, scale in zip(found.numerators, scales, strict=False)]
+    pole = float(np.exp(-1.0 / (RECORDS * data.longest)))
+    f, settled = np.convolve(found.f, [1.0, -pole]), float(found.f.sum())
+    gains = np.array([one.sum() for one in b]) / settled
+    ramps = found.numerators[len(b) : len(b) + len(data.u)]
+    slopes = [float(ramp[0]) / settled / data.longest for ramp in ramps]
+    # beside inputs at zero the output nears the offset by this share of its distance a sample
+    drift = [slope - float(gains @ u[0]) for slope, u in zip(slopes, data.u, strict=True)]
+    offset = float(np.average(drift, weights=[y.size for y in data.y])) / (1.0 - pole)
+    problem = Problem(form, data)
+    columns, used = problem.linear_columns(f), problem.used
+    driven = columns[:, : form.n_b + 1] @ np.concatenate([*b, [offset]])
+    free = columns[:, form.n_b + 1 :]
+    states = np.linalg.lstsq(free[used], (problem.y - driven)[used], rcond=None)[0]
+    left = (problem.y - driven - free @ states)[used]
+    cost = float(left @ left)
+    # several logs have one offset, and had a ramp each
+    cost = cost if len(data.u) > 1 or cost <= (1.0 + LOST) * found.cost else float("inf")
+    return LinearFit(form, np.concatenate([*b, f[1:], [offset], states]), cost, integrates=True)

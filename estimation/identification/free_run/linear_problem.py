@@ -1,0 +1,224 @@
+"""A linear model's size and values, and the free run's sensitivities to them on given data."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation.arrays import Array, BoolArray
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.lagged_columns import lay_shifted
+from estimation.identification.free_run.least_squares import Counted, least_squares
+from estimation.identification.free_run.linear_kernel import decay_rows, longest_pole, settles
+from estimation.identification.search.descent import stable
+from estimation.identification.search.levenberg import levenberg
+from estimation.identification.search.reflections import stable_step
+
+TOLERANCE, MOST_STEPS = 1e-9, 80
+"""Share of the cost that a further step may promise at the end, and evaluations at most."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """Size of a linear model.
+
+    Parameters
+    ----------
+    order : int
+        Coefficients of the denominator behind its 1.
+    sizes, delays : tuple of int
+        Coefficients of each input's numerator, and the samples before them.
+    """
+
+    order: int
+    sizes: tuple[int, ...]
+    delays: tuple[int, ...]
+
+    @property
+    def n_b(self) -> int:
+        """Coefficients of all numerators."""
+        return sum(self.sizes)
+
+    @property
+    def n_values(self) -> int:
+        """Coefficients of numerators and denominator, and the offset."""
+        return self.n_b + self.order + 1
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFit:
+    """Where a linear fit has ended, in the data's scale.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (p,)
+        Numerators, denominator behind its 1, offset, and the initial state of each log.
+    cost : float
+        Sum of squared residuals [dimensionless].
+    bounded : bool
+        Whether time constants were held within the record.
+    integrates : bool
+        Whether a pole was given at 1.
+    """
+
+    form: Form
+    theta: Array
+    cost: float
+    bounded: bool = False
+    integrates: bool = False
+
+    @property
+    def numerators(self) -> list[Array]:
+        """Free numerator of each input."""
+        return np.split(self.theta[: self.form.n_b], np.cumsum(self.form.sizes)[:-1])
+
+    @property
+    def f(self) -> Array:
+        """Denominator, monic."""
+        n_b = self.form.n_b
+        return np.concatenate([[1.0], self.theta[n_b : n_b + self.form.order]])
+
+
+class Problem:
+    """Sensitivities of one form on given data."""
+
+    def __init__(self, form: Form, data: Channels) -> None:
+        self.form, self.data = form, data
+        self.bounds = np.concatenate([[0], np.cumsum([y.size for y in data.y])])
+        self.y = np.concatenate(data.y)
+        self.used: BoolArray = np.isfinite(self.y)
+        self.counted = Counted(self.used)
+        self.n_parameters = form.n_values + form.order * len(data.y)
+
+    def linear_columns(self, f: Array) -> Array:
+        """Return the output's derivative by numerators, offset and initial states for a denominator.
+
+        Parameters
+        ----------
+        f : ndarray, shape (order + 1,)
+            Denominator, monic.
+
+        Returns
+        -------
+        ndarray, shape (n, n_b + 1 + order * logs)
+            Numerators, offset, initial states of each log.
+        """
+        out = np.zeros((self.y.size, self.form.n_b + 1 + self.form.order * len(self.data.y)), order="F")
+        self._lay_linear(f, out, self.form.n_b)
+        return out
+
+    def _lay_linear(self, f: Array, out: Array, offset: int) -> None:
+        """Put the linear columns where they belong: numerators first, the offset and initial states from a column on.
+
+        Where initial states have no part is left as it is: zero.
+        """
+        form, n = self.form, self.form.order
+        out[:, offset] = 1.0
+        for index, u in enumerate(self.data.u):
+            first, last = int(self.bounds[index]), int(self.bounds[index + 1])
+            # an input that stood at its first value before the log: lags are shifts, filtered or not
+            rows, levels = np.zeros((u.shape[1] + 1, last - first)), np.zeros(u.shape[1] + 1)
+            rows[:-1], levels[:-1], rows[-1, 0] = u.T, u[0], 1.0
+            decay_rows(f, rows, levels)
+            place = 0
+            for answer, level, size, delay in zip(rows, levels / float(f.sum()), form.sizes, form.delays, strict=False):
+                for k in range(size):
+                    lay_shifted(out[first:last, place + k], answer, delay + k, level)
+                place += size
+            for k in range(n):
+                out[first + k : last, offset + 1 + index * n + k] = rows[-1, : last - first - k]
+
+    def first_columns(self, index: int) -> Array:
+        """Return the lagged inputs before a log: every lag stands at the first value."""
+        return np.repeat(self.data.u[index][0], self.form.sizes)
+
+    def profiled(self, f: Array) -> tuple[float, Array]:
+        """Return the least cost that a denominator allows, and all values.
+
+        Parameters
+        ----------
+        f : ndarray, shape (order + 1,)
+            Denominator, monic.
+
+        Returns
+        -------
+        tuple of float and ndarray, shape (p,)
+            Sum of squared residuals, and values.
+        """
+        n_b, columns = self.form.n_b, self.linear_columns(f)
+        values, cost = least_squares(columns, self.y, self.counted)
+        return cost, np.concatenate([values[:n_b], f[1:], values[n_b:]])
+
+    def jacobian(self, theta: Array) -> tuple[Array, Array]:
+        """Return the output and its derivative by every value.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (p,)
+            All values.
+
+        Returns
+        -------
+        tuple of ndarray, shapes (n,) and (n, p)
+            Output and derivatives, scaled.
+        """
+        jacobian = np.zeros((self.y.size, theta.size), order="F")
+        return self._lay(theta, jacobian), jacobian
+
+    def _lay(self, theta: Array, jacobian: Array) -> Array:
+        """Return the output; its derivatives go into an array that was zero, or has been laid out by this before."""
+        n_b, n = self.form.n_b, self.form.order
+        f = np.concatenate([[1.0], theta[n_b : n_b + n]])
+        self._lay_linear(f, jacobian, n_b + n)
+        output = jacobian[:, :n_b] @ theta[:n_b] + jacobian[:, n_b + n :] @ theta[n_b + n :]
+        for index, first in enumerate(self.bounds[:-1]):
+            part = slice(int(first), int(self.bounds[index + 1]))
+            # before the log the input stood at its first value, and so did what it drives
+            before = float(self.first_columns(index) @ theta[:n_b]) / float(f.sum())
+            moved = -(output[part] - theta[n_b + n])[None, :]
+            decay_rows(f, moved, np.array([-before]))
+            for k in range(1, n + 1):
+                lay_shifted(jacobian[part, n_b + k - 1], moved[0], k, -before / float(f.sum()))
+        return output
+
+    def descend(
+        self, theta: Array, *, bounded: bool = False, least_gain: float = 0.0, most_steps: int = MOST_STEPS
+    ) -> LinearFit:
+        """Return the minimum that one start leads to.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (p,)
+            All values.
+        bounded : bool
+            Whether every time constant must stay within the record.
+        least_gain : float
+            As `levenberg` takes it [dimensionless].
+        most_steps : int
+            Evaluations at most.
+        """
+        n_b, n = self.form.n_b, self.form.order
+        jacobian = np.zeros((self.y.size, theta.size), order="F")
+
+        def at(values: Array) -> tuple[float, Array, Array]:
+            left = self._lay(values, jacobian) - self.y
+            return self.counted.square(left), *self.counted.normal_equations(jacobian, left)
+
+        # poles within a circle are those of the polynomial stretched by its radius within the unit circle
+        stretched = longest_pole(self.data.longest) ** -np.arange(1.0, n + 1.0)
+
+        poles, circle = slice(n_b, n_b + n), stretched if bounded else np.ones(n)
+
+        def acceptable(values: Array) -> bool:
+            f = values[poles]
+            return settles(f) and (not bounded or bool(stable(f * stretched)))
+
+        cost, best = levenberg(
+            at,
+            theta,
+            acceptable,
+            tolerance=TOLERANCE,
+            most_steps=most_steps,
+            least_gain=least_gain,
+            within=lambda now, gram, slope, damping: stable_step(now, gram, slope, damping, poles, circle),
+        )
+        return LinearFit(self.form, best, cost, bounded)

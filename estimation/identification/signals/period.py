@@ -1,0 +1,103 @@
+"""After how many samples inputs repeat themselves."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from estimation.arrays import Array
+
+REPEATS = 1e-4
+"""Power of an input's change over a period, over its own, up to which it repeats itself [fraction]."""
+
+NEARLY = 0.01
+"""Likewise where the inputs are measured with noise [fraction]."""
+
+OTHERWISE = 0.5
+"""Such a share from which a signal is no longer what it was: a period is longer than a lag at which it is
+[fraction]."""
+
+LEAST_SHARED = 0.2
+"""Share of a log that has to be there a second time [fraction]."""
+
+
+def find_period(u: ArrayLike) -> int | None:
+    """Return after how many samples an input repeats itself; None where it does not within half of the log.
+
+    Parameters
+    ----------
+    u : array_like, shape (n,)
+        Input [any unit].
+
+    Returns
+    -------
+    int or None
+        The period [samples].
+
+    Examples
+    --------
+    >>> find_period(np.tile([0.0, 1.0, 3.0, 2.0], 5)), find_period(np.arange(20.0))
+    (4, None)
+    """
+    values = np.asarray(u, dtype=np.float64)
+    values = values - values.mean()
+    n = len(values)
+    total = float(values @ values)
+    if not total > 0.0 or not np.isfinite(total):
+        return None
+    change, power = _changes(values, n // 2)
+    same = 1 + np.flatnonzero(change <= 2.0 * REPEATS * power)
+    return int(same[0]) if len(same) else None
+
+
+def common_period(u: Array) -> int | None:
+    """Return after how many samples all inputs repeat themselves, noise aside; the last period need not be whole.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n, m)
+        Inputs [any unit].
+
+    Returns
+    -------
+    int or None
+        The period [samples]; None where there is none of which a fifth of the log is there again.
+
+    Examples
+    --------
+    >>> once = np.random.default_rng(0).normal(size=(60, 2))
+    >>> common_period(np.concatenate([once, once, once[:9]])), common_period(np.arange(20.0)[:, None])
+    (60, None)
+    """
+    n, longest = len(u), int((1.0 - LEAST_SHARED) * len(u))
+    if longest < 2:
+        return None
+    share = np.zeros(longest)
+    for values in (u - u.mean(axis=0)).T:
+        total = float(values @ values)
+        if not total > 0.0:
+            continue
+        change, power = _changes(values, longest)
+        # where both parts hardly move, that they are alike says nothing
+        moves = power >= OTHERWISE * total * (n - np.arange(1, longest + 1)) / n
+        share = np.maximum(share, np.where(moves, change / np.maximum(2.0 * power, 1e-300), np.inf))
+    other = np.flatnonzero((share > OTHERWISE) & np.isfinite(share))
+    if not len(other):
+        return None
+    same = np.flatnonzero(share[other[0] :] <= NEARLY)
+    if not len(same):
+        return None
+    # a smooth signal is nearly the same for some lags around its period
+    first = int(other[0] + same[0])
+    near = share[first : first + max(first // 20, 1)]
+    return 1 + first + int(np.argmin(near))
+
+
+def _changes(values: Array, longest: int) -> tuple[Array, Array]:
+    """Return the energy of a signal's change over lags from one on, and that of its later part."""
+    n = len(values)
+    spectrum = np.fft.rfft(values, 2 * n)
+    likeness = np.fft.irfft(np.abs(spectrum) ** 2)[:n]
+    squares = np.concatenate([[0.0], np.cumsum(values**2)])
+    lags = np.arange(1, longest + 1)
+    # the power of u[k + lag] - u[k] over the samples that both have
+    later = squares[n] - squares[lags]
+    return later + squares[n - lags] - 2.0 * likeness[lags], later
