@@ -47,11 +47,12 @@ class IdentificationCode(Code):
     )
     TIME_CONSTANT_BEYOND_RECORD = (
         "the model of order {order} has a time constant of {time_constant_s:.3g} s, longer than the longest record "
-        "({duration_s:.3g} s), and no simpler model was found: its steady gain means nothing"
+        "or the period of its inputs ({duration_s:.3g} s), and no simpler model was found: its steady gain means "
+        "nothing"
     )
     SLOW_MODELS_PASSED_OVER = (
-        "models with a time constant longer than the record of {duration_s:.3g} s: {count}; a simpler one was chosen "
-        "instead"
+        "models with a time constant longer than the record or the period of its inputs ({duration_s:.3g} s): {count}; "
+        "a simpler one was chosen instead"
     )
     INTEGRATES = (
         "{output!r} integrates its input over the whole record: the model has a pole close to 1, so its steady gain "

@@ -72,7 +72,7 @@ class Candidate:
         data : Channels
             That it was judged on.
         """
-        return slowest_pole(self.fit.f) > np.exp(-(BLOCKS + 1.0) / data.longest)
+        return slowest_pole(self.fit.f) > np.exp(-(BLOCKS + 1.0) / data.told)
 
 
 def slowest_pole(f: Array) -> float:
@@ -126,7 +126,7 @@ def doubt_of(fit: LinearFit, data: Channels) -> str:
     if gained < fit.theta.size * float(np.log(n)):
         return "no_fit"
     radius = slowest_pole(fit.f)
-    if radius >= 1.0 or (radius > 0.0 and -1.0 / np.log(radius) > data.longest):
+    if radius >= 1.0 or (radius > 0.0 and -1.0 / np.log(radius) > data.told):
         return "time_constant"
     return ""
 

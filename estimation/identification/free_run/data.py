@@ -49,6 +49,11 @@ class Channels:
         return max(y.size for y in self.y)
 
     @property
+    def told(self) -> int:
+        """Samples of the longest log that its inputs tell something new in: a period, where they repeat themselves."""
+        return max(period_of(u) for u in self.u)
+
+    @property
     def duration(self) -> float:
         """Length of the longest log [s]."""
         return self.longest * self.sample_time
@@ -159,6 +164,20 @@ def in_scale(data: Channels, by: Scaling) -> Channels:
     )
 
 
+def period_of(u: Array, shortest: int = SHORTEST) -> int:
+    """Return after how many samples inputs repeat themselves, or how many there are where they do not.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n, m)
+        Inputs.
+    shortest : int
+        Shorter periods are not counted: they have too little in them [samples].
+    """
+    period = common_period(u) or len(u)
+    return period if period >= shortest else len(u)
+
+
 def blocks(data: Channels, count: int) -> list[list[BoolArray]]:
     """Return masks that hold back one block of every log after the other, but for the first.
 
@@ -177,24 +196,24 @@ def blocks(data: Channels, count: int) -> list[list[BoolArray]]:
     """
     places: list[Array] = []
     for u, y in zip(data.u, data.y, strict=True):
-        period = common_period(u) or y.size
-        period = max(period if period >= SHORTEST * (count + 1) else y.size, 1)
+        period = max(period_of(u, SHORTEST * (count + 1)), 1)
         places.append(np.arange(y.size) % period * (count + 1) // period)
     return [[place == 1 + index for place in places] for index in range(count)]
 
 
 def halves(data: Channels) -> tuple[Channels, Channels]:
-    """Return the first half of every log, and the second one.
+    """Return the first half of every log, and the second one; of inputs that repeat themselves, of the last period.
 
     Returns
     -------
     tuple of Channels
         As many logs each.
     """
-    cuts = [y.size // 2 for y in data.y]
+    begins = [y.size - period_of(u) for u, y in zip(data.u, data.y, strict=True)]
+    cuts = [(begin + y.size) // 2 for begin, y in zip(begins, data.y, strict=True)]
 
     def part(*, late: bool) -> Channels:
-        kept = [slice(cut, None) if late else slice(None, cut) for cut in cuts]
+        kept = [slice(cut, None) if late else slice(begin, cut) for begin, cut in zip(begins, cuts, strict=True)]
         return replace(
             data,
             u=tuple(u[one] for u, one in zip(data.u, kept, strict=True)),

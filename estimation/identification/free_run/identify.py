@@ -270,13 +270,15 @@ def _believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) ->
         slowest = -data.sample_time / float(np.log(radius)) if radius < 1.0 else float("inf")
         notes.append(
             IdentificationCode.TIME_CONSTANT_BEYOND_RECORD.note(
-                order=best.form.order, time_constant_s=slowest, duration_s=data.duration
+                order=best.form.order, time_constant_s=slowest, duration_s=data.told * data.sample_time
             )
         )
         return best, notes
     passed = [one for one in candidates if one.doubt == "time_constant" and one.held_back < best.held_back]
     if passed:
-        notes.append(IdentificationCode.SLOW_MODELS_PASSED_OVER.note(count=len(passed), duration_s=data.duration))
+        notes.append(
+            IdentificationCode.SLOW_MODELS_PASSED_OVER.note(count=len(passed), duration_s=data.told * data.sample_time)
+        )
     beyond = list(notes)
     simpler = [
         one for one in candidates if not one.doubt and one is not best and one.form.n_values <= best.form.n_values

@@ -13,15 +13,16 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.linear_fit import fit_linear, steiglitz_mcbride
+from estimation.identification.free_run.linear_kernel import settles
 from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
 
 RECORDS = 1e3
 """Time constant of the pole that is written for 1 [records]: a run begins at rest, which a pole at 1 does not have."""
 
 
-LOST = 0.01
-"""Share of the cost by which what is written may differ from what was fitted: beside other poles close to 1, sums of
-the denominator's coefficients are rounding."""
+LOST, ROUNDED = 0.01, 1e-12
+"""Share of the cost by which what is written may differ from what was fitted, and share of a denominator's coefficients
+that their sum must be: beside other poles close to 1 it is rounding, and a run begins at the first input over it."""
 
 
 def fit_integrating(
@@ -113,6 +114,8 @@ def _written(form: Form, data: Channels, found: LinearFit, scales: Array) -> Lin
     b = [numerator / scale for numerator, scale in zip(found.numerators, scales, strict=False)]
     pole = float(np.exp(-1.0 / (RECORDS * data.longest)))
     f, settled = np.convolve(found.f, [1.0, -pole]), float(found.f.sum())
+    if not settles(f[1:]) or f.sum() < ROUNDED * np.abs(f).sum():
+        return LinearFit(form, np.zeros(form.n_values + form.order * len(data.u)), float("inf"), integrates=True)
     gains = np.array([one.sum() for one in b]) / settled
     ramps = found.numerators[len(b) : len(b) + len(data.u)]
     slopes = [float(ramp[0]) / settled / data.longest for ramp in ramps]

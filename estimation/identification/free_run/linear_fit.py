@@ -53,7 +53,7 @@ def fit_linear(
     """
     problem = Problem(form, data)
     tried = list(starts) or [*steiglitz_mcbride(problem), *_searched(problem)]
-    radius = longest_pole(data.longest) ** 1.5 if bounded else 1.0 - 0.3 / data.longest
+    radius = longest_pole(data.told) ** 1.5 if bounded else 1.0 - 0.3 / data.longest
     ranked = sorted((problem.profiled(held_within(f, data.longest, radius)) for f in tried), key=lambda one: one[0])
     kept: list[tuple[float, Array]] = []
     for cost, theta in ranked:

@@ -204,9 +204,9 @@ class Problem:
             return self.counted.square(left), *self.counted.normal_equations(jacobian, left)
 
         # poles within a circle are those of the polynomial stretched by its radius within the unit circle
-        stretched = longest_pole(self.data.longest) ** -np.arange(1.0, n + 1.0)
+        stretched = longest_pole(self.data.told) ** -np.arange(1.0, n + 1.0) if bounded else np.ones(n)
 
-        poles, circle = slice(n_b, n_b + n), stretched if bounded else np.ones(n)
+        poles = slice(n_b, n_b + n)
 
         def acceptable(values: Array) -> bool:
             f = values[poles]
@@ -219,6 +219,6 @@ class Problem:
             tolerance=TOLERANCE,
             most_steps=most_steps,
             least_gain=least_gain,
-            within=lambda now, gram, slope, damping: stable_step(now, gram, slope, damping, poles, circle),
+            within=lambda now, gram, slope, damping: stable_step(now, gram, slope, damping, poles, stretched),
         )
         return LinearFit(self.form, best, cost, bounded)

@@ -200,8 +200,8 @@ def choices_of_polynomials() -> dict[str, Any]:
     base = linear()[0]
 
     def made(order: int, late: int, error: float, doubt: str = "") -> Candidate:
-        form = Form(order, (1,), (late,))
-        return replace(base, fit=LinearFit(form, np.zeros(order + 2), 1.0), held_back=error, doubt=doubt)
+        fit = LinearFit(Form(order, (1,), (late,)), np.zeros(order + 2), 1.0)
+        return replace(base, fit=fit, held_back=error, doubt=doubt)
 
     rows = [made(k, late, 1.0 - 0.01 * k - 0.1 * late) for k in (1, 2, 3, 4, 5) for late in (1, 2)]
     told["bases of many"] = [[one.form.order, one.form.delays[0]] for one in choose_polynomial._bases(rows)]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from estimation.identification.free_run.data import blocks, channels_from
+from estimation.identification.free_run.data import blocks, channels_from, halves
 from estimation.identification.signals.period import common_period
 
 RNG = np.random.default_rng(4)
@@ -39,6 +39,13 @@ def test_a_block_is_the_same_part_of_every_period() -> None:
         assert np.flatnonzero(mask).tolist() == [
             200 * period + 40 * (1 + index) + k for period in range(3) for k in range(40)
         ]
+    # inputs tell no more than one period does, and halves of a log would hold back nothing
+    data = channels_from([u[:, None], u[:250, None]], [u, u[:250]], 1.0, ["u"], "y")
+    assert (data.longest, data.told) == (600, 200)
+    assert [[half[:, 0].tolist() for half in one.u] for one in halves(data)] == [
+        [u[400:500].tolist(), u[50:150].tolist()],
+        [u[500:].tolist(), u[150:250].tolist()],
+    ]
     # of a short period a block would be too short
     short = np.tile(ONCE[:50], 8)
     (mask,) = blocks(channels_from([short[:, None]], [short], 1.0, ["u"], "y"), 4)[0]
