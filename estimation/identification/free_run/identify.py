@@ -256,11 +256,14 @@ def _believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) ->
     free = [one for one in candidates if not (one.fit.bounded or one.fit.integrates)]
     other = chosen(free or candidates)
     bar = BELIEVED if other.doubt else INTEGRATING * other.held_back
+    beyond = [one for one in free if one.doubt == "time_constant"]
+    # where two poles are close to one, none can be given at one
+    alone = {one.form for one in beyond} - {one.form for one in candidates if one.fit.integrates}
     integrating = [one for one in candidates if one.fit.integrates and one.doubt != "no_fit"]
+    integrating += [one for one in beyond if one.form in alone]
     tempting = chosen(integrating) if integrating else None
     if tempting is not None and tempting.held_back < bar and not wanders(tempting.fit, data):
         # a pole that is estimated beyond the record is believed beside one at 1 alone, and where it is surely better
-        beyond = [one for one in free if one.doubt == "time_constant"]
         leaky = chosen(beyond) if beyond else tempting
         surely = surely_better(leaky.block_errors, tempting.block_errors) and not wanders(leaky.fit, data)
         tempting = leaky if surely else tempting
