@@ -205,9 +205,8 @@ def choices_of_polynomials() -> dict[str, Any]:
 
     rows = [made(k, late, 1.0 - 0.01 * k - 0.1 * late) for k in (1, 2, 3, 4, 5) for late in (1, 2)]
     told["bases of many"] = [[one.form.order, one.form.delays[0]] for one in choose_polynomial._bases(rows)]
-    told["bases of doubtful ones"] = len(
-        choose_polynomial._bases([made(1, 1, 1.0, "no_fit"), made(2, 1, 0.5, "no_fit")])
-    )
+    doubtful = [made(1, 1, 1.0, "no_fit"), made(2, 1, 0.5, "no_fit")]
+    told["bases of doubtful ones"] = len(choose_polynomial._bases(doubtful))
     whole = polynomial_terms.begun(base.fit, data())
     assert whole is not None
     growth = choose_polynomial._Growth(whole, choose_polynomial._from_linear(base.fit), data())
