@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.arrays import Array, BoolArray
+from estimation.arrays import Array, BoolArray, IntArray
 from estimation.identification.signals.period import common_period
 from plant.errors import HydrostateError
 
@@ -194,7 +194,7 @@ def blocks(data: Channels, count: int) -> list[list[BoolArray]]:
     list of list of ndarray of bool, shape (n,)
         One mask a log, for each block.
     """
-    places: list[Array] = []
+    places: list[IntArray] = []
     for u, y in zip(data.u, data.y, strict=True):
         period = max(period_of(u, SHORTEST * (count + 1)), 1)
         places.append(np.arange(y.size) % period * (count + 1) // period)

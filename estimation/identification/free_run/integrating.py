@@ -104,9 +104,8 @@ def _without_slowest(f: Array) -> Array:
     """Return a denominator without its root nearest to 1; what would be left complex of a pair becomes real."""
     roots = np.roots(f)
     kept = np.delete(roots, int(np.argmin(np.abs(roots - 1.0))))
-    if abs(float(np.poly(kept).imag.max() if np.iscomplexobj(np.poly(kept)) else 0.0)) > 1e-9:
-        kept = kept.real
-    return np.real(np.poly(kept))
+    left = np.poly(kept)
+    return np.asarray(np.poly(kept.real) if np.iscomplexobj(left) else left, dtype=np.float64)
 
 
 def _written(form: Form, data: Channels, found: LinearFit, scales: Array) -> LinearFit:
