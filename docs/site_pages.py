@@ -2,8 +2,8 @@
 
 import ast
 import importlib
-from collections import Counter
-from collections.abc import Mapping
+from collections import Counter, deque
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from html import escape
@@ -28,6 +28,17 @@ def room_of(path: Path) -> str:
     return ".".join(parts[:2]) if len(parts) > 2 else parts[0]
 
 
+def _statements(tree: ast.Module) -> Iterator[ast.AST]:
+    """Yield statements, the outer ones first: an import is one, and most of a tree are expressions."""
+    waiting = deque[ast.AST]([tree])
+    while waiting:
+        above = waiting.popleft()
+        for part in ("body", "handlers", "orelse", "finalbody", "cases"):
+            below = getattr(above, part, [])
+            waiting.extend(below)
+            yield from below
+
+
 @cache
 def house() -> House:
     """Read all packages: files and lines of each room, and imports between rooms."""
@@ -37,7 +48,7 @@ def house() -> House:
         room = room_of(path)
         counts[room] += 1
         lines[room] += text.count("\n")
-        for node in ast.walk(ast.parse(text)):
+        for node in _statements(ast.parse(text)):
             if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] in LAYERS:
                 parts = node.module.split(".")
                 used = ".".join(parts[:2]) if (ROOT / Path(*parts[:2])).is_dir() else parts[0]

@@ -36,6 +36,27 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     return WholeFiles(config, log) if config.getvalue("dist") == "loadfile" else None
 
 
+WORKER = os.environ.get("PYTEST_XDIST_WORKER", "")
+
+
+def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """Let every second worker begin at the other end, so that each rewrites the asserts of half the files."""
+    if not WORKER:
+        return None
+    from tests.together import FromItsEnd, from_its_end  # needs xdist
+
+    return FromItsEnd.from_parent(parent, path=path) if from_its_end(WORKER) else None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put what workers have collected in one order, before any other order is made of it."""
+    if WORKER:
+        from tests.together import in_one_order  # needs xdist
+
+        in_one_order(items)
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collect_file(file_path: Path) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
     """Look for no examples in files of claims, which have none: looking takes a second of each worker's start."""

@@ -92,10 +92,13 @@ def _targets(node: ast.AST, source: Source) -> list[str]:
 
 
 def _imports_below(node: ast.AST, source: Source, *, eager: bool) -> Iterator[Import]:
+    calls = any(name in source.text for name in ("import_module", "__import__"))
     waiting = [(node, eager)]
     while waiting:
         above, at_once = waiting.pop()
         for child in ast.iter_child_nodes(above):
+            if isinstance(child, ast.expr) and not calls:
+                continue  # most of a tree, and only a call among them may import
             if isinstance(child, ast.Import | ast.ImportFrom | ast.Call):
                 yield from (Import(target, child.lineno, at_once) for target in _targets(child, source))
             if isinstance(child, ast.If) and _is_type_checking(child.test):

@@ -7,13 +7,13 @@ import re
 import sys
 import tomllib
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
 import yaml
 
-from tests.together import DIAGNOSE_A_MOTOR, SHOW_A_STUDY
+from tests.together import DIAGNOSE_A_MOTOR, SHOW_A_STUDY, FromItsEnd, from_its_end, in_one_order
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -127,6 +127,19 @@ def test_files_that_stand_on_the_same_go_to_one_worker() -> None:
     show = {file for file in folder.rglob("test_*.py") if made & (_asked(file) - _fixtures(file))}
     assert {file.relative_to(ROOT).as_posix() for file in show} == SHOW_A_STUDY
     assert all((ROOT / file).is_file() for file in DIAGNOSE_A_MOTOR)
+
+
+def test_every_second_worker_collects_from_the_other_end_and_all_tell_one_order(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    workers = ("", "master", "gw0", "gw1", "gw2", "gw11")
+    assert [from_its_end(worker) for worker in workers] == [False, False, False, True, False, True]
+    monkeypatch.setattr(pytest.Dir, "collect", lambda _: iter("abc"))
+    assert list(FromItsEnd.__new__(FromItsEnd).collect()) == ["c", "b", "a"]
+    forwards: list[Any] = [SimpleNamespace(nodeid=name) for name in ("a.py::z", "a.py::b[::]", "b.py::a", "c/d.py::e")]
+    backwards = [*forwards[3:], *forwards[2:3], *forwards[:2]]
+    in_one_order(backwards)
+    assert backwards == forwards
 
 
 def _functions(file: Path) -> dict[str, ast.FunctionDef]:

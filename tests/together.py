@@ -1,5 +1,8 @@
-"""Which files of tests one worker runs in one go, since they stand on what a session makes once."""
+"""How workers share tests: whole files, in one go where they stand on the same; and each rewrites half the asserts."""
 
+from collections.abc import Iterable
+
+import pytest
 from xdist.scheduler import LoadFileScheduling
 
 STUDIES = "tests/experiments"
@@ -47,3 +50,25 @@ class WholeFiles(LoadFileScheduling):
     def _split_scope(self, nodeid: str) -> str:
         file = super()._split_scope(nodeid)
         return IN_ONE_GO.get(file, file)
+
+
+class FromItsEnd(pytest.Dir):
+    """A folder that is collected last entry first.
+
+    Pytest rewrites the asserts of each file once and keeps the result. In a fresh clone that is more than half of
+    collecting. Workers that go through the files in one order rewrite all of them twice; one that begins at the other
+    end meets its neighbour halfway, and each reads what the other has kept.
+    """
+
+    def collect(self) -> Iterable[pytest.Item | pytest.Collector]:
+        return reversed(list(super().collect()))
+
+
+def from_its_end(worker: str) -> bool:
+    """Return whether a worker collects folders from their ends: every second one, by the number in its name."""
+    return worker.startswith("gw") and int(worker.removeprefix("gw")) % 2 == 1
+
+
+def in_one_order(items: list[pytest.Item]) -> None:
+    """Sort tests by file, since workers must have collected the same in the same order."""
+    items.sort(key=lambda item: item.nodeid.partition("::")[0])
