@@ -39,13 +39,16 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 WORKER = os.environ.get("PYTEST_XDIST_WORKER", "")
 
 
-def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_directory() -> Generator[None, pytest.Collector | None, pytest.Collector | None]:
     """Let every second worker begin at the other end, so that each rewrites the asserts of half the files."""
-    if not WORKER:
-        return None
-    from tests.together import FromItsEnd, from_its_end  # needs xdist
+    folder = yield
+    if folder is not None and WORKER:
+        from tests.together import backwards, from_its_end  # needs xdist
 
-    return FromItsEnd.from_parent(parent, path=path) if from_its_end(WORKER) else None
+        if from_its_end(WORKER):
+            backwards(folder)
+    return folder
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 
-from tests.together import DIAGNOSE_A_MOTOR, SHOW_A_STUDY, FromItsEnd, from_its_end, in_one_order
+from tests.together import DIAGNOSE_A_MOTOR, SHOW_A_STUDY, backwards, from_its_end, in_one_order
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -129,17 +129,16 @@ def test_files_that_stand_on_the_same_go_to_one_worker() -> None:
     assert all((ROOT / file).is_file() for file in DIAGNOSE_A_MOTOR)
 
 
-def test_every_second_worker_collects_from_the_other_end_and_all_tell_one_order(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_every_second_worker_collects_from_the_other_end_and_all_tell_one_order() -> None:
     workers = ("", "master", "gw0", "gw1", "gw2", "gw11")
     assert [from_its_end(worker) for worker in workers] == [False, False, False, True, False, True]
-    monkeypatch.setattr(pytest.Dir, "collect", lambda _: iter("abc"))
-    assert list(FromItsEnd.__new__(FromItsEnd).collect()) == ["c", "b", "a"]
+    folder: Any = SimpleNamespace(collect=lambda: iter("abc"))
+    backwards(folder)
+    assert list(folder.collect()) == ["c", "b", "a"]
     forwards: list[Any] = [SimpleNamespace(nodeid=name) for name in ("a.py::z", "a.py::b[::]", "b.py::a", "c/d.py::e")]
-    backwards = [*forwards[3:], *forwards[2:3], *forwards[:2]]
-    in_one_order(backwards)
-    assert backwards == forwards
+    turned = [*forwards[3:], *forwards[2:3], *forwards[:2]]
+    in_one_order(turned)
+    assert turned == forwards
 
 
 def _functions(file: Path) -> dict[str, ast.FunctionDef]:

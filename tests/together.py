@@ -1,7 +1,5 @@
 """How workers share tests: whole files, in one go where they stand on the same; and each rewrites half the asserts."""
 
-from collections.abc import Iterable
-
 import pytest
 from xdist.scheduler import LoadFileScheduling
 
@@ -52,16 +50,15 @@ class WholeFiles(LoadFileScheduling):
         return IN_ONE_GO.get(file, file)
 
 
-class FromItsEnd(pytest.Dir):
-    """A folder that is collected last entry first.
+def backwards(folder: pytest.Collector) -> None:
+    """Let a folder be collected last entry first.
 
     Pytest rewrites the asserts of each file once and keeps the result. In a fresh clone that is more than half of
-    collecting. Workers that go through the files in one order rewrite all of them twice; one that begins at the other
+    collecting. Workers that go through the files in one order rewrite most of them twice; one that begins at the other
     end meets its neighbour halfway, and each reads what the other has kept.
     """
-
-    def collect(self) -> Iterable[pytest.Item | pytest.Collector]:
-        return reversed(list(super().collect()))
+    collect = folder.collect
+    folder.collect = lambda: reversed(list(collect()))
 
 
 def from_its_end(worker: str) -> bool:
