@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.command.terminal import clauses
 from experiments.log_pages.entries import NO_GATE, gate_entry
+from experiments.page.numbers import decimals_of
 
 if TYPE_CHECKING:
     from estimation.eha.result import BulkModulusEstimate
@@ -180,7 +181,8 @@ def _estimate_message(found: "Finding") -> str:
             )
         return clauses(mistakes or [NOT_OBSERVABLE_WITH_PRESSURE if seen else OUTCOMES[found.outcome]])
     low, high = (1e-6 * end for end in modulus.ci95)
-    said = [f"bulk modulus {1e-6 * modulus.value:.2f} MPa, 95 % interval {low:.2f} to {high:.2f} MPa"]
+    digits = decimals_of(low, high)
+    said = [f"bulk modulus {1e-6 * modulus.value:.{digits}f} MPa, 95 % interval {low:.{digits}f} to {high:.{digits}f} MPa"]
     if modulus.ci95_total is not None:
         low, high = (1e-6 * end for end in modulus.ci95_total)
         said[0] += f", {low:.0f} to {high:.0f} MPa with rig error"

@@ -9,6 +9,7 @@ from experiments.command.options import PRESSURE
 from experiments.command.terminal import short_names, table
 from experiments.eha.entries import costs
 from experiments.eha.verdict_words import equally_likely, margin_word, verdict_lines
+from experiments.page.numbers import decimals_of
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -49,12 +50,15 @@ def _cells(result: Result) -> list[str]:
     bound = f"{result['bound_percent']:.2g}" if math.isfinite(result["bound_percent"] or math.inf) else "-"
     if modulus["value"] is None:
         return ["-", "-", "-", bound, verdict]
-    given, total = (
-        "-" if ends is None else f"{1e-6 * ends[0]:.{digits}f} to {1e-6 * ends[1]:.{digits}f}"
-        for ends, digits in ((modulus["ci95"], 2), (modulus["ci95_total"], 0))
-    )
+    value, given = 1e-6 * modulus["value"], modulus["ci95"]
+    ends = (value, value) if given is None else (1e-6 * given[0], 1e-6 * given[1])
+    decimals = decimals_of(*ends)
     trusted = verdict if result["gate"]["passed"] else "doubtful"
-    return [f"{1e-6 * modulus['value']:.2f}", given, total, bound, trusted]
+    return [f"{value:.{decimals}f}", _span(given, decimals), _span(modulus["ci95_total"], 0), bound, trusted]
+
+
+def _span(ends: Sequence[float] | None, decimals: int) -> str:
+    return "-" if ends is None else f"{1e-6 * ends[0]:.{decimals}f} to {1e-6 * ends[1]:.{decimals}f}"
 
 
 def diagnoses_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "Iterable[RenderableType]":
@@ -71,15 +75,16 @@ def diagnoses_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
     detailed = len(results) <= MOST_TABLES
     if not detailed:
         yield _summary(results)
-    for result in results:
+    for place, result in enumerate(results):
         judged = result["probabilities"] is not None
         if detailed and judged:
-            yield from verdict_lines(result)
+            yield from ["", *verdict_lines(result)][not place :]
         if tables and detailed:
             yield _scores_table(result)
         if not judged or result["outcome"] != "ok" or result["expected"] is not None:
             yield f"{result['file']}: {result['message']}"
-    yield from costs(results)
+    notes = list(costs(results))
+    yield from ["", *notes] if notes and detailed else notes
 
 
 def _summary(results: Sequence[Result]) -> "RenderableType":

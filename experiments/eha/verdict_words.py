@@ -179,6 +179,8 @@ def amount(one: Mapping[str, Any]) -> str:
     '207.0 MPa (205.0 to 209.0)'
     >>> amount({"value": 2.07e8, "unit": "Pa", "ci95": [2.05e8, 2.09e8], "ci95_total": [1.5e8, 2.8e8]})
     '207.0 MPa (205.0 to 209.0; with rig error 150 to 280)'
+    >>> amount({"value": 28.578, "unit": "%", "ci95": [28.5776, 28.5784], "ci95_total": [24.0, 34.0]})
+    '28.58 % (with rig error 24 to 34)'
     >>> amount({"value": -0.01, "unit": "N", "ci95": [-3.0, 4.0]})
     '0.0 N (-3.0 to 4.0)'
     >>> amount({"value": 1e-7, "unit": "%", "ci95": [0.0, 2e-7], "ci95_total": [0.0, 0.15]})
@@ -194,8 +196,9 @@ def amount(one: Mapping[str, Any]) -> str:
     if max(map(abs, (value, low, high))) < 0.5 * least:
         beyond = f" ({wider})" if wider and max(map(abs, total)) >= 0.5 * least else ""
         return f"under {least:.{MOST_DECIMALS}f} {unit}{beyond}"
-    said += f"; {wider}" if wider else ""
-    return f"{value:z.{decimals_of(low, high, MOST_DECIMALS)}f} {unit} ({said})"
+    shown = f"{value:z.{decimals_of(low, high, MOST_DECIMALS)}f}"
+    narrow = said == f"{shown} to {shown}"  # under the last digit that is shown, so the ends would say nothing
+    return f"{shown} {unit} ({'; '.join(one for one in ('' if wider and narrow else said, wider) if one)})"
 
 
 def _interval(low: float, high: float) -> str:

@@ -10,6 +10,9 @@ MINUS, TIMES = "\N{MINUS SIGN}", " \N{MULTIPLICATION SIGN} "
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
+MOST_DIGITS = 4
+"""Digits that a value with an interval is shown with, at most [count]; files for programs have all."""
+
 PLAIN_FROM, PLAIN_TO = 1e-3, 1e5
 """Between these magnitudes a number is written without an exponent."""
 
@@ -94,7 +97,7 @@ def fixed(value: float | None, decimals: int) -> str:
 
 
 def decimals_of(low: float, high: float, most: int = 3) -> int:
-    """Return the decimals that leave two digits of an interval's width.
+    """Return the decimals that leave two digits of an interval's width, and its ends `MOST_DIGITS` digits at most.
 
     Parameters
     ----------
@@ -107,8 +110,13 @@ def decimals_of(low: float, high: float, most: int = 3) -> int:
     --------
     >>> decimals_of(2.05, 2.09), decimals_of(-32.1, 31.2), decimals_of(1.0, 1.0)
     (3, 0, 2)
+    >>> decimals_of(28.573, 28.583), decimals_of(1523.2, 1523.9)
+    (2, 0)
     """
-    return min(max(1 - math.floor(math.log10(high - low)), 0), most) if high > low else 2
+    wanted = 1 - math.floor(math.log10(high - low)) if high > low else 2
+    largest = max(abs(low), abs(high))
+    meant = MOST_DIGITS - 1 - math.floor(math.log10(largest)) if largest > 0.0 else most
+    return max(min(wanted, meant, most), 0)
 
 
 def exact(value: float) -> str:

@@ -7,6 +7,7 @@ import pytest
 from experiments.command.terminal import rendered
 from experiments.eha.entries import NO_DIAGNOSIS, NO_ESTIMATE
 from experiments.eha.screens import MOST_MESSAGES, MOST_TABLES, diagnoses_shown, estimates_shown
+from experiments.eha.verdict_words import SHOWN
 
 
 def estimate(number: int, passed: bool = True, **changes: Any) -> dict[str, Any]:
@@ -21,7 +22,7 @@ def shown(results: list[dict[str, Any]]) -> str:
 
 def test_a_value_has_both_intervals_in_megapascals_and_its_verdict() -> None:
     line = next(line for line in shown([estimate(1)]).splitlines() if "run1.csv" in line)
-    assert " ".join(line.split()) == "run1.csv 207.12 200.00 to 210.00 180 to 240 0.5 ok"
+    assert " ".join(line.split()) == "run1.csv 207 200 to 210 180 to 240 0.5 ok"
 
 
 def test_a_value_that_is_not_to_be_relied_on_is_called_doubtful_and_its_reason_is_given() -> None:
@@ -38,7 +39,7 @@ def test_a_log_without_a_value_or_an_interval_has_dashes() -> None:
     assert line.split() == ["run1.csv", "-", "-", "-", "-", "not", "observable"]
     alone = {"value": 2e8, "ci95": None, "ci95_total": None}
     line = next(line for line in shown([estimate(1, bulk_modulus_pa=alone)]).splitlines() if "run1" in line)
-    assert line.split() == ["run1.csv", "200.00", "-", "-", "0.5", "ok"]
+    assert line.split() == ["run1.csv", "200.0", "-", "-", "0.5", "ok"]
 
 
 def test_of_many_logs_the_doubtful_are_counted_and_not_explained_one_by_one() -> None:
@@ -60,8 +61,20 @@ def diagnosis(number: int, **changes: Any) -> dict[str, Any]:
     return {**NO_DIAGNOSIS, **told, **found, **about, **changes}
 
 
+def found_severity() -> dict[str, Any]:
+    return {name: {"value": None, "unit": "1", "ci95": [None, None]} for name in SHOWN}
+
+
 def diagnosed(results: list[dict[str, Any]], **options: Any) -> str:
     return rendered(*diagnoses_shown(results, {"scores": False, "transfer_functions": None, **options}))
+
+
+def test_an_empty_line_stands_between_logs_and_before_notes() -> None:
+    noted = diagnosis(2, notes=[{"code": "known_as_the_rig", "data": {}, "text": "the rig limits it"}])
+    said = diagnosed([{**one, "severity": found_severity(), "message": ""} for one in (diagnosis(1), noted)]).split("\n")
+    first = [place for place, line in enumerate(said) if line.startswith(("run2", "1 of 2 logs"))]
+    assert len(first) == 2
+    assert all(said[place - 1] == "" for place in first)
 
 
 def test_many_diagnoses_are_a_table_with_a_line_each() -> None:
