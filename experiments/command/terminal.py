@@ -163,6 +163,34 @@ def short_names(results: Sequence[Mapping[str, Any]]) -> list[str]:
     return names if len(set(names)) == len(set(files)) else files
 
 
+def folded(text: str, width: int) -> str:
+    """Return a text whose lines end between words, what is folded set below the words that a name stands before.
+
+    Parameters
+    ----------
+    text : str
+        Lines, as ``"  oil       bulk modulus 207.0 MPa"``.
+    width : int
+        Characters in a line, at most; a longer word stays whole.
+
+    Examples
+    --------
+    >>> print(folded("  oil   bulk modulus 207.0 MPa", 24))
+      oil   bulk modulus
+            207.0 MPa
+    """
+    import re
+    import textwrap
+
+    lines: list[str] = []
+    for line in text.split("\n"):
+        named = re.match(r" +\S+ {2,}", line)
+        hang = " " * (len(named.group()) if named else 4)
+        form: dict[str, bool] = {"break_long_words": False, "break_on_hyphens": False}
+        lines += textwrap.wrap(line, width, subsequent_indent=hang, **form) or [""]
+    return "\n".join(lines)
+
+
 def rendered(*parts: "RenderableType") -> str:
     """Return tables and sentences as text for standard output, with colours only on a terminal.
 
@@ -184,7 +212,8 @@ def rendered(*parts: "RenderableType") -> str:
     console = Console(file=io.StringIO(), force_terminal=terminal, width=width, **as_is)
     with console.capture() as captured:
         for part in parts:
-            console.print(part, soft_wrap=isinstance(part, str))
+            told = folded(part, console.width) if terminal and isinstance(part, str) else part
+            console.print(told, soft_wrap=isinstance(part, str))
     return "\n".join(line.rstrip() for line in captured.get().strip("\n").splitlines())
 
 

@@ -5,7 +5,7 @@ import logging
 import pytest
 
 from experiments.command import terminal
-from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, guarded
+from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, guarded, rendered
 from plant.compiled.expression import symbol
 from plant.errors import HydrostateError
 
@@ -66,3 +66,15 @@ def test_compiling_is_said_once_and_every_warning(monkeypatch: pytest.MonkeyPatc
         notice.emit(logging.LogRecord("kernels", level, "", 0, "no compiler", None, None))
     assert len(said) == 2
     assert said[1] == "warning: no compiler"
+
+
+def test_a_terminal_folds_lines_between_words_and_a_pipe_keeps_them_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    line = "  reliable  " + "yes: a circuit reproduces the log; " * 8
+    assert rendered(line).splitlines() == [line.rstrip()]
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    monkeypatch.setenv("COLUMNS", "60")
+    first, *others = rendered(line).splitlines()
+    assert others
+    assert max(map(len, (first, *others))) <= 60
+    assert all(other.startswith(" " * 12) and other[12] != " " for other in others)
+    assert " ".join(one.strip() for one in (first, *others)) == line.strip()
