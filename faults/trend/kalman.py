@@ -24,6 +24,9 @@ BENDS = (0.0, 1e-3, 3e-3, 1e-2)
 SLOPES = (0.005, 0.03)
 """Standard deviation of the slope before the first log [1/log]."""
 
+FAST_SLOPE = 0.2
+"""The same of growth that takes a few logs to the limit, which has no curvature [1/log]."""
+
 CURVATURES = ((0.0, 0.0), (1e-3, 4e-4))
 """Standard deviation of the curvature before the first log, and that which it gains in a step [1/log^2]."""
 
@@ -56,7 +59,7 @@ class Settings:
     Parameters
     ----------
     pace, slope, curvature, jerk, bend, wander, scatter : ndarray, shape (g,)
-        As `PACES`, `SLOPES`, `CURVATURES`, `BENDS`, `WANDERS` and `SCATTERS` say [each in its unit]; paces rise.
+        As `PACES`, `SLOPES`, `FAST_SLOPE`, `CURVATURES`, `BENDS`, `WANDERS` and `SCATTERS` say [each in its unit]; paces rise.
     """
 
     pace: Array
@@ -111,9 +114,10 @@ class Settings:
 def settings() -> Settings:
     """Return the grid: every combination with a slope, and those without one."""
     bent = [(0.0, slope, *curvature, bend) for slope, curvature, bend in product(SLOPES, CURVATURES, BENDS)]
+    fast = [(0.0, FAST_SLOPE, 0.0, 0.0, bend) for bend in BENDS]
     paced = [(pace, slope, 0.0, 0.0, bend) for pace, slope, bend in product(PACES, SLOPES, PACED_BENDS)]
     still = (0.0, 0.0, 0.0, 0.0, 0.0)
-    grid = [(*one, *rest) for one in (*bent, still, *paced) for rest in product(WANDERS, SCATTERS)]
+    grid = [(*one, *rest) for one in (*bent, still, *fast, *paced) for rest in product(WANDERS, SCATTERS)]
     return Settings(*np.array(grid).T)
 
 

@@ -25,7 +25,7 @@ from tests.faults.trend.small_beliefs import next_belief, one_setting
 from tests.numbers import Numbers
 
 NUMBERS = Numbers(__file__)
-SOME = [0, 5, 16, 40, 77, 120, 166, 203]
+SOME = [0, 5, 16, 40, 77, 120, 166, 203, 221]
 """Places in the grid of settings."""
 
 

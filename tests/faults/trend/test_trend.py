@@ -22,6 +22,16 @@ def series_of(truth: Array, std: float = 0.04, seed: int = 0) -> Series:
     return Series(np.arange(len(truth), dtype=np.float64), truth + noise, np.full(len(truth), std), 0.0, 1.0)
 
 
+@pytest.mark.parametrize("rate", [0.33, 0.5, 1.0])
+def test_growth_that_takes_a_few_logs_to_the_limit_is_followed_and_is_no_jump(rate: float) -> None:
+    truth = growth(8, rate)
+    for seed in range(3):
+        found = trend_of(series_of(truth, std=0.02, seed=seed))
+        assert found.begin == 0
+        assert found.level[0] == pytest.approx(truth[-1], rel=0.02)
+        assert found.growth[0] == pytest.approx(rate, rel=0.05)
+
+
 def growth(count: int = 40, rate: float = 0.02) -> Array:
     return rate * np.arange(count, dtype=np.float64)
 
