@@ -124,8 +124,16 @@ class EstimateCode(Code):
         "observable"
     )
     KNOWN_AS_THE_RIG = (
-        "the uncertainty of {entry} in the rig file causes {percent:.0f} % of the total variance of {quantity!w}: a "
-        "better value of {entry} narrows the interval"
+        "{entry} in the rig file causes {percent:.0f} % of the variance of {quantity!w} with rig error: a better value "
+        "of it narrows that interval"
+    )
+    STIFFER_THAN_RIG = (
+        "bulk modulus is {ratio:.2g} times that in the rig file: if the oil is stiffer, enter its bulk_modulus there, "
+        "else correct chamber_volume from {written:.3g} to {volume:.3g} m^3"
+    )
+    SOFTER_THAN_RIG = (
+        "bulk modulus is {ratio:.2g} times that in the rig file: there is air in the oil or a soft hose, or "
+        "chamber_volume is {volume:.3g} m^3 and not {written:.3g} m^3"
     )
     DIVERGED = "the estimate stopped being finite; check units, rig parameters and the form of the model"
     PRESSURE_RESIDUALS_LARGE = (

@@ -3,6 +3,7 @@
 from estimation.eha.bulk_modulus import DEFAULT_OPTIONS, FITTED, EstimateOptions, estimate_clean, left_out
 from estimation.eha.explained import notes_of
 from estimation.eha.result import BulkModulusEstimate
+from estimation.eha.rig_share import another_oil
 from estimation.finding import Finding, Outcome, Quantity
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
@@ -98,7 +99,13 @@ def finding_of(log: CleanLog, found: BulkModulusEstimate, rig: Rig) -> Finding:
         quantities={"bulk_modulus": found.quantity, **_others(found)},
         gate=found.gate,
         channels=found.channels,
-        notes=(*left_out(log, found), *absences(found), *explained(found, rig.parameters), *found.rig_notes),
+        notes=(
+            *left_out(log, found),
+            *absences(found),
+            *explained(found, rig.parameters),
+            *another_oil(found.value if found.gate.passed else None, rig.parameters),
+            *found.rig_notes,
+        ),
         not_told=tuple(note for note in found.remarks if note.code in NOT_TOLD),
         evidence=found,
     )

@@ -35,6 +35,9 @@ GAIN: Mapping[str, float] = MappingProxyType({"bulk_modulus": -1.0, "leakage_coe
 DELIVERY_ENTRY = "pump_displacement"
 """The entry of a rig that a worn pump falls short of."""
 
+SOFT = 0.55
+"""Share of the rig's bulk modulus below which the oil holds air [dimensionless]; it is too stiff above the inverse."""
+
 MOSTLY_RIG = 2.0
 """Ratio of the total interval to the one given the rig above which a note names the entry [dimensionless]."""
 
@@ -256,3 +259,25 @@ def rig_notes(name: str, one: Quantity, responses: Responses, spreads: Mapping[s
     entry = max(squares, key=lambda name: squares[name])
     share = 100.0 * squares[entry] / (sum(squares.values()) + given**2)
     return (EstimateCode.KNOWN_AS_THE_RIG.note(quantity=name, entry=entry, percent=share),)
+
+
+def another_oil(value: float | None, rig: EhaParameters) -> tuple[Note, ...]:
+    """Return a note where a bulk modulus that is believed is not that of the rig's oil.
+
+    Parameters
+    ----------
+    value : float or None
+        Bulk modulus [Pa].
+    rig : EhaParameters
+        The actuator, as its file has it.
+
+    Returns
+    -------
+    tuple of Note
+        One at most: what it may be instead, and the chamber volume that would explain it.
+    """
+    ratio = 1.0 if value is None else value / rig.bulk_modulus
+    if SOFT <= ratio <= 1.0 / SOFT:
+        return ()
+    code = EstimateCode.SOFTER_THAN_RIG if ratio < 1.0 else EstimateCode.STIFFER_THAN_RIG
+    return (code.note(ratio=ratio, written=rig.chamber_volume, volume=rig.chamber_volume / ratio),)

@@ -13,7 +13,7 @@ from estimation.eha.bulk_modulus import EstimateOptions
 from estimation.eha.estimate import estimated, explained, finding_of, refused
 from estimation.eha.explained import OUTSIDE, at_pump_speed, rig_set_right, set_right
 from estimation.eha.result import BulkModulusEstimate
-from estimation.eha.rig_share import scaled_responses, with_total
+from estimation.eha.rig_share import SOFT, scaled_responses, with_total
 from estimation.finding import Finding, Outcome, Quantity
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
@@ -27,7 +27,6 @@ from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import LONGEST
-from faults.diagnosis.circuits.out_of_model import SOFT
 from faults.diagnosis.failed_search import doubts_after
 from faults.diagnosis.models_verdict import models_verdict, ranked
 from faults.diagnosis.rmse import Scores, score_mathematical

@@ -59,7 +59,8 @@ class Settings:
     Parameters
     ----------
     pace, slope, curvature, jerk, bend, wander, scatter : ndarray, shape (g,)
-        As `PACES`, `SLOPES`, `FAST_SLOPE`, `CURVATURES`, `BENDS`, `WANDERS` and `SCATTERS` say [each in its unit]; paces rise.
+        As `PACES`, `SLOPES`, `FAST_SLOPE`, `CURVATURES`, `BENDS`, `WANDERS` and `SCATTERS` say [each in its unit];
+        paces rise.
     """
 
     pace: Array

@@ -6,11 +6,11 @@ Where pressure is logged, bulk modulus is measured before a circuit is fitted. S
 import math
 from dataclasses import replace
 
+from estimation.eha.rig_share import SOFT
 from faults.diagnosis.beyond_nine.load import Diagnosed, Loaded
 from faults.diagnosis.beyond_nine.near_enough import only_beside
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
-from faults.diagnosis.circuits.out_of_model import SOFT
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.model import EhaParameters
 

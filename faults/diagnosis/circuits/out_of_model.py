@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.eha.rig_share import SOFT
 from estimation.fits.greybox.averaged import samples_a_block
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, severity
@@ -43,9 +44,6 @@ FARTHEST_BESIDE = 10.4
 """The same of the circuit that is the best of all severities, where pressure is logged [dimensionless]: two severities
 reach 7.0 by chance in one case of 1100, and five other coordinates in as many reach this. Without pressure nothing else
 tells some faults."""
-
-SOFT = 0.55
-"""Share of the rig's bulk modulus below which the oil holds air [dimensionless]; it is too stiff above the inverse."""
 
 STANDARD_ERRORS = 2.0
 """Standard errors from zero at which a bias is believed [dimensionless]; they hold the model's error already."""

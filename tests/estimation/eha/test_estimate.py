@@ -2,13 +2,14 @@
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from estimation.eha.bulk_modulus import EstimateOptions, estimate_bulk_modulus, estimate_clean
-from estimation.eha.estimate import estimate_log, refused
+from estimation.eha.estimate import estimate_log, finding_of, refused
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Gate, Outcome
 from estimation.log_checks import measurement_noise
@@ -27,6 +28,7 @@ from tests.thinned import thinned
 
 HEALTHY = EhaParameters()
 PRESSURE = "differential_pressure_pa"
+OILS = {EstimateCode.STIFFER_THAN_RIG, EstimateCode.SOFTER_THAN_RIG}
 PACKAGES = ("plant", "estimation", "faults", "experiments")
 
 
@@ -177,3 +179,19 @@ def test_the_noise_of_a_cleaned_log_is_measured_once(way: str, measured: list[tu
 )
 def test_a_filter_is_asked_for_by_its_name_or_by_what_only_a_filter_does(chosen: dict[str, Any], asked: bool) -> None:
     assert EstimateOptions(**chosen).filtering is asked
+
+
+@pytest.mark.parametrize(
+    ("share", "code"), [(0.4, EstimateCode.STIFFER_THAN_RIG), (1.0, None), (2.5, EstimateCode.SOFTER_THAN_RIG)]
+)
+def test_oil_that_is_not_the_rigs_is_told_with_the_volume_that_would_explain_it(
+    share: float, code: EstimateCode | None
+) -> None:
+    rig = replace(HEALTHY, bulk_modulus=share * HEALTHY.bulk_modulus)
+    believed = replace(estimate_bulk_modulus(log(), HEALTHY), gate=Gate(True, ()))
+    told = [note for note in finding_of(clean_log(log(), HEALTHY), believed, Rig(parameters=rig)).notes if note.code in OILS]
+    assert [note.code for note in told] == ([] if code is None else [code])
+    if told:
+        assert told[0].data["volume"] == pytest.approx(share * HEALTHY.chamber_volume, rel=0.01)
+    doubted = replace(believed, gate=Gate(False, ()))
+    assert not OILS & {note.code for note in finding_of(clean_log(log(), HEALTHY), doubted, Rig(parameters=rig)).notes}

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from estimation.eha.rig_share import SOFT
 from faults.conditions import CONDITIONS, severity
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
@@ -16,7 +17,6 @@ from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes, regi
 from faults.diagnosis.circuits.out_of_model import (
     EARLIER,
     LEAST_BIAS,
-    SOFT,
     STICKS,
     reasons_against,
     sensors_disagree,
