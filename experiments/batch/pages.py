@@ -4,9 +4,11 @@ import json
 from collections.abc import Mapping, Sequence
 from functools import partial
 from posixpath import commonpath
+from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
+from markupsafe import Markup
 
 from experiments.batch.compare import in_sentences
 from experiments.batch.figures import way_in_words
@@ -15,7 +17,7 @@ from experiments.page.frames import Tables
 from experiments.page.names_shown import SHOWN
 from experiments.page.numbers import MISSING, decimals_of, fixed, number, pretty_unit, shop_unit
 from experiments.page.render import render_page
-from experiments.page.tables import Cell, Column, decimals, right, spaced
+from experiments.page.tables import Cell, Column, Row, decimals, right, spaced
 from experiments.page.words import in_words
 
 MOST_TIMES = 1000.0
@@ -41,6 +43,12 @@ def _amount(one: Mapping[str, Any]) -> str:
         return f"{fixed(scale * one['value'], decimals_of(*ends))} {pretty_unit(unit)}"
     told = f"{number(scale * one['value'])} {pretty_unit(unit).removeprefix('1')}"
     return f"{told} ({number(ends[0])} to {number(ends[1])})" if len(ends) == 2 else told
+
+
+def _log(row: Row) -> Cell:
+    """Return the name of a log, which leads to its page where there is one."""
+    name = _or_dash(row["file"])
+    return Cell(Markup('<a href="{}">{}</a>').format(row["page"], name) if row["page"] else name, "name")
 
 
 def _times(margin: float | None) -> Cell:
@@ -80,7 +88,7 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
     ),
     "classes": (_condition("class"), Column("logs"), Column("percent", "of logs", "%", words=decimals(1))),
     "logs": (
-        _text("file", "log"),
+        Column("file", "log", of_row=_log),
         _text("verb", "asked"),
         Column("outcome", words=lambda value: spaced(_or_dash(value))),
         _condition("found_condition", "class"),
@@ -103,7 +111,13 @@ LISTED = ("logs", "failures")
 VERDICT_TONES: Mapping[str, str] = {"better": "good", "worse": "bad"}
 
 
-def render_batch_report(manifest: Mapping[str, Any], tables: Tables, files: Mapping[str, bytes], done: int) -> str:
+def render_batch_report(
+    manifest: Mapping[str, Any],
+    tables: Tables,
+    files: Mapping[str, bytes],
+    done: int,
+    pages: Mapping[str, str] = MappingProxyType({}),
+) -> str:
     """Return the report of a batch study as one HTML page.
 
     Parameters
@@ -114,6 +128,10 @@ def render_batch_report(manifest: Mapping[str, Any], tables: Tables, files: Mapp
         From `experiments.batch.summary.summary_tables`.
     files : Mapping[str, bytes]
         Its figures, by path.
+    done : int
+        Cases that are done [count].
+    pages : Mapping[str, str]
+        Path of a log's own page from the report, by log.
 
     Returns
     -------
@@ -121,7 +139,7 @@ def render_batch_report(manifest: Mapping[str, Any], tables: Tables, files: Mapp
         The page; it loads nothing.
     """
     listed = {name: one_row_a_log(table) if name in LISTED else table for name, table in tables.items()}
-    shown = {name: _shown(listed[name]) for name in COLUMNS if name in listed}
+    shown = {name: _shown(listed[name], pages) for name in COLUMNS if name in listed}
     columns = {
         name: [column for column in COLUMNS[name] if table[column.source].notna().any()]
         for name, table in shown.items()
@@ -130,6 +148,7 @@ def render_batch_report(manifest: Mapping[str, Any], tables: Tables, files: Mapp
         "manifest": manifest,
         "done": done,
         "shown": shown,
+        "linked": len(pages),
         "rows": {name: len(table) for name, table in listed.items()},
         "failed": int(tables["outcomes"]["failed"].sum()) if "outcomes" in tables else 0,
         "most_listed": MOST_LISTED,
@@ -189,11 +208,12 @@ def _told_once(name: str, rows: Sequence[Mapping[Any, Any]]) -> Any:
     return "; ".join(f"{verb}: {one}" for verb, one in told.items())
 
 
-def _shown(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows that the page lists, each with its method in words."""
+def _shown(table: pd.DataFrame, pages: Mapping[str, str]) -> pd.DataFrame:
+    """Return the rows that the page lists, each with its method in words, and a log with the path of its page."""
     head = table.head(MOST_LISTED)
     if "file" in head:
-        head = head.assign(file=below_one_folder(head["file"].tolist()))
+        files = head["file"].tolist()
+        head = head.assign(file=below_one_folder(files), page=[pages.get(file, "") for file in files])
     return head.assign(way=[way_in_words(row) for row in head.to_dict("records")]) if "pressure" in head else head
 
 

@@ -2,6 +2,7 @@
 
 from experiments.batch.figures import BATCH_FIGURES
 from experiments.batch.folder import Folder
+from experiments.batch.log_pages import pages_in
 from experiments.batch.pages import render_batch_report
 from experiments.batch.part_store import PartStore
 from experiments.batch.summary import frame_of, summary_tables
@@ -15,7 +16,7 @@ REPORT = "report.html"
 
 
 def write_report(store: PartStore, folder: Folder) -> str:
-    """Write a study's report, its figures and its tables.
+    """Write a study's report, its figures and its tables; it leads to pages of logs that are in the folder.
 
     Parameters
     ----------
@@ -34,7 +35,8 @@ def write_report(store: PartStore, folder: Folder) -> str:
     tables = summary_tables(frame_of(rows))
     drawings = {name: draw for name, draw in BATCH_FIGURES.items() if _drawable(name.replace("_", " "), tables)}
     figures = figure_files(drawings, tables)
-    page = render_batch_report(manifest, tables, figures, len(rows)).encode()
+    logs = tables["logs"]["file"].dropna().tolist() if "logs" in tables else []
+    page = render_batch_report(manifest, tables, figures, len(rows), pages_in(folder, logs)).encode()
     numbered = {name: table.reset_index() if table.index.name else table for name, table in tables.items()}
     with refused(f"report {folder.name} cannot be written"):
         for name, content in {**figures, **csv_files("tables", numbered), REPORT: page}.items():

@@ -41,6 +41,9 @@ def batch(
     ] = None,
     max_failures: Annotated[int | None, option("N", "Stop once more than N cases have failed.", min=0)] = None,
     logs: Annotated[str | None, option("GLOB", "Glob of logs, instead of that in the study file.")] = None,
+    pages: Annotated[
+        int, option("N", "Also write a page for each of the N worst logs, to which the report leads.", min=0)
+    ] = 0,
     as_json: Json = False,
 ) -> None:
     """Run a study of many cases into a store that survives interruptions, and write its report.
@@ -71,6 +74,11 @@ def batch(
     source = f"{SHIPPED}/{study}.toml" if shipped else Path(study).name
     with store.writing():
         tally, before = run_plan(plan, store, source, settings)
+        if pages and not tally.stopped:
+            from experiments.batch.log_pages import write_log_pages
+
+            for sentence in write_log_pages(plan, store, pages):
+                note(sentence)
         report = write_report(store, store.folder)
     _finish(plan, store, tally, before, report, as_json, time.perf_counter() - begin)
 

@@ -45,7 +45,12 @@ def test_what_was_found_in_a_log_is_short_and_its_path_names_no_machine() -> Non
     page = render_batch_report({**manifest, "cases": 2, "versions": {}}, summary_tables(table), {}, 2)
     assert "velocity lost 0.000 %; bulk modulus 206.7 MPa" in page.replace("\N{NO-BREAK SPACE}", " ")
     assert "/home/ann" not in page
-    assert '<td data-head="log">a.csv</td>' in page
+    assert '<td class="name" data-head="log">a.csv</td>' in page
+    page = render_batch_report(
+        {**manifest, "cases": 2, "versions": {}}, summary_tables(table), {}, 2, {"/home/ann/logs/b.csv": "pages/b.html"}
+    )
+    assert '<td class="name" data-head="log"><a href="pages/b.html">b.csv</a></td>' in page
+    assert page.count("pages/") == 1
 
 
 def test_a_log_that_was_asked_two_questions_has_one_row() -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from experiments.batch.cases import plan_study
 from experiments.batch.folder import open_folder
+from experiments.batch.log_pages import write_log_pages
 from experiments.batch.part_store import PartStore, open_store
 from experiments.batch.report import write_report
 from experiments.batch.rows import SCHEMA
@@ -120,7 +121,10 @@ def test_the_study_of_a_fleet_runs_on_a_small_archive(tmp_path: Path) -> None:
     assert (rows["found_condition"] == rows["condition"]).tolist() == [True, True]
     modulus = store.rows().to_pandas().query("verb == 'estimate' and outcome == 'ok'")["bulk_modulus_pa"]
     assert np.allclose(modulus, 2.07e8, rtol=0.03)
+    assert write_log_pages(plan, store, 1) == []
     page = Path(write_report(store, store.folder)).read_text(encoding="utf-8")
     assert "broken.csv" in page
+    (link,) = re.findall(r'<a href="(pages/[^"]+)">major_leakage/run.csv</a>', page)
+    assert "leaks badly inside" in (tmp_path / "store" / link).read_text(encoding="utf-8")
     for section in ("logs", "failures"):  # whose words leave no room on a phone for the rest of a row
         assert 'class="cards whole"' in page.split(f'<section id="{section}">')[1].split("</section>")[0]

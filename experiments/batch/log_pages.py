@@ -1,0 +1,86 @@
+"""Pages of the worst logs of a batch study, to which its report leads."""
+
+from collections.abc import Collection
+from pathlib import Path
+
+from experiments.actuators import actuator, offered
+from experiments.batch.cases import Plan
+from experiments.batch.folder import Folder
+from experiments.batch.part_store import PartStore
+from experiments.batch.series import Log
+from experiments.command.log_verb import page_of
+from experiments.command.logs import caught, read_log
+from experiments.fleet.log_pages import file_name
+from experiments.fleet.rows import log_rows
+from experiments.running.refusal import refused
+from plant.errors import HydrostateError
+
+PAGES = "pages"
+"""Sub-folder of a store that holds them."""
+
+READ = ("file", "verb", "outcome", "found_condition", "reason", "quantities", "against")
+"""Columns of a store that say how bad a log is."""
+
+
+def write_log_pages(plan: Plan, store: PartStore, most: int) -> list[str]:
+    """Write a page for each of the worst logs that were diagnosed.
+
+    Parameters
+    ----------
+    plan : Plan
+        The study.
+    store : PartStore
+        Its rows; the pages are written into its folder.
+    most : int
+        Pages at most [count].
+
+    Returns
+    -------
+    list of str
+        Why a page could not be written, a sentence a log.
+    """
+    kind = actuator(plan.study.plant)
+    chosen = offered(kind, "diagnose")
+    logs = {
+        one.series.file: (one.series, work)
+        for one in plan.groups
+        for work in one.works
+        if isinstance(one.series, Log) and work.verb == "diagnose"
+    }
+    rows = [one for one in log_rows(store.rows(list(READ)).to_pylist(), {}, {}) if one.file in logs]
+    worst = sorted((one for one in rows if one.state != "failed"), key=lambda one: one.order)
+    unwritten: list[str] = []
+    for one in worst[:most]:
+        series, work = logs[one.file]
+        options = {**chosen.options, "seed": 0} | ({} if work.pressure else {"no_pressure": True})
+        try:
+            with caught():
+                record = read_log(Path(series.path), plan.rig.columns, dict(series.columns), kind.required)
+                found = chosen.run(record, *chosen.prepare(plan.rig, options))
+            result = {**chosen.blank, "file": one.file, "rig": plan.rig.name, **chosen.entries(found)}
+            page = page_of(chosen, result, found, record).encode()
+            with refused(f"page of {one.file} cannot be written"):
+                store.folder.write(f"{PAGES}/{file_name(one.file)}", page)
+        except HydrostateError as error:
+            unwritten.append(str(error))
+    return unwritten
+
+
+def pages_in(folder: Folder, files: Collection[str]) -> dict[str, str]:
+    """Return the pages of logs that a folder has.
+
+    Parameters
+    ----------
+    folder : Folder
+        Of a report.
+    files : collection of str
+        Logs, as the store names them.
+
+    Returns
+    -------
+    dict[str, str]
+        Path from the report, by log.
+    """
+    there = set(folder.files(f"{PAGES}/"))
+    named = {file: file_name(file) for file in files}
+    return {file: f"{PAGES}/{name}" for file, name in named.items() if name in there}
