@@ -182,7 +182,9 @@ def _estimate_message(found: "Finding") -> str:
         return clauses(mistakes or [NOT_OBSERVABLE_WITH_PRESSURE if seen else OUTCOMES[found.outcome]])
     low, high = (1e-6 * end for end in modulus.ci95)
     digits = decimals_of(low, high)
-    said = [f"bulk modulus {1e-6 * modulus.value:.{digits}f} MPa, 95 % interval {low:.{digits}f} to {high:.{digits}f} MPa"]
+    said = [
+        f"bulk modulus {1e-6 * modulus.value:.{digits}f} MPa, 95 % interval {low:.{digits}f} to {high:.{digits}f} MPa"
+    ]
     if modulus.ci95_total is not None:
         low, high = (1e-6 * end for end in modulus.ci95_total)
         said[0] += f", {low:.0f} to {high:.0f} MPa with rig error"

@@ -71,7 +71,9 @@ def diagnosed(results: list[dict[str, Any]], **options: Any) -> str:
 
 def test_an_empty_line_stands_between_logs_and_before_notes() -> None:
     noted = diagnosis(2, notes=[{"code": "known_as_the_rig", "data": {}, "text": "the rig limits it"}])
-    said = diagnosed([{**one, "severity": found_severity(), "message": ""} for one in (diagnosis(1), noted)]).split("\n")
+    said = diagnosed([{**one, "severity": found_severity(), "message": ""} for one in (diagnosis(1), noted)]).split(
+        "\n"
+    )
     first = [place for place, line in enumerate(said) if line.startswith(("run2", "1 of 2 logs"))]
     assert len(first) == 2
     assert all(said[place - 1] == "" for place in first)
