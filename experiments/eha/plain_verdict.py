@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from estimation.notes import RigCode
+from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
 from experiments.page.condition_names import in_words
 from experiments.page.sentences import left_unread, sentence
 from faults.conditions import CONDITIONS
@@ -73,7 +73,7 @@ def verdict(result: Mapping[str, Any]) -> str:
     'The actuator is healthy: leakage and friction are normal.'
     """
     if result["unknown"]:
-        return " ".join(_named(result)) or "No verdict: the log does not fit any known condition of this actuator."
+        return " ".join(_named(result)) or f"No verdict: {_hindered(result)}."
     levels = _levels(result)
     faults = {"leakage": LEAKS.get(levels["leakage"] or ""), "friction": RUBS.get(levels["friction"] or "")}
     wrong = " and ".join(one for one in faults.values() if one)
@@ -90,6 +90,18 @@ def verdict(result: Mapping[str, Any]) -> str:
     if soft:
         return "The oil is softer than its limit; leakage and friction are normal."
     return "The actuator is healthy: leakage and friction are normal."
+
+
+def _hindered(result: Mapping[str, Any]) -> str:
+    """Return why there is no verdict, in one clause."""
+    against = {one["code"] for one in result["notes"] if one["text"] in result["reasons"]}
+    if against & set(ChannelCode):
+        return "a column of the log has a wrong sign, unit or name"
+    if against & set(SensorCode):
+        return "a sensor reads wrong"
+    if EstimateCode.RIG_CONTRADICTED in against:
+        return "the log and the rig file contradict each other"
+    return "the log does not fit any known condition of this actuator"
 
 
 def _levels(result: Mapping[str, Any]) -> dict[str, str | None]:

@@ -4,10 +4,11 @@ from typing import Any
 
 import pytest
 
-from estimation.notes import RigCode
+from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
 from experiments.eha.plain_verdict import sureness, verdict, what_to_do, work_on
 from faults.conditions import CONDITIONS
 from faults.notes import AdviceCode, AgainstCode
+from plant.notes import Note
 
 AMOUNT = {"velocity_lost": {"value": 28.4, "unit": "%", "ci95": [27.0, 30.0]}}
 
@@ -34,6 +35,23 @@ def test_every_condition_has_a_verdict_and_work_that_name_what_is_wrong(conditio
         assert (f"{level} {fault}" in verdict(result)) == (level != "none")
     assert ("Nothing needs repair." in what_to_do(result)) == (condition == "normal")
     assert what_to_do(result)[-1] == "Log again."
+
+
+@pytest.mark.parametrize(
+    ("note", "said"),
+    [
+        (ChannelCode.CHANNELS_SWAPPED.note(channel="a", other="b", correlation=0.9), "a wrong sign, unit or name."),
+        (SensorCode.SENSORS_DISAGREE.note(difference_m_s=0.01), "a sensor reads wrong."),
+        (EstimateCode.RIG_CONTRADICTED.note(percent=129.0), "the log and the rig file contradict each other."),
+        (AgainstCode.OIL_STIFF.note(share=2.0), "the log does not fit any known condition of this actuator."),
+    ],
+)
+def test_without_a_verdict_the_heading_says_what_hinders_it(note: Note, said: str) -> None:
+    result = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=[str(note)])
+    assert verdict(result).startswith("No verdict: ")
+    assert verdict(result).endswith(said)
+    beside = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=["another one"])
+    assert verdict(beside).endswith("does not fit any known condition of this actuator.")
 
 
 @pytest.mark.parametrize(
