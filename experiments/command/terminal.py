@@ -186,8 +186,8 @@ def folded(text: str, width: int) -> str:
     for line in text.split("\n"):
         named = re.match(r" +\S+ {2,}", line)
         hang = " " * (len(named.group()) if named else 4)
-        form: dict[str, bool] = {"break_long_words": False, "break_on_hyphens": False}
-        lines += textwrap.wrap(line, width, subsequent_indent=hang, **form) or [""]
+        folder = textwrap.TextWrapper(width, subsequent_indent=hang, break_long_words=False, break_on_hyphens=False)
+        lines += folder.wrap(line) or [""]
     return "\n".join(lines)
 
 

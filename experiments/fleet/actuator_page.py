@@ -40,12 +40,12 @@ FORECASTS = (
     Column("level", "level now, 95 % interval"),
     "limit",
     Column("growth", "growth per log"),
-    Column("half", "50 % interval to the limit", "logs"),
-    Column("most", "90 % interval to the limit", "logs"),
+    Column("half", "limit reached in, 50 % interval", "logs"),
+    Column("most", "limit reached in, 90 % interval", "logs"),
     Column("outlook", "outlook"),
 )
 LOGS = (
-    "log",
+    Column("log", words=lambda name: Cell(name, "name")),
     Column("date", words=lambda date: Cell(date, "name")),
     Column("state", words=lambda state: Cell(STATES[state], f"fleet-{state} name")),
     "found",
@@ -73,9 +73,10 @@ def actuator_page(row: ActuatorRow, log: str | None, fleet: str = "../index.html
         "outlook": "" if worst is None else f"{SHOWN.get(worst.name, worst.name)}: {_in_full(worst)}".capitalize(),
         "log": log,
         "fleet": fleet,
+        "apart": _apart(outlooks),
         "forecasts": pd.DataFrame([_forecast(one) for one in outlooks]),
         "logs": pd.DataFrame(
-            [(one.file.rsplit("/", 1)[-1], one.named.date, one.state, found_in(one)) for one in last],
+            [(one.file.rsplit("/", 1)[-1], one.named.shown, one.state, found_in(one)) for one in last],
             columns=["log", "date", "state", "found"],
         ),
         "charts": {one.name: _chart(one, row.name) for one in outlooks},
@@ -102,7 +103,7 @@ def _restarts(outlooks: Sequence[Outlook], maintained: Sequence[float]) -> list[
         names = [SHOWN[one.name] for one in which]
         subject = "Every severity" if len(names) == len(outlooks) else ", ".join(names).capitalize()
         verb = "is" if len(names) in (1, len(outlooks)) else "are"
-        said.append(f"{subject} {verb} followed from the log of {log.date or begin + 1} on, {why}.")
+        said.append(f"{subject} {verb} followed from the log of {log.shown or begin + 1} on, {why}.")
     return said
 
 
@@ -113,9 +114,18 @@ def _reached(low: float, high: float) -> str:
 def _in_full(one: Outlook) -> str:
     count = len(one.logs) - one.trend.begin
     if count >= FEWEST:
-        return one.words
+        return f"{one.words}, {one.time_left}" if one.time_left else one.words
     there = f"there {'is' if count == 1 else 'are'} {count}{' since the trend restarted' if one.trend.begin else ''}"
     return f"no forecast yet, since it needs {FEWEST} logs, and {there}"
+
+
+def _apart(outlooks: Sequence[Outlook]) -> str:
+    """Return how far apart logs usually are, in words; empty where dates do not say."""
+    days = next((one.days_apart for one in outlooks if one.days_apart is not None), None)
+    if days is None:
+        return ""
+    told = f"{24.0 * days:.2g} h" if days < 1.0 else f"{days:.3g} day{'' if f'{days:.3g}' == '1' else 's'}"
+    return f", {told}"
 
 
 def _forecast(one: Outlook) -> dict[str, str]:
@@ -124,14 +134,16 @@ def _forecast(one: Outlook) -> dict[str, str]:
     ends = interval_95(scale * level, scale * std)
     decimals = decimals_of(*ends)
     shown, low, high = (fixed(each, decimals) for each in (scale * level, *ends))
+    growth, growth_std = (scale * each for each in (growth, growth_std))
     growth = growth if abs(growth) > ROUNDING * growth_std else 0.0
+    places = decimals_of(0.0, 5.0 * growth_std, 6)  # one digit of the deviation, two of one below 0.2 of a digit
     crossing = one.trend.crossing
     reached = None if crossing is None else [float(end) for end in crossing.quantiles]
     return {
         "severity": SHOWN[one.name],
         "level": f"{shown} {unit} ({low} to {high})",
         "limit": f"{number(scale * one.series.limit, 3)} {unit}",
-        "growth": f"{number(scale * growth, 2)} ± {number(scale * growth_std, 2)} {unit}",
+        "growth": f"{fixed(growth, places)} ± {fixed(growth_std, places)} {unit}",
         "half": MISSING if reached is None else _reached(reached[1], reached[3]),
         "most": MISSING if reached is None else _reached(reached[0], reached[4]),
         "outlook": one.words,
@@ -149,15 +161,15 @@ def _chart(one: Outlook, name: str) -> Charts:
     curves = (
         Curve("logs", measured, "black", "dots"),
         Curve("level", scale * level, "blue"),
-        Curve("90 % upper", scale * (level + NORMAL_90 * std), "blue", "edge"),
-        Curve("90 % lower", scale * (level - NORMAL_90 * std), "blue", "edge"),
+        Curve("upper end, 90 %", scale * (level + NORMAL_90 * std), "blue", "edge"),
+        Curve("lower end, 90 %", scale * (level - NORMAL_90 * std), "blue", "edge"),
     )
     marks = (Mark("y", scale * one.series.limit, "limit"), Mark("x", float(count), "last log"))
     ends = scale * np.array([*one.series.values, one.series.healthy, one.series.limit])
     room = ROOM * float(np.ptp(ends))  # a forecast that leaves it would leave no height for the logs
     told = (float(ends.min()) - room, float(ends.max()) + room)
     panel = Panel(SHOWN[one.name], unit, curves, marks, [(2, 3)], told)
-    return Charts(x, "log", [panel], f"{name}-{one.name}", "logs")
+    return Charts(x, "number of the log", [panel], f"{name}-{one.name}", "logs")
 
 
 def _course(one: Outlook) -> tuple[Array, Array]:

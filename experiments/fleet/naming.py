@@ -15,6 +15,9 @@ STAMP = re.compile(
 )
 """A date as loggers write it into file names, with or without a time: 20261122, 2026-11-22_14-30-00."""
 
+CALENDAR = rf"{STAMP.pattern}|\d{{4}}-.*"
+"""A date of the calendar, as `place_of` reads them."""
+
 FIELDS: Mapping[str, str] = {"actuator": r"(?P<actuator>.+)", "date": r"(?P<date>[0-9][0-9T:.+\-Z]*)"}
 """What a pattern may name, and what stands there."""
 
@@ -45,6 +48,25 @@ class Named:
     date: str
     place: float | None
     problem: str = ""
+
+    @property
+    def shown(self) -> str:
+        """The date as a reader wants it: a `STAMP` with hyphens and colons, all else as it was given."""
+        stamp = STAMP.fullmatch(self.date)
+        if stamp is None:
+            return self.date
+        day = f"{stamp['year']}-{stamp['month']}-{stamp['day']}"
+        return f"{day} {stamp['hour']}:{stamp['minute']}" if stamp["hour"] else day
+
+    @property
+    def day(self) -> str:
+        """The date without the time of day, for a narrow column."""
+        return self.shown.split(" ")[0] if STAMP.fullmatch(self.date) else self.date
+
+    @property
+    def in_days(self) -> bool:
+        """Whether its place counts days, and no running hours or the like."""
+        return self.place is not None and re.fullmatch(CALENDAR, self.date) is not None
 
 
 UNNAMED = Named("", "", None)

@@ -13,6 +13,9 @@ from experiments.fleet.rows import LogRow
 from faults.trend.crossing import HORIZON
 from faults.trend.trend import FEWEST, Series, Trend, trends
 
+UNITS_OF_TIME = (("hours", 1.0 / 24.0, 2.0), ("days", 1.0, 21.0), ("weeks", 7.0, 120.0), ("months", 30.4, math.inf))
+"""Units in which a time is told: name, length [day], and up to which time each is used [day]."""
+
 LEAST_STD = 1e-3
 """Least standard deviation of a log, as a share of the way from healthy to the limit [fraction]."""
 
@@ -59,6 +62,22 @@ class Outlook:
         return self.trend.alarm
 
     @property
+    def days_apart(self) -> float | None:
+        """Usual time between two logs [day]; None where their dates are none of the calendar."""
+        return self.series.step if len(self.logs) > 1 and all(one.named.in_days for one in self.logs) else None
+
+    @property
+    def time_left(self) -> str:
+        """Time to the limit, if logs are taken as often as before; empty where the forecast or the dates do not say."""
+        if self.left is None or self.days_apart is None or self.left[1] <= 0.0:
+            return ""
+        low, middle, high = self.left
+        unit, days = next((unit, days) for unit, days, most in UNITS_OF_TIME if self.days_apart * middle < most)
+        scale = self.days_apart / days
+        ends = span_of(scale * low, scale * high, scale * HORIZON)
+        return f"about {scale * middle:.0f} {unit} ({ends})"
+
+    @property
     def words(self) -> str:
         """The forecast in one clause."""
         if len(self.logs) - self.trend.begin < FEWEST:
@@ -74,20 +93,22 @@ class Outlook:
         return f"limit in {middle:.0f} {logs} ({span_of(low, high)})"
 
 
-def span_of(low: float, high: float) -> str:
-    """Return the interval of a crossing in words; no future is followed beyond `HORIZON`.
+def span_of(low: float, high: float, horizon: float = HORIZON) -> str:
+    """Return the interval of a crossing in words; no future is followed beyond the horizon.
 
     Parameters
     ----------
     low, high : float
-        Its ends, infinite beyond [logs, a count].
+        Its ends, infinite beyond [logs, a count, or a unit of time].
+    horizon : float
+        How far futures are followed [the same unit].
 
     Examples
     --------
     >>> span_of(3.4, 12.0), span_of(80.0, math.inf), span_of(math.inf, math.inf)
     ('3 to 12', '80 to more than 300', 'more than 300')
     """
-    first, last = (f"{end:.0f}" if math.isfinite(end) else f"more than {HORIZON:.0f}" for end in (low, high))
+    first, last = (f"{end:.0f}" if math.isfinite(end) else f"more than {horizon:.0f}" for end in (low, high))
     return f"{first} to {last}" if math.isfinite(low) else first
 
 

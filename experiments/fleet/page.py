@@ -84,7 +84,8 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
         Column("logs left", digits=3),
     ]
     shown = [next((one for one in columns if one.source == each["label"]), each["label"]) for each in COLUMNS]
-    return render_page("fleet/fleet.html", facts, {"still": shown, "unread": UNREAD}, {})
+    named = (Column("log", words=lambda name: Cell(name, "name")), *UNREAD[1:])
+    return render_page("fleet/fleet.html", facts, {"still": shown, "unread": named}, {})
 
 
 def sickest_of(rows: Sequence[ActuatorRow]) -> list[str]:
@@ -142,7 +143,7 @@ def row_cells(row: ActuatorRow) -> list[Any]:
         share,
         words,
         left,
-        last.named.date,
+        last.named.day,
         len(row.logs),
     ]
 

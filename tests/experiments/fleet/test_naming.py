@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.fleet.naming import UNNAMED, by_dates, by_pattern, by_table, place_of
+from experiments.fleet.naming import UNNAMED, Named, by_dates, by_pattern, by_table, place_of
 from plant.errors import HydrostateError
 
 
@@ -44,6 +44,13 @@ def test_a_later_date_is_a_larger_number_whatever_its_form() -> None:
     assert (
         place_of("20261122_180000", "log") == place_of("2026-11-22_18-00", "log") == place_of("20261122", "log") + 0.75
     )
+
+
+def test_a_date_is_shown_with_hyphens_and_colons_and_what_is_none_as_it_was_given() -> None:
+    named = [Named("P-1", date, place_of(date, "log")) for date in ("20261122_143000", "2026-11-22", "812.5")]
+    assert [one.shown for one in named] == ["2026-11-22 14:30", "2026-11-22", "812.5"]
+    assert [one.day for one in named] == ["2026-11-22", "2026-11-22", "812.5"]
+    assert [one.in_days for one in named] == [True, True, False]
 
 
 @pytest.mark.parametrize(

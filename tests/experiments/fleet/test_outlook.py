@@ -42,6 +42,24 @@ def test_an_actuator_that_grows_towards_its_limit_is_in_alarm_before_it_is_past(
     assert re.fullmatch(r"limit in \d+ logs \(\d+ to (\d+|more than 300)\)", row.outlook.words)
 
 
+@pytest.mark.parametrize(
+    ("name", "step", "words"),
+    [
+        ("P-1_202601{:02d}.csv", 1, r"about \d+ days \(\d+ to (\d+|more than 300)\)"),
+        ("P-1_20260101_{:02d}00.csv", 1, r"about \d+ hours \(\d+ to (\d+|more than 300)\)"),
+        ("P-1_{}.csv", 7, ""),  # running hours
+    ],
+)
+def test_a_forecast_is_also_told_in_time_where_logs_have_dates(name: str, step: int, words: str) -> None:
+    files = [name.format(step * (place + 1)) for place in range(18)]
+    rows = [store_row(file, 1.0 + 0.09 * place) for place, file in enumerate(files)]
+    (row,) = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {}))
+    assert row.outlook is not None
+    assert row.outlook.left is not None
+    assert re.fullmatch(words, row.outlook.time_left)
+    assert row.outlook.time_left in actuator_page(row, None)
+
+
 def test_an_actuator_that_rests_is_in_no_alarm() -> None:
     row = actuator(np.full(30, 1.5))
     assert row.state == "within"
