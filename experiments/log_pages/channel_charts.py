@@ -1,5 +1,6 @@
 """The channels of a log as charts."""
 
+import math
 from typing import TYPE_CHECKING
 
 from experiments.page.charts import Charts
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 MOST_CHANNELS = 8
 """Most channels that are drawn [count]."""
 
-SHOWN_IN = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "Pa": ("bar", 1e-5)}
+SHOWN_IN = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "Pa": ("bar", 1e-5), "rad/s": ("rpm", 30.0 / math.pi)}
 """Units that a shop reads, and the factor from SI."""
 
 

@@ -11,7 +11,7 @@ from experiments.command.terminal import clauses
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.log_pages.entries import SOUND, either
 from experiments.page.condition_names import in_words
-from experiments.page.numbers import MISSING, number, percent_text, pretty_unit, shop_unit
+from experiments.page.numbers import MISSING, alike_in_digits, number, percent_text, pretty_unit, shop_unit
 from experiments.page.render import render_page
 from experiments.page.sentences import left_unread, sentence
 from experiments.page.tables import Column
@@ -107,6 +107,9 @@ def _title(found: "Finding") -> str:
         return sentence(f"Found: {found.faults[0]}" if found.faults else SOUND[found.named[0]])
     if found.named:
         return f"Found: {either(found.named)}."
+    oil = found.quantities.get("bulk_modulus")
+    if oil is not None and oil.value is not None and found.gate.passed:
+        return f"Bulk modulus is {number(1e-6 * oil.value, 3)} MPa; the consistency check passed."
     if any(one.value is not None for one in found.quantities.values()):
         passed = "which passed the consistency check" if found.gate.passed else "but do not rely on them"
         return f"Estimated values, {passed}."
@@ -114,20 +117,21 @@ def _title(found: "Finding") -> str:
 
 
 def _row(name: str, one: "Quantity") -> dict[str, str]:
-    scale, unit = shop_unit(one.unit)
+    _, unit = shop_unit(one.unit)
+    value, *ends = _in_digits(one.value, one.ci95, one.unit)
+    _, *total = _in_digits(one.value, one.ci95_total, one.unit)
     return {
         "quantity": f"{name.replace('_', ' ')}{f' [{_whole(pretty_unit(unit))}]' if unit != '1' else ''}",
-        "value": _whole(number(None if one.value is None else scale * one.value)),
-        "interval": _ends(one.ci95, scale),
-        "total": _ends(one.ci95_total, scale),
+        "value": value,
+        "interval": " to ".join(ends) or MISSING,
+        "total": " to ".join(total) or MISSING,
     }
 
 
-def _ends(interval: tuple[float, float] | None, scale: float) -> str:
-    if interval is None:
-        return MISSING
-    low, high = (_whole(number(scale * end)) for end in interval)
-    return f"{low} to {high}"
+def _in_digits(value: float | None, interval: tuple[float, float] | None, si_unit: str) -> list[str]:
+    scale, unit = shop_unit(si_unit)
+    ends = None if interval is None else [scale * end for end in interval]
+    return [_whole(one) for one in alike_in_digits(None if value is None else scale * value, ends, unit)]
 
 
 def _whole(shown: str) -> str:

@@ -1,7 +1,7 @@
 """Numbers as a reader wants them: sensible digits, exponents in threes, raised units."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 MISSING = "\N{EN DASH}"
 """What stands where there is no number."""
@@ -15,6 +15,9 @@ MOST_DIGITS = 4
 
 PLAIN_FROM, PLAIN_TO = 1e-3, 1e5
 """Between these magnitudes a number is written without an exponent."""
+
+LEAST_WIDTH = 5e-3
+"""Width of an interval from which decimals show it, not powers of ten [any unit]."""
 
 SHOP_UNITS: Mapping[str, tuple[float, str]] = {
     "Pa": (1e-6, "MPa"),
@@ -117,6 +120,29 @@ def decimals_of(low: float, high: float, most: int = 3) -> int:
     largest = max(abs(low), abs(high))
     meant = MOST_DIGITS - 1 - math.floor(math.log10(largest)) if largest > 0.0 else most
     return max(min(wanted, meant, most), 0)
+
+
+def alike_in_digits(value: float | None, interval: Sequence[float] | None, unit: str) -> list[str]:
+    """Return a value and the ends of its interval with the decimals that the interval leaves it.
+
+    Parameters
+    ----------
+    value : float or None
+        The value [``unit``].
+    interval : sequence of float or None
+        Its ends [``unit``]; None where there is none.
+
+    Examples
+    --------
+    >>> alike_in_digits(1.1e-13, [-2.01, 1.92], "N"), alike_in_digits(2.5e-11, [2.4e-11, 2.6e-11], "m^3/(s Pa)")
+    (['0.0', '−2.0', '1.9'], ['25.00 × 10⁻¹²', '24.0 × 10⁻¹²', '26.0 × 10⁻¹²'])
+    """
+    if value is None or interval is None:
+        return [number(value)]
+    low, high = interval
+    if unit == "%" or (high - low > LEAST_WIDTH and max(abs(low), abs(high)) < PLAIN_TO):
+        return [fixed(each, decimals_of(low, high)) for each in (value, low, high)]
+    return [number(value), number(low, 3), number(high, 3)]
 
 
 def exact(value: float) -> str:

@@ -6,16 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from estimation.finding import NORMAL_95
 from experiments.page.names_shown import SHOWN
-from experiments.page.numbers import (
-    MISSING,
-    PLAIN_TO,
-    decimals_of,
-    fixed,
-    number,
-    percent_text,
-    pretty_unit,
-    shop_unit,
-)
+from experiments.page.numbers import MISSING, alike_in_digits, percent_text, pretty_unit, shop_unit
 from experiments.page.sentences import sentence
 from experiments.page.words import in_words
 
@@ -24,9 +15,6 @@ if TYPE_CHECKING:
 
 LEAST_SHARE = 1e-3
 """Conditions that are less likely in both logs are not shown [probability]."""
-
-LEAST_WIDTH = 5e-3
-"""Width of an interval from which decimals show it, not powers of ten [any unit]."""
 
 MOST_NAMED = 6
 """Quantities that a title names, at most [count]."""
@@ -192,29 +180,6 @@ def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:
         "interval": " to ".join(ends) or MISSING,
         "quantity": f"{named} [{pretty_unit(unit)}]" if unit else named,
     }
-
-
-def alike_in_digits(value: float | None, interval: Sequence[float] | None, unit: str) -> list[str]:
-    """Return a value and the ends of its interval with the decimals that the interval leaves it.
-
-    Parameters
-    ----------
-    value : float or None
-        The value [``unit``].
-    interval : sequence of float or None
-        Its ends [``unit``]; None where there is none.
-
-    Examples
-    --------
-    >>> alike_in_digits(1.1e-13, [-2.01, 1.92], "N"), alike_in_digits(2.5e-11, [2.4e-11, 2.6e-11], "m^3/(s Pa)")
-    (['0.0', '−2.0', '1.9'], ['25.00 × 10⁻¹²', '24.0 × 10⁻¹²', '26.0 × 10⁻¹²'])
-    """
-    if value is None or interval is None:
-        return [number(value)]
-    low, high = interval
-    if unit == "%" or (high - low > LEAST_WIDTH and max(abs(low), abs(high)) < PLAIN_TO):
-        return [fixed(each, decimals_of(low, high)) for each in (value, low, high)]
-    return [number(value), number(low, 3), number(high, 3)]
 
 
 def plain_words(result: Mapping[str, Any]) -> str:

@@ -189,7 +189,9 @@ def test_oil_that_is_not_the_rigs_is_told_with_the_volume_that_would_explain_it(
 ) -> None:
     rig = replace(HEALTHY, bulk_modulus=share * HEALTHY.bulk_modulus)
     believed = replace(estimate_bulk_modulus(log(), HEALTHY), gate=Gate(True, ()))
-    told = [note for note in finding_of(clean_log(log(), HEALTHY), believed, Rig(parameters=rig)).notes if note.code in OILS]
+    told = [
+        note for note in finding_of(clean_log(log(), HEALTHY), believed, Rig(parameters=rig)).notes if note.code in OILS
+    ]
     assert [note.code for note in told] == ([] if code is None else [code])
     if told:
         assert told[0].data["volume"] == pytest.approx(share * HEALTHY.chamber_volume, rel=0.01)

@@ -26,7 +26,8 @@ def found(**changes: object) -> Finding:
 @pytest.mark.parametrize(
     ("changes", "title"),
     [
-        ({}, "Estimated values, which passed the consistency check."),
+        ({}, "Bulk modulus is 207 MPa; the consistency check passed."),
+        ({"quantities": {"load": Quantity(2.0, "N")}}, "Estimated values, which passed the consistency check."),
         ({"gate": DOUBTED}, "Estimated values, but do not rely on them."),
         ({"quantities": {"bulk_modulus": Quantity(None, "Pa")}}, "No values: the log contains too little"),
         ({"condition": "minor_leakage", "probabilities": {"minor_leakage": 0.9}}, "Found: minor leakage."),
