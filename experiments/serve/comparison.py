@@ -46,8 +46,8 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
         "logs": logs,
         "links": None if identities is None else [f"logs/{one}" for one in identities],
         "turned": identities and f"compare?first={identities[1]}&second={identities[0]}",
-        "title": _title([row for row in rows if row["changed"]], any(row["interval"] for row in rows)),
-        "quantities": _quantities_shown(rows),
+        "title": title_of(rows),
+        "quantities": quantities_shown(rows),
         "probabilities": _probabilities_shown(first.get("probabilities"), second.get("probabilities")),
     }
     names = [log["file"] for log in logs]
@@ -65,7 +65,14 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
     return render_page("serve/compare.html", facts, headed, {})
 
 
-def _quantities_shown(rows: Sequence[Mapping[str, Any]]) -> "pd.DataFrame":
+def quantities_shown(rows: Sequence[Mapping[str, Any]]) -> "pd.DataFrame":
+    """Return the quantities of two logs in a reader's units, with what is said of each.
+
+    Parameters
+    ----------
+    rows : sequence of Mapping
+        From `compared`.
+    """
     import pandas as pd
 
     shown = [
@@ -199,9 +206,16 @@ def plain_words(result: Mapping[str, Any]) -> str:
     return said if result["unknown"] else f"{said} {how_sure(result)}"
 
 
-def _title(changed: Sequence[Mapping[str, Any]], comparable: bool) -> str:
-    """Return which quantities the second log has more of, and less."""
-    if not comparable:
+def title_of(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return which quantities the second log has more of, and less, in one sentence.
+
+    Parameters
+    ----------
+    rows : sequence of Mapping
+        From `compared`.
+    """
+    changed = [row for row in rows if row["changed"]]
+    if not any(row["interval"] for row in rows):
         return "The two logs cannot be compared: no quantity has an interval in both."
     if not changed:
         return "No certain difference between the two logs."

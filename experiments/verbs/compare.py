@@ -1,29 +1,33 @@
-"""`hydrostate compare A B`: what got better and what got worse between two batch studies."""
+"""`hydrostate compare A B`: what changed between two logs, or what got better and worse between two batch studies."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from experiments.command.json_output import json_text, write_whole
-from experiments.command.options import SEED, Json, Seed, argument, option
+from experiments.command.options import SEED, Columns, Json, Plant, RigFile, Seed, argument, option
 from experiments.command.terminal import emit, note, rendered, table
 
 commands = typer.Typer()
 
 
-@commands.command(epilog="Example: hydrostate compare results/before results/after --out comparison.html")
+@commands.command(epilog="Example: hydrostate compare before.csv after.csv --out comparison.html")
 def compare(
-    first: Annotated[str, argument("A", "Store of the first study.")],
-    second: Annotated[str, argument("B", "Store of the second study.")],
-    out: Annotated[Path | None, option("HTML", "Also write a page with every condition.", "--out", "-o")] = None,
+    first: Annotated[str, argument("A", "The first log, or the store of the first study.")],
+    second: Annotated[str, argument("B", "The second log, or the store of the second study.")],
+    out: Annotated[Path | None, option("HTML", "Also write a page.", "--out", "-o")] = None,
+    plant: Plant = None,
+    rig: RigFile = None,
+    columns: Columns = None,
     seed: Seed = SEED,
     as_json: Json = False,
 ) -> None:
-    """Show what got better and what got worse from study A to study B, with 95 % intervals by bootstrap.
+    """Show what changed between two logs: every severity, the difference, and its 95 % interval.
 
-    Cases are paired: the same series with the same treatment. If each study uses one filter (or form, plant, ...)
-    throughout and the two studies differ in it, that difference is compared. The seed draws the bootstrap.
+    Of two batch studies, show what got better and what got worse from A to B, with 95 % intervals by bootstrap; the
+    seed draws it. Cases are paired: the same series with the same treatment. If each study uses one filter (or form,
+    plant, ...) throughout and the two studies differ in it, that difference is compared.
     """
     from experiments.batch.compare import compare_studies
     from experiments.batch.pages import render_comparison
@@ -31,10 +35,16 @@ def compare(
     from experiments.batch.summary import frame_of
     from plant.errors import HydrostateError
 
-    if log := next((place for place in (first, second) if Path(place).is_file()), None):
-        raise HydrostateError(
-            f"{log} is a file, not the store of a batch study; for two logs, run: hydrostate diagnose {first} {second}"
-        )
+    files = [place for place in (first, second) if Path(place).is_file()]
+    if len(files) == 2:
+        from experiments.log_pages.two_logs import compare_logs
+
+        chosen: dict[str, Any] = {"plant": plant, "rig": rig, "columns": columns, "seed": seed, "as_json": as_json}
+        compare_logs([Path(first), Path(second)], out, **chosen)
+        return
+    if files:
+        other = second if files[0] == first else first
+        raise HydrostateError(f"{files[0]} is a log, and {other} is none: compare takes two logs, or two stores")
     names = [Path(place.rstrip("/")).name for place in (first, second)]
     if names[0] == names[1]:
         names = ["A", "B"]

@@ -44,3 +44,22 @@ def test_a_program_gets_the_rows_that_the_screen_shows(stores: tuple[Path, Path]
     assert f"{error['difference']:+.3g}" in shown.stdout
     same = CliRunner().invoke(app, ["compare", str(stores[0]), str(stores[0])])
     assert "A [%]" in same.stdout  # studies of one name
+
+
+@pytest.mark.slow
+def test_two_logs_are_compared_on_the_terminal_on_a_page_and_for_a_program(tmp_path: Path) -> None:
+    logs = [str(tmp_path / f"{name}.csv") for name in ("before", "after")]
+    for log, leakage in zip(logs, ("0", "1"), strict=True):
+        how = ["--drive", "steps", "--duration", "2", "--sample-time", "2e-3", "--leakage-severity", leakage]
+        assert CliRunner().invoke(app, ["simulate", *how, "--out", log]).exit_code == 0
+    shown = CliRunner().invoke(app, ["compare", *logs, "--out", str(tmp_path / "page.html")])
+    assert shown.exit_code == 0, shown.output
+    title = next(line for line in shown.stdout.splitlines() if line.startswith("In the second log, "))
+    assert "leakage" in title.partition(" higher")[0]
+    assert title in (tmp_path / "page.html").read_text(encoding="utf-8")
+    (told,) = json.loads(CliRunner().invoke(app, ["compare", *logs, "--json"]).stdout)
+    leak = next(row for row in told["differences"] if row["quantity"] == "leakage_flow")
+    assert leak["changed"]
+    assert leak["interval"][0] > 2.0
+    same = CliRunner().invoke(app, ["compare", logs[0], logs[0]])
+    assert (same.exit_code, "twice" in same.output) == (2, True)

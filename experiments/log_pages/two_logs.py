@@ -1,0 +1,82 @@
+"""`hydrostate compare A B` of two logs: both diagnosed, and what is higher or lower in the second."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from experiments.actuators import offered
+from experiments.command.json_output import json_text, write_whole
+from experiments.command.logs import read_log, run_logs
+from experiments.command.options import load_actuator, load_columns
+from experiments.command.terminal import emit, note, rendered, short_names, table
+from experiments.serve.comparison import compare_view, compared, plain_words, quantities_shown, title_of
+from plant.errors import HydrostateError
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+
+def compare_logs(
+    logs: Sequence[Path],
+    out: Path | None,
+    *,
+    plant: str | None,
+    rig: Path | None,
+    columns: Sequence[str] | None,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Diagnose two logs, and print their quantities with the differences.
+
+    Parameters
+    ----------
+    logs : sequence of Path
+        Two of them.
+    out : Path or None
+        Where a page is written too.
+
+    Raises
+    ------
+    HydrostateError
+        If an option cannot be used.
+    typer.Exit
+        If a log cannot be read.
+    """
+    if len({str(log) for log in logs}) < 2:
+        raise HydrostateError(f"two logs are compared, got {logs[0]} twice")
+    kind, bench = load_actuator(plant, rig)
+    chosen = offered(kind, "diagnose")
+    actual, prepared = chosen.prepare(bench, {**chosen.options, "seed": seed})
+    read = partial(read_log, rig_columns=bench.columns, columns=load_columns(columns), required=kind.required)
+    about = {"plant": kind.name, "rig": bench.name, "seed": seed}
+
+    def work(log: Path) -> dict[str, Any]:
+        return {**chosen.blank, **about, **chosen.entries(chosen.run(read(log), actual, prepared))}
+
+    batch = run_logs(logs, work, {**chosen.blank, **about}, "diagnosing")
+    if len(batch.done) < len(logs):
+        raise typer.Exit(batch.exit_code)
+    first, second = (
+        {**result, "file": name} for result, name in zip(batch.results, short_names(batch.results), strict=True)
+    )
+    if out is not None:
+        write_whole(out, compare_view(first, second), "--out", parents=True)
+        note(f"written: {out}; open it in a browser")
+    if as_json:
+        files = [str(log) for log in logs]
+        entries = {"outcome": "ok", "first": files[0], "second": files[1], "seed": seed}
+        emit(json_text([{**entries, "differences": compared(first, second)}]))
+        return
+    emit(rendered(*_shown(first, second)))
+
+
+def _shown(first: Mapping[str, Any], second: Mapping[str, Any]) -> "list[RenderableType]":
+    rows = compared(first, second)
+    said = [f"{one['file']}: {plain_words(one) or one['message']}" for one in (first, second)]
+    shown = table("quantity", "verdict", first["file"], second["file"], "difference", "95 % interval of the difference")
+    for row in quantities_shown(rows).to_dict("records"):
+        shown.add_row(*(row[name] for name in ("quantity", "says", "first", "second", "difference", "interval")))
+    return [title_of(rows), "", *said, shown]
