@@ -21,8 +21,8 @@ class SensorCode(Code):
         "values were left out"
     )
     SPEED_HELD = (
-        "{channel} has a new sample every {milliseconds:.3g} ms only and is repeated for {rows} rows; what the pump "
-        "delivered in between is not known, so the log was taken at those samples alone: log the speed in every row"
+        "{channel} has a new sample only every {milliseconds:.3g} ms and repeats it for {rows} rows; the pump's flow "
+        "in between is not known, so only the rows of new samples were used: log the speed in every row"
     )
     BRIDGED = (
         "{channel} has a new sample only every {milliseconds:.3g} ms and was interpolated linearly in between; one row "
@@ -86,7 +86,7 @@ class ChannelCode(Code):
     )
     UNIT_CHANGES = (
         "{channel}: from {begin_s:.3g} s on, noise is about {factor:.3g} times what it was, as when the column's unit "
-        "changes within the log; give both parts as logs of their own"
+        "changes within the log; cut the log there, and read each part by itself"
     )
     NOTHING_CHANGES = (
         "{channel}: no value changes from the first row to the last although the motor turns, so the log shows "
@@ -237,7 +237,7 @@ class RigCode(Code):
         "play (backlash): the interval of bulk modulus includes its effect"
     )
     AREA_TO_DISPLACEMENT = (
-        "the ratio of pump displacement to piston area is {percent:.2f} ± {half_width:.2f} % of that in the rig file: "
+        "the ratio of pump displacement to piston area is {percent:.1f} ± {half_width:.1f} % of that in the rig file: "
         "one of the two is wrong, or (below 100 %) the pump is worn, and the log does not show which"
     )
     PUMP_WORN = (
@@ -253,8 +253,8 @@ class RigCode(Code):
         "much flow per pascal as at a small drop; the fit includes this"
     )
     MAKEUP_UNSEEN = (
-        "the make-up valve of chamber {side} never opened, so this log does not show whether it is stuck shut; use a "
-        "drive that draws oil into chamber {side}"
+        "the make-up valve of chamber {side} never opened, so this log does not show whether it is stuck shut; a "
+        "drive that draws oil into chamber {side} would"
     )
     SPEED_OFFSET = (
         "motor_speed_rad_s reads {offset_rad_s:.3g} ± {half_width:.2g} rad/s too much; the offset was subtracted"
@@ -288,13 +288,13 @@ class RigCode(Code):
     )
     LEAKAGE_GROWS = "leakage grows by a factor of {factor:.3g} over the log: more than warming oil explains"
     LEAKAGE_STEPS = (
-        "leakage changes from {first:.3g} to {last:.3g} m^3/(s Pa) after {percent_of_log:.3g} % of the log, within "
-        "{within_percent:.2g} % of it"
+        "leakage changes from {first:.3g} to {last:.3g} m^3/(s Pa) after {percent_of_log:.3g} % of the log; the "
+        "change takes {within_percent:.2g} % of it"
     )
     LEAKAGE_DRIFTS = (
         "leakage changes by a factor of {factor:.2f} over the log, from {first:.3g} to {last:.3g} m^3/(s Pa), as when "
-        "the oil warms or cools; severities are those at the end; the condition holds for a rig file at any oil "
-        "temperature in between"
+        "the oil warms or cools; severities are those at the end; the condition was "
+        "judged for rig files that describe the oil at the beginning, halfway and at the end"
     )
     MAKEUP_BLOCKED = "the make-up valve of chamber {side} lets almost no oil in: it is stuck shut"
     PORT_DRAINS = (
@@ -317,8 +317,8 @@ class RigCode(Code):
         "pressure"
     )
     PUMP_COMPRESSES = (
-        "the pump loses {share:.2g} ± {half_width:.2g} times what the oil that it delivers is compressed by: it is "
-        "filled at the pressure of its inlet; the fit includes this"
+        "the pump is filled at the pressure of its inlet and then compresses its oil, so it delivers less: by "
+        "{share:.2g} ± {half_width:.2g} times the compression of the oil; the fit includes this"
     )
     BORE_LEAKS = (
         "near position {at_mm:.3g} mm, within about {width_mm:.2g} mm, leakage is {factor:.2g} times as large as "

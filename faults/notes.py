@@ -58,8 +58,8 @@ class ClassCode(Code):
     )
     BULK_MODULUS_NOT_VISIBLE = "this drive does not show bulk modulus"
     ONE_SCALE = (
-        "without pressure, leakage and friction are known only up to one common factor; its uncertainty is the spread "
-        "among actuators of one kind"
+        "without pressure, leakage and friction are known only up to one common factor; the intervals include the "
+        "spread of this factor among actuators of one kind"
     )
     LEAKAGE_AND_BIAS_ALIKE = "the log does not separate the leakage coefficient from the flow bias"
     VELOCITY_LOST_TOLD = "the log does determine the velocity lost: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
@@ -72,8 +72,8 @@ class ClassCode(Code):
         "well; {condition}"
     )
     WEAR_NOT_TOLD = (
-        "the log does not tell a worn pump from a sound one: that the pump delivers less than {limit:.0f} % of its "
-        "displacement, which is none of the nine conditions, has a probability of {percent:.2g} %"
+        "the log does not tell a worn pump from a sound one: with a probability of {percent:.2g} %, the pump delivers "
+        "less than {limit:.0f} % of its displacement, which is none of the nine conditions"
     )
     MODELS_DIVERGED = "the models of all conditions diverged; check units and rig file"
     MODELS_ALIKE = (
@@ -109,7 +109,10 @@ class AdviceCode(Code):
         "the same log again"
     )
     CHECK_LOGGER = "check the logger and its wiring, then log again while the motor turns and the piston moves"
-    CHECK_RIG = "compare rig file and actuator (geometry, pump, relief, healthy leakage and friction), then log again"
+    CHECK_RIG = (
+        "compare the rig file with the actuator (geometry, pump, relief valve, healthy leakage and friction) and check "
+        "the scale of each sensor, then diagnose this log again"
+    )
     STOP_LEAKAGE = "stop, and check pump and piston seal before the next run: leakage grew during this log"
     CHECK_PUMP = "measure the pump's flow at low pressure; compare displacement and piston area with the rig file"
     INSPECT_BORE = "inspect the bore and the piston seal near position {at_mm:.3g} mm"

@@ -161,6 +161,18 @@ class Answer(Shown):
         table = self.to_frame().to_html(float_format=_FIVE)
         return f"<p>{escape(str(self._entries['message']))}</p>{table}<ul>{notes}</ul>"
 
+    def compare(self, other: "Answer") -> "pd.DataFrame":
+        """Return what is higher or lower in another answer, a row a quantity.
+
+        Returns
+        -------
+        pandas.DataFrame
+            As `experiments.serve.comparison.differences` has it; ``second`` is the other [the row's unit].
+        """
+        from experiments.serve.comparison import differences
+
+        return differences(self.to_dict(), other.to_dict())
+
     def to_dict(self) -> dict[str, Any]:
         """Return the entries of the JSON contract.
 

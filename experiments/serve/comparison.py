@@ -138,6 +138,35 @@ def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[s
     return rows
 
 
+def differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> "pd.DataFrame":
+    """Return the quantities of two logs with their differences, as a table for programs.
+
+    Parameters
+    ----------
+    first, second : Mapping
+        Their entries of the JSON contract.
+
+    Returns
+    -------
+    pandas.DataFrame
+        By quantity: ``unit``, ``first``, ``second``, ``difference`` (second less first), the ends ``low`` and ``high``
+        of its 95 % interval [the row's unit], and whether that leaves out zero, ``changed``.
+    """
+    import pandas as pd
+
+    rows = [
+        {
+            **{name: row[name] for name in ("quantity", "unit")},
+            **{name: (row[name] or {}).get("value") for name in ("first", "second")},
+            "difference": row["difference"],
+            **dict(zip(("low", "high"), row["interval"] or (None, None), strict=True)),
+            "changed": row["changed"],
+        }
+        for row in compared(first, second)
+    ]
+    return pd.DataFrame(rows).set_index("quantity")
+
+
 def quantities_of(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return severities and quantities of a log by name, each with its ``unit``.
 

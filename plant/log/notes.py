@@ -35,13 +35,13 @@ class LogCode(Code):
     LINES_SKIPPED = "lines skipped between rows of data (comments, or the header again): {count}"
     ROWS_LEFT_OUT = "lines left out because they hold no row of data: {count} (the first is line {line}: {said!r})"
     CELLS_NO_NUMBERS = (
-        "column {column!r} has cells that are no numbers, which are not used: {count} (the first is {said!r} in "
+        "cells of column {column!r} that are no numbers and were not used: {count} (the first is {said!r} in "
         "{where} {place})"
     )
-    CHANNEL_OF_TEXT = "{channel} is not used, for column {column!r} holds text"
+    CHANNEL_OF_TEXT = "{channel} is not used, because column {column!r} holds text"
     TIME_SET = (
-        "{channel} jumps by {hours:+g} h at row {row}, as where a clock is set to summer time or back; the rows were "
-        "taken to go on evenly"
+        "{channel} jumps by {hours:+g} h at row {row}, as when a clock is set to summer time or back; the rows were "
+        "taken as evenly spaced"
     )
     END_LEFT_OUT = "lines left out after row {taken}, the last row of data: {count}"
     COLUMNS_ABSENT = "the rig file names columns that the log does not have: {columns}"

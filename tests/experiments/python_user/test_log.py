@@ -71,6 +71,16 @@ def test_an_answer_has_what_was_found_and_says_what_it_has_not(log: hs.Log) -> N
     assert answer.quantities.get("bulk_moduls") is None
 
 
+def test_two_answers_are_compared_as_a_table(log: hs.Log) -> None:
+    found = log.estimate()
+    table = found.compare(found)
+    modulus = table.loc["bulk_modulus"]
+    assert modulus["unit"] == "Pa"
+    assert (modulus["first"], modulus["difference"]) == (found.bulk_modulus.value, 0.0)
+    assert modulus["low"] < 0.0 < modulus["high"]
+    assert not modulus["changed"]
+
+
 def test_errors_give_options_the_names_that_python_users_know(log: hs.Log) -> None:
     with pytest.raises(hs.HydrostateError, match=r"^form must be one of auto, "):
         log.estimate(form="best")
