@@ -9,6 +9,7 @@ from experiments.command.options import PRESSURE
 from experiments.command.terminal import short_names, table
 from experiments.eha.entries import costs
 from experiments.eha.verdict_words import equally_likely, margin_word, verdict_lines
+from experiments.page.condition_names import in_words
 from experiments.page.numbers import decimals_of
 
 if TYPE_CHECKING:
@@ -81,10 +82,18 @@ def diagnoses_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
             yield from ["", *verdict_lines(result)][not place :]
         if tables and detailed:
             yield _scores_table(result)
-        if not judged or result["outcome"] != "ok" or result["expected"] is not None:
+        if detailed and judged and result["outcome"] == "ok" and result["expected"] is not None:
+            yield f"  {_agreement(result)}"
+        elif not judged or result["outcome"] != "ok" or result["expected"] is not None:
             yield f"{result['file']}: {result['message']}"
     notes = list(costs(results))
     yield from ["", *notes] if notes and detailed else notes
+
+
+def _agreement(result: Result) -> str:
+    """Return whether the condition is the one that was expected; the lines above say which it is."""
+    agreed = not result["unknown"] and result["condition"] == result["expected"]
+    return f"expected  {in_words(result['expected'])}: {'agrees' if agreed else 'does not agree'}"
 
 
 def _summary(results: Sequence[Result]) -> "RenderableType":

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from estimation.notes import ChannelCode
+from estimation.notes import ChannelCode, EstimateCode
 from experiments.command.terminal import clauses
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.log_pages.entries import SOUND, either
@@ -29,6 +29,9 @@ ACTUATORS = {
 
 LEAST_SHARE = 0.001
 """Probability below which a condition is not listed [probability]."""
+
+OTHER_OIL = frozenset({EstimateCode.STIFFER_THAN_RIG, EstimateCode.SOFTER_THAN_RIG})
+"""Notes that say what to correct."""
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 """A space at which no line ends."""
@@ -55,7 +58,8 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
     shown = {**found.quantities, **found.severities}
     shares = sorted(found.probabilities.items(), key=lambda item: -item[1])
     file = Path(result["file"]).name
-    to_do = [*left_unread(result), *(sentence(str(note)) for note in found.advice)]
+    unlike = [note for note in found.notes if note.code in OTHER_OIL]
+    to_do = [*left_unread(result), *(sentence(str(note)) for note in (*found.advice, *unlike))]
     noted = [sentence(one["text"]) for one in result["notes"]]
     against = list(dict.fromkeys(map(str, (*found.against, *found.gate.reasons))))
     message = _shortened(result["message"], against)

@@ -16,8 +16,8 @@ MOST_DIGITS = 4
 PLAIN_FROM, PLAIN_TO = 1e-3, 1e5
 """Between these magnitudes a number is written without an exponent."""
 
-LEAST_WIDTH = 5e-3
-"""Width of an interval from which decimals show it, not powers of ten [any unit]."""
+MOST_DECIMALS = 6
+"""Decimals of a number without a power of ten, at most [count]."""
 
 SHOP_UNITS: Mapping[str, tuple[float, str]] = {
     "Pa": (1e-6, "MPa"),
@@ -136,12 +136,15 @@ def alike_in_digits(value: float | None, interval: Sequence[float] | None, unit:
     --------
     >>> alike_in_digits(1.1e-13, [-2.01, 1.92], "N"), alike_in_digits(2.5e-11, [2.4e-11, 2.6e-11], "m^3/(s Pa)")
     (['0.0', '−2.0', '1.9'], ['25.00 × 10⁻¹²', '24.0 × 10⁻¹²', '26.0 × 10⁻¹²'])
+    >>> alike_in_digits(0.15058, [0.15021, 0.15094], "L/(min bar)")
+    ['0.1506', '0.1502', '0.1509']
     """
     if value is None or interval is None:
         return [number(value)]
     low, high = interval
-    if unit == "%" or (high - low > LEAST_WIDTH and max(abs(low), abs(high)) < PLAIN_TO):
-        return [fixed(each, decimals_of(low, high)) for each in (value, low, high)]
+    if unit == "%" or PLAIN_FROM <= max(abs(low), abs(high)) < PLAIN_TO:
+        decimals = decimals_of(low, high, 3 if unit == "%" else MOST_DECIMALS)
+        return [fixed(each, decimals) for each in (value, low, high)]
     return [number(value), number(low, 3), number(high, 3)]
 
 

@@ -120,8 +120,8 @@ def fmu(
 ) -> None:
     """Write a plant, or a filter, as an FMU for co-simulation: the binary for this Linux, the sources for all others.
 
-    Parameters and variables have the units and meanings of the parameter notes. A plant goes on by whole numbers of
-    samples, a filter by one sample a step.
+    Parameters and variables have the units and meanings of the parameter notes. A plant advances by whole samples,
+    a filter by one sample per step.
     """
     require_positive("--sample-time", sample_time, "s")
     bench = load_rig(rig)

@@ -103,3 +103,17 @@ def test_the_errors_of_a_log_are_a_table_if_asked_for_with_the_best_and_the_runn
     assert marks["normal"].rstrip().endswith("<- best")
     assert marks["minor_leakage"].rstrip().endswith("runner-up, best transfer function")
     assert "model error" not in diagnosed([one])
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"expected": "normal"}, "  expected  normal: agrees"),
+        ({"expected": "minor_leakage"}, "  expected  minor leakage: does not agree"),
+        ({"expected": "normal", "unknown": True}, "  expected  normal: does not agree"),
+    ],
+)
+def test_what_was_expected_is_compared_in_a_line_that_repeats_nothing(changes: dict[str, Any], said: str) -> None:
+    told = diagnosed([diagnosis(1, severity=found_severity(), **changes)]).split("\n")
+    assert told.count(said) == 1
+    assert "said 1" not in " ".join(told)
