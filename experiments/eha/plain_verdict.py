@@ -38,6 +38,11 @@ WORK_ON_FRICTION: Mapping[str, str] = {
 }
 """What follows from each level."""
 
+WRONG_SENSORS = frozenset(
+    {SensorCode.SENSOR_FROZE, SensorCode.SENSOR_CONSTANT, SensorCode.SENSOR_NOISE_ONLY, SensorCode.SENSORS_DISAGREE}
+)
+"""Codes of sensors of which nothing can be used."""
+
 OUTSIDE: Mapping[str, str] = {
     str(RigCode.LEAKAGE_GROWS): "Leakage grows while the actuator runs.",
     str(RigCode.PUMP_WORN): "The pump delivers less than it should: it is worn, or the rig file is wrong.",
@@ -94,12 +99,12 @@ def verdict(result: Mapping[str, Any]) -> str:
 
 def _hindered(result: Mapping[str, Any]) -> str:
     """Return why there is no verdict, in one clause."""
-    against = {one["code"] for one in result["notes"] if one["text"] in result["reasons"]}
-    if against & set(ChannelCode):
+    codes = {one["code"] for one in result["notes"]}
+    if codes & set(ChannelCode):
         return "a column of the log has a wrong sign, unit or name"
-    if against & set(SensorCode):
+    if codes & WRONG_SENSORS:
         return "a sensor reads wrong"
-    if EstimateCode.RIG_CONTRADICTED in against:
+    if EstimateCode.RIG_CONTRADICTED in codes:
         return "the log and the rig file contradict each other"
     return "the log does not fit any known condition of this actuator"
 

@@ -50,7 +50,8 @@ def test_without_a_verdict_the_heading_says_what_hinders_it(note: Note, said: st
     result = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=[str(note)])
     assert verdict(result).startswith("No verdict: ")
     assert verdict(result).endswith(said)
-    beside = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=["another one"])
+    filtered = SensorCode.FILTERED.note(channel="position_m", rows=4)
+    beside = said_of("normal", unknown=True, notes=[filtered.to_dict()], reasons=["another one"])
     assert verdict(beside).endswith("does not fit any known condition of this actuator.")
 
 
