@@ -4,20 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.fits.explaining.settled import at_end, coarse, descended
+from estimation.fits.explaining.settled import NEAR, at_end, coarse, descended
 from estimation.fits.explaining.thinned import FEW, left_by
 from estimation.fits.explaining.tried import Tried
 from estimation.fits.explaining.wide_log import balanced_by, balances_mass, delayed, usual_values
 from estimation.fits.explaining.wide_problem import flow_bounds, freed
-from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.sparing import sparing_steps
 from estimation.models.flow import STIFFNESS
 from plant.arrays import Array
 
 FINISHING = 12
 """Evaluations of the model for the last search, with short model steps."""
+
+LAST = 4
+"""The same at their end, with short steps throughout: where few of them were short, the search is all but there."""
 
 ROUNDS = 6
 """How often the last ones are made at most, while each gains what would tell a hypothesis from another [count]."""
@@ -76,7 +80,7 @@ def finished(log: GreyBoxLog, tried: Tried, useful: float = np.inf) -> Tried:
         own, more = balanced_by(row, share), (STIFFNESS, *last) if share else last
         problem, begun = freed(own, tried.together, *more), done[-1][0] if done else tried
         start = problem.model.theta({**usual_values(own), **begun.values})
-        done.append((_to_its_end(own, begun, start, *more, useful=useful), problem))
+        done.append((_to_its_end(problem, begun, start, *more, useful=useful), problem))
         useful = min(useful, done[-1][0].cost + ALIKE)
     done.sort(key=lambda one: one[0].cost)
     best = replace(done[0][0], coarse=tried.values)
@@ -93,19 +97,31 @@ def _concluded(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxF
     return concluded(problem, point, least=least, warned=False)
 
 
-def _to_its_end(log: GreyBoxLog, tried: Tried, start: Array, *more: str, useful: float = np.inf) -> Tried:
-    """Return the end of a search with short model steps: where long ones end may be far from it."""
-    best = descended(log, tried, start, FINISHING, *more, wanted=min(useful, _hoped(log, tried.cost)))
+def _to_its_end(problem: FreedProblem, tried: Tried, start: Array, *more: str, useful: float = np.inf) -> Tried:
+    """Return the end of a search with short model steps: where long ones end may be far from it.
+
+    Steps are short where they matter, found anew in each round, and all of them at the end.
+    """
+    log = problem.log
+
+    def further(one: Tried, theta: Array) -> Tried:
+        wanted = min(useful, _hoped(log, one.cost))
+        spared = replace(log, steps=sparing_steps(problem, theta))
+        return descended(spared, one, theta, FINISHING, *more, wanted=wanted)
+
+    best = further(tried, start)
     for _ in range(ROUNDS - 1):
         if best.cost > FAR_BEHIND * useful:
             break
-        further = descended(log, best, best.point.theta, FINISHING, *more, wanted=min(useful, _hoped(log, best.cost)))
-        gained = best.cost - further.cost
+        again = further(best, best.point.theta)
+        gained = best.cost - again.cost
         if gained > 0.0:
-            best = further
+            best = again
         if gained < max(CLOSE, LITTLE * best.cost):
             break
-    return best
+    bounds = flow_bounds(problem.model, [best.point.theta], log)
+    point = descend(problem.at, best.point.theta, LAST, bounds, radius=NEAR, wanted=useful)
+    return replace(best, point=point, values=problem.model.values(point.theta))
 
 
 def _hoped(log: GreyBoxLog, cost: float) -> float:

@@ -11,6 +11,7 @@ from math import ceil, prod
 
 import numpy as np
 
+from estimation.arrays import IntArray
 from estimation.fits.explaining.form_fit import FAULTS_TRIED
 from estimation.fits.explaining.wide_problem import flow_bounds
 from estimation.fits.flow.log import DRAIN_START, LEAST_LEAKAGE, OPENING_START, carried, outruns_pump, usual_leakage
@@ -21,6 +22,7 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.greybox.side_by_side import LANES
+from estimation.fits.greybox.sparing import sparing_steps, with_steps
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
@@ -141,9 +143,13 @@ def balanced(
     likely = [one for one in rough if one is near or one.point.cost < least + RIVAL]
     behind = [one for one in rough if not (_held(one.problem) or one in likely)]
     log, bent = carried(log, parameters, near.values), outruns_pump(log, parameters)
-    done = each(lambda one: _finished(one, log, bent=bent), likely)
+    first = rough[0] if rough[0] in likely else near  # whose kernel has fewer runs side by side
+    steps = sparing_steps(first.problem.on(log), first.point.theta)
+    done = each(lambda one: _finished(one, log, steps, bent=bent), likely)
     wanted = min(done, key=_cost)[1].cost
-    done += each(lambda one: _finished(one, log, wanted, bent=bent), behind)
+    done += each(lambda one: _finished(one, log, steps, wanted, bent=bent), behind)
+    told_of = min(done, key=_cost), min((one for one in done if not _held(one[0])), key=_cost)
+    done = each(lambda one: _ended(one, log) if one in told_of else one, done)
     if valley is not None:
         done = each(lambda one: min(one, from_valley(one[0].model, log, valley, bent=bent), key=_cost), done)
     best = min(done, key=_cost)
@@ -158,19 +164,31 @@ def balanced(
     return each(told, done)
 
 
-def _finished(one: _Rough, log: GreyBoxLog, wanted: float = np.inf, *, bent: bool) -> Found:
+def _finished(one: _Rough, log: GreyBoxLog, steps: IntArray, wanted: float = np.inf, *, bent: bool) -> Found:
     """Return where short model steps lead; what they alone explain is completed as well, for long ones have errors.
+
+    Steps are short where the log says so (``steps``).
 
     A search that will not come down to the cost ``wanted`` ends early. Make-up valves that must let in more than the
     pump delivers are orifices (``bent``).
     """
-    one = replace(one, problem=one.problem.on(log))
+    one = replace(one, problem=one.problem.on(replace(log, steps=steps)))
     if not _plain(one):
         one = replace(one, point=descend(one.problem.at, one.point.theta, SETTLING, one.bounds, wanted=wanted))
         if not _plain(one):
             return one.problem, one.point, one.bounds
     problem, theta, bounds = _completed(one, log, bent=bent)
     return problem, descend(problem.at, theta, FINISHING, bounds, wanted=wanted), bounds
+
+
+def _ended(one: Found, log: GreyBoxLog) -> Found:
+    """Return where the last steps of a search lead with short model steps throughout."""
+    problem, point, bounds = one
+    ending = with_steps(problem, log.steps)
+    if ending is problem:
+        return one
+    evaluations = FINISHING if explained(problem, point) else 1
+    return ending, descend(ending.at, point.theta, evaluations, bounds), bounds
 
 
 def _cost(one: Found) -> float:
