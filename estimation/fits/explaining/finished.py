@@ -13,15 +13,12 @@ from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.greybox.sparing import sparing_steps
+from estimation.fits.greybox.sparing import LAST, sparing_steps, with_steps
 from estimation.models.flow import STIFFNESS
 from plant.arrays import Array
 
 FINISHING = 12
 """Evaluations of the model for the last search, with short model steps."""
-
-LAST = 4
-"""The same at their end, with short steps throughout: where few of them were short, the search is all but there."""
 
 ROUNDS = 6
 """How often the last ones are made at most, while each gains what would tell a hypothesis from another [count]."""
@@ -106,7 +103,7 @@ def _to_its_end(problem: FreedProblem, tried: Tried, start: Array, *more: str, u
 
     def further(one: Tried, theta: Array) -> Tried:
         wanted = min(useful, _hoped(log, one.cost))
-        spared = replace(log, steps=sparing_steps(problem, theta))
+        spared = with_steps(problem, sparing_steps(problem, theta)).log
         return descended(spared, one, theta, FINISHING, *more, wanted=wanted)
 
     best = further(tried, start)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.finding import NORMAL_95
-from estimation.fits.explaining.finished import ALIKE
+from estimation.fits.explaining.finished import ALIKE, in_vain
 from estimation.fits.explaining.loss_courses import ONE_WAY, WEAR, Course, Measured, measured_of, moved
 from estimation.fits.explaining.settled import gone
 from estimation.fits.explaining.wide_log import widened
@@ -21,6 +21,7 @@ from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.sparing import LAST, sparing_steps, with_steps
 from estimation.fits.hypotheses import WORN
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
@@ -51,6 +52,14 @@ chance, and what is mended by less is wrong for another reason."""
 
 SHORTEST = 0.1
 """Least share of a step by which a course is moved [fraction]."""
+
+ROUGH_ENOUGH = 0.05
+"""Half the sum of squares that a further step must promise while model steps are long [dimensionless]: they err by
+more."""
+
+BEHIND = 3.0
+"""How many times the cost of the best start one has after its first search, that its course is not moved
+[dimensionless]."""
 
 SETTLED, SLIGHT = 0.5, 1e-4
 """Gain, and share of the cost, below which a course is moved no more [dimensionless]."""
@@ -114,7 +123,9 @@ def uneven_loss(
     search = _Search(log, parameters)
     found: list[UnevenLoss] = []
     for course, size in search.promising(starts[0], largest):
-        ended = min((search.followed(course, {**one, LOSS_SIZE: size}) for one in starts), key=lambda one: one[1].cost)
+        ended = search.followed_from(course, [{**one, LOSS_SIZE: size} for one in starts])
+        if in_vain(log, ended[1].cost):
+            continue
         loss = search.concluded(*ended)
         least = 1.0 - WORN if course.kind == WEAR else 0.0
         if loss.size > least and explains(loss.fit) and loss.fit.cost < wanted - WORTH:
@@ -199,28 +210,36 @@ class _Search:
             return [*found, *((course, ONE_WAY_TRIED) for course in asked if course.kind == ONE_WAY)]
         return found
 
-    def followed(self, course: Course, start: Mapping[str, float]) -> tuple[Course, Point]:
+    def followed_from(self, course: Course, starts: Sequence[Mapping[str, float]]) -> tuple[Course, Point]:
+        """Return where the best of several searches for a loss leads."""
+        best, *others = starts
+        found = self._followed(course, best)
+        for start in others:
+            found = min(found, self._followed(course, start, BEHIND * found[1].cost), key=lambda one: one[1].cost)
+        return found
+
+    def _followed(self, course: Course, start: Mapping[str, float], hopeless: float = np.inf) -> tuple[Course, Point]:
         """Return where a search for a loss leads; what has vanished by mistake is tried once more."""
-        course, best = self._led(course, start)
+        course, best = self._led(course, start, hopeless)
         values = self._problem(None, coarse=True).model.values(best.theta)
         if lost := gone(self._wide, values):
-            again = self._led(course, {**values, **lost})
+            again = self._led(course, {**values, **lost}, hopeless)
             return min((course, best), again, key=lambda one: one[1].cost)
         return course, best
 
-    def _led(self, course: Course, start: Mapping[str, float]) -> tuple[Course, Point]:
-        """Return where a search leads, the course moved between steps of all that is fitted."""
+    def _led(self, course: Course, start: Mapping[str, float], hopeless: float) -> tuple[Course, Point]:
+        """Return where a search leads, the course moved between steps of all that is fitted, if it is of use."""
         problem = self._problem(course, coarse=True)
         theta = self._theta(problem, start)
         bounds = self._bounds(problem, theta)
-        best = descend(problem.at, theta, SETTLING, bounds)
-        for _ in range(SHIFTED if course.free else 0):
+        best = descend(problem.at, theta, SETTLING, bounds, ROUGH_ENOUGH)
+        for _ in range(SHIFTED if course.free and best.cost < hopeless else 0):
             step = self._step(problem, best.theta, course)
             share, further = 1.0, None
             while further is None and share > SHORTEST:
                 there = moved(course, step, share)
                 tried = self._problem(there, coarse=True)
-                point = descend(tried.at, best.theta, MOVING, bounds, wanted=best.cost)
+                point = descend(tried.at, best.theta, MOVING, bounds, ROUGH_ENOUGH, wanted=best.cost)
                 further, share = (there, tried, point) if point.cost < best.cost else None, 0.5 * share
             if further is None:
                 break
@@ -234,7 +253,9 @@ class _Search:
         """Return a loss with its fit by short model steps."""
         problem = self._problem(course, coarse=False)
         bounds = self._bounds(problem, point.theta)
-        ended = descend(problem.at, point.theta, FINISHING, bounds)
+        quick = with_steps(problem, sparing_steps(problem, point.theta))
+        near = descend(quick.at, point.theta, FINISHING, bounds)
+        ended = near if quick is problem else descend(problem.at, near.theta, LAST, bounds)
         fit = concluded(problem, ended, least=bounds[0], warned=False)
         opened = 0.0
         if answers := self._answers(problem, ended.theta, course):

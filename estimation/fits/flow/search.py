@@ -148,18 +148,17 @@ def balanced(
     done = each(lambda one: _finished(one, log, steps, bent=bent), likely)
     wanted = min(done, key=_cost)[1].cost
     done += each(lambda one: _finished(one, log, steps, wanted, bent=bent), behind)
-    told_of = min(done, key=_cost), min((one for one in done if not _held(one[0])), key=_cost)
-    done = each(lambda one: _ended(one, log) if one in told_of else one, done)
     if valley is not None:
         done = each(lambda one: min(one, from_valley(one[0].model, log, valley, bent=bent), key=_cost), done)
-    best = min(done, key=_cost)
-    swinging = min((one for one in done if not _held(one[0])), key=_cost)
+    while sparing := [one for one in _told_of(done) if one[0].log.steps is not log.steps]:
+        done = each(lambda one, ending=sparing: _ended(one, log) if one in ending else one, done)
+    best, swinging = _told_of(done)
     least = best[1].cost
 
     def told(one: Found) -> GreyBoxFit:
         problem, point, bounds = one
         counts, asked = point.cost < least + UNLIKELY, one is best or one is swinging
-        return concluded(problem, point, least=bounds[0], disturbed=counts, asked=asked)
+        return concluded(problem, point, least=bounds[0], disturbed=counts, asked=asked, steps=steps)
 
     return each(told, done)
 
@@ -185,10 +184,13 @@ def _ended(one: Found, log: GreyBoxLog) -> Found:
     """Return where the last steps of a search lead with short model steps throughout."""
     problem, point, bounds = one
     ending = with_steps(problem, log.steps)
-    if ending is problem:
-        return one
     evaluations = FINISHING if explained(problem, point) else 1
     return ending, descend(ending.at, point.theta, evaluations, bounds), bounds
+
+
+def _told_of(done: Sequence[Found]) -> tuple[Found, Found]:
+    """Return the likeliest, and the likeliest with volumes that swing."""
+    return min(done, key=_cost), min((one for one in done if not _held(one[0])), key=_cost)
 
 
 def _cost(one: Found) -> float:

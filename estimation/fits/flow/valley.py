@@ -12,6 +12,7 @@ from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
+from estimation.fits.greybox.sparing import sparing_steps, with_steps
 from estimation.models.completed_flow import CRACKS, completed
 from estimation.models.flow import HELD_FLOW_FORM, STIFFNESS
 from estimation.models.greybox import GreyBoxModel
@@ -78,7 +79,7 @@ def lower_valley(
 def from_valley(
     form: GreyBoxModel, log: GreyBoxLog, valley: Mapping[str, float], wanted: float = np.inf, *, bent: bool
 ) -> Found:
-    """Return where a form, completed, leads from values of its unknowns.
+    """Return where a form, completed, leads from values of its unknowns, with short model steps where they matter.
 
     Parameters
     ----------
@@ -102,7 +103,8 @@ def from_valley(
     problem = FreedProblem.of(form, log)
     theta = form.theta({STIFFNESS: 0.0, **valley})
     bounds = flow_bounds(form, [theta], log)
-    return problem, descend(problem.at, theta, FINISHING, bounds, radius=WITHIN, wanted=wanted), bounds
+    quick = with_steps(problem, sparing_steps(problem, theta))
+    return quick, descend(quick.at, theta, FINISHING, bounds, radius=WITHIN, wanted=wanted), bounds
 
 
 def completed_form(form: GreyBoxModel, *, bent: bool) -> GreyBoxModel:

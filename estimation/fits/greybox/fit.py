@@ -4,12 +4,13 @@ The variance of an estimate has three parts, told apart: noise of the outputs, n
 well the rig's own parameters are known. The last two are read off the fit's linear response to them.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.arrays import IntArray
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.deviations import Information, information, variances
@@ -17,8 +18,9 @@ from estimation.fits.greybox.lateness import changes_beside, lateness, left_by
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, shown_play
 from estimation.fits.greybox.problem import Problem, search_bounds
-from estimation.fits.greybox.rig_response import rig_slopes
+from estimation.fits.greybox.rig_response import answers_by_rig
 from estimation.fits.greybox.small_teeth import NOT_MOVED, small_teeth
+from estimation.fits.greybox.sparing import with_steps
 from estimation.fits.greybox.teeth import NO_OFFSET, ShownOffset, ShownTeeth, shown_teeth
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
@@ -74,6 +76,8 @@ class GreyBoxFit:
         By how much teeth that are not taken up move each coordinate, and add to its variance [dimensionless].
     seen : float
         Residuals of the first output that count; without end where they are not counted [count].
+    steps : ndarray of int, shape (n,), optional
+        Fewer model steps than the log's that are as exact near it, see `sparing_steps` [count].
     """
 
     model: GreyBoxModel
@@ -91,6 +95,7 @@ class GreyBoxFit:
     speed_offset: ShownOffset = NO_OFFSET
     small_teeth: tuple[Mapping[str, float], Mapping[str, float]] = NOT_MOVED
     seen: float = np.inf
+    steps: IntArray | None = None
 
 
 @dataclass(frozen=True)
@@ -242,6 +247,7 @@ def concluded(
     disturbed: bool = True,
     asked: bool = True,
     warned: bool = True,
+    steps: IntArray | None = None,
 ) -> GreyBoxFit:
     """Return what a solution says, with its deviations.
 
@@ -259,6 +265,8 @@ def concluded(
         Whether it is told, of a fit so disturbed, what the rig's doubts would change and which drives come late.
     warned : bool
         Whether the caller is warned where unknowns are not separately determined; else their deviations are infinite.
+    steps : ndarray of int, shape (n,), optional
+        See `GreyBoxFit`; answers to the rig's doubts are as exact with them.
 
     Returns
     -------
@@ -287,7 +295,7 @@ def concluded(
         noise[felt] = np.sqrt(variance)
         noise[effects <= LEAST_EFFECT**2] = np.inf  # what is known of it is not from this log
         if told:
-            rig = dict(_by_rig(problem, theta, known_of))
+            rig = dict(answers_by_rig(problem if steps is None else with_steps(problem, steps), theta, known_of))
             late, play = _late_and_play(problem, known_of, moved, effects[felt] > LEAST_EFFECT**2)
     # teeth that are taken up are not small, and the course of a slow log's motor looks like some
     asked_of_teeth = {} if problem.log.teeth or problem.log.course is not None else teeth
@@ -311,15 +319,8 @@ def concluded(
         chi_square=chi_square,
         autocorrelation=autocorrelation,
         seen=seen,
+        steps=steps,
     )
-
-
-def _by_rig(problem: Problem, theta: Array, known_of: Information) -> Iterator[tuple[str, Array]]:
-    """Yield how each unknown would differ per relative change of an uncertain parameter of the rig."""
-    for name, slope in rig_slopes(problem, theta, known_of.response):
-        whole = np.zeros(len(theta))
-        whole[known_of.felt] = slope[: len(known_of.felt)]
-        yield name, whole
 
 
 def _late_and_play(

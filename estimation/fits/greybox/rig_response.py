@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from estimation.fits.greybox.deviations import Information
 from estimation.fits.greybox.problem import Problem
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
@@ -41,3 +42,28 @@ def rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Array
     known, *shifted = problem.residuals_of(theta, [row, *nudged])
     for name, errors in zip(asked, shifted, strict=True):
         yield name, -response(errors - known) / RIG_NUDGE
+
+
+def answers_by_rig(problem: Problem, theta: Array, known_of: Information) -> Iterator[tuple[str, Array]]:
+    """Yield how each unknown would differ per relative change of an uncertain parameter of the rig.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    theta : ndarray, shape (unknowns,)
+        Its solution [dimensionless].
+    known_of : Information
+        What the log says there.
+
+    Yields
+    ------
+    name : str
+        The parameter.
+    slopes : ndarray, shape (unknowns,)
+        Of all unknowns, zero of those that are not felt, in the fitted coordinates [dimensionless].
+    """
+    for name, slope in rig_slopes(problem, theta, known_of.response):
+        whole = np.zeros(len(theta))
+        whole[known_of.felt] = slope[: len(known_of.felt)]
+        yield name, whole

@@ -13,7 +13,7 @@ from estimation.arrays import IntArray
 from estimation.fits.greybox.problem import Problem
 from plant.arrays import Array
 
-FELT_ERRORS = (1e-4, 3e-4, 1e-3)
+FELT_ERRORS = (1e-4, 3e-4, 1e-3, 3e-3)
 """A sample has short steps if one long step errs there by more than the first, in standard deviations of its noise, or
 by the next one where too many samples do [dimensionless]. On 20 plain training logs the first moves the optimum by
 0.017 deviations of bulk modulus at most."""
@@ -23,6 +23,9 @@ AROUND = 3
 
 MOST_SHORT = 0.3
 """Share of samples with short steps that is too many [fraction]."""
+
+LAST = 4
+"""Evaluations with all short steps at the end of a search that had few [count]."""
 
 
 def sparing_steps(problem: Problem, theta: Array) -> IntArray:

@@ -20,16 +20,16 @@ def test_the_balance_in_which_a_set_was_sought_comes_first_and_the_other_must_co
 ) -> None:
     led: list[tuple[float, float]] = []
 
-    def to_its_end(share: Any, tried: Tried, *_: Any, useful: float = np.inf) -> Tried:
-        led.append((share, useful))
+    def to_its_end(problem: Any, tried: Tried, *_: Any, useful: float = np.inf) -> Tried:
+        led.append((problem.share, useful))
         return replace(tried, point=replace(tried.point, cost=50.0 * len(led)))
 
-    problem = SimpleNamespace(model=SimpleNamespace(theta=lambda _: np.zeros(1)))
+    model = SimpleNamespace(theta=lambda _: np.zeros(1))
     monkeypatch.setattr(finishing, "delayed", lambda log, _: log)
     monkeypatch.setattr(finishing, "coarse", lambda *_: None)
     monkeypatch.setattr(finishing, "balances_mass", lambda _: by_mass)
     monkeypatch.setattr(finishing, "balanced_by", lambda _, share: share)
-    monkeypatch.setattr(finishing, "freed", lambda *_: problem)
+    monkeypatch.setattr(finishing, "freed", lambda share, *_: SimpleNamespace(model=model, share=share))
     monkeypatch.setattr(finishing, "usual_values", lambda _: {})
     monkeypatch.setattr(finishing, "_to_its_end", to_its_end)
     monkeypatch.setattr(finishing, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
@@ -49,7 +49,12 @@ def test_what_stays_far_behind_is_given_up(cost: float, searches: int, monkeypat
         return SimpleNamespace(cost=costs.pop(), point=SimpleNamespace(theta=np.zeros(1)))
 
     monkeypatch.setattr(finishing, "descended", descended)
-    nothing: Any = SimpleNamespace(drives=())
+    nothing: Any = SimpleNamespace(drives=(), steps=None)
     begun: Any = SimpleNamespace(cost=np.inf)
-    finishing._to_its_end(nothing, begun, np.zeros(1), useful=useful)  # pyright: ignore[reportPrivateUsage]
+    problem: Any = SimpleNamespace(log=nothing, model=SimpleNamespace(values=lambda _: {}), at=None)
+    monkeypatch.setattr(finishing, "sparing_steps", lambda *_: None)
+    monkeypatch.setattr(finishing, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
+    monkeypatch.setattr(finishing, "descend", lambda *_, **__: begun)
+    monkeypatch.setattr(finishing, "replace", lambda one, **_: one)
+    finishing._to_its_end(problem, begun, np.zeros(1), useful=useful)  # pyright: ignore[reportPrivateUsage]
     assert len(costs) == 2 - searches
