@@ -51,10 +51,17 @@ def test_what_stays_far_behind_is_given_up(cost: float, searches: int, monkeypat
     monkeypatch.setattr(finishing, "descended", descended)
     nothing: Any = SimpleNamespace(drives=(), steps=None)
     begun: Any = SimpleNamespace(cost=np.inf)
-    problem: Any = SimpleNamespace(log=nothing, model=SimpleNamespace(values=lambda _: {}), at=None)
+    ended: list[Any] = []
+
+    def to_all_short_steps(at: Any, theta: Any, *_: Any, **__: Any) -> Any:
+        ended.append(at)
+        return SimpleNamespace(theta=theta)
+
+    problem: Any = SimpleNamespace(log=nothing, model=SimpleNamespace(values=lambda _: {}), at="all short steps")
     monkeypatch.setattr(finishing, "sparing_steps", lambda *_: None)
     monkeypatch.setattr(finishing, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
-    monkeypatch.setattr(finishing, "descend", lambda *_, **__: begun)
+    monkeypatch.setattr(finishing, "descend", to_all_short_steps)
     monkeypatch.setattr(finishing, "replace", lambda one, **_: one)
     finishing._to_its_end(problem, begun, np.zeros(1), useful=useful)  # pyright: ignore[reportPrivateUsage]
     assert len(costs) == 2 - searches
+    assert ended == [problem.at]
