@@ -22,6 +22,7 @@ from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox import fit as greybox_fit
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.sparing import LAST
 from estimation.fits.hypotheses import HYPOTHESES
 from estimation.fits.motion import fit as motion_fit
 from estimation.fits.motion import force_scale
@@ -47,16 +48,28 @@ def still(theta: Array, cost: float) -> Point:
 def planned(cost: Cost, *modules: Any) -> Iterator[list[list[float]]]:
     """Write down evaluations, samples, steps, noise and radius of each descent, which stays where it begins.
 
-    Its cost is that of its number in the order of descents.
+    Its cost is that of its number in the order of descents. One that ends another with all short steps keeps that.
     """
     plan: list[list[float]] = []
+    led: list[tuple[Array, float, bool]] = []
+    endings: list[int] = []
 
     def descended(at: Any, start: Array, evaluations: int, *others: Any, **named: Any) -> Point:
+        if not plan:
+            endings.clear()
         one = (at.args[0] if isinstance(at, partial) else at.__self__).log
         noise = [one.noise[0].variance, one.noise[0].walk]
         rest = [other for other in others[1:] if isinstance(other, float)]
         plan.append([evaluations, len(one.measured), int(np.max(one.steps)), *noise, *rest, *named.values()])
-        return still(start, cost(len(plan)))
+        few, short = bool(np.min(one.steps[1:]) == 1), np.max(one.steps) > 1
+        ended = [cost for theta, cost, sparing in led if theta is start and (sparing or evaluations == LAST)]
+        if ended and not few:
+            endings.append(len(plan))
+            return still(start, min(ended[-2:]))
+        point = still(start, cost(len(plan) - len(endings)))
+        if short:
+            led.append((start, point.cost, few))
+        return point
 
     def together(at: Any, starts: Sequence[Array], evaluations: int, *others: Any, **named: Any) -> list[Point]:
         return [descended(at, start, evaluations, *others, **named) for start in starts]
@@ -133,7 +146,7 @@ def plan_of_explanations() -> dict[str, Any]:
 
     for name, cost in costs.items():
         with (
-            planned(cost, explaining, screened, settled) as plan,
+            planned(cost, explaining, screened, settled, finishing) as plan,
             patch.object(promising, "_promises", promised),
             patch.object(finishing, "concluded", concluded),
         ):
