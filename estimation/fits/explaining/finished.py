@@ -95,9 +95,17 @@ def _concluded(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxF
 
 
 def _to_its_end(problem: FreedProblem, tried: Tried, start: Array, *more: str, useful: float = np.inf) -> Tried:
-    """Return the end of a search with short model steps: where long ones end may be far from it.
+    """Return the end of a search with short model steps: where they matter on the way, and all of them at the end."""
+    best = _led_on(problem, tried, start, *more, useful=useful)
+    bounds = flow_bounds(problem.model, [best.point.theta], problem.log)
+    point = descend(problem.at, best.point.theta, LAST, bounds, radius=NEAR, wanted=useful)
+    return replace(best, point=point, values=problem.model.values(point.theta))
 
-    Steps are short where they matter, found anew in each round, and all of them at the end.
+
+def _led_on(problem: FreedProblem, tried: Tried, start: Array, *more: str, useful: float = np.inf) -> Tried:
+    """Return where short model steps lead: where long ones end may be far from it.
+
+    Which samples have them is found anew in each round.
     """
     log = problem.log
 
@@ -116,9 +124,7 @@ def _to_its_end(problem: FreedProblem, tried: Tried, start: Array, *more: str, u
             best = again
         if gained < max(CLOSE, LITTLE * best.cost):
             break
-    bounds = flow_bounds(problem.model, [best.point.theta], log)
-    point = descend(problem.at, best.point.theta, LAST, bounds, radius=NEAR, wanted=useful)
-    return replace(best, point=point, values=problem.model.values(point.theta))
+    return best
 
 
 def _hoped(log: GreyBoxLog, cost: float) -> float:

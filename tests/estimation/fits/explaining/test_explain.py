@@ -43,9 +43,10 @@ def ended(costs: Sequence[float], monkeypatch: pytest.MonkeyPatch) -> tuple[floa
 
     monkeypatch.setattr(finishing, "descended", descended)
     monkeypatch.setattr(finishing, "left_by", lambda *_: 1.0)
-    nothing: Any = SimpleNamespace(drives=())
+    monkeypatch.setattr(finishing, "sparing_steps", lambda problem, _: problem.log.steps)
+    problem: Any = SimpleNamespace(log=SimpleNamespace(drives=(), steps=None))
     begun: Any = SimpleNamespace(cost=np.inf)
-    return finishing._to_its_end(nothing, begun, np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
+    return finishing._led_on(problem, begun, np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
 
 
 def test_a_search_goes_on_while_it_gains_what_tells_hypotheses_apart(monkeypatch: pytest.MonkeyPatch) -> None:
