@@ -2,10 +2,13 @@
 
 from collections.abc import Mapping
 from functools import cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from estimation.fits.explaining import uneven_loss as uneven
 from estimation.fits.explaining.loss_courses import BORE, FILLING, ONE_WAY, TOOTH, WEAR, Course, Measured
 from estimation.fits.explaining.uneven_loss import UnevenLoss, loss_note, uneven_loss
 from estimation.fits.flow.log import flow_log, without_strays
@@ -89,3 +92,21 @@ def test_a_pump_that_fills_badly_from_a_low_speed_on_is_told_as_a_worn_one() -> 
 def test_a_loss_is_the_last_drive_and_the_last_unknown_of_its_form() -> None:
     assert LOSING_FLOW_FORM.drives[-1] == LOSS
     assert LOSING_FLOW_FORM.unknowns[-1] == LOSS_SIZE
+
+
+@pytest.mark.parametrize(("left", "fitted"), [(9.0, True), (11.0, False)])
+def test_a_loss_that_leaves_far_more_than_noise_is_not_fitted_with_short_steps(
+    left: float, fitted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    samples, concluded = 10_000, list[float]()
+    log: Any = SimpleNamespace(drives=np.zeros(samples), measured=np.zeros((samples, 1)), block=1e-3, sample_time=1e-3)
+    course, fit = SimpleNamespace(kind="bore"), SimpleNamespace(cost=0.0)
+    search = SimpleNamespace(
+        promising=lambda *_: [(course, 1.0)],
+        followed_from=lambda *_: (course, SimpleNamespace(cost=0.5 * left * samples)),
+        concluded=lambda *_: concluded.append(left) or SimpleNamespace(size=1.0, fit=fit, course=course),
+    )
+    monkeypatch.setattr(uneven, "_Search", lambda *_: search)
+    nothing: Any = None
+    assert bool(uneven.uneven_loss(log, nothing, [{}], lambda _: True, 1e9, 1.2)) is fitted
+    assert bool(concluded) is fitted
