@@ -14,7 +14,7 @@ from faults.diagnosis.changes.warming import Drift
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
-from faults.diagnosis.circuits.class_regions import ClassFits, is_stuck, told_apart
+from faults.diagnosis.circuits.class_regions import ClassFits, is_stuck
 from faults.diagnosis.innovation_bank import innovation_scores
 from faults.diagnosis.rmse import score_transfer_functions
 from plant.arrays import Array
@@ -131,7 +131,7 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
     if library is not None:
         table = score_transfer_functions(record, library).by_condition
         found["transfer_functions"] = -SAMPLES * np.log([table[name] for name in CONDITIONS])
-    apart = told_apart(fits.spread, actuator)
+    apart = fits.apart(actuator)
     found = {name: scores if name == "parameters" else within_reach(scores, apart) for name, scores in found.items()}
     if is_stuck(blocks, actuator):
         found = {name: friction_left_open(scores, blocks, actuator) for name, scores in found.items()}
@@ -166,7 +166,7 @@ def within_reach(scores: Array, apart: Array) -> Array:
     scores : ndarray, shape (9,)
         Log-likelihoods of the conditions [dimensionless].
     apart : ndarray, shape (9, 9)
-        How far the log tells one condition from another, see `faults.diagnosis.circuits.class_regions.told_apart`.
+        How far the log tells one condition from another, see `faults.diagnosis.circuits.region_scores.told_apart`.
 
     Returns
     -------

@@ -14,8 +14,9 @@ from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.class_fit import LASTING, WITHIN
-from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes, region_scores
+from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
 from faults.diagnosis.circuits.model_doubt import distrust
+from faults.diagnosis.circuits.region_scores import region_scores
 from faults.diagnosis.circuits.rivals import behind
 
 CHANGES = 0.05

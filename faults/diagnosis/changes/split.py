@@ -13,7 +13,8 @@ import numpy as np
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.class_fit import LASTING, WEAK, PointFit
-from faults.diagnosis.circuits.class_regions import believed_information, region_scores
+from faults.diagnosis.circuits.class_regions import believed_information
+from faults.diagnosis.circuits.region_scores import region_scores
 
 EDGE = 1.0
 """What a log must hold before a change and after it [s]."""

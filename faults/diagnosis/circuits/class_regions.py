@@ -6,7 +6,7 @@ chapter 27) scores the condition. What a log says nothing of, as friction beyond
 counts for none.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,7 +28,14 @@ from faults.diagnosis.circuits.class_fit import (
     nominal_runs,
     scales_of,
 )
+from faults.diagnosis.circuits.friction_shape import bent_by, doubt_of_bends, told_of_bent
 from faults.diagnosis.circuits.model_doubt import distrust, doubt_of, lasting_power, seldom_known_slopes, spreads_of
+from faults.diagnosis.circuits.region_scores import (
+    apart_in_forces,
+    region_scores,
+    scores_in_forces,
+    told_apart,
+)
 from faults.diagnosis.circuits.rivals import behind, between_fits, creeps, explains, other_friction
 from plant.arrays import Array
 
@@ -70,6 +77,8 @@ class ClassFits:
     lasting : float
         By what a model error that lasts divides the information [dimensionless], see `lasting_misfit`; 1 at the least,
         and without pressure.
+    moved : ndarray, shape (7, m)
+        What bends of the law of friction move the coordinates by [dimensionless], see `bent_by`.
     """
 
     best: PointFit
@@ -79,6 +88,7 @@ class ClassFits:
     scores: Array
     spread: Array
     lasting: float
+    moved: Array = field(default_factory=lambda: np.zeros((len(COORDINATES), 1)))
 
     @property
     def told(self) -> Array:
@@ -88,7 +98,24 @@ class ClassFits:
         model error lasts: with it more such circuits are seen on the lumped plant, but one more plain log in 150 is
         falsely unknown.
         """
-        return self.information / self.lasting
+        return told_of_bent(self.information / self.lasting, self.moved)
+
+    def apart(self, actuator: Actuator) -> Array:
+        """Return how well the log tells each condition from each other one, see `told_apart`.
+
+        Parameters
+        ----------
+        actuator : Actuator
+            The healthy actuator.
+
+        Returns
+        -------
+        ndarray, shape (9, 9)
+            Expected log-likelihood ratios [dimensionless], where the law of friction may be bent.
+        """
+        if not np.any(self.moved):
+            return told_apart(self.spread, actuator)
+        return apart_in_forces(self.best, self.spread + self.moved @ self.moved.T, actuator)
 
     @property
     def covariance(self) -> Array:
@@ -143,11 +170,16 @@ def fit_classes(
     known = [believed_information(fit, blocks, stuck=stuck) for fit in fits]
     least = int(np.argmin([fit.cost for fit in fits]))
     worse = behind(fits, fits[least], blocks)
-    scores = [
-        region_scores(fit, information, actuator) - lead
-        for fit, information, lead in zip(fits, known, worse, strict=True)
-    ]
-    held = np.max(scores, axis=0) - misfit(blocks, fits[least].fitted) / LASTING
+    if blocks.pressure is None or stuck:
+        moved = [np.zeros((len(COORDINATES), 1)) for _ in fits]
+        scores = [region_scores(fit, information, actuator) for fit, information in zip(fits, known, strict=True)]
+    else:
+        moved = [bent_by(fit, blocks, actuator) for fit in fits]
+        scores = [
+            scores_in_forces(fit, told_of_bent(information, by), actuator)
+            for fit, information, by in zip(fits, known, moved, strict=True)
+        ]
+    held = np.max(np.array(scores) - worse[:, None], axis=0) - misfit(blocks, fits[least].fitted) / LASTING
     centre = actuator.conditions[np.argmax(held)]
     best = fits[least] if blocks.pressure is not None else _scaled(fits[least], centre)
     # without pressure no balance of flows looks for another pump or other faults, so regions alone have to
@@ -157,9 +189,9 @@ def fit_classes(
     else:
         seen, seldom = _NO_FRICTION if stuck else np.ones(len(COORDINATES)), seldom_known_slopes(best, blocks, actuator)
         spread = doubt_of(best, seldom, blocks, actuator.conditions, held, seen, spreads_of(actuator))
-        spread = spread + between_fits(fits, best, worse)
+        spread = spread + between_fits(fits, best, worse) + doubt_of_bends(known[least], moved[least])
     errors = np.array([scales_of(blocks, run) for run in runs])
-    return ClassFits(best, known[least], nominal, errors, held, spread, lasting)
+    return ClassFits(best, known[least], nominal, errors, held, spread, lasting, moved[least])
 
 
 def _scaled(fit: PointFit, centre: Array) -> PointFit:
@@ -269,28 +301,6 @@ def believed_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) 
     return believed - np.outer(along, along) / curvature if curvature > 0.0 else believed
 
 
-def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Array:
-    """Return how well each condition's region holds a fitted circuit: the log of the likelihood over the region.
-
-    Parameters
-    ----------
-    fit : PointFit
-        The circuit.
-    information : ndarray, shape (7, 7)
-        Inverse covariance of its coordinates; directions of which a log says nothing do not count.
-    actuator : Actuator
-        The healthy actuator.
-
-    Returns
-    -------
-    ndarray, shape (9,)
-        Log-likelihoods [dimensionless] up to a constant.
-    """
-    off = fit.coordinates - actuator.conditions
-    weight = information @ np.linalg.inv(np.eye(len(information)) + WITHIN @ information)
-    return -0.5 * np.einsum("ci,ij,cj->c", off, weight, off)
-
-
 def how_near(fits: ClassFits, blocks: Blocks, actuator: Actuator) -> float:
     """Return how well the condition that is nearest to a log holds it.
 
@@ -316,22 +326,3 @@ def how_near(fits: ClassFits, blocks: Blocks, actuator: Actuator) -> float:
     if blocks.pressure is not None:
         return best
     return max(best, float(np.max(fits.scores)) + misfit(blocks, fits.best.fitted) / LASTING)
-
-
-def told_apart(spread: Array, actuator: Actuator) -> Array:
-    """Return how well a log tells each condition from each other one, as an expected log-likelihood ratio.
-
-    Parameters
-    ----------
-    spread : ndarray, shape (7, 7)
-        Covariance of the coordinates for intervals, see `ClassFits`.
-    actuator : Actuator
-        The healthy actuator.
-
-    Returns
-    -------
-    ndarray, shape (9, 9)
-        Half the squared distance of their regions, each blurred by the log, in deviations [dimensionless].
-    """
-    between = actuator.conditions[:, None] - actuator.conditions
-    return 0.5 * np.einsum("abi,ij,abj->ab", between, np.linalg.inv(WITHIN + spread), between)

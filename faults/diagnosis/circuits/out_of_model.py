@@ -19,8 +19,9 @@ from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.circuits.class_fit import LASTING, SEALS, STEP, WEAK, PointFit, fit_freely
-from faults.diagnosis.circuits.class_regions import ClassFits, region_scores
+from faults.diagnosis.circuits.class_regions import ClassFits
 from faults.diagnosis.circuits.load_or_offset import load_for_offset
+from faults.diagnosis.circuits.region_scores import region_scores
 from faults.diagnosis.circuits.yielding import UNEXPLAINED, follows, yielding_velocity
 from faults.notes import AgainstCode
 from plant.eha.circuit_parameters import CircuitParameters

@@ -155,7 +155,7 @@ def test_where_a_log_tells_no_condition_from_another_only_fitted_circuits_speak(
 ) -> None:
     record = driven("prbs", "normal")
     told = weigh(record, ACTUATOR)
-    monkeypatch.setattr("faults.diagnosis.evidence.told_apart", lambda *_: np.zeros((9, 9)))
+    monkeypatch.setattr("faults.diagnosis.circuits.class_regions.ClassFits.apart", lambda *_: np.zeros((9, 9)))
     blind = weigh(record, ACTUATOR)
     for name in ("models", "innovations"):
         assert np.ptp(told.log_odds[name]) > 1.0

@@ -25,9 +25,9 @@ from faults.diagnosis.circuits.class_regions import (
     believed_information,
     is_stuck,
     lasting_misfit,
-    region_scores,
     spread_of,
 )
+from faults.diagnosis.circuits.region_scores import region_scores
 from faults.diagnosis.severity import limits_of, severities, severities_at, what_is_not_told, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
 from plant.eha.circuit_parameters import CircuitParameters

@@ -18,8 +18,9 @@ from faults.diagnosis.changes.onset import find_onset, part_of, parted
 from faults.diagnosis.changes.split import likeliest_split
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
 from faults.diagnosis.circuits.circuit_runs import coordinates_of
-from faults.diagnosis.circuits.class_regions import fit_classes, region_scores
+from faults.diagnosis.circuits.class_regions import fit_classes
 from faults.diagnosis.circuits.out_of_model import reasons_against, sensors_disagree
+from faults.diagnosis.circuits.region_scores import region_scores
 from faults.diagnosis.evidence import Scoreboard, bounded, friction_left_open, weigh
 from faults.diagnosis.innovation_bank import innovation_scores
 from faults.diagnosis.models_verdict import margin, models_verdict

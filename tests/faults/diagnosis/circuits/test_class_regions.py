@@ -19,10 +19,9 @@ from faults.diagnosis.circuits.class_regions import (
     how_near,
     is_stuck,
     lasting_misfit,
-    region_scores,
     spread_of,
-    told_apart,
 )
+from faults.diagnosis.circuits.region_scores import region_scores, told_apart
 from plant.eha.model import EhaParameters
 
 ACTUATOR = actuator_of(EhaParameters())

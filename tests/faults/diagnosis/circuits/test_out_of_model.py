@@ -13,7 +13,7 @@ from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.circuits.class_fit import PointFit, scales_of
-from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes, region_scores
+from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
 from faults.diagnosis.circuits.out_of_model import (
     EARLIER,
     LEAST_BIAS,
@@ -21,6 +21,7 @@ from faults.diagnosis.circuits.out_of_model import (
     reasons_against,
     sensors_disagree,
 )
+from faults.diagnosis.circuits.region_scores import region_scores
 from faults.diagnosis.circuits.yielding import UNEXPLAINED, YIELDING
 from faults.notes import AgainstCode
 from plant.eha.model import EhaParameters

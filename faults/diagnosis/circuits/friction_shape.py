@@ -1,0 +1,111 @@
+"""How friction goes with speed differs from seal to seal: what a slow log leaves open of friction at rated speed.
+
+A circuit's friction has three parts (at rest, quadratic, whole at rated velocity). That of real seals falls from rest
+on as oil is drawn under them (Stribeck), and rises by another power than one or two. Friction at rated velocity is read
+off where the piston comes near it; where it does not, it is carried on by the three parts. So the law may depart from
+them by bends that fade within some velocity, with a judged spread. What bends would move the three parts by is left
+open in classes and intervals.
+
+Source: law and size of the fall, Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, European Journal of Control 4
+(1998), sections 2 and 3; an error of a model as an unknown with a prior, Kennedy and O'Hagan, Journal of the Royal
+Statistical Society B 63 (2001).
+"""
+
+import numpy as np
+
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_fit import WEAK, PointFit
+from plant.arrays import Array
+
+FADES = (0.03, 0.1, 0.3)
+"""Velocities within which a bend fades, over the rated one [fraction]: 1 to 13 mm/s on the paper's actuator. Seals of
+cylinders have Stribeck velocities of one to some tens of millimetres a second."""
+
+BEND = 0.1
+"""Standard deviation of each bend over friction at rest [dimensionless], judged: all three together are 17 % at rest.
+Seals break loose at 1.05 to 1.5 times the force at which they slide."""
+
+SLIDES = 0.005
+"""Velocity above which a piston shows what friction is when it slides, over the rated one [fraction]."""
+
+RIDGE = 1e-7
+"""Ridge of the regression [dimensionless]: one speed alone does not tell three parts."""
+
+FORCES = [at for at, name in enumerate(COORDINATES) if name.startswith("friction")]
+"""Coordinates that are forces."""
+
+
+def bent_by(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
+    """Return how a fit gives way to bends of the law of friction that it does not know.
+
+    A search lays the three parts through what friction was at the velocities reached. What a bend adds there moves them
+    as it moves a regression. Nothing is concluded of the bend from what is left of the log: a piston that turns leaves
+    errors of the seals' elasticity that look like one.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    blocks : Blocks
+        Its log.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (7, 3)
+        What each of `FADES`, as large as its standard deviation, moves the coordinates by [dimensionless].
+    """
+    speed = np.abs(fit.fitted[blocks.first :, 0][blocks.seen[:, 0]]) / actuator.rated
+    speed = np.append(speed[speed > SLIDES], 0.0)  # what breaks loose shows friction at rest
+    parts = np.stack([np.ones_like(speed), speed, speed**2], axis=1)
+    bends = BEND * np.exp(-speed[:, None] / np.array(FADES))
+    rest, linear, quadratic = np.linalg.solve(parts.T @ parts + RIDGE * len(speed) * np.eye(3), parts.T @ bends)
+    forces = np.exp(fit.coordinates[FORCES])
+    moved = np.zeros((len(fit.coordinates), len(FADES)))
+    moved[FORCES] = np.array([rest, quadratic, rest + linear + quadratic]) * (forces[0] / forces)[:, None]
+    return moved
+
+
+def told_of_bent(information: Array, moved: Array) -> Array:
+    """Return what a log tells of a circuit whose law of friction may be bent.
+
+    Parameters
+    ----------
+    information : ndarray, shape (7, 7)
+        What it would tell if the law had the circuit's shape.
+    moved : ndarray, shape (7, m)
+        What bends move the coordinates by, see `bent_by`.
+
+    Returns
+    -------
+    ndarray, shape (7, 7)
+        Inverse of the covariance with the bends' in it, for information that has no inverse too.
+
+    Examples
+    --------
+    >>> told_of_bent(np.diag([4.0, 0.0]), np.array([[0.5], [0.0]])).tolist()
+    [[2.0, 0.0], [0.0, 0.0]]
+    """
+    along = information @ moved
+    return np.asarray(information - along @ np.linalg.solve(np.eye(moved.shape[1]) + moved.T @ along, along.T))
+
+
+def doubt_of_bends(information: Array, moved: Array) -> Array:
+    """Return what bends add to the covariance of a circuit's coordinates.
+
+    Parameters
+    ----------
+    information, moved : ndarray
+        As in `told_of_bent`.
+
+    Returns
+    -------
+    ndarray, shape (7, 7)
+        Covariance [dimensionless]; no more than the weak prior leaves.
+    """
+    weak = np.linalg.inv(WEAK)
+    bent, straight = (np.linalg.inv(one + weak) for one in (told_of_bent(information, moved), information))
+    return np.asarray(bent - straight, dtype=np.float64)

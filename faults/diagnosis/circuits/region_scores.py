@@ -1,0 +1,117 @@
+"""How well the nine conditions' regions hold a fitted circuit, and how far a log tells them apart.
+
+A region is Gaussian in the logarithms of what is fitted, as actuators of one kind differ in them. So is a log's
+likelihood where it is narrow. Where it is wide, the forces of friction count: pressure is linear in them.
+"""
+
+import numpy as np
+
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.class_fit import WITHIN, PointFit
+from faults.diagnosis.circuits.friction_shape import FORCES
+from plant.arrays import Array
+
+
+def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Array:
+    """Return how well each condition's region holds a fitted circuit: the log of the likelihood over the region.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The circuit.
+    information : ndarray, shape (7, 7)
+        Inverse covariance of its coordinates; directions of which a log says nothing do not count.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (9,)
+        Log-likelihoods [dimensionless] up to a constant.
+    """
+    off = fit.coordinates - actuator.conditions
+    weight = information @ np.linalg.inv(np.eye(len(information)) + WITHIN @ information)
+    return -0.5 * np.einsum("ci,ij,cj->c", off, weight, off)
+
+
+def scores_in_forces(fit: PointFit, told: Array, actuator: Actuator) -> Array:
+    """Return how well each condition's region holds a fitted circuit, where friction counts as forces.
+
+    Pressure is linear in the forces of friction and not in their logarithms: a quadratic part that a slow log tells to
+    900 N more or less may be 100 N or 1900 N, and both lie one deviation off.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The circuit.
+    told : ndarray, shape (7, 7)
+        What is believed of it: inverse covariance of its coordinates.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (9,)
+        Log-likelihoods [dimensionless] up to a constant.
+    """
+    off, sizes = _in_forces(fit, actuator)
+    return np.array([_held(one, told, size[:, None] * WITHIN * size) for one, size in zip(off, sizes, strict=True)])
+
+
+def told_apart(spread: Array, actuator: Actuator) -> Array:
+    """Return how well a log tells each condition from each other one, as an expected log-likelihood ratio.
+
+    Parameters
+    ----------
+    spread : ndarray, shape (7, 7)
+        Covariance of the coordinates for intervals, see `ClassFits`.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (9, 9)
+        Half the squared distance of their regions, each blurred by the log, in deviations [dimensionless].
+    """
+    between = actuator.conditions[:, None] - actuator.conditions
+    return 0.5 * np.einsum("abi,ij,abj->ab", between, np.linalg.inv(WITHIN + spread), between)
+
+
+def apart_in_forces(fit: PointFit, spread: Array, actuator: Actuator) -> Array:
+    """Return how well a log tells each condition from each other one, where friction counts as forces.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The circuit.
+    spread : ndarray, shape (7, 7)
+        Covariance of its coordinates, with what bends move them by.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    ndarray, shape (9, 9)
+        Half the squared distance of their regions, each blurred by the log, in deviations [dimensionless].
+    """
+    off, sizes = _in_forces(fit, actuator)
+    within = sizes[:, :, None] * WITHIN * sizes[:, None, :]
+    between = off[:, None] - off
+    blurred = np.linalg.inv(0.5 * (within[:, None] + within) + spread)
+    return np.asarray(0.5 * np.einsum("abi,abij,abj->ab", between, blurred, between), dtype=np.float64)
+
+
+def _in_forces(fit: PointFit, actuator: Actuator) -> tuple[Array, Array]:
+    """Return how far a circuit is off each condition, and what a logarithm counts there; forces over the circuit's."""
+    off = fit.coordinates - actuator.conditions
+    sizes = np.ones_like(off)
+    sizes[:, FORCES] = np.exp(-off[:, FORCES])
+    off[:, FORCES] = 1.0 - sizes[:, FORCES]
+    return off, sizes
+
+
+def _held(off: Array, told: Array, within: Array) -> float:
+    """Return the log-likelihood of a region at an offset; a wide one counts less."""
+    blurred, usual = (np.eye(len(told)) + one @ told for one in (within, WITHIN))
+    volumes = float(np.linalg.slogdet(blurred)[1] - np.linalg.slogdet(usual)[1])
+    return -0.5 * float(off @ told @ np.linalg.inv(blurred) @ off) - 0.5 * volumes
