@@ -171,7 +171,8 @@ def longest_stroke(p: EhaParameters | SimpleNamespace) -> Any:
 def circuit_of(p: EhaParameters) -> CircuitParameters:
     """Return the circuit around an actuator: itself if it is one, else with the paper's rest, scaled to fit.
 
-    Leakage of the pump is at most its share of L_t; the accumulator grows with the compliance of the chambers.
+    Leakage of the pump is at most its share of L_t; the accumulator grows with the compliance of the chambers. A stroke
+    that is not known is no longer than the chambers have room for.
 
     Returns
     -------
@@ -194,8 +195,9 @@ def circuit_of(p: EhaParameters) -> CircuitParameters:
     share = min(1.0, p.leakage_coefficient / paper.leakage_coefficient)
     compliance = p.chamber_volume / p.bulk_modulus * paper.bulk_modulus / paper.chamber_volume
     size = max(1.0, compliance * max(1.0, p.relief_pressure / paper.relief_pressure))
+    known = {name: value for name, value in asdict(p).items() if value is not None}
     return CircuitParameters(
-        **{name: value for name, value in asdict(p).items() if value is not None},
+        **{"stroke": min(paper.stroke, float(longest_stroke(p))), **known},
         pump_crossport_leakage=share * paper.pump_crossport_leakage,
         pump_case_leakage=share * paper.pump_case_leakage,
         accumulator_gas=size * paper.accumulator_gas,

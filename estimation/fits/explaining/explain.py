@@ -209,7 +209,7 @@ def _paired(
         more = [screened(late, (*first.together, one), begun, wanted, spared.every) for one in rest]
         ended, others = sorted((ended, settled_each(late, more, known, spared)), key=lambda each: each[0].cost)
         pairs = led_on(late, ended, least, spared, useful)
-        known, useful = min(least, pairs[0].cost), _as_useful(pairs, useful)
+        known, useful = min([least, *(one.cost for one in pairs[:1])]), _as_useful(pairs, useful)
         return _better(first, ranked([*pairs, *led_on(late, others, known, spared, useful)]), least)
     pairs = led_on(late, ended, least, spared, useful)
     useful = _as_useful(pairs, useful)

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from faults.conditions import CONDITIONS, parameters_for
-from plant.eha.circuit_parameters import CircuitParameters, circuit_of, circuit_values, oil_demand
+from plant.eha.circuit_parameters import (
+    CircuitParameters,
+    circuit_of,
+    circuit_values,
+    longest_stroke,
+    oil_demand,
+)
 from plant.eha.model import JUDGED_STROKE, EhaParameters
 from plant.errors import RigError
 from plant.solvers.steps import parameter_row
@@ -20,6 +26,11 @@ def test_the_circuit_keeps_the_actuator_it_is_made_around() -> None:
     circuit = circuit_of(actuator)
     assert {name: asdict(circuit)[name] for name in asdict(actuator)} == {**asdict(actuator), "stroke": JUDGED_STROKE}
     assert circuit_of(replace(actuator, stroke=0.3)).stroke == 0.3
+
+
+def test_a_stroke_that_is_not_known_has_room_in_small_chambers() -> None:
+    small = replace(EhaParameters(), chamber_volume=1e-4, piston_area=2e-3)
+    assert circuit_of(small).stroke == longest_stroke(small) < circuit_of(EhaParameters()).stroke
 
 
 def test_a_circuit_stays_as_it_is() -> None:

@@ -197,6 +197,19 @@ def test_pairs_that_few_samples_leave_unexplained_are_not_led_on_before_all_othe
     assert found[0].cost == min(near, 1500.0)
 
 
+def test_where_no_pair_that_was_compared_first_is_worth_leading_on_the_others_are_led_on(pairing: Pairing) -> None:
+    led: list[int] = []
+
+    def screened(_: Any, together: Any, starts: Any, *__: Any, **___: Any) -> list[Tried]:
+        return [tried(1600.0, together=together)] * len(starts)
+
+    def led_on(_: Any, ended: Sequence[Tried], *__: Any) -> list[Tried]:
+        led.append(len(ended))
+        return [*ended] if len(led) > 1 else []
+
+    assert [one.cost for one in pairing(2, screened, led_on)] == [1600.0, 1600.0]
+
+
 def test_a_pair_beside_a_rival_counts_only_below_what_is_known(pairing: Pairing) -> None:
     useful: list[float] = []
 
