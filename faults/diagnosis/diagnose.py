@@ -7,7 +7,10 @@ estimated once, and where its gate refuses the fit the class is unknown for the 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from math import inf
 from typing import NamedTuple
+
+import numpy as np
 
 from estimation.eha.bulk_modulus import EstimateOptions
 from estimation.eha.estimate import estimated, explained, finding_of, refused
@@ -295,7 +298,9 @@ def _severities(
         laws = scaled_responses(healthy, {}, pressure=False)["bulk_modulus"]
         oil = with_total(diagnosis.severity["bulk_modulus"], laws, estimate.spreads)
     found = with_bulk_modulus(diagnosis.severity, oil, actuator_of(healthy))
-    return with_totals(found, actuator_of(rig.parameters), estimate.spreads, pressure=pressure)
+    logged = diagnosis.scoreboard.blocks.pressure
+    reached = inf if logged is None else float(np.nanmax(np.abs(logged)))
+    return with_totals(found, actuator_of(rig.parameters), estimate.spreads, pressure=pressure, reached=reached)
 
 
 def _without_class(found: Finding, log: CleanLog, scores: Scores, against: tuple[Note, ...]) -> Finding:

@@ -5,10 +5,15 @@ by pumped flow over leakage; the velocity that is lost answers it one to one. Fr
 gain of the sensor is that of the pressure. Without pressure the missing flow is the product of leakage and pressure:
 what a wrong ratio adds goes into either, so each is given it in full, which is too much; the scale itself is held by
 how alike actuators of one kind are, which the interval given the rig holds already.
+
+Leakage is told at rated pressure, which few logs come near. It is carried on in proportion to pressure, as oil flows
+through a narrow gap. Through a scored land or a throttle it rises with the root of pressure (Merritt, Hydraulic Control
+Systems, 1967, chapter 3), and is less there.
 """
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import inf
 
 from estimation.eha.rig_share import Responses, with_total
 from estimation.finding import Quantity
@@ -19,9 +24,19 @@ from plant.eha.doubts import PRESSURE_GAIN, Spread
 LEAST_LEAKAGE = 1e-2
 """Least share of the pumped flow that counts as leaking [fraction]."""
 
+_TURBULENT = "turbulent_share"
+
+TURBULENT = Spread(0.35, 0.0)
+"""Share of a leakage that may rise with the root of pressure [fraction], judged: a standard deviation."""
+
 
 def with_totals(
-    found: Mapping[str, Quantity], actuator: Actuator, spreads: Mapping[str, Spread], *, pressure: bool
+    found: Mapping[str, Quantity],
+    actuator: Actuator,
+    spreads: Mapping[str, Spread],
+    *,
+    pressure: bool,
+    reached: float = inf,
 ) -> Mapping[str, Quantity]:
     """Return severities with their total intervals; bulk modulus and the air bring theirs along.
 
@@ -35,6 +50,8 @@ def with_totals(
         How far each entry of the rig may be off.
     pressure : bool
         Whether differential pressure is used.
+    reached : float
+        Largest differential pressure of the log [Pa].
 
     Returns
     -------
@@ -45,6 +62,9 @@ def with_totals(
     if lost is None:
         return found
     laws, whole = _laws(lost, actuator, pressure=pressure), _whole(found, actuator)
+    beyond = 1.0 - min(1.0, reached / actuator.circuit.relief_pressure) ** 0.5
+    laws = {**laws, "leakage_flow": {**laws["leakage_flow"], _TURBULENT: beyond}}
+    spreads = {**spreads, _TURBULENT: TURBULENT}
     totals = {name: with_total(found[name], law, spreads, whole.get(name)) for name, law in laws.items()}
     return {**found, **{name: _holding(found[name].ci95_total, one) for name, one in totals.items()}}
 

@@ -14,7 +14,7 @@ from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.severity import with_bulk_modulus
-from faults.diagnosis.severity_total import with_totals
+from faults.diagnosis.severity_total import TURBULENT, with_totals
 from plant.eha.doubts import PRESSURE_GAIN, Spread
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -144,3 +144,14 @@ def test_without_pressure_the_gain_of_its_sensor_widens_nothing() -> None:
     for name in ("leakage_flow", "added_friction", "pressure_rise"):
         assert unseen[name].ci95_total == unseen[name].ci95
         assert seen[name].ci95_total != seen[name].ci95
+
+
+@pytest.mark.parametrize("reached", [4e5, 2e6])
+def test_a_leakage_may_be_less_at_rated_pressure_the_lower_the_pressures_that_were_logged(reached: float) -> None:
+    found = {name: Quantity(5.0, "1", (4.5, 5.5)) for name in ASKED}
+    actuator, share = actuator_of(HEALTHY), 1.0 - float(np.exp(-1.96 * TURBULENT.down))
+    near, far = (with_totals(found, actuator, {}, pressure=True, reached=one) for one in (1e9, reached))
+    less = share * (1.0 - (reached / HEALTHY.relief_pressure) ** 0.5)
+    assert far["leakage_flow"].ci95_total == pytest.approx((5.0 - np.hypot(0.5, 5.0 * less), 5.5), rel=1e-4)
+    assert {**far, "leakage_flow": near["leakage_flow"]} == near
+    assert near["leakage_flow"].ci95_total == (4.5, 5.5)

@@ -1,0 +1,59 @@
+"""How well the conditions' regions hold a circuit where friction counts as forces."""
+
+import numpy as np
+import pytest
+
+from faults.conditions import CONDITIONS
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_fit import PointFit
+from faults.diagnosis.circuits.friction_shape import told_of_bent
+from faults.diagnosis.circuits.region_scores import apart_in_forces, region_scores, scores_in_forces, told_apart
+from plant.eha.model import EhaParameters
+
+ACTUATOR = actuator_of(EhaParameters())
+NORMAL, RUBS = (list(CONDITIONS).index(name) for name in ("normal", "minor_friction"))
+QUADRATIC, RATED = (COORDINATES.index(f"friction_{name}") for name in ("quadratic", "rated"))
+KNOWN = 1e4 * np.eye(7)
+
+
+def at(place: np.ndarray) -> PointFit:
+    empty = np.zeros((10, 2))
+    return PointFit(place, 0.0, KNOWN, np.ones(2), empty, np.zeros((7, 10, 2)))
+
+
+@pytest.mark.parametrize("place", range(len(CONDITIONS)))
+def test_a_nominal_circuit_lies_in_its_own_region_alone(place: int) -> None:
+    fit = at(ACTUATOR.conditions[place])
+    scores = scores_in_forces(fit, KNOWN, ACTUATOR)
+    assert scores[place] == pytest.approx(0.0, abs=1e-9)
+    assert np.all(np.delete(scores, place) < -10.0)
+    near = at(ACTUATOR.conditions[place] + 0.02)
+    assert scores_in_forces(near, KNOWN, ACTUATOR)[place] == pytest.approx(
+        region_scores(near, KNOWN, ACTUATOR)[place], abs=0.2
+    )
+
+
+def test_a_wide_log_leaves_two_regions_open_that_lie_as_far_off_in_newtons() -> None:
+    quadratic, rated = np.exp(
+        0.5 * np.log(np.exp(2.0 * ACTUATOR.conditions[[NORMAL, RUBS]][:, [QUADRATIC, RATED]]).mean(0))
+    )
+    middle = ACTUATOR.conditions[NORMAL].copy()
+    middle[[QUADRATIC, RATED]] = np.log([quadratic, rated])
+    moved = np.zeros((7, 2))
+    moved[QUADRATIC, 0] = moved[RATED, 1] = 1.0
+    told = told_of_bent(KNOWN, moved)
+    straight, forces = (scores(at(middle), told, ACTUATOR) for scores in (region_scores, scores_in_forces))
+    assert straight[NORMAL] - straight[RUBS] < -1.0
+    assert abs(forces[NORMAL] - forces[RUBS]) < abs(straight[NORMAL] - straight[RUBS])
+
+
+def test_regions_are_as_far_apart_in_forces_as_in_logarithms_but_where_a_log_tells_few_newtons() -> None:
+    fit = at(ACTUATOR.conditions[RUBS])
+    wide = np.zeros((7, 7))
+    wide[QUADRATIC, QUADRATIC] = wide[RATED, RATED] = 4.0
+    apart = apart_in_forces(fit, wide, ACTUATOR)
+    assert np.array_equal(apart, apart.T)
+    assert apart[NORMAL, RUBS] < 1.0 < 10.0 < apart_in_forces(fit, 0.0 * wide, ACTUATOR)[NORMAL, RUBS]
+    leaks = list(CONDITIONS).index("minor_leakage_minor_friction")
+    assert apart[RUBS, leaks] == pytest.approx(told_apart(0.0 * wide, ACTUATOR)[RUBS, leaks])
