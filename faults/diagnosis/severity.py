@@ -1,6 +1,7 @@
 """How bad is it? A fitted circuit in the units of a shop, each number with a 95 % interval."""
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from functools import cache, lru_cache
 from typing import Any
 
@@ -118,7 +119,8 @@ def severities(
     Returns
     -------
     Mapping[str, Quantity]
-        By the names of `UNITS`.
+        By the names of `UNITS`. What hangs on friction brings a total interval along: the law may have another shape
+        than the rig's.
     """
     among = circuits or [OpenCircuit(fits.best.coordinates, 1.0)]
     centre = max(among, key=lambda one: one.probability).coordinates
@@ -139,7 +141,12 @@ def severities(
         if name == "bulk_modulus" and stretch != 1.0:  # never negative, however wide
             ends = value * (low / value) ** stretch, value * (high / value) ** stretch
         found[name] = Quantity(value, UNITS[name], ends)
-    return found | {"entrained_air": _with_air(found["entrained_air"], found["bulk_modulus"], actuator)}
+    found |= {"entrained_air": _with_air(found["entrained_air"], found["bulk_modulus"], actuator)}
+    if not np.any(fits.moved):
+        return found
+    straight = replace(fits, spread=fits.bent_spread, moved=0.0 * fits.moved)
+    bent = severities(straight, actuator, widths, circuits)
+    return found | {name: replace(found[name], ci95_total=bent[name].ci95) for name in OF_FRICTION}
 
 
 @cache

@@ -127,7 +127,7 @@ def odds_of_change(
         - math.log(len(CONDITIONS) * times)
         + math.log(CHANGES / (1.0 - CHANGES))
     )
-    before, after = (one.scores for one in parts)
+    before, after = (one.of_one_law for one in parts)
     to_drift = float(np.max(before) + np.max(after) - np.max(before + after))
     return -float(np.logaddexp(-to_one, -to_drift))
 

@@ -106,7 +106,7 @@ class Parted(NamedTuple):
     @property
     def conditions(self) -> tuple[int, int]:
         """Places of the conditions in which the parts are."""
-        first, last = (int(np.argmax(one.scores)) for one in self.fits)
+        first, last = (int(np.argmax(one.of_one_law)) for one in self.fits)
         return first, last
 
 

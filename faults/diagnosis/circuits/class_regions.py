@@ -79,6 +79,8 @@ class ClassFits:
         and without pressure.
     moved : ndarray, shape (7, m)
         What bends of the law of friction move the coordinates by [dimensionless], see `bent_by`.
+    unbent : ndarray, shape (9,), optional
+        The scores if the law is not bent; `scores` if not given.
     """
 
     best: PointFit
@@ -89,6 +91,12 @@ class ClassFits:
     spread: Array
     lasting: float
     moved: Array = field(default_factory=lambda: np.zeros((len(COORDINATES), 1)))
+    unbent: Array | None = None
+
+    @property
+    def of_one_law(self) -> Array:
+        """Scores of parts of a log, or of circuits, that have one law of friction in common, shape (9,)."""
+        return self.scores if self.unbent is None else self.unbent
 
     @property
     def told(self) -> Array:
@@ -99,6 +107,11 @@ class ClassFits:
         falsely unknown.
         """
         return told_of_bent(self.information / self.lasting, self.moved)
+
+    @property
+    def bent_spread(self) -> Array:
+        """Covariance of the coordinates for intervals, where the law of friction may be bent, shape (7, 7)."""
+        return self.spread + doubt_of_bends(self.information, self.moved)
 
     def apart(self, actuator: Actuator) -> Array:
         """Return how well the log tells each condition from each other one, see `told_apart`.
@@ -170,17 +183,15 @@ def fit_classes(
     known = [believed_information(fit, blocks, stuck=stuck) for fit in fits]
     least = int(np.argmin([fit.cost for fit in fits]))
     worse = behind(fits, fits[least], blocks)
-    if blocks.pressure is None or stuck:
-        moved = [np.zeros((len(COORDINATES), 1)) for _ in fits]
-        scores = [region_scores(fit, information, actuator) for fit, information in zip(fits, known, strict=True)]
-    else:
+    straight = [region_scores(fit, information, actuator) for fit, information in zip(fits, known, strict=True)]
+    moved, scores = [np.zeros((len(COORDINATES), 1)) for _ in fits], straight
+    if blocks.pressure is not None and not stuck:
         moved = [bent_by(fit, blocks, actuator) for fit in fits]
-        scores = [
-            scores_in_forces(fit, told_of_bent(information, by), actuator)
-            for fit, information, by in zip(fits, known, moved, strict=True)
-        ]
-    held = np.max(np.array(scores) - worse[:, None], axis=0) - misfit(blocks, fits[least].fitted) / LASTING
-    centre = actuator.conditions[np.argmax(held)]
+        told = [told_of_bent(information, by) for information, by in zip(known, moved, strict=True)]
+        scores = [scores_in_forces(fit, one, actuator) for fit, one in zip(fits, told, strict=True)]
+    likeliest = misfit(blocks, fits[least].fitted) / LASTING
+    held, unbent = (np.max(np.array(one) - worse[:, None], axis=0) - likeliest for one in (scores, straight))
+    centre = actuator.conditions[np.argmax(unbent)]
     best = fits[least] if blocks.pressure is not None else _scaled(fits[least], centre)
     # without pressure no balance of flows looks for another pump or other faults, so regions alone have to
     lasting = 1.0 if blocks.pressure is None else max(1.0, lasting_misfit(best.fitted, blocks))
@@ -188,10 +199,10 @@ def fit_classes(
         spread = spread_of(best, known[least], blocks, centre)
     else:
         seen, seldom = _NO_FRICTION if stuck else np.ones(len(COORDINATES)), seldom_known_slopes(best, blocks, actuator)
-        spread = doubt_of(best, seldom, blocks, actuator.conditions, held, seen, spreads_of(actuator))
-        spread = spread + between_fits(fits, best, worse) + doubt_of_bends(known[least], moved[least])
+        spread = doubt_of(best, seldom, blocks, actuator.conditions, unbent, seen, spreads_of(actuator))
+        spread = spread + between_fits(fits, best, worse)
     errors = np.array([scales_of(blocks, run) for run in runs])
-    return ClassFits(best, known[least], nominal, errors, held, spread, lasting, moved[least])
+    return ClassFits(best, known[least], nominal, errors, held, spread, lasting, moved[least], unbent)
 
 
 def _scaled(fit: PointFit, centre: Array) -> PointFit:

@@ -94,6 +94,17 @@ def ratio(one: Quantity) -> float:
     return math.log(one.ci95[1] / one.ci95[0])
 
 
+def test_what_hangs_on_friction_is_known_less_well_where_the_law_of_friction_may_be_bent() -> None:
+    moved = np.zeros((7, 1))
+    moved[COORDINATES.index("friction_rated")] = 0.3
+    straight, bent = (severities(one, ACTUATOR) for one in (fits(NARROW), replace(fits(NARROW), moved=moved)))
+    for name in ("added_friction", "pressure_rise"):
+        low, high = bent[name].ci95_total or (0.0, 0.0)
+        assert bent[name].ci95 == straight[name].ci95
+        assert high - low > 3.0 * extent(bent[name])
+    assert bent["leakage_flow"] == straight["leakage_flow"]
+
+
 def test_the_ends_of_an_interval_are_those_of_the_covariance_whichever_way_a_severity_goes() -> None:
     tight, step = np.diag(np.full(7, 1e-4**2)), 1e-5
     for place in range(len(CONDITIONS)):
