@@ -31,7 +31,8 @@ def fits(*scores: tuple[int, float], deviation: float = 0.02) -> list[ClassFits]
         one = np.full(9, -lead)
         one[place] = 0.0
         best = replace(whole().best, coordinates=ACTUATOR.conditions[place])
-        found.append(replace(whole(), best=best, scores=one, information=np.eye(7) * 2 * LASTING / deviation**2))
+        told = np.eye(7) * 2 * LASTING / deviation**2
+        found.append(replace(whole(), best=best, scores=one, unbent=None, information=told))
     return found
 
 
@@ -92,7 +93,7 @@ def test_one_circuit_for_all_is_asked_again_where_its_search_ended_short_of_the_
     ends = [fit_classes(one, ACTUATOR) for one in halves]
     lost = replace(whole(), best=replace(whole().best, fitted=0.9 * whole().best.fitted))
     assert gain_of(lost, halves, ends) > gain_of(whole(), halves, ends) + 10.0
-    apart = [replace(ends[0], scores=np.array([0.0, *np.full(8, -300.0)])), ends[1]]
+    apart = [replace(ends[0], scores=np.array([0.0, *np.full(8, -300.0)]), unbent=None), ends[1]]
     assert odds_of_change(gain_of(lost, halves, apart), apart, lost, steady, ACTUATOR) > math.log(LIKELIER)
     assert not believed(steady, halves, apart, lost, ACTUATOR)
 

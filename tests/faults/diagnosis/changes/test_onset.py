@@ -97,7 +97,7 @@ def test_without_pressure_oil_that_softens_within_a_log_is_in_no_condition() -> 
     assert not softened(two._replace(gain=0.99 * SOFTENED))
     assert not softened(two._replace(parts=[replace(one, pressure=one.velocity) for one in two.parts]))
     assert find_onset(blocks, two, ACTUATOR) is None
-    elsewhere = replace(two.fits[1], scores=np.roll(two.fits[1].scores, 1))
+    elsewhere = replace(two.fits[1], unbent=np.roll(two.fits[1].of_one_law, 1))
     assert softened(two._replace(fits=[two.fits[0], elsewhere])), "no condition softens the oil"
 
 
