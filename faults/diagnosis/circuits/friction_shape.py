@@ -98,7 +98,9 @@ def doubt_of_bends(information: Array, moved: Array) -> Array:
 
     Parameters
     ----------
-    information, moved : ndarray
+    information : ndarray, shape (7, 7)
+        As in `told_of_bent`.
+    moved : ndarray, shape (7, m)
         As in `told_of_bent`.
 
     Returns

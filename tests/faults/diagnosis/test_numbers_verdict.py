@@ -18,9 +18,8 @@ from faults.diagnosis.changes.onset import find_onset, part_of, parted
 from faults.diagnosis.changes.split import likeliest_split
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
 from faults.diagnosis.circuits.circuit_runs import coordinates_of
-from faults.diagnosis.circuits.class_regions import fit_classes
+from faults.diagnosis.circuits.class_regions import fit_classes, how_near
 from faults.diagnosis.circuits.out_of_model import reasons_against, sensors_disagree
-from faults.diagnosis.circuits.region_scores import region_scores
 from faults.diagnosis.evidence import Scoreboard, bounded, friction_left_open, weigh
 from faults.diagnosis.innovation_bank import innovation_scores
 from faults.diagnosis.models_verdict import margin, models_verdict
@@ -108,8 +107,7 @@ def biases_of_sensors_and_pump() -> dict[str, Any]:
     for name, record in logs.items():
         one = blocks_of(record)
         fits = fit_classes(one, ACTUATOR)
-        region = float(np.max(region_scores(fits.best, fits.told, ACTUATOR)))
-        told[name] = noted(reasons_against(one, fits, region, ACTUATOR))
+        told[name] = noted(reasons_against(one, fits, how_near(fits, one, ACTUATOR), ACTUATOR))
     return told
 
 
