@@ -26,7 +26,7 @@ def series_of(truth: Array, std: float = 0.04, seed: int = 0) -> Series:
 def test_growth_that_takes_a_few_logs_to_the_limit_is_followed_and_is_no_jump(rate: float) -> None:
     truth = growth(8, rate)
     for seed in range(3):
-        found = trend_of(series_of(truth, std=0.02, seed=seed))
+        found = last_trend(series_of(truth, std=0.02, seed=seed))
         assert found.begin == 0
         assert found.level[0] == pytest.approx(truth[-1], rel=0.02)
         assert found.growth[0] == pytest.approx(rate, rel=0.05)
