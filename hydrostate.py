@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib.util import find_spec
 from numbers import Integral, Real
+from os import PathLike, fsdecode
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,6 +41,9 @@ if TYPE_CHECKING:
 
 OF_A_LOG = ("estimate", "diagnose", "identify")
 """Verbs of the command that Python asks of a log."""
+
+LONGEST_PATH = 4096
+"""Characters of a path; a longer text is a log itself."""
 
 PACKAGES = ("plant", "estimation", "faults", "experiments")
 
@@ -134,7 +138,7 @@ def actuators() -> Mapping[str, str]:
 
 
 def read(
-    path: "str | Path | pd.DataFrame | Mapping[str, Any]",
+    path: "str | bytes | PathLike[Any] | pd.DataFrame | Mapping[str, Any]",
     *,
     rig: "Rig[Any] | str | Path | None" = None,
     columns: Mapping[str, str] | None = None,
@@ -150,10 +154,11 @@ def read(
 
     Parameters
     ----------
-    path : str, Path, pandas.DataFrame or Mapping[str, array_like]
+    path : str, bytes, path-like, pandas.DataFrame or Mapping[str, array_like]
         Text, Parquet, Feather or MAT; with the extra ``bench`` also XLSX, TDMS, MDF and HDF5. `hydrostate inspect`
-        shows what a strange one holds. Or a table, also of Polars or Arrow, or arrays by name, with ``time_s`` or its
-        index as time: seconds, durations or dates.
+        shows what a strange one holds. Or a table, also of Polars or Arrow, NumPy's records, or arrays by name, with
+        ``time_s`` or its index as time: seconds, durations or dates. Masked values are missing ones; quantities of Pint
+        are converted.
     rig : Rig, str or Path, optional
         The actuator, or its rig file; the paper's if not given.
     columns : Mapping[str, str], optional
@@ -197,6 +202,10 @@ def read(
     bench = _rig(rig, kind)
     if not isinstance(sample_time, Real | None):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         refuse(f"sample_time must be a number of seconds, got {sample_time!r}")
+    if isinstance(path, PathLike | bytes):
+        path = Path(fsdecode(path))
+    if isinstance(path, str) and (len(path) > LONGEST_PATH or "\n" in path or not path):
+        refuse(f"the path of a log is needed, got the text {path[:60]!r}")
     table = None if isinstance(path, str | Path) else path if is_frame(path) else by_name(path)
     levels = getattr(getattr(table, "columns", None), "nlevels", 1)
     if levels > 1:
@@ -204,11 +213,15 @@ def read(
         refuse(f"each column of the table must have one name, got names of {levels} levels (MultiIndex); {how}")
     file = Path(path) if isinstance(path, str | Path) else None if table is None else frame_table(table)
     if file is None:
-        got = repr(path) if isinstance(path, Real | bytes | list | tuple | None) else type(path).__name__
-        refuse(f"the path of a log, a pandas.DataFrame or arrays by name are needed, got {got}"[:200])
+        got = repr(path) if isinstance(path, Real | list | tuple | None) else type(path).__name__
+        hint = "; give the path of an open file" if hasattr(path, "read") else ""
+        refuse(f"the path of a log, a pandas.DataFrame or arrays by name are needed, got {got[:100]}{hint}")
     if columns is not None and not isinstance(columns, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         refuse(f"columns must be a mapping such as {{'position_m': 'POS_MM:mm'}}, got {columns!r}")
-    others = [Path(one) for one in ([beside] if isinstance(beside, str | Path) else beside)]
+    given: Any = [beside] if isinstance(beside, str | PathLike) else beside
+    if not isinstance(given, Sequence) or not all(isinstance(one, str | PathLike) for one in given):
+        refuse(f"beside must be paths of other loggers' files, got {given!r:.80}")
+    others = [Path(one) for one in given]
     more: dict[str, Any] = {"sample_time": sample_time, "beside": others}
     try:
         with options_by_name():
@@ -249,6 +262,8 @@ def load_model(path: "str | Path") -> "Relation":
     from estimation.identification.free_run.saved import load_models
     from experiments.python_user.relation import Relation
 
+    if not isinstance(path, str | PathLike):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
+        refuse(f"the path of a model is needed, got {path!r:.80}")
     return Relation(load_models(path))
 
 
@@ -305,6 +320,8 @@ def simulate(
 
 def _rig(rig: Any, kind: Any) -> "Rig[Any]":
     """Return a rig of this kind of actuator."""
+    if isinstance(rig, PathLike):
+        rig = Path(rig)
     if isinstance(rig, str | Path) and not Path(rig).is_file():
         refuse(f"rig {str(rig)!r}: there is no such file; `hydrostate rig init FILE` writes one to edit, or pass a Rig")
     if rig is None or isinstance(rig, str | Path):

@@ -261,7 +261,7 @@ class Finding:
     not_told: tuple[Note, ...] = ()
     since: Change | None = None
     advice: tuple[Note, ...] = ()
-    evidence: Any = None
+    evidence: Any = field(default=None, repr=False)
 
     @property
     def named(self) -> tuple[str, ...]:

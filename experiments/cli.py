@@ -147,6 +147,13 @@ def app_for(words: Sequence[str]) -> typer.Typer:
     return _whole() if alone is None else _of({"": [alone]})
 
 
+def _with_streams() -> None:
+    """Open what was closed when the command began, as by a shell's ``>&-``: what is said must have somewhere to go."""
+    for name, how, mode in (("stdin", os.O_RDONLY, "r"), ("stdout", os.O_WRONLY, "w"), ("stderr", os.O_WRONLY, "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, how), mode, encoding="utf-8"))
+
+
 def main() -> None:
     """Run the command line and exit with its code.
 
@@ -156,6 +163,7 @@ def main() -> None:
     three times as long as they save, and results would depend on the count of cores.
     """
     gc.set_threshold(OBJECTS_AT_START)
+    _with_streams()
     trust_sources()
     for name in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{name}_NUM_THREADS", "1")

@@ -178,6 +178,43 @@ LOWER_CASE: Mapping[str, str] = {
 """Units that column names write in lower case, where pint reads another unit or none (``pa``: pico-year)."""
 
 
+USUAL: Mapping[str, tuple[str, float]] = {
+    "s": ("s", 1.0),
+    "ms": ("s", 1e-3),
+    "us": ("s", 1e-6),
+    "µs": ("s", 1e-6),
+    "ns": ("s", 1e-9),
+    "min": ("s", 60.0),
+    "rad/s": ("rad/s", 1.0),
+    "rpm": ("rad/s", 0.10471975511965977),
+    "degree/s": ("rad/s", 0.017453292519943295),
+    "m": ("m", 1.0),
+    "mm": ("m", 1e-3),
+    "cm": ("m", 1e-2),
+    "um": ("m", 1e-6),
+    "µm": ("m", 1e-6),
+    "nm": ("m", 1e-9),
+    "m/s": ("m/s", 1.0),
+    "mm/s": ("m/s", 1e-3),
+    "cm/s": ("m/s", 1e-2),
+    "um/s": ("m/s", 1e-6),
+    "Pa": ("Pa", 1.0),
+    "kPa": ("Pa", 1e3),
+    "MPa": ("Pa", 1e6),
+    "hPa": ("Pa", 1e2),
+    "mbar": ("Pa", 1e2),
+    "bar": ("Pa", 1e5),
+    "psi": ("Pa", 6894.7572931683635),
+    "V": ("V", 1.0),
+    "mV": ("V", 1e-3),
+    "kV": ("V", 1e3),
+    "N": ("N", 1.0),
+    "kN": ("N", 1e3),
+}
+"""Units that benches log, with what they are of and their factor as pint has it, whose import takes as long as an
+estimate."""
+
+
 @cache
 def converts(unit: str, wanted: str) -> bool:
     """Return whether a unit is known, and measures what another does."""
@@ -221,6 +258,29 @@ def conversion_to(unit: str, wanted: str) -> tuple[float, float]:
         factor, offset = conversion_to(unit[1:], wanted)
         return -factor, offset
     name = plain_unit(LOWER_CASE.get(unit, unit), angular=wanted == "rad/s")
+    if name in USUAL and USUAL.get(wanted, ("", 0.0)) == (wanted, 1.0):
+        of, factor = USUAL[name]
+        if of != wanted:
+            raise ValueError(f"unit {unit!r} does not convert to {wanted!r}")
+        return factor, 0.0
+    return by_pint(unit, name, wanted)
+
+
+def by_pint(unit: str, name: str, wanted: str) -> tuple[float, float]:
+    """Return what `conversion_to` returns, for any unit that Pint knows.
+
+    Parameters
+    ----------
+    unit, name : str
+        The unit as it was given, and as Pint spells it.
+    wanted : str
+        The unit that is wanted.
+
+    Raises
+    ------
+    ValueError
+        As `conversion_to`.
+    """
     import pint
 
     registry = unit_registry()

@@ -224,12 +224,15 @@ class Answer(Shown):
         HydrostateError
             If the file cannot be written, or its name ends as no page's does.
         """
+        from os import PathLike
         from pathlib import Path
 
         from experiments.command.json_output import write_whole
         from experiments.command.output_paths import PAGES
         from plant.errors import HydrostateError
 
+        if not isinstance(path, str | PathLike):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
+            raise HydrostateError(f"the path of a page is needed, got {path!r:.80}")
         file = Path(path)
         if file.suffix.lower() not in PAGES:
             raise HydrostateError(f"a page's name must end in .html, got {file.name!r}")

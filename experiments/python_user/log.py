@@ -140,6 +140,8 @@ class Log(Shown):
         """
         from plant.log.clock.uniform import FEWEST_SAMPLES
 
+        if not all(isinstance(one, Real) for one in (begin, end)):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
+            refuse(f"begin and end of a part must be seconds, got {begin!r} and {end!r}")
         start = self.record.start_time
         until = min(end, start + self.duration + self.sample_time)
         first, last = (round((at - start) / self.sample_time) if isfinite(at) else -1 for at in (begin, until))

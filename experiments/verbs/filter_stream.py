@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from experiments.command.json_output import plain
-from experiments.command.logs import read_log
+from experiments.command.logs import noted, read_log
 from experiments.command.options import (
     Columns,
     RigFile,
@@ -95,7 +95,7 @@ def filter_stream(
     with ExitStack() as outputs:
         bench, named = load_rig(rig), load_columns(columns)
         asked = StreamFilterOptions(bench.parameters, form, method, listed(states), tune)
-        log = None if like is None else read_log(like, bench.columns, named)
+        log = None if like is None else noted(str(like), lambda: read_log(like, bench.columns, named))
         source = STANDARD_INPUT if stream == "-" else stream
         told = Filtering(say, asked, (bench.columns, named), every, log, state, source)
         if publish is not None:

@@ -15,6 +15,7 @@ from plant.log.clock.uniform import MOST_MISSING
 from plant.log.columns import TIME, UNITS, Column, listed, resolve_columns
 from plant.log.formats.detect import open_tables
 from plant.log.headings import Heading, cleaned
+from plant.log.lost_values import without_lost
 from plant.log.notes import LogCode
 from plant.log.plausibility import implausible
 from plant.log.record import Record
@@ -81,6 +82,10 @@ def read_any(
     columns = _every(table, headings, time) if names is None else _wanted(table, headings, time, names, source)
     if not set(columns) - {TIME}:
         raise LogError("a column of numbers is needed; the log has none", source)
+    for name in columns.keys() - {TIME}:
+        columns[name], said = without_lost(columns[name], name)
+        for note in said:
+            warnings.warn(LogWarning(note, source), stacklevel=2)
     clock = None
     if time is None:
         step = sample_time if sample_time is not None else table.step

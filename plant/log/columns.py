@@ -323,9 +323,9 @@ def parse_columns(texts: Sequence[str]) -> dict[str, str]:
     for text in texts:
         channel, equals, spec = (part.strip() for part in text.partition("="))
         if not (channel and equals and spec):
-            raise RigError(f"columns must be given as CHANNEL=NAME:UNIT (position_m=POS_MM:mm), got {text!r}")
+            raise RigError(f"columns must be given as CHANNEL=NAME:UNIT (position_m=POS_MM:mm), got {text!r:.80}")
         if channel in mapping:
-            raise RigError(f"channel {channel!r} is needed once, got {mapping[channel]!r} and {spec!r}")
+            raise RigError(f"channel {channel!r} is needed once, got {mapping[channel]!r:.80} and {spec!r:.80}")
         mapping[channel] = spec
     return check_columns(mapping)
 

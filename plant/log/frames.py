@@ -1,13 +1,14 @@
 """Tables in memory, read as a log: of pandas, Polars or Arrow, or columns by name."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
 from plant.errors import LogError
 from plant.log.any_columns import TIME_STEM
-from plant.log.columns import TIME
+from plant.log.columns import TIME, TRUTH, UNITS, resolve_columns
+from plant.log.formats.cells import values_of
 from plant.log.table import Table, table_of
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ def is_frame(given: object) -> "TypeGuard[pd.DataFrame]":
 
 
 def by_name(given: object) -> "Mapping[str, Any] | None":
-    """Return the columns of a table of Polars or Arrow, or of a mapping; None of anything else.
+    """Return the columns of a table of Polars or Arrow, of NumPy's records, or of a mapping; None of anything else.
 
     Parameters
     ----------
@@ -37,6 +38,9 @@ def by_name(given: object) -> "Mapping[str, Any] | None":
     """
     if isinstance(given, Mapping):
         return given  # pyright: ignore[reportUnknownVariableType]  names and values are checked where they are read
+    if (fields := getattr(getattr(given, "dtype", None), "names", None)) and getattr(given, "ndim", 0) == 1:
+        records: Any = given
+        return {name: records[name] for name in fields}
     if hasattr(given, "collect"):  # a query, whose rows are not there yet
         return None
     names = getattr(given, "column_names", getattr(given, "columns", None))
@@ -72,10 +76,15 @@ def frame_table(given: "pd.DataFrame | Mapping[str, Any]") -> Table:
     >>> [one.name for one in frame_table({"time_s": [0.0, 1.0], "position_m": [0.0, 0.1]}).headings]
     ['time_s', 'position_m']
     """
-    names = [str(name) for name in (given.columns if is_frame(given) else given)]
+    names = [_text(name) for name in (given.columns if is_frame(given) else given)]
     if len(set(names)) < len(names):
         raise LogError(f"columns of different names are needed, got {', '.join(names)}", SOURCE)
-    values: dict[str, Any] = dict(zip(names, _columns(given), strict=True))
+    values: dict[str, Any] = dict(zip(names, _columns(given, names), strict=True))
+    values = {name: one for name, one in values.items() if not (name.startswith("__") and name.endswith("__"))}
+    units: dict[str, str | None] = {}
+    for name, one in values.items():
+        if hasattr(one, "magnitude"):
+            values[name], units[name] = _of_quantity(name, one)
     if is_frame(given) and not any(map(_is_time, names)):
         values = {**_time(given.index), **values}
     lengths = {name: np.size(one) for name, one in values.items()}
@@ -85,7 +94,7 @@ def frame_table(given: "pd.DataFrame | Mapping[str, Any]") -> Table:
         got = ", ".join(f"{name} {length}" for name, length in lengths.items())
         raise LogError(f"columns of one length are needed, got {got} samples", SOURCE)
     spans = {name: _seconds(one) for name, one in values.items() if np.asarray(one).dtype.kind == "m"}
-    return table_of(SOURCE, {**values, **spans}, units=dict.fromkeys(spans, "s"))
+    return table_of(SOURCE, {**values, **spans}, units={**units, **dict.fromkeys(spans, "s")})
 
 
 def _is_time(name: str) -> bool:
@@ -97,6 +106,8 @@ def _time(index: "pd.Index[Any]") -> dict[str, Any]:
     name = "" if index.name is None else str(index.name)
     if index.dtype.kind in "iuf" and (_is_time(name) or index.dtype.kind == "f"):
         return {name if _is_time(name) else TIME: _plain(index)}
+    starts: Any = getattr(index, "to_timestamp", None)  # of periods, as a table that was resampled has
+    index = index if starts is None else starts()
     return {TIME: _plain(index)} if index.dtype.kind in "mM" else {}
 
 
@@ -106,10 +117,26 @@ def _seconds(spans: Any) -> Any:
     return np.where(np.isnat(exact), np.nan, exact.astype(np.int64) * 1e-9)
 
 
-def _columns(given: Any) -> list[Any]:
+def _columns(given: Any, names: Sequence[str]) -> list[Any]:
     if is_frame(given):
         return [_plain(given.iloc[:, place]) for place in range(given.shape[1])]
-    return [np.asarray(one) for one in given.values()]
+    return [values_of(name, one, SOURCE) for name, one in zip(names, given.values(), strict=True)]
+
+
+def _of_quantity(name: str, quantity: Any) -> tuple[Any, str | None]:
+    """Return the numbers of a quantity with units: in the unit that the name says, or with their own."""
+    named = resolve_columns([name], None, SOURCE)
+    try:
+        if named and not named[0].channel.startswith(TRUTH):
+            column = named[0]
+            return (quantity.to(UNITS[column.channel]).magnitude - column.offset) / column.factor, None
+    except TypeError as error:  # what units that do not convert are in pint
+        raise LogError(f"column {name[:80]!r}: {error}", SOURCE) from error
+    return quantity.magnitude, f"{quantity.units:~C}" or "1"
+
+
+def _text(name: object) -> str:
+    return name.decode(errors="replace") if isinstance(name, bytes) else str(name)
 
 
 def _plain(column: Any) -> Any:

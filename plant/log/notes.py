@@ -27,6 +27,10 @@ class LogCode(Code):
         "{sample_time_s:.6g} s"
     )
     SAMPLES_MASKED = "{channel} is missing in {count} of {total} samples ({percent:.2g} %); those samples are not used"
+    LOST_VALUE = (
+        "{channel} is {value:.6g} in {count} of {total} samples, far from all others, as a logger writes it for a lost "
+        "sample; those samples are not used"
+    )
     CHANNEL_SLOWER = "{channel} has one value in {rows} rows"
     CHANNEL_LEFT_OUT = "{channel} is missing in {count} of {total} samples ({percent:.2g} %); the channel is not used"
     CHANNEL_LOGGED_IN_PART = (

@@ -3,25 +3,32 @@
 import warnings
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
+from math import isfinite
+from numbers import Integral, Real
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from plant.errors import LogError, LogWarning
 from plant.log.checks import REQUIRED, trusted
 from plant.log.columns import CHANNELS as CHANNELS
 from plant.log.columns import converted, resolve_columns
-from plant.log.formats.cells import numbers
+from plant.log.formats.cells import numbers, values_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-def _frozen_channels(channels: Mapping[str, NDArray[np.float64]]) -> Mapping[str, NDArray[np.float64]]:
+def _frozen_channels(channels: Mapping[str, ArrayLike]) -> Mapping[str, NDArray[np.float64]]:
     frozen: dict[str, NDArray[np.float64]] = {}
-    for name, values in channels.items():
+    for name, given in channels.items():
+        values = given if type(given) is np.ndarray else values_of(name, given, "the record")
+        if hasattr(values, "magnitude"):
+            raise LogError(f"channel {name[:80]!r} must be plain numbers in SI, got a quantity", "the record")
+        if values.dtype.kind not in "fiub":
+            values = numbers(values, name, "the record")
         column = np.asarray(values, dtype=np.float64).view()
         column.flags.writeable = False
         frozen[name] = column
@@ -71,15 +78,25 @@ class Record:
     start_time: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.sample_time) and self.sample_time > 0.0):
+        if not (isinstance(self.sample_time, Real) and isfinite(self.sample_time) and self.sample_time > 0.0):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise LogError(f"sample_time must be positive and finite, got {self.sample_time!r}")
+        if not (isinstance(self.start_time, Real) and isfinite(self.start_time)):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise LogError(f"start_time must be a finite number of seconds, got {self.start_time!r}")
         if not self.channels:
             raise LogError("a record needs at least one channel, got none")
-        lengths = {name: np.shape(values) for name, values in self.channels.items()}
+        for what, given in (("channels", self.channels), ("metadata", self.metadata)):
+            if not isinstance(given, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+                raise LogError(f"{what} must be a mapping by name, got {given!r:.80}")
+        channels = _frozen_channels(self.channels)
+        lengths = {name: np.shape(values) for name, values in channels.items()}
         if len(set(lengths.values())) != 1 or any(len(shape) != 1 for shape in lengths.values()):
             raise LogError(f"channels must be one-dimensional and of one length, got {lengths}")
-        object.__setattr__(self, "channels", _frozen_channels(self.channels))
+        object.__setattr__(self, "channels", channels)
         object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
+
+    def __repr__(self) -> str:
+        names = ", ".join(self.channels)
+        return f"Record({self.sample_time:g} s, {len(self)} samples from {self.start_time:g} s: {names})"
 
     def __reduce__(self) -> tuple[object, ...]:
         return Record, (self.sample_time, dict(self.channels), dict(self.metadata), self.start_time)
@@ -148,6 +165,8 @@ class Record:
         LogError
             If ``start`` is negative or ``step`` is below 1.
         """
+        if not all(isinstance(one, Integral | None) for one in (start, stop, step)):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise LogError(f"a slice counts samples in whole numbers, got {start!r}, {stop!r} and {step!r}")
         if start < 0 or step < 1:
             raise LogError(f"a slice needs start of 0 or more and step of 1 or more, got {start} and {step}")
         part = {name: values[start:stop:step] for name, values in self.channels.items()}
@@ -203,6 +222,8 @@ class Record:
         >>> record.sample_time, round(float(record["position_m"][9]), 6)
         (0.001, 0.009)
         """
+        if not hasattr(frame, "iloc"):
+            raise LogError(f"a pandas.DataFrame is needed, got {type(frame).__name__}", source)
         chosen = resolve_columns([str(name) for name in frame.columns], columns, source)
         raw = {c: numbers(_values(frame.iloc[:, c.position]), c.name, source) for c in chosen}
         checked = trusted(converted(raw), source=source, required=required)

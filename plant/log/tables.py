@@ -13,6 +13,7 @@ from plant.log.clock.merging import Timed, merged
 from plant.log.columns import TIME, TRUTH, Column, converted, listed, resolve_columns
 from plant.log.guess import hint_of, missing_channels, overlooked
 from plant.log.headings import Heading, cleaned
+from plant.log.lost_values import without_lost
 from plant.log.notes import LogCode
 from plant.log.table import Table
 from plant.notes import Note
@@ -97,7 +98,7 @@ def _without_text(
 ) -> dict[str, Array]:
     """Return the channels of a table, without those that nobody asked for and that hold text."""
     try:
-        return _read(table, columns)
+        return _read(table, columns, notes)
     except TextColumnError as error:
         text = next((one for one in columns if one.name == error.column and one.channel != TIME), None)
         if text is None or not found:
@@ -202,13 +203,16 @@ def _once(chosen: Chosen, source: str) -> None:
                 )
 
 
-def _read(table: Table, columns: Sequence[Column]) -> dict[str, Array]:
+def _read(table: Table, columns: Sequence[Column], notes: list[Note]) -> dict[str, Array]:
     raw = table.read(columns)
     stamps = {column: values for column, values in raw.items() if values.dtype.kind == "M"}
     for column in stamps:
         if column.channel != TIME and not column.channel.startswith(TRUTH):
             raise LogError(f"column {column.name!r} must hold numbers, got dates", table.source)
-    numbers = {column: values for column, values in raw.items() if column not in stamps}
+    numbers: dict[Column, Array] = {}
+    for column, values in ((one, values) for one, values in raw.items() if one not in stamps):
+        numbers[column], said = (values, []) if column.channel == TIME else without_lost(values, column.channel)
+        notes += said
     return converted(numbers) | {column.channel: values for column, values in stamps.items()}
 
 

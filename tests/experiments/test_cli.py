@@ -301,6 +301,11 @@ def test_the_command_runs_as_a_process_with_its_exit_codes(tmp_path: Path) -> No
     assert "Traceback" not in refused.stderr
 
 
+def test_streams_that_were_closed_before_the_command_began_are_no_error() -> None:
+    command = f"exec {sys.executable} -m experiments.cli conditions --json >&- 2>&- <&-"
+    assert subprocess.run(["/bin/sh", "-c", command], check=False).returncode == 0  # noqa: S603
+
+
 def test_a_reader_that_goes_away_is_no_error() -> None:
     reading, writing = os.pipe()
     os.close(reading)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fuzz import bench_layouts, columns_held, files, spellings, texts
+from tests.fuzz import bench_layouts, columns_held, files, spellings, texts, verbs
 from tests.fuzz.guard import limited
 from tests.fuzz.mutations import CELLS, mutated
 from tests.fuzz.seeds import KINDS
@@ -45,6 +45,11 @@ def test_logs_as_programs_of_benches_write_them_are_read(tmp_path: Path) -> None
 @pytest.mark.slow
 def test_no_mishap_of_a_log_is_passed_over_in_silence() -> None:
     assert bench_layouts.run(600) == []
+
+
+@pytest.mark.slow
+def test_every_verb_ends_what_it_is_given_with_an_answer_or_a_sentence() -> None:
+    assert verbs.fuzz(300) == []
 
 
 @pytest.mark.slow

@@ -21,6 +21,7 @@ from plant.errors import HydrostateError
 from plant.log.columns import resolve_columns
 from tests.fuzz.guard import limited
 from tests.fuzz.mutations import CELLS, mutated
+from tests.fuzz.structures import TEXT
 
 TOML = tuple(
     one.encode()
@@ -35,6 +36,28 @@ TOML = tuple(
             "sample_time = 0.0\n",
             "duration = 1e300\n",
             "\0",
+        ),
+        *(
+            "name = 'a'\nname = 'b'\n",
+            "9223372036854775808",
+            "0x" + "f" * 300,
+            "1e-400",
+            "+nan",
+            "1_0",
+            "d\u03bfuration = 1.0\n",
+            "\uff4e\uff41\uff4d\uff45 = 1\n",
+            "\u202e",
+            "\u2212" + "1.0",
+            "a.b.c = 1\n",
+            "{a = {b = {c = 1}}}",
+            "[[runs]]\n" * 300,
+            "[runs]\n",
+            "[" * 3000 + "]" * 3000,
+            "0,5",
+            "1979-05-27T07:32:00Z",
+            '"\\uD800"',
+            "'" * 3,
+            "\r",
         ),
     )
 )
@@ -91,7 +114,10 @@ def run(texts: int, streams: int, first: int = 0) -> list[str]:
         cases += [(seed, "stream", ROWS.encode(), watch_stream) for seed in range(first, first + streams)]
         for seed, kind, content, use in cases:
             pieces = CELLS if kind in ("columns", "stream") else TOML
-            made = mutated(content, np.random.default_rng(seed), pieces)
+            rng = np.random.default_rng(seed)
+            made = mutated(content, rng, pieces)
+            if rng.random() < 0.4:
+                made = TEXT[int(rng.integers(len(TEXT)))](made, rng)
             said = limited(lambda made=made, use=use: use(made, path))
             if said:
                 wrong.append(f"{kind}, seed {seed}: {said}")

@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from dataclasses import make_dataclass
 from math import pi
 from typing import Annotated
@@ -5,7 +6,8 @@ from typing import Annotated
 import pytest
 
 from plant.errors import RigError
-from plant.units import LITRE_PER_MINUTE, SI, conversion_to, notes, require_number
+from plant.unit_text import plain_unit
+from plant.units import LITRE_PER_MINUTE, SI, USUAL, by_pint, conversion_to, notes, require_number
 
 
 @pytest.mark.parametrize(
@@ -59,3 +61,16 @@ def test_a_parameter_without_a_unit_is_refused_by_name() -> None:
     made = make_dataclass("Own", [("mass", Annotated[float, SI("kg", "of the piston", "own")]), ("length", float)])
     with pytest.raises(TypeError, match=r"Own\.length must carry an SI note, got <class 'float'>"):
         notes(made)
+
+
+def test_units_of_most_logs_convert_as_pint_converts_them_without_its_import() -> None:
+    for name in USUAL:
+        for wanted in {si for si, _ in USUAL.values()}:
+            assert _converted(conversion_to, name, wanted) == _converted(by_pint, name, plain_unit(name), wanted)
+
+
+def _converted(convert: Callable[..., tuple[float, float]], *units: str) -> object:
+    try:
+        return convert(*units)
+    except ValueError as error:
+        return str(error)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.arrays import Array, BoolArray, IntArray
+from estimation.identification.search.experiments import SAMPLES_PER_PARAMETER
 from estimation.identification.signals.period import common_period
 from plant.errors import HydrostateError
 
@@ -14,6 +15,9 @@ FEWEST = 20
 
 SHORTEST = 20
 """Samples of a block that is held back in every period at least; a shorter period has too little in it."""
+
+MOST_ORDER = 20
+"""Order at most that may be asked for: time grows with its square [count]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +126,37 @@ def channels_from(
 def _require_variation(values: Array, name: str) -> None:
     if np.nanmin(values) == np.nanmax(values):
         raise HydrostateError(f"channel {name!r} must vary, got {np.nanmin(values):g} throughout")
+
+
+def require_room(data: Channels, order: int | None, delay: int | None, n_numerator: int | None) -> None:
+    """Refuse a size of a model for which the logs are too short, or which would keep the search busy for minutes.
+
+    Parameters
+    ----------
+    order, delay, n_numerator : int, optional
+        Of every input.
+
+    Raises
+    ------
+    HydrostateError
+        If an entry is too small, or there are fewer than five samples a value or two a sample of dead time.
+    """
+    for name, given, least, most in (
+        ("order", order, 1, MOST_ORDER),
+        ("n_numerator", n_numerator, 1, None),
+        ("delay", delay, 0, None),
+    ):
+        if given is not None and not (least <= given and (most is None or given <= most)):
+            wanted = f"{least} or more" if most is None else f"from {least} to {most}"
+            raise HydrostateError(f"{name} must be {wanted}, got {given}")
+    poles = order or 1
+    values = poles + len(data.inputs) * (n_numerator or poles + 1)
+    wanted = SAMPLES_PER_PARAMETER * values + 2 * (delay or 0)
+    if data.longest < wanted:
+        raise HydrostateError(
+            f"a model of this size and dead time needs a log of at least {wanted} samples of {data.output!r}, the "
+            f"longest has {data.longest}"
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.state_space.dynamics import StateSpaceDynamics
 from plant.errors import HydrostateError
+from plant.log.formats.cells import values_of
 
 if TYPE_CHECKING:
     import control
@@ -189,7 +190,8 @@ class FreeRunModel:
 
     def _scaled(self, u: ArrayLike, y: ArrayLike | None) -> tuple[Array, Array]:
         try:
-            inputs = np.asarray(u, dtype=np.float64)
+            inputs = np.asarray(values_of("input", u, "the inputs"))
+            inputs = inputs.astype(np.float64, casting="same_kind" if np.iscomplexobj(inputs) else "unsafe")
         except (TypeError, ValueError):
             raise HydrostateError(f"inputs {', '.join(self.inputs)} must be numbers, got {u!r:.60}") from None
         inputs = inputs[:, None] if inputs.ndim == 1 else inputs
@@ -197,6 +199,8 @@ class FreeRunModel:
             raise HydrostateError(
                 f"inputs {', '.join(self.inputs)} are needed, shape (n, {len(self.inputs)}), got {inputs.shape}"
             )
+        if not len(inputs):
+            raise HydrostateError(f"inputs {', '.join(self.inputs)} are needed at one sample at least, got none")
         if not np.isfinite(inputs).all():
             row = int(np.argmax(~np.isfinite(inputs).all(axis=1)))
             raise HydrostateError(f"inputs {', '.join(self.inputs)} must be finite at every sample, row {row} is not")

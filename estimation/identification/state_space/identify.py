@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimation.identification.free_run.choose_linear import CLEARLY
-from estimation.identification.free_run.data import Channels, scaled, section
+from estimation.identification.free_run.data import Channels, require_room, scaled, section
 from estimation.identification.free_run.held_back import pooled
 from estimation.identification.free_run.identify import (
     MOST_CHOSEN,
@@ -128,6 +128,8 @@ def identify_state_space(
     LogWarning
         If the model is not to be believed.
     """
+    for one in data:
+        require_room(one, order, delay, None)
     with threadpool_limits(limits=1, user_api="blas"):
         found = _identified(data, range(1, MOST_STATES + 1) if order is None else [order], delay)
     for note in {note.code: note for one in found for note in one.notes if note.code in WARNED}.values():

@@ -104,6 +104,43 @@ def numbers(values: NDArray[Any], name: str, source: str) -> Array:
     return out
 
 
+def values_of(name: str, given: Any, source: str) -> Any:
+    """Return what a user has for a column as an array, masked values as missing ones.
+
+    Parameters
+    ----------
+    name : str
+        What the column is called.
+    given : array_like
+        Its values; a quantity of `pint` is returned as it is.
+    source : str
+        What messages call the log.
+
+    Raises
+    ------
+    LogError
+        If it is a list of lists of several lengths.
+
+    Examples
+    --------
+    >>> values_of("position_m", np.ma.masked_array([1, 2], mask=[False, True]), "the table").tolist()
+    [1.0, nan]
+    """
+    if hasattr(given, "magnitude") and hasattr(given, "to"):
+        return given
+    try:
+        values = np.asarray(given)
+    except ValueError:
+        raise LogError(f"column {name[:80]!r} must be one-dimensional, got rows of several lengths", source) from None
+    hidden = getattr(given, "mask", None)
+    if hidden is not None and hasattr(given, "filled") and np.any(hidden):
+        if values.dtype.kind == "M":
+            return np.where(hidden, np.datetime64("NaT"), values)
+        return np.where(hidden, np.nan if values.dtype.kind in "fiubc" else None, values)  # pyright: ignore[reportCallIssue, reportArgumentType]
+    # a matrix of one column or one row, as MATLAB's
+    return values.ravel() if values.ndim == 2 and 1 in values.shape else values
+
+
 def no_numbers(name: str, count: int, where: str, place: int, said: str) -> Note:
     """Return the note on a few cells of a column that are no numbers.
 

@@ -226,11 +226,13 @@ class _Body:
         last = self.rows[taken - 1][0] if taken else 0
         within = [one for one in self.strange if one.line < last]
         self._note_out_of_order(found)
-        self._refuse(found, within, allowed)
+        # one line below the data says that it ends, however short the log is
+        below = len(self.rows) - taken + len(self.strange) - len(within)
+        self._refuse(found, within, taken, allowed, spared=below == 1)
         timeless = {row: said for row, said in self.timeless.items() if row < taken}
         notes = self._notes(found, taken, within, timeless)
-        if ended := len(self.rows) - taken + len(self.strange) - len(within):
-            notes.append(LogCode.END_LEFT_OUT.note(count=ended, taken=taken))
+        if below:
+            notes.append(LogCode.END_LEFT_OUT.note(count=below, taken=taken))
         return {one: np.delete(values[:taken], sorted(timeless)) for one, values in found.items()}, notes
 
     def _may_leave_out(self) -> bool:
@@ -259,18 +261,20 @@ class _Body:
                     if (late or (row and here <= time[row - 1])) and row not in self.timeless:
                         self.timeless[row] = cell
 
-    def _refuse(self, found: Iterable[Column], within: Sequence[_Strange], allowed: float) -> None:
+    def _refuse(
+        self, found: Iterable[Column], within: Sequence[_Strange], taken: int, allowed: float, *, spared: bool
+    ) -> None:
         """Refuse rows if too many are no data, by the first of them; another header comes before all others."""
         for one in within:
             if one.is_header:
                 raise one.error
         reasons: list[tuple[int, LogError]] = []
-        if (count := len(self.strange) + len(self.timeless)) > allowed:
+        if (count := len(self.strange) + len(self.timeless) - spared) > allowed:
             more = f"; {count} rows cannot be read, at most 1 % of {len(self.rows)} may be so"
             reasons += [(one.line, LogError(f"{one.error.message}{more}", self.source)) for one in self.strange[:1]]
         for column in found:
             bad = self.columns[column].bad
-            if len(bad) > allowed:
+            if len(bad) - (spared and taken in bad) > allowed:
                 place = min(bad)
                 line, row = self.rows[place]
                 reasons.append((line, not_a_number(self.source, column.name, row, bad[place])))

@@ -186,7 +186,7 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
     tried = [one for one in DELIMITERS if one not in absent[1:]]
     block = max((_block(lines, one) for one in tried), key=lambda one: one.score)
     if not block.score or _header_parts_at_commas(lines, block):
-        return _by_header(lines, encoding)
+        return _by_header(lines, encoding, source)
     made = block.layout(lines, encoding)
     require_ungrouped([row for _, row in block.rows], [one.name for one in made.headings], source)
     return made
@@ -222,11 +222,13 @@ def _header_parts_at_commas(lines: Sequence[str], block: "_Block") -> bool:
     return not others and cell.count(",") == commas > 0
 
 
-def _by_header(lines: Sequence[str], encoding: str) -> Layout:
+def _by_header(lines: Sequence[str], encoding: str, source: str) -> Layout:
     """Return the layout of a log without a row of numbers: its first line is the header."""
     first = next(place for place, line in enumerate(lines) if line.strip())
     delimiter = max(",;\t", key=lines[first].count)
     names = [COMMENT.sub("", name) for name in cells_of(lines[first], delimiter)]
+    if len(names) > _WIDEST:
+        raise LogError(f"at most {_WIDEST:,} columns are read, the first line has {len(names):,} cells", source)
     return Layout(tuple(map(Heading, names)), first + 1, delimiter, ".", encoding)
 
 

@@ -49,7 +49,10 @@ def open_xlsx(path: Path) -> tuple[Table, ...]:
     made: list[Table] = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
+        reader = openpyxl.reader.excel.ExcelReader(path, read_only=True, data_only=True, keep_links=False)
+        reader.read_chartsheet = _no_charts
+        reader.read()
+        book = reader.wb
         try:
             for sheet in book.worksheets:
                 sheet.reset_dimensions()
@@ -60,6 +63,10 @@ def open_xlsx(path: Path) -> tuple[Table, ...]:
     if not made:
         raise LogError("no sheet has rows of numbers", str(path))
     return tuple(made)
+
+
+def _no_charts(*_: object) -> None:
+    """Pass over a sheet of charts, which holds no cells; openpyxl fails at an empty one."""
 
 
 def _bounded(path: Path) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.errors import LogError, LogWarning
-from plant.log.columns import TIME, TRUTH, Column, resolve_columns
+from plant.log.columns import TIME, TRUTH, Column, listed, resolve_columns
 from plant.log.formats.cells import MOST_STRANGE, not_a_number, number, wrong_width
 from plant.log.guess import overlooked
 from plant.log.headings import cleaned
@@ -83,12 +83,14 @@ class CsvStream:
         if not header:
             raise LogError("a header line is needed, but nothing came", source)
         self._delimiter = max(",;\t", key=header.count)
-        names = next(csv.reader([header], delimiter=self._delimiter))
+        names = self._quoted(header)
+        if names is None:
+            raise LogError(f"the header cannot be split into names, got {header[:60]!r}", source)
         self._width = len(names)
         columns = [one for one in resolve_columns(names, mapping, source) if not one.channel.startswith(TRUTH)]
         time = [one for one in columns if one.channel == TIME]
         if not time:
-            raise LogError(f"a column {TIME} is needed, or in another unit as time_ms, got {', '.join(names)}", source)
+            raise LogError(f"a column {TIME} is needed, or in another unit as time_ms, got {listed(names)}", source)
         self._columns = time + [one for one in columns if one.channel != TIME]
         read = {one.position for one in columns}
         left = [heading for place, heading in enumerate(cleaned(names)) if place not in read]
@@ -208,7 +210,7 @@ class CsvStream:
                 continue
             cells = line.rstrip("\r\n").split(self._delimiter)
             if '"' in line:
-                cells = next(csv.reader([line], delimiter=self._delimiter))
+                cells = self._quoted(line) or []
             if not line.endswith(("\n", "\r")):  # it may end in the middle of a digit
                 self.cut = True
                 return
@@ -227,6 +229,13 @@ class CsvStream:
             if row[0] == row[0]:
                 self._allowed = min(self._allowed + MOST_STRANGE, BURST)
                 yield place, row
+
+    def _quoted(self, line: str) -> list[str] | None:
+        """Return the cells of a line with quotes, or nothing where it has none: with a line's end within."""
+        try:
+            return next(csv.reader([line], delimiter=self._delimiter))
+        except (csv.Error, StopIteration):
+            return None
 
     def _value(self, column: Column, cell: str, place: int) -> float:
         try:

@@ -70,18 +70,27 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     paths = {suffix: folder / f"run.{suffix}" for suffix in ("csv", "parquet", "mat")}
     for path in paths.values():
         write_record(record, path)
+    paths["txt"] = folder / "bench.txt"
+    names = ("Time [ms]", "Motor speed [rpm]", "Position [mm]", "Differential pressure [bar]")
+    scaled = (1e3 * record.time, 9.549296585513721 * record["motor_speed_rad_s"], 1e3 * record["position_m"])
+    table = np.column_stack([*scaled, 1e-5 * record["differential_pressure_pa"]])
+    np.savetxt(paths["txt"], table, delimiter=",", header=",".join(names), comments="")
     return paths
 
 
 @pytest.mark.parametrize(
     ("verb", "suffix"),
     thinned(
-        [("estimate", "csv"), ("estimate", "parquet"), ("estimate", "mat"), ("diagnose", "csv"), ("identify", "csv")],
-        [("estimate", "csv"), ("diagnose", "csv"), ("identify", "csv")],
+        [
+            *(("estimate", suffix) for suffix in ("csv", "parquet", "mat", "txt")),
+            *(("diagnose", "csv"), ("identify", "csv"), ("inspect", "txt")),
+        ],
+        [("estimate", "txt"), ("inspect", "txt"), ("diagnose", "csv"), ("identify", "csv")],
     ),
 )
 def test_a_verb_on_a_log_imports_nothing_dear(logs: dict[str, Path], verb: str, suffix: str) -> None:
-    assert not (DEAR | OTHERS) & loaded_by([verb, str(logs[suffix]), "--json"])
+    dear = DEAR | (set() if verb == "inspect" else OTHERS)
+    assert not dear & loaded_by([verb, str(logs[suffix]), "--json"])
 
 
 def test_help_imports_no_arithmetic() -> None:

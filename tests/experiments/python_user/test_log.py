@@ -185,3 +185,18 @@ def test_an_answer_comes_back_from_another_process_as_it_was(log: hs.Log, verb: 
 def test_a_seed_of_numpy_is_a_seed() -> None:
     runs = [hs.simulate(duration=0.1, sample_time=1e-3, seed=seed) for seed in (3, np.int64(3))]
     assert np.array_equal(runs[0]["position_m"], runs[1]["position_m"])
+
+
+def test_what_is_no_time_and_no_size_is_refused_in_a_sentence(log: hs.Log) -> None:
+    with pytest.raises(hs.HydrostateError, match="must be seconds, got 'a' and 1"):
+        log.between("a", 1)  # type: ignore[arg-type]
+    for size, said in (
+        ({"order": -1}, "order must be from 1 to 20, got -1"),
+        ({"order": 0}, "order must be from 1 to 20, got 0"),
+        ({"order": 21}, "order must be from 1 to 20, got 21"),
+        ({"order": 2, "n_numerator": 0}, "n_numerator must be 1 or more, got 0"),
+        ({"order": 2, "delay": 10**6}, "a model of this size and dead time needs a log of at least 2000025 samples"),
+        ({"order": 2, "delay": 10**6, "structure": "state-space"}, "needs a log of at least 2000025 samples"),
+    ):
+        with pytest.raises(hs.HydrostateError, match=said):
+            log.identify(input="motor_speed_rad_s", output="velocity_m_s", **size)

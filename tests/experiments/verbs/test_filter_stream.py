@@ -80,8 +80,12 @@ def test_noise_of_another_log_is_taken_where_one_is_named(log: Path) -> None:
     loud = record.replace(position_m=record["position_m"] + 1e-4 * np.random.default_rng(0).normal(size=len(record)))
     own, other = begin_filter(asked, record).problem, begin_filter(asked, record, loud).problem
     assert other.variances[0] > 100.0 * own.variances[0]
-    code, told, _ = run(log, "--like", log, "--every", "10")
+    spoilt = log.with_name("spoilt.csv")
+    lines = log.read_text().splitlines(keepends=True)
+    spoilt.write_text("".join([*lines[:900], "overload\n", *lines[900:]]))
+    code, told, said = run(log, "--like", spoilt, "--every", "10")
     assert (code, len(told)) == (0, 3)
+    assert f"{spoilt}: warning: lines left out because they hold no row of data: 1" in said
 
 
 def test_a_state_of_another_filter_actuator_or_rate_is_refused(log: Path, tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from plant.errors import LogError, LogWarning
 from plant.log.any_columns import read_any
 from plant.log.files import read_record
 from plant.log.frames import by_name, frame_table, is_frame
+from plant.units import unit_registry
 
 TIME = 0.01 * np.arange(400)
 CHANNELS = {"motor_speed_rad_s": 90.0 + np.sin(TIME), "position_m": 0.01 * np.cos(TIME)}
@@ -32,6 +33,9 @@ def table(index: Any = None) -> pd.DataFrame:
         pd.DataFrame({"time_s": pd.to_timedelta(TIME, unit="s"), **CHANNELS}),
         table(index=pd.to_timedelta(TIME, unit="s")),
         by_name(pa.Table.from_pandas(pd.DataFrame({"time_s": TIME, **CHANNELS}))),
+        by_name(pd.DataFrame({"time_s": TIME, **CHANNELS}).to_records(index=False)),
+        {name: values[:, None] for name, values in {"time_s": TIME, **CHANNELS}.items()} | {"__header__": b"MATLAB"},
+        {name.encode(): values for name, values in {"time_s": TIME, **CHANNELS}.items()},
         pd.DataFrame({"time_s": TIME, **CHANNELS}, index=TIME + 7.0),
         pd.DataFrame({"time_s": TIME, **CHANNELS}, index=[f"row {k}" for k in range(400)]),
     ],
@@ -44,6 +48,9 @@ def table(index: Any = None) -> pd.DataFrame:
         "durations",
         "index of durations",
         "Arrow",
+        "records",
+        "matrices of one column",
+        "names of bytes",
         "column before index",
         "index of text",
     ],
@@ -144,3 +151,36 @@ def test_a_query_that_has_not_run_and_bare_numbers_are_no_tables() -> None:
     assert by_name(Query()) is None
     assert by_name(np.zeros((20, 3))) is None
     assert by_name({"time_s": TIME}) == {"time_s": TIME}
+
+
+def test_masked_values_are_missing_ones() -> None:
+    position = np.ma.masked_array(CHANNELS["position_m"].copy(), mask=np.arange(400) % 50 == 7)
+    position.data[7::50] = 1e9
+    with pytest.warns(LogWarning, match=r"position_m is missing in 8 of 400 samples"):
+        record = read_record(frame_table({"time_s": TIME, **CHANNELS, "position_m": position}))
+    np.testing.assert_array_equal(np.isnan(record["position_m"]), position.mask)
+
+
+def test_quantities_are_converted() -> None:
+    one = unit_registry().Quantity
+    table = {
+        "time_ms": one(TIME, "s"),
+        "motor_speed_rad_s": one(CHANNELS["motor_speed_rad_s"], "rad/s").to("rpm"),
+        "Weg": one(1e3 * CHANNELS["position_m"], "mm"),
+    }
+    record = read_record(frame_table(table), columns={"position_m": "Weg"})
+    np.testing.assert_allclose(record.time, TIME, atol=1e-12)
+    for name, values in CHANNELS.items():
+        np.testing.assert_allclose(record[name], values, rtol=1e-12)
+    with pytest.raises(LogError, match="column 'position_m': Cannot convert"):
+        frame_table({**table, "position_m": one(TIME, "s")})
+
+
+def test_an_index_of_periods_is_time() -> None:
+    record = read_record(frame_table(table(index=pd.period_range("2026-03-01", periods=400, freq="10ms"))))
+    assert (record.sample_time, len(record)) == (pytest.approx(0.01), 400)
+
+
+def test_a_list_of_lists_of_several_lengths_is_refused() -> None:
+    with pytest.raises(LogError, match=r"column 'position_m' must be one-dimensional, got rows of several lengths"):
+        frame_table({"time_s": [0.0, 1.0], "position_m": [[1.0, 2.0], [3.0]]})

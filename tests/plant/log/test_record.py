@@ -1,5 +1,7 @@
 import pickle
+import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -8,6 +10,7 @@ import pytest
 from plant.errors import LogError, LogWarning
 from plant.log.notes import LogCode
 from plant.log.record import Record
+from plant.units import unit_registry
 
 RAMP = np.arange(20.0)
 
@@ -139,3 +142,32 @@ def test_a_record_has_a_clock_and_channels_of_one_length() -> None:
     for other in (np.zeros(4), np.zeros((3, 1))):
         with pytest.raises(LogError, match="one-dimensional and of one length"):
             Record(1e-3, {"position_m": np.zeros(3), "velocity_m_s": other})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((1e-3, {"a": [[1.0, 2.0], [3.0]]}), "column 'a' must be one-dimensional, got rows of several lengths"),
+        ((1e-3, {"a": ["x", "y"]}), "column 'a' must hold numbers, got 'x' in row 1"),
+        ((1e-3, {"a": np.array([1j, 2.0])}), "column 'a' must hold numbers, got '1j' in row 1"),
+        ((1e-3, {"a": np.array(["2026-01-01"], "M8[s]")}), "column 'a' must hold numbers, got '2026-01-01"),
+        ((1e-3, {"a": unit_registry().Quantity(RAMP, "mm")}), "channel 'a' must be plain numbers in SI"),
+        ((1e-3, [RAMP]), "channels must be a mapping by name"),
+        ((1e-3, {"a": RAMP}, 3), "metadata must be a mapping by name, got 3"),
+        (("x", {"a": RAMP}), "sample_time must be positive and finite, got 'x'"),
+        ((1e-3, {"a": RAMP}, {}, float("nan")), "start_time must be a finite number of seconds, got nan"),
+    ],
+)
+def test_what_is_no_record_is_refused_in_a_sentence(arguments: tuple[Any, ...], said: str) -> None:
+    with pytest.raises(LogError, match=re.escape(said)):
+        Record(*arguments)
+
+
+def test_a_record_takes_lists_and_masked_arrays_and_prints_itself_in_a_line() -> None:
+    record = Record(0.01, {"a": [1, 2, 3], "b": np.ma.masked_array([1.0, 2.0, 3.0], mask=[0, 1, 0])})
+    np.testing.assert_array_equal(record["b"], [1.0, np.nan, 3.0])
+    assert repr(record) == "Record(0.01 s, 3 samples from 0 s: a, b)"
+    with pytest.raises(LogError, match=r"whole numbers, got 0\.5, None and 1"):
+        record.slice(0.5)  # type: ignore[arg-type]
+    with pytest.raises(LogError, match=r"a pandas\.DataFrame is needed, got dict"):
+        Record.from_frame({"a": [1.0]})  # type: ignore[arg-type]

@@ -52,6 +52,14 @@ def test_sheets_without_rows_of_numbers_are_passed_over(tmp_path: Path) -> None:
         open_xlsx(workbook(tmp_path / "none.xlsx", [["a title"]], []))
 
 
+def test_an_empty_sheet_of_charts_is_passed_over(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.load_workbook(workbook(tmp_path / "log.xlsx", NUMBERS))
+    book.create_chartsheet("Chart")
+    book.save(tmp_path / "log.xlsx")
+    assert len(open_xlsx(tmp_path / "log.xlsx")) == 1
+
+
 def test_too_many_cells_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xlsx, "MOST_CELLS", 5)
     with pytest.raises(LogError, match="more than 5 cells"):

@@ -132,7 +132,7 @@ def test_a_quote_that_is_never_closed_swallows_no_rows(tmp_path: Path) -> None:
     [
         ([*ROWS, *["end of test"] * 16], f"got 1 in row {len(ROWS) + 1}.* 16 rows cannot be read, at most 1 %"),
         ([*ROWS[:40], *["1,2"] * 16, *ROWS[40:]], "got 2 in row 41, .* 16 rows cannot be read, at most 1 % of 1500"),
-        ([*ROWS[:60], "0.060,x,0.06,text"], "column 'motor_speed_rad_s' must hold numbers, got 'x' in row 61"),
+        ([*ROWS[:60], *["0.060,x,0.06,text"] * 2], "column 'motor_speed_rad_s' must hold numbers, got 'x' in row 61"),
         ([*ROWS[:9], "time_s,position_m,motor_speed_rad_s,said", *ROWS[9:]], "got another header in row 10"),
     ],
 )
@@ -203,3 +203,11 @@ def test_a_sheet_is_read_by_the_same_rules(tmp_path: Path) -> None:
     assert said == [LogCode.LINES_SKIPPED.note(count=1), LogCode.END_LEFT_OUT.note(count=1, taken=150)]
     np.testing.assert_allclose(found[2], 0.01 * np.arange(150))
     assert np.isnan(found[1][::7]).all()
+
+
+@pytest.mark.parametrize("end", ["END", "END,,,", "\x1a", "Total,20", "1.5,3,0.0"])
+def test_one_line_below_a_short_log_says_that_it_ends(end: str, tmp_path: Path) -> None:
+    record, notes = read(written(tmp_path, *ROWS[:40], end))
+    assert (len(record), notes) == (40, [LogCode.END_LEFT_OUT.note(count=1, taken=40)])
+    with pytest.raises(LogError, match="row 41"):
+        read(written(tmp_path, *ROWS[:40], end, end, *["END"] * (end != "END")))

@@ -158,3 +158,8 @@ def test_channels_of_twincat_that_share_a_sample_time_share_a_clock() -> None:
         *(f"{k}\t1\t2" for k in range(9)),
     )
     assert ((made.headings[0].name, made.headings[0].unit), made.skipped) == (("Time", "ms"), 6)
+
+
+def test_a_first_line_of_very_many_cells_is_no_header() -> None:
+    with pytest.raises(LogError, match=r"at most 10,000 columns are read, the first line has 20,001 cells"):
+        layout_of_lines(["0," * 20_000], "utf-8", "a.csv")

@@ -172,3 +172,14 @@ def test_a_column_that_was_left_unread_and_may_be_pressure_is_named() -> None:
     lines = ["time_ms,motor_speed_rpm,position_mm,Druck [bar]\n", *(f"{k},1,2,3\n" for k in range(5))]
     with pytest.warns(LogWarning, match=r"column 'Druck \[bar\]' was not used, but it may be differential_pressure_pa"):
         CsvStream(lines, source="bench")
+
+
+def test_a_line_with_an_end_within_it_is_garbage_and_a_long_header_is_not_told_whole() -> None:
+    rows = _rows(300)
+    rows[100] = '1.0,"1\r2",3\n'
+    (piece,) = (piece for _, piece, _ in _taken([HEADER, *rows], most=1000))
+    assert len(piece) == 300
+    with pytest.raises(LogError, match=r"^bench: the header cannot be split into names, got "):
+        CsvStream(['a\rb,"c\rd"\n'], source="bench")
+    with pytest.raises(LogError, match="and 4990 more"):
+        CsvStream([",".join(["name"] * 5002) + "\n"], source="bench")

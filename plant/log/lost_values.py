@@ -1,0 +1,57 @@
+"""Numbers that a logger writes in place of a sample that it has lost, such as -9999."""
+
+import numpy as np
+
+from plant.arrays import Array
+from plant.log.notes import LogCode
+from plant.notes import Note
+
+_WRITTEN = (
+    *(999.0, 9999.0, 99999.0, 999999.0, 999.25, 9999.25, 32767.0, 32768.0, 65535.0, 2147483647.0, 2147483648.0),
+    *(4294967295.0, 1e20, 1e30, 1e31, 1e36, 1e37, 9.9e37, 9.91e37, 1e38, float(np.finfo(np.float32).max)),
+)
+LOST_VALUES = frozenset(sign * float(kind(one)) for one in _WRITTEN for sign in (1, -1) for kind in (float, np.float32))
+"""Such numbers in the file's own unit: nines, ends of integers, SCPI's 9.91e37 and others (judged)."""
+
+FEWEST, MOST = 2, 0.1
+"""How often it must come, and the share of the samples that it may have [count, fraction]; judged."""
+
+
+def without_lost(values: Array, channel: str) -> tuple[Array, list[Note]]:
+    """Return a column without the number that stands for a lost sample, and what to say of it.
+
+    It must be one of `LOST_VALUES`, come twice or more, and be farther from all other samples than they reach.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        As the file has them [any unit]; NaN where missing.
+    channel : str
+        What the note calls the column.
+
+    Returns
+    -------
+    tuple of ndarray, shape (n,), and list of Note
+        The column, NaN where a sample was lost.
+
+    Examples
+    --------
+    >>> course = np.append(np.linspace(0.0, 0.2, 50), [-9999.0, -9999.0])
+    >>> int(np.isnan(without_lost(course, "position_m")[0]).sum())
+    2
+    """
+    notes: list[Note] = []
+    if values.dtype.kind != "f" or not len(values):
+        return values, notes
+    for end in (float(np.fmin.reduce(values)), float(np.fmax.reduce(values))):
+        if end not in LOST_VALUES:
+            continue
+        lost = values == end
+        count, rest = int(lost.sum()), values[~lost & np.isfinite(values)]
+        if not len(rest) or not FEWEST <= count <= MOST * len(values):
+            continue
+        low, high = float(rest.min()), float(rest.max())
+        if max(low - end, end - high) > high - low:
+            values = np.where(lost, np.nan, values)
+            notes.append(LogCode.LOST_VALUE.note(channel=channel, value=end, count=count, total=len(values)))
+    return values, notes
