@@ -276,6 +276,11 @@ def by_pint(unit: str, name: str, wanted: str) -> tuple[float, float]:
     wanted : str
         The unit that is wanted.
 
+    Returns
+    -------
+    tuple[float, float]
+        Factor and offset of the affine conversion.
+
     Raises
     ------
     ValueError
