@@ -25,6 +25,10 @@ NOT_MOVED: tuple[Mapping[str, float], Mapping[str, float]] = ({}, {})
 """What teeth move where a fit was not asked for them, or holds some."""
 
 
+MOST_MOVED = 1.0
+"""Logarithm of the factor by which small teeth move a parameter at most [dimensionless]; judged."""
+
+
 def small_teeth(
     shown: Mapping[int, ShownTeeth], names: Sequence[str]
 ) -> tuple[Mapping[str, float], Mapping[str, float]]:
@@ -87,5 +91,6 @@ def with_small_teeth(
     out = dict(found)
     for name in (name for name in MOVED if name in moved and name in found):
         value, std = found[name]
-        out[name] = value * math.exp(moved[name]), math.hypot(std, value * variance[name] ** 0.5)
+        step = moved[name] if abs(moved[name]) <= MOST_MOVED else 0.0  # no fit is linear so far: it is only uncertain
+        out[name] = value * math.exp(step), math.hypot(std, value * variance[name] ** 0.5)
     return out

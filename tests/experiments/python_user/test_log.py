@@ -196,7 +196,7 @@ def test_what_is_no_time_and_no_size_is_refused_in_a_sentence(log: hs.Log) -> No
         ({"order": 21}, "order must be from 1 to 20, got 21"),
         ({"order": 2, "n_numerator": 0}, "n_numerator must be 1 or more, got 0"),
         ({"order": 2, "delay": 10**6}, "a model of this size and dead time needs a log of at least 2000025 samples"),
-        ({"order": 2, "delay": 10**6, "structure": "state-space"}, "needs a log of at least 2000025 samples"),
+        ({"order": 2, "delay": 10**6, "structure": "state-space"}, "needs a log of at least 2000015 samples"),
     ):
         with pytest.raises(hs.HydrostateError, match=said):
             log.identify(input="motor_speed_rad_s", output="velocity_m_s", **size)

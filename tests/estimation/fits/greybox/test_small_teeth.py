@@ -59,6 +59,11 @@ def test_what_is_told_is_moved_and_wider_and_the_rest_stays() -> None:
     assert told["speed_lead"] == found["speed_lead"]
 
 
+def test_a_move_beyond_what_is_linear_makes_a_number_uncertain_and_no_other_one() -> None:
+    found = with_small_teeth({"bulk_modulus": (2e8, 0.0)}, ({"bulk_modulus": 800.0}, {"bulk_modulus": 4.0}))
+    assert found == {"bulk_modulus": (2e8, 4e8)}
+
+
 @cache
 def logged(ripple: float) -> Record:
     """Return a leaky actuator that is driven slowly and logged at 2 kHz, whose pump has 11 teeth."""
