@@ -58,7 +58,7 @@ def positive_interval_95(value: float, std: float) -> tuple[float, float]:
     >>> [round(end, 1) for end in positive_interval_95(200.0, 4.0)]
     [192.2, 207.8]
     >>> [round(end, 1) for end in positive_interval_95(200.0, 200.0)]
-    [28.2, 1419.9]
+    [28.2, 1419.8]
     """
     if not std > LARGE * value > 0.0:
         return interval_95(value, std)

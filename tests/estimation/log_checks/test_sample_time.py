@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.eha.online import Asked, begun
+from estimation.eha.online import StreamFilterOptions, begin_filter
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.sample_time import SLOWEST
 from plant.eha.model import EhaParameters
@@ -33,4 +33,4 @@ def test_a_log_at_the_limit_is_looked_at_though_its_stamps_are_rounded() -> None
 @pytest.mark.parametrize("form", ["acceleration", "pressure"])
 def test_a_filter_of_such_a_stream_does_not_begin(form: str) -> None:
     with pytest.raises(LogError, match="samples are 1 s apart"):
-        begun(Asked(EhaParameters(), form, "ekf"), slow(1.0))
+        begin_filter(StreamFilterOptions(EhaParameters(), form, "ekf"), slow(1.0))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.open_benchmark.drives import (
-    Room,
+    DriveLimits,
     multisine,
     position_steps,
     prbs,
@@ -14,7 +14,7 @@ from experiments.open_benchmark.drives import (
 )
 from experiments.open_benchmark.run import TICK
 
-ROOM = Room(duration=6.0, rated=125.0, travel=0.03, glide=4e-4)
+ROOM = DriveLimits(duration=6.0, rated=125.0, travel=0.03, glide=4e-4)
 
 
 @pytest.mark.parametrize("drive", [steps, prbs, multisine, sines])
