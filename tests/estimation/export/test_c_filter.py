@@ -108,7 +108,8 @@ def test_nine_interacting_filters_give_in_c_what_they_give_in_python(tmp_path: P
     assert likelihood == pytest.approx(METHODS["imm"](problem).log_likelihood, rel=1e-12)
 
 
-@pytest.mark.parametrize("form", thinned(EXPORTED_FORMS, ["chambers_by_mass"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("form", EXPORTED_FORMS)
 def test_it_runs_clean_under_sanitizers(form: str, tmp_path: Path) -> None:
     assert np.all(np.isfinite(in_c(tmp_path, task(form, "normal", 500), "ekf", EXACT, *SANITIZED)[0]))
 
