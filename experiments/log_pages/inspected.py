@@ -46,8 +46,14 @@ def looked_into(
     from plant.log.inspection import inspect_table
 
     tables = [inspect_table(one) for path in [log, *beside] for one in open_tables(path)]
-    kind = actuator(plant or _kind_told(tables))
+    kind = actuator(plant or DEFAULT)
     guesses = _guessed(tables, kind)
+    if plant is None and not _complete(guesses, kind):
+        names = [column.heading.name for facts in tables for column in facts.columns]
+        kinds = kinds_by_columns(names)  # imports every kind of actuator
+        if len(kinds) == 1 and kinds[0] != kind.name:
+            kind = actuator(kinds[0])
+            guesses = _guessed(tables, kind)
     sure = {one.guess.channel: one.guess.spec for one in guesses if one.guess.sure >= 0.5}
     columns = {channel: sure[channel] for channel in in_order(sure)}
     reads = _reads(log, columns, kind, sample_time, beside)
@@ -56,9 +62,12 @@ def looked_into(
     return {"plant": kind.name, **found}, tables
 
 
-def _kind_told(tables: "Sequence[TableFacts]") -> str:
-    kinds = kinds_by_columns([column.heading.name for facts in tables for column in facts.columns])
-    return kinds[0] if len(kinds) == 1 else DEFAULT
+def _complete(guesses: "Sequence[ChannelGuess]", kind: "ActuatorKind") -> bool:
+    """Return whether there is a guess for every channel that a kind of actuator needs."""
+    from plant.log.checks import alternatives
+
+    guessed = {one.guess.channel for one in guesses}
+    return all(guessed & set(alternatives(wanted)) for wanted in kind.required)
 
 
 def _guessed(tables: "Sequence[TableFacts]", kind: "ActuatorKind") -> "list[ChannelGuess]":
