@@ -11,9 +11,9 @@ from estimation.finding import Quantity
 from estimation.log_checks.order import percentile
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
-from faults.diagnosis.circuits.circuit_runs import COORDINATES, friction_parts, parameter_rows
-from faults.diagnosis.circuits.class_fit import WEAK
+from faults.diagnosis.circuits.circuit_runs import friction_parts, parameter_rows
 from faults.diagnosis.circuits.class_regions import ClassFits
+from faults.diagnosis.circuits.not_shown import FRICTION_LAW, not_shown
 from faults.diagnosis.circuits.open_classes import OpenCircuit
 from faults.notes import ClassCode
 from plant.arrays import Array
@@ -29,15 +29,15 @@ DRAWS = 2_000
 OF_KIND = 0.2
 """How far bulk modulus differs between sound actuators of one kind [dimensionless]: what is less may be air."""
 
-BLIND = 0.9
-"""A log that narrows a coefficient to no less than this share of the prior says nothing of it [dimensionless]."""
-
 VAGUE = 3.0
 """Ratio of relative widths from which a combination is known and its parts are not [dimensionless]."""
 
 
 OF_FRICTION = frozenset({"velocity_lost", "added_friction", "pressure_rise"})
 """Severities that hang on friction."""
+
+OF_OIL = frozenset({"bulk_modulus", "entrained_air"})
+"""Severities that hang on bulk modulus."""
 
 UNITS: Mapping[str, str] = {
     "leakage_flow": "L/min",
@@ -284,10 +284,8 @@ def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure
     list[Note]
         None for a log that tells all.
     """
-    known, believed = np.sqrt(np.diag(fits.covariance)), np.sqrt(np.diag(WEAK))
-    blind = {name for name, k, b in zip(COORDINATES, known, believed, strict=True) if k > BLIND * b}
-    said: list[Note] = []
-    unseen = "friction_rated" in blind and "friction_rest" in blind
+    blind, said = not_shown(fits), list[Note]()
+    unseen = blind >= FRICTION_LAW
     if unseen:
         said.append(ClassCode.FRICTION_NOT_VISIBLE.note())
     if "bulk_modulus" in blind:
@@ -319,7 +317,11 @@ def not_determined(codes: Collection[object]) -> frozenset[str]:
     >>> sorted(not_determined(["friction_not_visible"])), sorted(not_determined(["one_scale"]))
     (['added_friction', 'pressure_rise', 'velocity_lost'], [])
     """
-    return OF_FRICTION if str(ClassCode.FRICTION_NOT_VISIBLE) in map(str, codes) else frozenset()
+    said = set(map(str, codes))
+    if str(ClassCode.FRICTION_NOT_VISIBLE) not in said:
+        return frozenset()
+    # without pressure, a piston that yields on its seals shows bulk modulus over friction alone
+    return OF_FRICTION | OF_OIL if str(ClassCode.ONE_SCALE) in said else OF_FRICTION
 
 
 def _velocity_lost(speed: Quantity) -> list[Note]:

@@ -21,6 +21,7 @@ from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, 
 from faults.diagnosis.circuits.class_fit import LASTING, SEALS, STEP, WEAK, PointFit, fit_freely
 from faults.diagnosis.circuits.class_regions import ClassFits
 from faults.diagnosis.circuits.load_or_offset import load_for_offset
+from faults.diagnosis.circuits.not_shown import FRICTION_LAW, not_shown
 from faults.diagnosis.circuits.region_scores import region_scores
 from faults.diagnosis.circuits.yielding import UNEXPLAINED, follows, yielding_velocity
 from faults.notes import AgainstCode
@@ -297,7 +298,9 @@ def _outside(blocks: Blocks, fits: ClassFits, region: float, actuator: Actuator)
     stiffness = float(np.exp(fits.best.coordinates[COORDINATES.index("bulk_modulus")]))
     share = stiffness / actuator.circuit.bulk_modulus
     known = fits.covariance[5, 5] ** 0.5
-    if share < SOFT * np.exp(-2.0 * known) or share > np.exp(2.0 * known) / SOFT:
+    # without pressure, a piston that yields on its seals shows bulk modulus over friction alone
+    over_friction = blocks.pressure is None and not_shown(fits) >= FRICTION_LAW
+    if not over_friction and (share < SOFT * np.exp(-2.0 * known) or share > np.exp(2.0 * known) / SOFT):
         return [(AgainstCode.OIL_SOFT if share < 1.0 else AgainstCode.OIL_STIFF).note(share=share)]
     if region >= -FARTHEST_OUT:
         return []

@@ -1,0 +1,30 @@
+"""Which parts of a circuit a log says nothing of: their values are those of the belief before it."""
+
+import numpy as np
+
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_fit import WEAK
+from faults.diagnosis.circuits.class_regions import ClassFits
+
+BLIND = 0.9
+"""A log that narrows a coefficient to no less than this share of the prior says nothing of it [dimensionless]."""
+
+FRICTION_LAW = frozenset({"friction_rated", "friction_rest"})
+"""Coordinates of a circuit that tell its friction."""
+
+
+def not_shown(fits: ClassFits) -> frozenset[str]:
+    """Return the coordinates of the best circuit that a log does not narrow.
+
+    Parameters
+    ----------
+    fits : ClassFits
+        The fit.
+
+    Returns
+    -------
+    frozenset[str]
+        Of `faults.diagnosis.circuits.circuit_runs.COORDINATES`.
+    """
+    known, believed = np.sqrt(np.diag(fits.covariance)), np.sqrt(np.diag(WEAK))
+    return frozenset(name for name, k, b in zip(COORDINATES, known, believed, strict=True) if k > BLIND * b)

@@ -1,0 +1,35 @@
+"""What a log says nothing of, and what then hangs on it."""
+
+import numpy as np
+
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_fit import WEAK
+from faults.diagnosis.circuits.not_shown import BLIND, FRICTION_LAW, not_shown
+from faults.diagnosis.diagnose import diagnose_log
+from faults.diagnosis.severity import not_determined
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.chamber_pressures import PRESSURE
+from plant.sensors.sensors import BENCH
+from tests.faults.diagnosis.test_severity import fits
+
+
+def test_a_coordinate_that_is_hardly_narrowed_is_not_shown() -> None:
+    narrowed = np.array([20.0 if name.startswith("friction") else 0.2 for name in COORDINATES])
+    found = not_shown(fits(np.diag(narrowed**2 * np.diag(WEAK))))
+    assert found >= FRICTION_LAW
+    assert all(name.startswith("friction") for name in found)
+    assert not_shown(fits(BLIND**2 * 0.1 * WEAK)) == frozenset()
+
+
+def test_a_stuck_piston_without_pressure_has_no_soft_oil_whatever_holds_it() -> None:
+    truth = parameters_for(CONDITIONS["minor_leakage_major_friction"])
+    drive = make_drive("sine", 3.0, 1e-3, EhaParameters(), np.random.default_rng(0))
+    log = simulate(CIRCUIT, drive, 1e-3, truth, sensors=BENCH, rng=np.random.default_rng(1))
+    found = diagnose_log(log.replace(**{PRESSURE: None}), Rig())
+    assert not found.unknown
+    assert found.condition == "minor_leakage"
+    assert {"bulk_modulus", "added_friction"} <= not_determined([note.code for note in found.not_told])
