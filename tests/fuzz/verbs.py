@@ -92,6 +92,9 @@ def run(words: Sequence[str], folder: Path, stdin: bytes = b"") -> Run:
                 (err, 2, os.O_WRONLY | os.O_CREAT | os.O_TRUNC),
             ):
                 os.dup2(os.open(path, flags), number)
+            # pytest has put files and settings of its own in their place
+            np.seterr(all="warn", under="ignore")
+            sys.stdin, sys.stdout, sys.stderr = (os.fdopen(k, mode, closefd=False) for k, mode in enumerate("rww"))
             resource.setrlimit(resource.RLIMIT_AS, (3 * MOST, 3 * MOST))
             resource.setrlimit(resource.RLIMIT_CPU, (int(2 * LONGEST), int(2 * LONGEST) + 1))
             sys.argv = ["hydrostate", *words]

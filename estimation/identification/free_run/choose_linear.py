@@ -122,7 +122,9 @@ def doubt_of(fit: LinearFit, data: Channels) -> str:
     """Return why a linear model may not be taken: ``time_constant``, ``no_fit``, or nothing."""
     output, n = np.concatenate(data.y), data.n_samples
     spread = float(np.nansum((output - np.nanmean(output)) ** 2))
-    gained = n * float(np.log(spread / max(fit.cost, 1e-300 * spread)))
+    if spread == 0.0:  # beside one huge value all others are rounded to one number
+        return "no_fit"
+    gained = n * float(np.log(spread / max(fit.cost, 1e-300 * spread, np.finfo(float).tiny)))
     if gained < fit.theta.size * float(np.log(n)):
         return "no_fit"
     radius = slowest_pole(fit.f)

@@ -11,6 +11,7 @@ from estimation.identification.free_run.choose_linear import (
     Candidate,
     candidate,
     chosen,
+    doubt_of,
     linear_candidates,
     slowest_pole,
 )
@@ -150,3 +151,11 @@ def test_the_drift_of_one_record_is_not_taken_for_a_slow_pole() -> None:
     candidates = linear_candidates(data, [1, 2, 3], (1,))
     assert chosen(candidates).outlasts_block(data), "held-back blocks alone want the slow pole"
     assert _believable(candidates, data, by)[0].fit.f == pytest.approx([1.0, -0.7], abs=0.03)
+
+
+def test_an_output_that_rounding_left_no_spread_has_no_fit() -> None:
+    u, y = np.sin(np.arange(40.0)), np.cos(np.arange(40.0))
+    data = channels_from([u[:, None]], [y], 0.1, ["u"], "y")
+    fit = replace(fit_linear(Form(1, (1,), (1,)), data, [np.array([1.0, -0.5])]), cost=0.0)
+    flat = replace(data, y=tuple(np.zeros(40) for _ in data.y))
+    assert doubt_of(fit, flat) == "no_fit"

