@@ -209,7 +209,7 @@ def _reversed(record: Record, long: ChannelBlocks, balance: FlowBalance | None) 
     apart = together < OPPOSED and alike(long.piston, long.pumped)[0] < OPPOSED
     with_pump = together > FOLLOWS
     opposed = with_pressure = False
-    if balance is not None and long.pressure is not None and long.pumped is not None:
+    if balance is not None and long.pumped is not None:
         power = power_of(long.pressure, long.pumped, long.piston)
         opposed = power * len(long.pumped) ** 0.5 < -REFUTED and balance.compressed < -TOLD * balance.compressed_std
         with_pressure = balance.compressed > TOLD * balance.compressed_std
