@@ -13,7 +13,7 @@ from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.greybox.sparing import LAST, sparing_steps, with_steps
+from estimation.fits.greybox.sparing import LAST, spared
 from estimation.models.flow import STIFFNESS
 from plant.arrays import Array
 
@@ -111,8 +111,7 @@ def _led_on(problem: FreedProblem, tried: Tried, start: Array, *more: str, usefu
 
     def further(one: Tried, theta: Array) -> Tried:
         wanted = min(useful, _hoped(log, one.cost))
-        spared = with_steps(problem, sparing_steps(problem, theta)).log
-        return descended(spared, one, theta, FINISHING, *more, wanted=wanted)
+        return descended(spared(problem, theta).log, one, theta, FINISHING, *more, wanted=wanted)
 
     best = further(tried, start)
     for _ in range(ROUNDS - 1):

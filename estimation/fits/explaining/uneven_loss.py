@@ -21,7 +21,7 @@ from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.greybox.sparing import LAST, sparing_steps, with_steps
+from estimation.fits.greybox.sparing import LAST, spared
 from estimation.fits.hypotheses import WORN
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
@@ -253,7 +253,7 @@ class _Search:
         """Return a loss with its fit by short model steps."""
         problem = self._problem(course, coarse=False)
         bounds = self._bounds(problem, point.theta)
-        quick = with_steps(problem, sparing_steps(problem, point.theta))
+        quick = spared(problem, point.theta)
         near = descend(quick.at, point.theta, FINISHING, bounds)
         ended = near if quick is problem else descend(problem.at, near.theta, LAST, bounds)
         fit = concluded(problem, ended, least=bounds[0], warned=False)

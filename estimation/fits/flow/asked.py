@@ -1,7 +1,6 @@
 """`asked_of(log, parameters, ...)`: which hypotheses a log is asked beside the plain flow form, and from where."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 from estimation.fits.explaining.explain import WORTH
 from estimation.fits.explaining.left_open import share_lost, wear_open
@@ -97,9 +96,13 @@ def asked_of(
         pulled = (MAKEUP_BENDS,) if outruns_pump(log, parameters) else ()
         return (BEGUN,) if moving else (*HYPOTHESES, *pulled), ()
     by_mass = balances_mass(swinging.model)
-    spared = log if swinging.steps is None else replace(log, steps=swinging.steps)
     promises = promised_each(
-        spared, parameters, swinging.values, ALWAYS_ASKED, by_mass=by_mass, slopes=slopes_of(swinging, log)
+        log.stepped(swinging.steps),
+        parameters,
+        swinging.values,
+        ALWAYS_ASKED,
+        by_mass=by_mass,
+        slopes=slopes_of(swinging, log),
     )
     delivery, zero, *hidden = _possible(promises, swinging)
     shows_zero = best is swinging or homed_at_stop(log)

@@ -171,7 +171,7 @@ def _finished(one: _Rough, log: GreyBoxLog, steps: IntArray, wanted: float = np.
     A search that will not come down to the cost ``wanted`` ends early. Make-up valves that must let in more than the
     pump delivers are orifices (``bent``).
     """
-    one = replace(one, problem=one.problem.on(replace(log, steps=steps)))
+    one = replace(one, problem=one.problem.on(log.stepped(steps)))
     if not _plain(one):
         one = replace(one, point=descend(one.problem.at, one.point.theta, SETTLING, one.bounds, wanted=wanted))
         if not _plain(one):

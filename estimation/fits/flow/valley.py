@@ -12,7 +12,7 @@ from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
-from estimation.fits.greybox.sparing import sparing_steps, with_steps
+from estimation.fits.greybox.sparing import spared
 from estimation.models.completed_flow import CRACKS, completed
 from estimation.models.flow import HELD_FLOW_FORM, STIFFNESS
 from estimation.models.greybox import GreyBoxModel
@@ -103,7 +103,7 @@ def from_valley(
     problem = FreedProblem.of(form, log)
     theta = form.theta({STIFFNESS: 0.0, **valley})
     bounds = flow_bounds(form, [theta], log)
-    quick = with_steps(problem, sparing_steps(problem, theta))
+    quick = spared(problem, theta)
     return quick, descend(quick.at, theta, FINISHING, bounds, radius=WITHIN, wanted=wanted), bounds
 
 

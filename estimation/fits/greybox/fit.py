@@ -295,7 +295,7 @@ def concluded(
         noise[felt] = np.sqrt(variance)
         noise[effects <= LEAST_EFFECT**2] = np.inf  # what is known of it is not from this log
         if told:
-            rig = dict(answers_by_rig(problem if steps is None else with_steps(problem, steps), theta, known_of))
+            rig = dict(answers_by_rig(with_steps(problem, steps), theta, known_of))
             late, play = _late_and_play(problem, known_of, moved, effects[felt] > LEAST_EFFECT**2)
     # teeth that are taken up are not small, and the course of a slow log's motor looks like some
     asked_of_teeth = {} if problem.log.teeth or problem.log.course is not None else teeth

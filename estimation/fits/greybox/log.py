@@ -141,6 +141,21 @@ class GreyBoxLog:
         """
         return replace(self, drives=self.drives[:samples], measured=self.measured[:samples], steps=self.steps[:samples])
 
+    def stepped(self, steps: IntArray | None) -> "GreyBoxLog":
+        """Return the log with other model steps.
+
+        Parameters
+        ----------
+        steps : ndarray of int, shape (n,), or None
+            Up to each sample [count]; None for those that it has.
+
+        Returns
+        -------
+        GreyBoxLog
+            The log; the same one where it has those.
+        """
+        return self if steps is None or steps is self.steps else replace(self, steps=steps)
+
     def coarsened(self) -> "GreyBoxLog":
         """Return the log with one model step a sample: predicted faster and less exactly.
 
@@ -149,7 +164,7 @@ class GreyBoxLog:
         GreyBoxLog
             The same log.
         """
-        return replace(self, steps=np.ones_like(self.steps))
+        return self.stepped(np.ones_like(self.steps))
 
     @property
     def passes_on(self) -> bool:

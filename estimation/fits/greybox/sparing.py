@@ -54,22 +54,41 @@ def sparing_steps(problem: Problem, theta: Array) -> IntArray:
     return log.steps
 
 
-def with_steps(problem: Problem, steps: IntArray) -> Problem:
+def with_steps(problem: Problem, steps: IntArray | None) -> Problem:
     """Return a problem with other model steps.
 
     Parameters
     ----------
     problem : Problem
         The problem.
-    steps : ndarray of int, shape (n,)
-        Up to each sample [count].
+    steps : ndarray of int, shape (n,), or None
+        Up to each sample [count]; None for those that it has.
 
     Returns
     -------
     Problem
         The problem; the same one where it has those.
     """
-    return problem if steps is problem.log.steps else problem.on(replace(problem.log, steps=steps))
+    log = problem.log.stepped(steps)
+    return problem if log is problem.log else problem.on(log)
+
+
+def spared(problem: Problem, theta: Array) -> Problem:
+    """Return a problem with short model steps where they matter near a point, see `sparing_steps`.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    theta : ndarray, shape (unknowns,)
+        The point [dimensionless].
+
+    Returns
+    -------
+    Problem
+        The problem; the same one where nothing is to be spared.
+    """
+    return with_steps(problem, sparing_steps(problem, theta))
 
 
 def _long_step_errors(problem: Problem, theta: Array) -> Array:

@@ -43,7 +43,7 @@ def ended(costs: Sequence[float], monkeypatch: pytest.MonkeyPatch) -> tuple[floa
 
     monkeypatch.setattr(finishing, "descended", descended)
     monkeypatch.setattr(finishing, "left_by", lambda *_: 1.0)
-    monkeypatch.setattr(finishing, "sparing_steps", lambda problem, _: problem.log.steps)
+    monkeypatch.setattr(finishing, "spared", lambda one, _: one)
     problem: Any = SimpleNamespace(log=SimpleNamespace(drives=(), steps=None))
     begun: Any = SimpleNamespace(cost=np.inf)
     return finishing._led_on(problem, begun, np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]

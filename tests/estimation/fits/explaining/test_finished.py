@@ -58,7 +58,7 @@ def test_what_stays_far_behind_is_given_up(cost: float, searches: int, monkeypat
         return SimpleNamespace(theta=theta)
 
     problem: Any = SimpleNamespace(log=nothing, model=SimpleNamespace(values=lambda _: {}), at="all short steps")
-    monkeypatch.setattr(finishing, "sparing_steps", lambda *_: None)
+    monkeypatch.setattr(finishing, "spared", lambda one, _: one)
     monkeypatch.setattr(finishing, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
     monkeypatch.setattr(finishing, "descend", to_all_short_steps)
     monkeypatch.setattr(finishing, "replace", lambda one, **_: one)
