@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -52,10 +53,15 @@ class Channels:
         """Samples of the longest log."""
         return max(y.size for y in self.y)
 
+    @cached_property
+    def periods(self) -> tuple[int | None, ...]:
+        """After how many samples the inputs of each log repeat themselves; None where they do not."""
+        return tuple(common_period(u) for u in self.u)
+
     @property
     def told(self) -> int:
         """Samples of the longest log that its inputs tell something new in: a period, where they repeat themselves."""
-        return max(period_of(u) for u in self.u)
+        return max(lengths_told(self))
 
     @property
     def duration(self) -> float:
@@ -128,8 +134,8 @@ def _require_variation(values: Array, name: str) -> None:
         raise HydrostateError(f"channel {name!r} must vary, got {np.nanmin(values):g} throughout")
 
 
-def require_room(data: Channels, order: int | None, delay: int | None, n_numerator: int | None) -> None:
-    """Refuse a size of a model for which the logs are too short, or which would keep the search busy for minutes.
+def require_size(order: int | None, delay: int | None, n_numerator: int | None) -> None:
+    """Refuse a size that no model has, or that would keep the search busy for minutes.
 
     Parameters
     ----------
@@ -139,7 +145,7 @@ def require_room(data: Channels, order: int | None, delay: int | None, n_numerat
     Raises
     ------
     HydrostateError
-        If an entry is too small, or there are fewer than five samples a value or two a sample of dead time.
+        If an entry is too small or too large.
     """
     for name, given, least, most in (
         ("order", order, 1, MOST_ORDER),
@@ -149,6 +155,21 @@ def require_room(data: Channels, order: int | None, delay: int | None, n_numerat
         if given is not None and not (least <= given and (most is None or given <= most)):
             wanted = f"{least} or more" if most is None else f"from {least} to {most}"
             raise HydrostateError(f"{name} must be {wanted}, got {given}")
+
+
+def require_room(data: Channels, order: int | None, delay: int | None, n_numerator: int | None) -> None:
+    """Refuse a size of a model for which the logs are too short.
+
+    Parameters
+    ----------
+    order, delay, n_numerator : int, optional
+        Of every input.
+
+    Raises
+    ------
+    HydrostateError
+        If there are fewer than five samples a value or two a sample of dead time.
+    """
     poles = order or 1
     values = poles + len(data.inputs) * (n_numerator or poles + 1)
     wanted = SAMPLES_PER_PARAMETER * values + 2 * (delay or 0)
@@ -199,18 +220,18 @@ def in_scale(data: Channels, by: Scaling) -> Channels:
     )
 
 
-def period_of(u: Array, shortest: int = SHORTEST) -> int:
-    """Return after how many samples inputs repeat themselves, or how many there are where they do not.
+def lengths_told(data: Channels, shortest: int = SHORTEST) -> list[int]:
+    """Return after how many samples the inputs of each log repeat themselves, or how many it has where they do not.
 
     Parameters
     ----------
-    u : ndarray, shape (n, m)
-        Inputs.
     shortest : int
         Shorter periods are not counted: they have too little in them [samples].
     """
-    period = common_period(u) or len(u)
-    return period if period >= shortest else len(u)
+    return [
+        period if period is not None and period >= shortest else len(u)
+        for period, u in zip(data.periods, data.u, strict=True)
+    ]
 
 
 def blocks(data: Channels, count: int) -> list[list[BoolArray]]:
@@ -230,8 +251,8 @@ def blocks(data: Channels, count: int) -> list[list[BoolArray]]:
         One mask a log, for each block.
     """
     places: list[IntArray] = []
-    for u, y in zip(data.u, data.y, strict=True):
-        period = max(period_of(u, SHORTEST * (count + 1)), 1)
+    for told, y in zip(lengths_told(data, SHORTEST * (count + 1)), data.y, strict=True):
+        period = max(told, 1)
         places.append(np.arange(y.size) % period * (count + 1) // period)
     return [[place == 1 + index for place in places] for index in range(count)]
 
@@ -244,7 +265,7 @@ def halves(data: Channels) -> tuple[Channels, Channels]:
     tuple of Channels
         As many logs each.
     """
-    begins = [y.size - period_of(u) for u, y in zip(data.u, data.y, strict=True)]
+    begins = [y.size - told for told, y in zip(lengths_told(data), data.y, strict=True)]
     cuts = [(begin + y.size) // 2 for begin, y in zip(begins, data.y, strict=True)]
 
     def part(*, late: bool) -> Channels:

@@ -17,7 +17,15 @@ from estimation.identification.free_run.choose_hammerstein import (
 )
 from estimation.identification.free_run.choose_linear import INTEGRATING, Candidate, chosen, linear_candidates
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate, polynomial_candidates
-from estimation.identification.free_run.data import Channels, Scaling, blocks, require_room, scaled, section
+from estimation.identification.free_run.data import (
+    Channels,
+    Scaling,
+    blocks,
+    require_room,
+    require_size,
+    scaled,
+    section,
+)
 from estimation.identification.free_run.dense_polynomial import Asked
 from estimation.identification.free_run.fallback import Fallback
 from estimation.identification.free_run.fewer_samples import on_fewer
@@ -130,6 +138,7 @@ def identify_channels(
         If the model is not to be believed, or its steady gain means nothing.
     """
     require_known("structure", structure, FREE_STRUCTURES)
+    require_size(order, delay, n_numerator)
     require_room(data, order, delay, n_numerator)
     with threadpool_limits(limits=1, user_api="blas"):
         found = _identified(data, structure, order, delay, n_numerator)

@@ -66,26 +66,6 @@ def fit_linear(
     return problem.descend(theta, bounded=bounded, least_gain=least_gain)
 
 
-def fit_coarsely(form: Form, data: Channels, starts: Sequence[Array] = (), *, bounded: bool = False) -> LinearFit:
-    """Return the best linear model of one form, as near to its minimum as a comparison of models needs.
-
-    Parameters
-    ----------
-    data : Channels
-        Scaled.
-    starts : sequence of ndarray, shape (n + 1,)
-        As `fit_linear` takes them.
-    bounded : bool
-        Likewise.
-
-    Returns
-    -------
-    LinearFit
-        The lowest minimum found.
-    """
-    return fit_linear(form, data, starts, bounded=bounded, least_gain=COARSE)
-
-
 def extended(fit: LinearFit) -> list[Array]:
     """Return denominators of one order more that hold a minimum: a real pole is added, which zeros can cancel."""
     return [np.convolve(fit.f, [1.0, -pole]) for pole in SLOWER]

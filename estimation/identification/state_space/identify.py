@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimation.identification.free_run.choose_linear import CLEARLY
-from estimation.identification.free_run.data import MOST_ORDER, Channels, require_room, scaled, section
+from estimation.identification.free_run.data import Channels, require_room, require_size, scaled, section
 from estimation.identification.free_run.held_back import pooled
 from estimation.identification.free_run.identify import (
     MOST_CHOSEN,
@@ -128,9 +128,9 @@ def identify_state_space(
     LogWarning
         If the model is not to be believed.
     """
-    fits = order is None or 1 <= order <= MOST_ORDER  # whether the logs are long enough for it, the fit itself says
+    require_size(order, delay, None)
     for one in data:
-        require_room(one, None if fits else order, delay, None)
+        require_room(one, None, delay, None)  # whether it is long enough for the order, the fit itself says
     with threadpool_limits(limits=1, user_api="blas"):
         found = _identified(data, range(1, MOST_STATES + 1) if order is None else [order], delay)
     for note in {note.code: note for one in found for note in one.notes if note.code in WARNED}.values():
