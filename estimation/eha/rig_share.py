@@ -106,8 +106,7 @@ def with_total(
     """Return a quantity with its total interval: noise and every entry of the rig, taken as independent.
 
     An entry's logarithm is normal, so its ends are ``value * exp(-1.96 s)`` and ``value * exp(1.96 s)``; distances of
-    the ends from the value add in squares. Those of logarithms do for an
-    interval of a logarithm.
+    the ends from the value add in squares. If the interval is one of the logarithm, distances of logarithms do.
 
     Parameters
     ----------

@@ -123,8 +123,19 @@ def severities(
         than the rig's.
     """
     among = circuits or [OpenCircuit(fits.best.coordinates, 1.0)]
+    found = _under(fits.spread, among, actuator, widths or {})
+    if not np.any(fits.moved):
+        return found
+    bent = _under(fits.bent_spread, among, actuator, widths or {})
+    return found | {name: replace(found[name], ci95_total=bent[name].ci95) for name in OF_FRICTION}
+
+
+def _under(
+    spread: Array, among: Sequence[OpenCircuit], actuator: Actuator, widths: Mapping[str, float]
+) -> dict[str, Quantity]:
+    """Return the severities of the likeliest circuit, with intervals of all under a covariance of their coordinates."""
     centre = max(among, key=lambda one: one.probability).coordinates
-    drawn = _centres(among) + _normal_draws(len(centre)) @ np.linalg.cholesky(fits.spread).T
+    drawn = _centres(among) + _normal_draws(len(centre)) @ np.linalg.cholesky(spread).T
     with np.errstate(all="ignore"):  # friction that falls faster than leakage holds has no steady state
         table, best = _of_circuits(drawn, actuator), severities_at(centre, actuator)
     found: dict[str, Quantity] = {}
@@ -135,18 +146,13 @@ def severities(
             continue
         finite = table[name][~np.isnan(table[name])]
         low, high = (percentile(finite, percent) if len(finite) else np.nan for percent in (2.5, 97.5))
-        stretch = 1.0 if widths is None else widths.get(name, 1.0)
+        stretch = widths.get(name, 1.0)
         least = unresolved.get(name, 0.0)
         ends = value - stretch * (value - low) - least, value + stretch * (high - value) + least
         if name == "bulk_modulus" and stretch != 1.0:  # never negative, however wide
             ends = value * (low / value) ** stretch, value * (high / value) ** stretch
         found[name] = Quantity(value, UNITS[name], ends)
-    found |= {"entrained_air": _with_air(found["entrained_air"], found["bulk_modulus"], actuator)}
-    if not np.any(fits.moved):
-        return found
-    straight = replace(fits, spread=fits.bent_spread, moved=0.0 * fits.moved)
-    bent = severities(straight, actuator, widths, circuits)
-    return found | {name: replace(found[name], ci95_total=bent[name].ci95) for name in OF_FRICTION}
+    return found | {"entrained_air": _with_air(found["entrained_air"], found["bulk_modulus"], actuator)}
 
 
 @cache
