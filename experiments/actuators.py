@@ -81,14 +81,15 @@ def kinds_by_columns(columns: Collection[str]) -> tuple[str, ...]:
     >>> kinds_by_columns(["time_s", "drive_voltage_v", "position_m"])
     ('piezo-stack', 'diaphragm-motor')
     """
-    from plant.log.checks import alternatives
+    from plant.log.checks import lacking
 
-    def lacks(kind: "ActuatorKind") -> bool:
-        return any(not set(alternatives(wanted)) & set(columns) for wanted in kind.required)
-
-    if not lacks(_loaded(DEFAULT, ACTUATORS[DEFAULT])):
+    if not lacking(_loaded(DEFAULT, ACTUATORS[DEFAULT]).required, columns):
         return (DEFAULT,)
-    shared = {kind.name: len(kind.channels.keys() & set(columns)) for kind in actuators() if not lacks(kind)}
+    shared = {
+        kind.name: len(kind.channels.keys() & set(columns))
+        for kind in actuators()
+        if not lacking(kind.required, columns)
+    }
     return tuple(name for name, count in shared.items() if count == max(shared.values()))
 
 

@@ -41,6 +41,7 @@ def looked_into(
     HydrostateError
         If a file cannot be opened, or there is no such kind.
     """
+    from plant.log.checks import lacking
     from plant.log.formats.detect import open_tables
     from plant.log.guess import in_order
     from plant.log.inspection import inspect_table
@@ -48,7 +49,7 @@ def looked_into(
     tables = [inspect_table(one) for path in [log, *beside] for one in open_tables(path)]
     kind = actuator(plant or DEFAULT)
     guesses = _guessed(tables, kind)
-    if plant is None and not _complete(guesses, kind):
+    if plant is None and lacking(kind.required, {one.guess.channel for one in guesses}):
         names = [column.heading.name for facts in tables for column in facts.columns]
         kinds = kinds_by_columns(names)  # imports every kind of actuator
         if len(kinds) == 1 and kinds[0] != kind.name:
@@ -60,14 +61,6 @@ def looked_into(
     found = _entries(tables, guesses, columns) | {"reads": reads["reads"], "message": reads["message"]}
     found["options"] = _options(columns, kind.name, sample_time, beside)
     return {"plant": kind.name, **found}, tables
-
-
-def _complete(guesses: "Sequence[ChannelGuess]", kind: "ActuatorKind") -> bool:
-    """Return whether there is a guess for every channel that a kind of actuator needs."""
-    from plant.log.checks import alternatives
-
-    guessed = {one.guess.channel for one in guesses}
-    return all(guessed & set(alternatives(wanted)) for wanted in kind.required)
 
 
 def _guessed(tables: "Sequence[TableFacts]", kind: "ActuatorKind") -> "list[ChannelGuess]":

@@ -1,6 +1,6 @@
 """What a log must satisfy to be trusted: a clock, few enough gaps, finite numbers. Says what it mended."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 import numpy as np
 
@@ -101,13 +101,30 @@ def alternatives(wanted: str) -> list[str]:
     return [name.strip() for name in wanted.split(" or ")]
 
 
+def lacking(required: Iterable[str], names: Collection[str]) -> list[str]:
+    """Return what is wanted of a log and not there.
+
+    Parameters
+    ----------
+    required : iterable of str
+        Channels, as `alternatives` takes them.
+    names : collection of str
+        Channels that are there.
+
+    Examples
+    --------
+    >>> lacking(["motor_speed_rad_s", "position_m or velocity_m_s"], {"velocity_m_s"})
+    ['motor_speed_rad_s']
+    """
+    return [wanted for wanted in required if not any(name in names for name in alternatives(wanted))]
+
+
 def _counted(count: int, total: int) -> dict[str, float]:
     return {"count": count, "total": total, "percent": 100.0 * count / total}
 
 
 def _present(columns: Channels, required: Collection[str], source: str) -> None:
-    missing = [wanted for wanted in required if not any(name in columns for name in alternatives(wanted))]
-    if missing:
+    if missing := lacking(required, columns):
         known = ", ".join(columns) or "none that is known"
         raise NoChannelError(f"{absent(missing)}; the log has {known}", source, columns=tuple(columns))
     if set(columns) <= {TIME}:
@@ -206,7 +223,7 @@ def _masked(
             notes.append(LogCode.CHANNEL_SLOWER.note(channel=name, rows=rows))
             continue
         del kept[name]
-        if not all(any(other in kept for other in alternatives(wanted)) for wanted in required):
+        if lacking(required, kept):
             raise SparseLogError(
                 f"{name} is missing in {_share(count, total)}, at most {100.0 * most_missing:g} % may be", source
             )

@@ -8,7 +8,7 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError, MissingColumnError, TextColumnError
-from plant.log.checks import alternatives
+from plant.log.checks import alternatives, lacking
 from plant.log.clock.merging import Timed, merged
 from plant.log.columns import TIME, TRUTH, Column, converted, listed, resolve_columns
 from plant.log.guess import hint_of, missing_channels, overlooked
@@ -79,10 +79,10 @@ def gathered(
         hint = hint_of([error.channel], headings)
         raise MissingColumnError(error.channel, error.column, error.known, source, hint) from error
     found = [column.channel for _, columns in chosen for column in columns]
-    lacking = [wanted for wanted in required if not any(name in found for name in alternatives(wanted))]
+    missing = lacking(required, found)
     timeless = TIME not in found and sample_time is None and not any(table.step for table, _ in chosen)
-    if timeless or lacking:
-        wanted = [TIME] * timeless + lacking
+    if timeless or missing:
+        wanted = [TIME] * timeless + missing
         raise missing_channels(wanted, headings, source, found)
     with np.errstate(over="ignore", invalid="ignore"):  # what is no finite number is refused or noted later
         notes: list[Note] = []
