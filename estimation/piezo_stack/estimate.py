@@ -116,16 +116,21 @@ def covariance(slopes: Array) -> Array:
     ndarray, shape (unknowns, unknowns)
         Covariance [dimensionless]; very large where nothing is known.
     """
-    size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
-    known, axes = np.linalg.eigh((slopes / size).T @ (slopes / size))
-    return (axes / np.maximum(known, _LEAST_KNOWN * known[-1])) @ axes.T / np.outer(size, size)
+    normal, sizes = _normalised(slopes)
+    known, axes = np.linalg.eigh(normal)
+    return (axes / np.maximum(known, _LEAST_KNOWN * known[-1])) @ axes.T / sizes
 
 
-def _newton_step(slopes: Array, residuals: Array) -> Array:
-    """Return the step of Gauss and Newton, none along what the channels do not show."""
+def _shown(slopes: Array) -> Array:
+    """Return the same along what the channels show, and nothing along all else: no step leads there."""
+    normal, sizes = _normalised(slopes)
+    return np.linalg.pinv(normal, rcond=_LEAST_KNOWN) / sizes
+
+
+def _normalised(slopes: Array) -> tuple[Array, Array]:
+    """Return the normal equations with each column of slopes brought to one, and by what they were divided."""
     size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
-    known = np.linalg.pinv((slopes / size).T @ (slopes / size), rcond=_LEAST_KNOWN)
-    return -known @ (slopes.T @ residuals / size) / size
+    return (slopes / size).T @ (slopes / size), np.outer(size, size)
 
 
 def stack_bounds(
@@ -169,10 +174,10 @@ def _descended(runs: StackRuns, measured: Array, start: Array) -> tuple[Array, A
     """
     theta = _coarsely_descended(runs, measured, start)
     found, slopes = runs.around(theta, LONGEST_STEP)
-    known = covariance(slopes)
+    known, shown = covariance(slopes), _shown(slopes)
     residuals = found - measured
     for _ in range(_MOST_EXACT):
-        changes = np.outer(_SHORTENED, _newton_step(slopes, residuals))
+        changes = np.outer(_SHORTENED, -shown @ (slopes.T @ residuals))
         change, tried = _best(runs, measured, theta, changes, LONGEST_STEP)
         if float(tried @ tried) >= float(residuals @ residuals):
             break

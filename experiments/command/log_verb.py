@@ -123,8 +123,9 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
         except NoChannelError as error:
             name = kind_meant(error, asked["plant"], asked["rig"])
             note(f"{log}: read as a log of a {name} actuator, by its columns; --plant names another kind")
-            other = questions.get(name) or _Question.of(context, verb, asked, name)
-            return questions.setdefault(name, other), other.read(log, beside=beside)
+            if name not in questions:
+                questions[name] = _Question.of(context, verb, asked, name)
+            return questions[name], questions[name].read(log, beside=beside)
 
     def work(log: Path) -> Result:
         with overheard() as said:

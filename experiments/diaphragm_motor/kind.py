@@ -14,8 +14,8 @@ from experiments.actuator_kind import ActuatorKind, Experiment, LogVerb, Options
 from experiments.command.json_output import Result
 from experiments.command.terminal import short_names, table
 from experiments.log_pages.entries import BLANK, finding_entries, quantity_entry
+from experiments.log_pages.screens import messages_shown
 from experiments.page.numbers import percent_text
-from experiments.page.sentences import sentence
 from faults.diaphragm_motor.diagnose import Match
 from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS, motor_with_fault
 from faults.diaphragm_motor.finding import motor_fault_finding, severity_of
@@ -133,9 +133,7 @@ def _faults_shown(results: Sequence[Result], options: Options) -> "Iterable[Rend
                 cells = (f"{size['value']:.3g}", f"{size['ci95'][0]:.3g} to {size['ci95'][1]:.3g}", size["unit"])
             shown.add_row(name, one["fault"].replace("_", " "), percent_text(one["probability"]), *cells)
     yield shown
-    for result in results:
-        yield f"{result['file']}: {result['message']}"
-        yield from (f"  next  {sentence(one)}" for one in result["advice"])
+    yield from messages_shown(results)
 
 
 OF_A_LOG: Any = {"prepare": _prepared, "options": {"load": None, "healthy": None}, "blank": {**BLANK, **OWN}}

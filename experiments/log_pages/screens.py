@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from experiments.command.json_output import Result
 from experiments.command.terminal import table
 from experiments.page.numbers import percent_text
+from experiments.page.sentences import sentence
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -38,6 +39,19 @@ def quantities_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "
         probable = "" if sure is None else f", probability {percent_text(sure)} %"
         yield f"{about}: {result['outcome'].replace('_', ' ')}: {result['message']}{probable}"
         yield from (f"{about}: next: {one}" for one in result.get("advice", ()))
+
+
+def messages_shown(results: Sequence[Result]) -> "Iterable[RenderableType]":
+    """Show the message of each log, with what to do below it.
+
+    Parameters
+    ----------
+    results : sequence of Result
+        One a log, with ``message`` and ``advice``.
+    """
+    for result in results:
+        yield f"{result['file']}: {result['message']}"
+        yield from (f"  next  {sentence(one)}" for one in result["advice"])
 
 
 def _digits(ends: Sequence[float] | None) -> int:

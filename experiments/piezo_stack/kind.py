@@ -13,8 +13,8 @@ from experiments.command.json_output import Result
 from experiments.command.options import listed
 from experiments.command.terminal import short_names, table
 from experiments.log_pages.entries import BLANK, finding_entries
+from experiments.log_pages.screens import messages_shown
 from experiments.page.condition_names import in_words
-from experiments.page.sentences import sentence
 from faults.conditions import CONDITIONS
 from faults.piezo_stack.diagnose import calibrated_stack, diagnose_stack
 from faults.piezo_stack.faults import stack_with_fault
@@ -118,9 +118,7 @@ def _conditions_shown(results: Sequence[Result], options: Options) -> "Iterable[
         for name, result in zip(short_names(results), results, strict=True):
             shown.add_row(name, in_words(result["condition"] or "-"), result["outcome"].replace("_", " "))
         yield shown
-    for result in results:
-        yield f"{result['file']}: {result['message']}"
-        yield from (f"  next  {sentence(one)}" for one in result["advice"])
+    yield from messages_shown(results)
 
 
 OF_A_LOG: Any = {"prepare": _prepared, "entries": _entries, "blank": {**BLANK, "misfit": {}}}
