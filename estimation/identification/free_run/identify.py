@@ -34,7 +34,6 @@ from estimation.identification.free_run.hammerstein_fit import deviations, finis
 from estimation.identification.free_run.held_back import BLOCKS, halves_error, surely_better
 from estimation.identification.free_run.integrating import refitted_linear
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
-from estimation.identification.free_run.linear_problem import LinearFit
 from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
 from estimation.identification.free_run.other_orders import wanders
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
@@ -199,7 +198,7 @@ def _identified(
             sound = related and np.isfinite(held_back) and held_back < 1.0
     transfer = None
     if isinstance(dynamics, LinearDynamics):
-        fit = _continued(best, whole)
+        fit = refitted_linear(best.fit, whole)
         dynamics = LinearDynamics.of(fit)
         transfer = linear_model(fit, whole, by) if len(data.inputs) == 1 else None
     model = FreeRunModel(data.inputs, data.output, data.sample_time, named, by, dynamics, transfer)
@@ -343,13 +342,8 @@ def _refitted(found: PolynomialCandidate, whole: Channels) -> PolynomialDynamics
     return PolynomialDynamics.of(found.refit(section(whole, MOST_FITTED)) or found.fit)
 
 
-def _continued(linear: Candidate, data: Channels) -> LinearFit:
-    """Return a linear model fitted to other data."""
-    return refitted_linear(linear.fit, data)
-
-
 def _fallback(taken: PolynomialCandidate, linear: Candidate, part: Channels, whole: Channels) -> Fallback:
     """Return what is run where inputs do not determine a polynomial model."""
-    others = tuple(LinearDynamics.of(_continued(linear, part.without(mask))) for mask in blocks(part, BLOCKS))
+    others = tuple(LinearDynamics.of(refitted_linear(linear.fit, part.without(mask))) for mask in blocks(part, BLOCKS))
     parts = tuple(PolynomialDynamics.of(one) for one in taken.parts)
-    return Fallback(LinearDynamics.of(_continued(linear, whole)), others, parts, linear.held_back)
+    return Fallback(LinearDynamics.of(refitted_linear(linear.fit, whole)), others, parts, linear.held_back)
