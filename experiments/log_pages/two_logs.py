@@ -12,7 +12,7 @@ from experiments.command.json_output import json_text, write_whole
 from experiments.command.logs import read_log, run_logs
 from experiments.command.options import load_actuator, load_columns
 from experiments.command.terminal import emit, note, rendered, short_names, table
-from experiments.serve.comparison import compare_view, compared, plain_words, quantities_shown, title_of
+from experiments.log_pages.comparison import compare_view, compared, plain_words, quantities_shown, title_of
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:

@@ -167,9 +167,9 @@ class Answer(Shown):
         Returns
         -------
         pandas.DataFrame
-            As `experiments.serve.comparison.differences` has it; ``second`` is the other [the row's unit].
+            As `experiments.log_pages.comparison.differences` has it; ``second`` is the other [the row's unit].
         """
-        from experiments.serve.comparison import differences
+        from experiments.log_pages.comparison import differences
 
         return differences(self.to_dict(), other.to_dict())
 

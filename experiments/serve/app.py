@@ -19,8 +19,8 @@ from starlette.routing import Match, Route
 from starlette.types import Scope
 
 from experiments.command.terminal import note, unexpected
+from experiments.log_pages.comparison import compared
 from experiments.serve.answers import Comparison, Health, Log, Logs, Refusal, StreamHistory, StreamState, Verb, log_of
-from experiments.serve.comparison import compared
 from experiments.serve.events import MOST_LOOKING, event_stream
 from experiments.serve.limits import (
     HEADERS,

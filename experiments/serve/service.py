@@ -9,8 +9,8 @@ from typing import Any, TextIO
 
 from pebble import ProcessExpired
 
+from experiments.log_pages.comparison import compare_view
 from experiments.running.refusal import refused
-from experiments.serve.comparison import compare_view
 from experiments.serve.fleet_view import Repairs, actuator_view, fleet_view
 from experiments.serve.jobs import BusyError, Jobs, log_file, page_file, phase_file
 from experiments.serve.limits import FreeSpace, RefusedError

@@ -14,8 +14,8 @@ from experiments.command.log_verb import page_of
 from experiments.command.logs import caught, overheard, read_log, with_remarks
 from experiments.command.options import load_actuator
 from experiments.command.terminal import clauses, unexpected
+from experiments.log_pages.comparison import plain_words
 from experiments.page.sentences import sentence
-from experiments.serve.comparison import plain_words
 from experiments.serve.process import bind_to_server
 from plant.atomic import replacing
 from plant.errors import HydrostateError, MissingColumnError, NoChannelError

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from experiments.serve.comparison import compare_view, compared, plain_words, quantities_of
+from experiments.log_pages.comparison import compare_view, compared, plain_words, quantities_of
 from experiments.serve.fleet_view import actuator_view, fleet_view
 
 

@@ -1,4 +1,4 @@
-"""Two logs side by side: their quantities, what changed, and the page, made in a process that can be killed."""
+"""Two logs side by side: their quantities, what changed, and the page."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -62,7 +62,7 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
         ),
         "probabilities": ("condition", Column("first", names[0], "%"), Column("second", names[1], "%")),
     }
-    return render_page("serve/compare.html", facts, headed, {})
+    return render_page("log_pages/compare.html", facts, headed, {})
 
 
 def quantities_shown(rows: Sequence[Mapping[str, Any]]) -> "pd.DataFrame":
