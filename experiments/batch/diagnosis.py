@@ -13,7 +13,7 @@ from experiments.log_pages.entries import quantity_entry
 from experiments.page.condition_names import in_words
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.severity import not_determined
-from faults.notes import ClassCode
+from faults.notes import AgainstCode, ClassCode
 from plant.eha.rig import Rig
 from plant.errors import LogWarning
 from plant.log.record import Record
@@ -69,7 +69,7 @@ def class_row(found: Finding) -> dict[str, Any]:
     (best, first), (second, other) = sorted(found.probabilities.items(), key=lambda item: -item[1])[:2]
     margin, severities = first / max(other, 1e-300), {"quantities": json.dumps(_severities(found))}
     if found.unknown:
-        said = f"{'; '.join(map(str, found.against))}; in none of the nine conditions, the nearest is {in_words(best)}"
+        said = f"{_why_unknown(found)}; the nearest of the nine conditions is {in_words(best)}"
         against = json.dumps([{"code": str(one.code), "data": dict(one.data)} for one in found.against])
         return {"outcome": "mismatch", "reason": said, "trusted": False, "against": against, **severities}
     if margin < TOLD_APART:
@@ -78,6 +78,12 @@ def class_row(found: Finding) -> dict[str, Any]:
         return {"outcome": "not_observable", "reason": said, "margin": margin}
     row = {"outcome": "ok", "found_condition": best, "runner_up": second, "margin": margin, "trusted": True}
     return {**row, **severities}
+
+
+def _why_unknown(found: Finding) -> str:
+    """Return what speaks against the nine conditions; that none fits is left out where more is known."""
+    more = [one for one in found.against if one.code != AgainstCode.OUTSIDE_CONDITIONS]
+    return "; ".join(map(str, more or found.against))
 
 
 def _severities(found: Finding) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import pandas as pd
 
 from estimation.finding import interval_95
 from experiments.fleet.actuators import ActuatorRow
-from experiments.fleet.outlook import Outlook, outlook_of, span_of
+from experiments.fleet.outlook import Outlook, outlook_of
 from experiments.fleet.page import found_in
 from experiments.fleet.rows import STATES
 from experiments.page.charts import Charts
@@ -40,8 +40,8 @@ FORECASTS = (
     Column("level", "level now, 95 % interval"),
     "limit",
     Column("growth", "growth per log"),
-    Column("half", "limit reached in, 50 % interval", "logs"),
-    Column("most", "limit reached in, 90 % interval", "logs"),
+    Column("half", "limit reached, 50 % interval"),
+    Column("most", "limit reached, 90 % interval"),
     Column("outlook", "outlook"),
 )
 LOGS = (
@@ -70,7 +70,7 @@ def actuator_page(row: ActuatorRow, log: str | None, fleet: str = "../index.html
     facts = {
         "name": row.name,
         "title": f"{row.name}: {STATES[row.state]}{f' ({found_in(row.last)})' if row.last.between else ''}.",
-        "outlook": "" if worst is None else f"{SHOWN.get(worst.name, worst.name)}: {_in_full(worst)}".capitalize(),
+        "outlook": "" if worst is None else _sentence(worst),
         "log": log,
         "fleet": fleet,
         "apart": _apart(outlooks),
@@ -107,16 +107,13 @@ def _restarts(outlooks: Sequence[Outlook], maintained: Sequence[float]) -> list[
     return said
 
 
-def _reached(low: float, high: float) -> str:
-    return "reached" if high <= 0.0 else span_of(low, high)
-
-
-def _in_full(one: Outlook) -> str:
-    count = len(one.logs) - one.trend.begin
+def _sentence(one: Outlook) -> str:
+    name, count = SHOWN.get(one.name, one.name).capitalize(), len(one.logs) - one.trend.begin
     if count >= FEWEST:
-        return f"{one.words}, {one.time_left}" if one.time_left else one.words
+        return f"{name}{one.in_full}"
+    past = f"{one.past}; " if one.past else ""
     there = f"there {'is' if count == 1 else 'are'} {count}{' since the trend restarted' if one.trend.begin else ''}"
-    return f"no forecast yet, since it needs {FEWEST} logs, and {there}"
+    return f"{name}: {past}no forecast yet, since it needs {FEWEST} logs, and {there}"
 
 
 def _apart(outlooks: Sequence[Outlook]) -> str:
@@ -137,15 +134,13 @@ def _forecast(one: Outlook) -> dict[str, str]:
     growth, growth_std = (scale * each for each in (growth, growth_std))
     growth = growth if abs(growth) > ROUNDING * growth_std else 0.0
     places = decimals_of(0.0, 5.0 * growth_std, 6)  # one digit of the deviation, two of one below 0.2 of a digit
-    crossing = one.trend.crossing
-    reached = None if crossing is None else [float(end) for end in crossing.quantiles]
     return {
         "severity": SHOWN[one.name],
         "level": f"{shown} {unit} ({low} to {high})",
         "limit": f"{number(scale * one.series.limit, 3)} {unit}",
         "growth": f"{fixed(growth, places)} ± {fixed(growth_std, places)} {unit}",
-        "half": MISSING if reached is None else _reached(reached[1], reached[3]),
-        "most": MISSING if reached is None else _reached(reached[0], reached[4]),
+        "half": one.when(1, 3) or MISSING,
+        "most": one.when(0, 4) or MISSING,
         "outlook": one.words,
     }
 

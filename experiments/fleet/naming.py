@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from experiments.fleet.dates import without_wrong_clocks, year_first
 from plant.errors import HydrostateError
 
 STAMP = re.compile(
@@ -41,7 +42,7 @@ class Named:
     place : float or None
         The date as a number [day, or the unit of numbers that were given]; None where it is not known.
     problem : str
-        Why the log cannot be placed among those of its actuator; empty where it can.
+        Why the log cannot be placed among those of its actuator and has a row of its own; empty where it can.
     """
 
     actuator: str
@@ -79,7 +80,8 @@ def place_of(date: str, source: str) -> float:
     ----------
     date : str
         ISO 8601, such as 2026-11-22, 20261122 or 2026-11-22T14:30, the same as in file names (20261122_143000,
-        2026-11-22_14-30), a month (2026-11: its first day), or a number such as running hours.
+        2026-11-22_14-30), with dots and the day first (22.11.2026), a month (2026-11: its first day), or a number such
+        as running hours.
     source : str
         Where it stands, for the error.
 
@@ -97,9 +99,10 @@ def place_of(date: str, source: str) -> float:
     --------
     >>> place_of("1970-01-03", "a log"), place_of("1970-02", "a log"), place_of("812.5", "a log")
     (2.0, 31.0, 812.5)
-    >>> place_of("19700103_120000", "a log")
-    2.5
+    >>> place_of("19700103_120000", "a log"), place_of("03.01.1970", "a log")
+    (2.5, 2.0)
     """
+    given, date = date, year_first(date)
     stamp = STAMP.fullmatch(date)
     try:
         if stamp is not None:
@@ -112,7 +115,7 @@ def place_of(date: str, source: str) -> float:
         return float(date)
     except ValueError as error:
         raise HydrostateError(
-            f"{source}: date must be ISO 8601 such as 2026-11-22, or a number, got {date!r}"
+            f"{source}: date must be ISO 8601 such as 2026-11-22, or a number, got {given!r}"
         ) from error
 
 
@@ -162,7 +165,7 @@ def by_pattern(files: Iterable[str], pattern: str) -> dict[str, Named]:
             continue
         date = match.groupdict().get("date") or ""
         found[file] = _named(match["actuator"].split("/")[-1], date, "its name")
-    return _require_a_date(found)
+    return without_wrong_clocks(_require_a_date(found))
 
 
 def _text(part: str, fields: Mapping[str, str]) -> str:
@@ -199,13 +202,13 @@ def by_dates(files: Iterable[str], folder: str = "") -> dict[str, Named]:
     found = {file: _by_date(f"{folder}/{file}".replace("\\", "/")) for file in files}
     named = [one.actuator for one in found.values() if one.actuator]
     together = len(named) >= MATCHING * len(found) and len(set(named)) < len(named)
-    return found if together else {}
+    return without_wrong_clocks(found) if together else {}
 
 
 def _by_date(path: str) -> Named:
     """Return what the name of one file and of its folder says."""
     *_, folder, name = path.split("/")
-    stem = re.sub(r"\.[A-Za-z][A-Za-z0-9]*(?:\.(?:gz|zst))?$", "", name)
+    stem = year_first(re.sub(r"\.[A-Za-z][A-Za-z0-9]*(?:\.(?:gz|zst))?$", "", name))
     dates = list(re.finditer(rf"(?<![0-9]){STAMP.pattern}(?![0-9])", stem))
     if len(dates) != 1:
         return UNNAMED
@@ -228,7 +231,7 @@ def _require_a_date(found: dict[str, Named]) -> dict[str, Named]:
 def _named(actuator: str, date: str, source: str) -> Named:
     """Return what is known of a log; one bad date must not cost the fleet its page."""
     try:
-        return Named(actuator, date, place_of(date, source) if date else None)
+        return Named(actuator, year_first(date), place_of(date, source) if date else None)
     except HydrostateError as error:
         return Named("", "", None, str(error))
 
@@ -255,8 +258,9 @@ def by_table(files: Iterable[str], table: Path) -> dict[str, Named]:
         If the table cannot be read or lacks a column, or no date in it can be read.
     """
     rows = table_rows(table, ("file", "actuator"))
-    said = {row["file"]: _named(row["actuator"], row.get("date") or "", table.name) for row in rows}
-    _require_a_date(said)
+    said = without_wrong_clocks(
+        _require_a_date({row["file"]: _named(row["actuator"], row.get("date") or "", table.name) for row in rows})
+    )
     return {file: said.get(file) or said.get(Path(file).name) or UNNAMED for file in files}
 
 

@@ -8,13 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.fleet.dates import told_date, told_dates
 from experiments.fleet.naming import place_of, table_rows
 from experiments.fleet.rows import LogRow
 from faults.trend.crossing import HORIZON
 from faults.trend.trend import FEWEST, Series, Trend, trends
-
-UNITS_OF_TIME = (("hours", 1.0 / 24.0, 2.0), ("days", 1.0, 21.0), ("weeks", 7.0, 120.0), ("months", 30.4, math.inf))
-"""Units in which a time is told: name, length [day], and up to which time each is used [day]."""
 
 LEAST_STD = 1e-3
 """Least standard deviation of a log, as a share of the way from healthy to the limit [fraction]."""
@@ -48,13 +46,17 @@ class Outlook:
         return self.course[-1]
 
     @cached_property
+    def quantiles(self) -> tuple[float, ...] | None:
+        """Logs to the limit at `QUANTILES` of the crossing [step]; None where the median is not within sight."""
+        crossing = self.trend.crossing if self.trend.certain else None
+        if crossing is None or not math.isfinite(crossing.quantiles[2]):
+            return None
+        return tuple(float(one) for one in crossing.quantiles)
+
+    @property
     def left(self) -> tuple[float, float, float] | None:
         """Logs to the limit: 5 %, median and 95 % [step]; None where the median is not within sight."""
-        crossing = self.trend.crossing if self.trend.certain else None
-        if crossing is None:
-            return None
-        low, _, middle, _, high = crossing.quantiles
-        return (float(low), float(middle), float(high)) if math.isfinite(middle) else None
+        return None if self.quantiles is None else (self.quantiles[0], self.quantiles[2], self.quantiles[4])
 
     @property
     def alarm(self) -> bool:
@@ -67,30 +69,65 @@ class Outlook:
         return self.series.step if len(self.logs) > 1 and all(one.named.in_days for one in self.logs) else None
 
     @property
-    def time_left(self) -> str:
-        """Time to the limit, if logs are taken as often as before; empty where the forecast or the dates do not say."""
-        if self.left is None or self.days_apart is None or self.left[1] <= 0.0:
+    def past(self) -> str:
+        """Since when the severity is past its limit, without a break up to the last log; empty where it is not."""
+        within = [place for place, one in enumerate(self.logs) if one.amounts[self.name].share <= 1.0]
+        first = within[-1] + 1 if within else 0
+        count = len(self.logs) - first
+        if not count:
             return ""
-        low, middle, high = self.left
-        unit, days = next((unit, days) for unit, days, most in UNITS_OF_TIME if self.days_apart * middle < most)
-        scale = self.days_apart / days
-        ends = span_of(scale * low, scale * high, scale * HORIZON)
-        return f"about {scale * middle:.0f} {unit} ({ends})"
+        if not first:
+            return "past the limit in every log"
+        day = self.logs[first].named.day
+        return f"past the limit since {day}" if day else f"past the limit for {count} log{'s' if count > 1 else ''}"
+
+    def when(self, low: int, high: int) -> str:
+        """Return when the limit is reached, between two of `QUANTILES`: as dates where logs have them, else in logs.
+
+        Parameters
+        ----------
+        low, high : int
+            Places among `QUANTILES` [index].
+        """
+        if self.trend.crossing is None:
+            return ""
+        ends = [float(self.trend.crossing.quantiles[place]) for place in (low, high)]
+        if ends[1] <= 0.0:
+            return "reached"
+        if self.days_apart is None:
+            return f"{span_of(*ends)} logs" if low != high else f"{ends[0]:.0f} log{'' if round(ends[0]) == 1 else 's'}"
+        ahead = [self.days_apart * end for end in ends]
+        places = [(self.logs[-1].named.place or 0.0) + days for days in ahead]
+        return told_dates(places, ahead) if low != high else told_date(places[0], ahead[0])
 
     @property
     def words(self) -> str:
         """The forecast in one clause."""
+        if self.past:
+            return self.past
         if len(self.logs) - self.trend.begin < FEWEST:
             return "too few logs"
         if self.left is None and self.alarm:  # the last log alone may lie within it
             return "the trend is past the limit"
         if self.left is None:
             return "growing" if self.trend.certain else "no certain growth"
+        if self.left[1] <= 0.0:
+            return "the trend is past the limit"
+        middle, ends = self.when(2, 2), self.when(0, 4).removesuffix(" logs")
+        around = "" if middle == ends else f" ({ends})"
+        return f"limit {'in ' if self.days_apart is None else ''}{middle}{around}"
+
+    @property
+    def in_full(self) -> str:
+        """The forecast in one sentence for the page of the actuator, without a full stop."""
+        if self.past or self.left is None or self.left[1] <= 0.0 or len(self.logs) - self.trend.begin < FEWEST:
+            return f": {self.words}"
         low, middle, high = self.left
-        if middle <= 0.0:
-            return "past the limit"
-        logs = "log" if f"{middle:.0f}" == "1" else "logs"
-        return f"limit in {middle:.0f} {logs} ({span_of(low, high)})"
+        logs = f"about {middle:.0f} log{'' if round(middle) == 1 else 's'}"
+        if self.days_apart is None:
+            half = self.when(1, 3).removesuffix(" logs")
+            return f" reaches its limit in {logs} (50 %: {half}; 90 %: {span_of(low, high)})"
+        return f" reaches its limit in {logs}: {self.when(2, 2)} (50 %: {self.when(1, 3)}; 90 %: {self.when(0, 4)})"
 
 
 def span_of(low: float, high: float, horizon: float = HORIZON) -> str:

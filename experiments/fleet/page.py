@@ -9,7 +9,7 @@ import pandas as pd
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.rows import STATES, LogRow
 from experiments.page.names_shown import SHOWN
-from experiments.page.numbers import MISSING, fixed, number, shop_unit
+from experiments.page.numbers import MISSING, alike_in_digits, fixed, shop_unit
 from experiments.page.render import render_page
 from experiments.page.scripting import data_block
 from experiments.page.tables import Cell, Column, right
@@ -27,16 +27,19 @@ LEVELS = ("none", "minor", "major")
 MOST_NAMED = 5
 """Actuators that are named above the table [count]."""
 
+LEAST_OPEN, SHARE_OPEN = 3, 0.2
+"""Actuators without a verdict [count, fraction of all], from which the rig file is suspected."""
+
 SICK = ("over", "likely")
 """States of actuators that need work."""
 
 COLUMNS: Sequence[Mapping[str, Any]] = (
     {"label": "actuator", "kind": "name", "width": 7.7},
     {"label": "state", "kind": "state", "width": 11.3, "words": STATES},
-    {"label": "found", "kind": "text", "width": 12.5},
-    {"label": "worst", "kind": "text", "width": 11.2},
+    {"label": "found", "kind": "text", "width": 11.2},
+    {"label": "worst", "kind": "text", "width": 10.0},
     {"label": "of the limit", "kind": "number", "width": 6.5, "unit": "%"},
-    {"label": "outlook", "kind": "text", "width": 10.5},
+    {"label": "outlook", "kind": "text", "width": 13.0},
     {"label": "logs left", "kind": "number", "width": 5.5},
     {"label": "last log", "kind": "text", "width": 6.8},
     {"label": "logs", "kind": "number", "width": 4},
@@ -60,14 +63,20 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     """
     counts = Counter(row.state for row in rows)
     cells = [row_cells(row) for row in rows]
-    failed = [one for row in rows for one in row.logs if one.state == "failed"]
-    unread = [(one.file.rsplit("/", 1)[-1], one.named.actuator or MISSING, found_in(one)) for one in failed]
+    every = [one for row in rows for one in row.logs]
+    unread = [
+        (one.file.rsplit("/", 1)[-1], one.named.actuator or MISSING, found_in(one))
+        for one in every
+        if one.state == "failed"
+    ]
+    undated = [(one.file, one.named.problem) for one in every if one.named.problem]
     data = {"columns": COLUMNS, "rows": cells, "links": [links.get(row.name) for row in rows]}
     facts = {
         "source": source,
         "home": home,
         "title": title_of(rows),
         "sickest": sickest_of(rows),
+        "hint": rig_hint(rows),
         "counts": [(words, counts[name], name) for name, words in STATES.items() if counts[name]],
         "logs": sum(len(row.logs) for row in rows),
         "data": data_block(data),
@@ -76,6 +85,8 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
         "rows": len(rows),
         "unread_count": len(unread),
         "unread": pd.DataFrame(unread[:MOST_STILL], columns=list(UNREAD)),
+        "undated_count": len(undated),
+        "undated": pd.DataFrame(undated[:MOST_STILL], columns=["log", "why"]),
         "still": pd.DataFrame(cells[:MOST_STILL], columns=[column["label"] for column in COLUMNS]),
     }
     columns = [
@@ -85,7 +96,7 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     ]
     shown = [next((one for one in columns if one.source == each["label"]), each["label"]) for each in COLUMNS]
     named = (Column("log", words=lambda name: Cell(name, "name")), *UNREAD[1:])
-    return render_page("fleet/fleet.html", facts, {"still": shown, "unread": named}, {})
+    return render_page("fleet/fleet.html", facts, {"still": shown, "unread": named, "undated": (named[0], "why")}, {})
 
 
 def sickest_of(rows: Sequence[ActuatorRow]) -> list[str]:
@@ -108,17 +119,42 @@ def title_of(rows: Sequence[ActuatorRow]) -> str:
     rows : sequence of ActuatorRow
         In any order.
     """
-    counts = Counter(row.state for row in rows)
-    total = len(rows) - counts["failed"]
+    known = [row for row in rows if row.last.named.actuator]
+    alone = [row for row in rows if not row.last.named.actuator] if known else []
+    counts = Counter(row.state for row in known or rows)
+    total = len(known or rows) - counts["failed"]
     sick = sum(counts[name] for name in SICK)
-    near = f"; {counts['alarm']} {'nears' if counts['alarm'] == 1 else 'near'} one" if counts["alarm"] else ""
+    stray = sum(row.state in SICK for row in alone)
     if not total:
         return "No log could be read."
-    if total == 1:
-        return "The actuator nears a limit." if near else f"The actuator is past {'a' if sick else 'no'} limit."
-    if not sick:
-        return f"None of {total} actuators is past a limit{near}."
-    return f"{sick} of {total} actuators {'is' if sick == 1 else 'are'} past a limit{near}."
+    if total == 1 and not stray:
+        return (
+            "The actuator nears a limit." if counts["alarm"] else f"The actuator is past {'a' if sick else 'no'} limit."
+        )
+    more = [
+        f"; {counts['alarm']} {'nears' if counts['alarm'] == 1 else 'near'} one" if counts["alarm"] else "",
+        f"; {counts['unknown']} {'has' if counts['unknown'] == 1 else 'have'} no verdict" if counts["unknown"] else "",
+        f"; {stray} of {len(alone)} logs without an actuator {'is' if stray == 1 else 'are'} past one" if stray else "",
+    ]
+    who = f"{sick} of {total} actuators {'is' if sick == 1 else 'are'}" if sick else f"None of {total} actuators is"
+    return f"{who} past a limit{''.join(more)}."
+
+
+def rig_hint(rows: Sequence[ActuatorRow]) -> str:
+    """Return what to do where many actuators have no verdict; empty where few have none.
+
+    Parameters
+    ----------
+    rows : sequence of ActuatorRow
+        In any order.
+    """
+    unknown = [row for row in rows if row.state == "unknown" and not row.last.told]
+    if len(unknown) < LEAST_OPEN or len(unknown) < SHARE_OPEN * len(rows):
+        return ""
+    return (
+        f"{len(unknown)} of {len(rows)} actuators fit none of the nine conditions. If they are of another size than "
+        "the rig file says, move their logs into a folder of their own, and give its rig file (--rig)."
+    )
 
 
 def row_cells(row: ActuatorRow) -> list[Any]:
@@ -133,8 +169,8 @@ def row_cells(row: ActuatorRow) -> list[Any]:
     told = last.told  # the amounts of a model that does not fit are none of the actuator's
     share = round(100.0 * last.worst.share, 1) if last.worst is not None and told else None
     outlook = row.outlook
-    left = None if outlook is None or outlook.left is None else round(outlook.left[1], 1)
-    words = "" if outlook is None else outlook.words
+    left = None if outlook is None or outlook.left is None or not told else round(outlook.left[1], 1)
+    words = "" if outlook is None or not told else outlook.words
     return [
         row.name,
         row.state,
@@ -181,4 +217,5 @@ def worst_in(log: LogRow) -> str:
     if one is None:
         return ""
     scale, unit = shop_unit(one.unit)
-    return f"{SHOWN.get(one.name, one.name.replace('_', ' '))} {number(scale * one.value, 3)} {unit}"
+    shown, *_ = alike_in_digits(scale * one.value, [scale * one.low, scale * one.high], unit)
+    return f"{SHOWN.get(one.name, one.name.replace('_', ' '))} {shown} {unit}"

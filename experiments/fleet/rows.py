@@ -136,8 +136,6 @@ def log_rows(
 
 
 def _row(row: Mapping[str, Any], named: Named, limits: Mapping[str, float]) -> LogRow:
-    if named.problem:
-        return LogRow(row["file"], named, "failed", "", named.problem, {})
     amounts = _amounts(row["quantities"], limits)
     between = _between(row.get("against"))
     state = _state(row, amounts)

@@ -65,7 +65,7 @@ def fleet(
     from experiments.fleet.actuators import actuator_rows
     from experiments.fleet.log_pages import write_pages
     from experiments.fleet.outlook import read_maintenance
-    from experiments.fleet.page import fleet_page, sickest_of, title_of
+    from experiments.fleet.page import fleet_page, rig_hint, sickest_of, title_of
     from experiments.fleet.rows import log_rows
 
     limits, repairs = limits_of_options(limit or []), read_maintenance(maintenance)
@@ -94,6 +94,8 @@ def fleet(
     total = sum(len(row.logs) for row in rows)
     if failed:
         note(f"{failed} of {total} logs could not be read; the page says why")
+    if hint := rig_hint(rows):
+        note(f"warning: {hint}")
     first = sickest_of(rows)
     note(title_of(rows) + (f" Start with {', '.join(first)}." if first else ""))
     emit(f"{out / PAGE}")
@@ -107,6 +109,12 @@ def _warn(rows: "Sequence[ActuatorRow]", repairs: Mapping[str, Sequence[float]],
     alone = [one.file for one in every if not (one.named.actuator or one.named.problem)]
     if alone and unnamed:
         note(f"warning: {len(alone)} of {len(every)} files {unnamed}, so each has its own row, such as {alone[0]}")
+    undated = [one for one in every if one.named.problem]
+    if undated:
+        said = f"{undated[0].file}: {undated[0].named.problem}"
+        note(
+            f"warning: {len(undated)} of {len(every)} logs have no usable date, so each has its own row, such as {said}"
+        )
     known = {row.name: row for row in rows}
     for name in repairs:
         if name not in known:

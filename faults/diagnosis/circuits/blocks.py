@@ -36,6 +36,9 @@ STIRRED = 0.05
 """Share of a log's motor speed, root mean square, from which its first one is that of a machine that runs [fraction]: a
 motor passes through zero, and noise of logs that begin at rest is some 0.001."""
 
+FEWEST = 8
+"""Blocks of a log, at least [count]."""
+
 LONGEST = 30.0
 """Longest stretch of a log that is simulated [s]."""
 
@@ -188,10 +191,9 @@ def blocks_of(record: Record) -> Blocks:
     sample_time = pooled * record.sample_time
     block = max(2, round(BLOCK / sample_time))
     count = (len(record) // pooled - 1) // block
-    if count * block * sample_time < 2.0 * SETTLING or count < 8:
-        raise LogError(
-            f"a diagnosis needs a log of 8 blocks of {block * sample_time:g} s or more, got {record.duration:g} s"
-        )
+    if count * block * sample_time < 2.0 * SETTLING or count < FEWEST:
+        least = max(2.0 * SETTLING, FEWEST * block * sample_time)
+        raise LogError(f"a diagnosis needs a log of {least:.3g} s or more, got {record.duration:g} s")
     slow, rows = filled(record[PRESSURE]) if PRESSURE in record else (None, 1)
     given = record if slow is None or rows == 1 else record.replace(**{PRESSURE: slow})
     whole = {name: _pooled(given[name], pooled)[: count * block + 1] for name in record if name in _NEEDED}

@@ -37,7 +37,7 @@ def test_a_log_in_none_of_the_nine_conditions_is_a_mismatch_with_a_reason() -> N
     row = diagnosed(spoilt, RIG)
     assert row["outcome"] == "mismatch"
     assert row.get("found_condition") is None
-    assert "; in none of the nine conditions, the nearest is" in row["reason"]
+    assert "; the nearest of the nine conditions is" in row["reason"]
     assert row["reason"].startswith("; ".join(map(str, diagnose_log(spoilt, RIG).against)))
 
 

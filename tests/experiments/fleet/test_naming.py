@@ -60,6 +60,7 @@ def test_a_date_is_shown_with_hyphens_and_colons_and_what_is_none_as_it_was_give
         (["hall/20261122_0800_P-12.csv.gz", "hall/20261122_0900_P-12.csv.gz"], ["P-12", "P-12"]),
         (["P-7/log 2026-11-21.csv", "P-7/2026.11.22.csv", "P-8/log 2026-11-22.csv"], ["P-7", "P-7", "P-8"]),
         (["log_20261121.csv", "log_20261122.csv"], ["press 4", "press 4"]),
+        (["P-7_08.05.2026.csv", "P-7_01.06.2026_14-30-00.csv"], ["P-7", "P-7"]),
         (["A_20261121.csv", "A_20261122.csv", "A_20261123.csv", "A_20261124.csv", "notes.csv"], ["A"] * 4 + [""]),
     ],
 )
@@ -93,8 +94,8 @@ def test_one_bad_date_costs_its_own_log_a_name_and_no_other() -> None:
 
 
 def test_names_of_which_no_date_can_be_read_are_refused_with_the_file(tmp_path: Path) -> None:
-    with pytest.raises(HydrostateError, match=r"P_22.11.2026.csv: its name: date must be ISO 8601"):
-        by_pattern(["P_22.11.2026.csv", "notes.txt"], "{actuator}_{date}.csv")
+    with pytest.raises(HydrostateError, match=r"P_22-11-2026.csv: its name: date must be ISO 8601"):
+        by_pattern(["P_22-11-2026.csv", "notes.txt"], "{actuator}_{date}.csv")
     table = tmp_path / "names.csv"
     table.write_text("file,actuator,date\na.csv,P-1,22 Nov\n", encoding="utf-8")
     with pytest.raises(HydrostateError, match=r"a.csv: names.csv: date must be ISO 8601"):
@@ -116,3 +117,25 @@ def test_a_table_without_its_columns_is_refused_with_those_it_has(tmp_path: Path
         by_table([], table)
     with pytest.raises(HydrostateError, match="must be a CSV table"):
         by_table([], tmp_path / "absent.csv")
+
+
+def test_dates_with_dots_have_the_day_first() -> None:
+    found = by_pattern(["P_02.11.2026.csv", "P_2026-11-03.csv"], "{actuator}_{date}.csv")
+    first, second = found.values()
+    assert (first.date, first.day, second.place) == ("2026-11-02", "2026-11-02", (first.place or 0.0) + 1.0)
+
+
+def test_a_date_of_a_clock_that_was_never_set_places_no_log() -> None:
+    files = [f"P_2026-11-{day}.csv" for day in range(10, 22)]
+    wrong = ["P_1970-01-01.csv"]
+    found = by_pattern([*files, *wrong], "{actuator}_{date}.csv")
+    assert {found[file].actuator for file in files} == {"P"}
+    assert (found[wrong[0]].actuator, found[wrong[0]].place) == ("", None)
+    assert "its date 1970-01-01 is years away" in found[wrong[0]].problem
+    late = by_pattern([*files, "P_2062-11-01.csv"], "{actuator}_{date}.csv")["P_2062-11-01.csv"]
+    assert "its date 2062-11-01 is years away" in late.problem
+
+
+def test_a_fleet_that_stood_still_for_years_has_no_wrong_dates() -> None:
+    files = [f"P_{year}-11-{day}.csv" for year in (2016, 2026) for day in range(10, 14)]
+    assert {one.actuator for one in by_pattern(files, "{actuator}_{date}.csv").values()} == {"P"}

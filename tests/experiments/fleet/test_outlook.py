@@ -43,21 +43,38 @@ def test_an_actuator_that_grows_towards_its_limit_is_in_alarm_before_it_is_past(
 
 
 @pytest.mark.parametrize(
-    ("name", "step", "words"),
+    ("name", "words"),
     [
-        ("P-1_202601{:02d}.csv", 1, r"about \d+ days \(\d+ to (\d+|more than 300)\)"),
-        ("P-1_20260101_{:02d}00.csv", 1, r"about \d+ hours \(\d+ to (\d+|more than 300)\)"),
-        ("P-1_{}.csv", 7, ""),  # running hours
+        ("P-1_202601{:02d}.csv", r"limit \d+ January 2026 \(\d+ January to \d+ (January|February) 2026\)"),
+        ("P-1_20260101_{:02d}00.csv", r"limit 2026-01-\d\d \d\d:00 \(2026-01-\d\d \d\d:00 to 2026-01-\d\d \d\d:00\)"),
+        ("P-1_{}.csv", r"limit in \d+ logs \(\d+ to \d+\)"),  # running hours
     ],
 )
-def test_a_forecast_is_also_told_in_time_where_logs_have_dates(name: str, step: int, words: str) -> None:
-    files = [name.format(step * (place + 1)) for place in range(18)]
-    rows = [store_row(file, 1.0 + 0.09 * place) for place, file in enumerate(files)]
+def test_a_forecast_is_told_in_dates_where_logs_have_them_and_holds_the_crossing(name: str, words: str) -> None:
+    files = [name.format(place + 1) for place in range(18)]
+    rows = [store_row(file, 1.0 + 0.09 * place, 0.2) for place, file in enumerate(files)]
     (row,) = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {}))
     assert row.outlook is not None
     assert row.outlook.left is not None
-    assert re.fullmatch(words, row.outlook.time_left)
-    assert row.outlook.time_left in actuator_page(row, None)
+    assert row.outlook.left[0] < 2.0 / 0.09 - 17.0 < row.outlook.left[2]
+    assert re.fullmatch(words, row.outlook.words)
+    page = actuator_page(row, None).replace("\N{NO-BREAK SPACE}", " ")
+    assert re.search(r"Leakage reaches its limit in about \d logs.* \(50 %: .*; 90 %: .*\)\.</p>", page)
+    assert row.outlook.when(0, 4) in page
+
+
+def test_what_has_been_past_its_limit_since_a_log_says_so_even_if_its_logs_are_few() -> None:
+    files = [f"P-1_2026070{day}.csv" for day in range(1, 7)]
+    rows = [store_row(file, 1.0 if place < 4 else 3.6) for place, file in enumerate(files)]
+    (row,) = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {}))
+    assert row.outlook is not None
+    assert row.outlook.words == "past the limit since 2026-07-05"
+    undated = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_*"), {}))[0].outlook
+    assert undated is not None
+    assert undated.words == "past the limit for 2 logs"
+    always = actuator([4.0] * 5).outlook
+    assert always is not None
+    assert always.words == "past the limit in every log"
 
 
 def test_an_actuator_that_rests_is_in_no_alarm() -> None:
@@ -77,7 +94,7 @@ def test_few_logs_have_no_outlook_and_a_repair_makes_them_few() -> None:
 def test_what_is_past_its_limit_says_so() -> None:
     outlook = actuator(1.0 + 0.1 * np.arange(30)).outlook
     assert outlook is not None
-    assert outlook.words == "past the limit"
+    assert outlook.words == "past the limit since 21"
 
 
 def test_an_alarm_without_certain_growth_says_that_the_trend_is_past_the_limit() -> None:
@@ -126,8 +143,8 @@ def test_the_page_of_an_actuator_shows_every_severity_with_its_forecast() -> Non
     assert "<h1>P-1: nearing a limit.</h1>" in page
     assert page.count('class="charts"') == 2
     assert 'href="../pages/last.html"' in page
-    assert "Leakage: limit in" in page
-    assert "more than 300" in page
+    assert "Leakage reaches its limit in about" in page
+    assert "more than 300 logs" in page
 
 
 def test_a_repair_is_named_on_the_page() -> None:

@@ -11,7 +11,7 @@ import pytest
 from experiments.fleet.actuators import ActuatorRow, actuator_rows
 from experiments.fleet.log_pages import file_name, write_pages
 from experiments.fleet.naming import by_pattern
-from experiments.fleet.page import fleet_page, row_cells, sickest_of, title_of
+from experiments.fleet.page import fleet_page, rig_hint, row_cells, sickest_of, title_of
 from experiments.fleet.rows import STATES, log_rows
 from tests.experiments.fleet.conftest import between, store_row
 
@@ -43,6 +43,28 @@ def test_actuators_that_near_a_limit_are_in_the_title_and_named_where_none_is_pa
     assert title_of([near, sound]) == "None of 2 actuators is past a limit; 1 nears one."
     assert title_of([sick, near, near]) == "1 of 3 actuators is past a limit; 2 near one."
     assert sickest_of([sick, near]) == ["C"]
+
+
+def test_many_actuators_without_a_verdict_put_the_rig_file_in_doubt() -> None:
+    def rows(unknown: int) -> list[ActuatorRow]:
+        outcomes = ["mismatch"] * unknown + ["ok"] * (8 - unknown)
+        return actuator_rows(
+            log_rows([store_row(f"{i}.csv", 1.0, outcome=one) for i, one in enumerate(outcomes)], {}, {})
+        )
+
+    assert rig_hint(rows(2)) == ""
+    assert "3 of 8 actuators fit none of the nine conditions" in rig_hint(rows(3))
+    assert rig_hint(rows(3)) in fleet_page(rows(3), {}, "hall")
+    assert title_of(rows(3)) == "None of 8 actuators is past a limit; 3 have no verdict."
+
+
+def test_an_outlook_is_no_better_known_than_the_last_log() -> None:
+    files = [f"A_{place}.csv" for place in range(6)]
+    rows = [store_row(file, 3.6) for file in files[:5]]
+    rows.append(store_row(files[5], 3.6, outcome="mismatch", found_condition=None, reason="the pump is worn"))
+    (row,) = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {}))
+    _, state, _, _, _, outlook, left, *_ = row_cells(row)
+    assert (state, outlook, left) == ("unknown", "", None)
 
 
 def test_what_cannot_be_read_is_no_actuator_within_limits() -> None:

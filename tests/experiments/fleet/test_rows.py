@@ -7,6 +7,7 @@ import pytest
 
 from experiments.fleet.actuators import actuator_rows
 from experiments.fleet.naming import by_pattern
+from experiments.fleet.page import fleet_page, title_of
 from experiments.fleet.rows import STATES, log_rows
 from tests.experiments.fleet.conftest import between, store_row
 
@@ -58,11 +59,17 @@ def test_a_log_against_which_more_speaks_than_its_size_has_no_severities() -> No
     assert (row.state, row.told) == ("unknown", False)
 
 
-def test_a_log_whose_date_cannot_be_read_is_not_readable_and_says_why() -> None:
+def test_a_log_whose_date_cannot_be_read_has_a_row_of_its_own_and_keeps_its_verdict() -> None:
     files = ["A_2026-99-01.csv", "A_2026-11-22.csv"]
-    logs = log_rows([store_row(file, 4.0) for file in files], by_pattern(files, "{actuator}_{date}.csv"), {})
-    assert [(one.name, one.state) for one in actuator_rows(logs)] == [("A", "over"), (files[0], "failed")]
-    assert "must be ISO 8601 such as 2026-11-22, or a number, got '2026-99-01'" in logs[0].reason
+    rows = [store_row(files[0], 4.0), store_row(files[1], 1.0)]
+    logs = log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {})
+    found = actuator_rows(logs)
+    assert [(one.name, one.state) for one in found] == [(files[0], "over"), ("A", "within")]
+    assert "must be ISO 8601 such as 2026-11-22, or a number, got '2026-99-01'" in logs[0].named.problem
+    assert title_of(found) == "None of 1 actuators is past a limit; 1 of 1 logs without an actuator is past one."
+    page = fleet_page(found, {}, "hall")
+    assert "Logs without a usable date" in page
+    assert "could not be read" not in page
 
 
 def test_of_another_kind_of_actuator_the_condition_decides() -> None:

@@ -1,0 +1,132 @@
+"""Dates of logs: the day-first form, dates that a wrong clock wrote, and how a date to come is told."""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from experiments.fleet.naming import Named
+
+DAY_FIRST = re.compile(
+    r"(?<![0-9])(?P<day>0[1-9]|[12]\d|3[01])\.(?P<month>0[1-9]|1[0-2])\.(?P<year>(?:19|20)\d\d)(?![0-9])"
+)
+"""A date with dots, such as 22.11.2026: wherever dates are written with dots, the day comes first."""
+
+MONTHS = (
+    *("January", "February", "March", "April", "May", "June"),
+    *("July", "August", "September", "October", "November", "December"),
+)
+
+APART = 1000.0
+"""Longest time between two logs of a fleet; beyond it, the fewer logs have a wrong date [day]."""
+
+FEW = 0.1
+"""Share of logs that may have a wrong date; if more lie apart, the fleet has a gap and no wrong clock [fraction]."""
+
+HOURS, DAYS, PARTS = 2.0, 45.0, 730.0
+"""Up to which time ahead a date is told with its hour, with its day, and with the part of its month [day]."""
+
+LAST = datetime(9999, 1, 1, tzinfo=UTC)
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+def year_first(text: str) -> str:
+    """Return a text with each date of the day-first form as year, month, day.
+
+    Examples
+    --------
+    >>> year_first("P-12_22.11.2026"), year_first("P-12_2026-11-22")
+    ('P-12_2026-11-22', 'P-12_2026-11-22')
+    """
+    return DAY_FIRST.sub(r"\g<year>-\g<month>-\g<day>", text)
+
+
+def without_wrong_clocks(named: "Mapping[str, Named]") -> "dict[str, Named]":
+    """Take the date from the few logs whose date lies years before or after those of all others.
+
+    A logger whose clock was never set writes 1970 or 2000. Such a log would be the first or the last of its actuator.
+
+    Parameters
+    ----------
+    named : Mapping[str, Named]
+        By file.
+
+    Returns
+    -------
+    dict[str, Named]
+        By file; a log with a wrong date has a ``problem`` in place of an actuator and a date.
+    """
+    dated = sorted((one.place, file) for file, one in named.items() if one.in_days and one.place is not None)
+    groups: list[list[str]] = [[dated[0][1]]] if dated else []
+    for (before, _), (place, file) in pairwise(dated):
+        if place - before > APART:
+            groups.append([])
+        groups[-1].append(file)
+    most = max(groups, key=len, default=[])
+    far = [file for group in groups if group is not most for file in group]
+    if len(far) > FEW * len(dated):
+        return dict(named)
+    said = "its date {} is years away from those of all other logs: is the logger's clock set?"
+    wrong = {file: said.format(named[file].day) for file in far}
+    return {
+        file: replace(one, actuator="", date="", place=None, problem=wrong[file]) if file in wrong else one
+        for file, one in named.items()
+    }
+
+
+def told_date(place: float, ahead: float) -> str:
+    """Return a date as precisely as a forecast deserves it.
+
+    Parameters
+    ----------
+    place : float
+        Days since 1970-01-01 [day].
+    ahead : float
+        How far from the last log it is [day].
+
+    Examples
+    --------
+    >>> told_date(20530.0, 9.0), told_date(20530.0, 100.0), told_date(20530.0, 900.0)
+    ('18 March 2026', 'mid March 2026', '2026')
+    >>> told_date(20530.6, 1.0)
+    '2026-03-18 14:00'
+    """
+    date = min(EPOCH + timedelta(days=min(place, 2.9e6)), LAST)
+    if ahead < HOURS:
+        return f"{date:%Y-%m-%d %H:00}"
+    month = f"{MONTHS[date.month - 1]} {date.year}"
+    if ahead < DAYS:
+        return f"{date.day} {month}"
+    return f"{('early', 'mid', 'late')[min((date.day - 1) // 10, 2)]} {month}" if ahead < PARTS else str(date.year)
+
+
+def told_dates(places: Iterable[float], ahead: Iterable[float]) -> str:
+    """Return the interval of a date to come in words.
+
+    Parameters
+    ----------
+    places : iterable of float
+        Its two ends, infinite beyond the horizon [day].
+    ahead : iterable of float
+        How far from the last log each is [day].
+
+    Examples
+    --------
+    >>> told_dates([20490.0, 20560.0], [60.0, 130.0]), told_dates([20490.0, float("inf")], [60.0, float("inf")])
+    ('early February to mid April 2026', 'early February 2026 or later')
+    >>> told_dates([20490.0, 20491.0], [60.0, 61.0])
+    'early February 2026'
+    """
+    (low, high), (first, last) = places, ahead
+    if low == float("inf"):
+        return "not within sight"
+    begin = told_date(low, first)
+    if high == float("inf"):
+        return f"{begin} or later"
+    end = told_date(high, last)
+    year = f" {end[-4:]}"
+    short = begin.removesuffix(year) if begin.endswith(year) and end != begin else begin
+    return begin if begin == end else f"{short} to {end}"
