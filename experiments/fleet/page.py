@@ -37,9 +37,9 @@ COLUMNS: Sequence[Mapping[str, Any]] = (
     {"label": "actuator", "kind": "name", "width": 7.7},
     {"label": "state", "kind": "state", "width": 11.3, "words": STATES},
     {"label": "found", "kind": "text", "width": 11.2},
-    {"label": "worst", "kind": "text", "width": 10.0},
+    {"label": "worst", "kind": "text", "width": 11.2},
     {"label": "of the limit", "kind": "number", "width": 6.5, "unit": "%"},
-    {"label": "outlook", "kind": "text", "width": 13.0},
+    {"label": "outlook", "kind": "text", "width": 11.8},
     {"label": "logs left", "kind": "number", "width": 5.5},
     {"label": "last log", "kind": "text", "width": 6.8},
     {"label": "logs", "kind": "number", "width": 4},
@@ -120,9 +120,10 @@ def title_of(rows: Sequence[ActuatorRow]) -> str:
         In any order.
     """
     known = [row for row in rows if row.last.named.actuator]
-    alone = [row for row in rows if not row.last.named.actuator] if known else []
-    counts = Counter(row.state for row in known or rows)
-    total = len(known or rows) - counts["failed"]
+    known = known if 2 * len(known) >= len(rows) else list(rows)
+    alone = [row for row in rows if row not in known]
+    counts = Counter(row.state for row in known)
+    total = len(known) - counts["failed"]
     sick = sum(counts[name] for name in SICK)
     stray = sum(row.state in SICK for row in alone)
     if not total:
@@ -170,7 +171,7 @@ def row_cells(row: ActuatorRow) -> list[Any]:
     share = round(100.0 * last.worst.share, 1) if last.worst is not None and told else None
     outlook = row.outlook
     left = None if outlook is None or outlook.left is None or not told else round(outlook.left[1], 1)
-    words = "" if outlook is None or not told else outlook.words
+    words = "" if outlook is None or not told else outlook.words.replace("past the limit ", "past ", 1)
     return [
         row.name,
         row.state,

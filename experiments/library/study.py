@@ -14,7 +14,7 @@ from experiments.library.sentences import clock_sentences, order_sentences, stru
 from experiments.library.structures import clock_table, order_and_bandwidth, structure_table
 from experiments.library.tables import library_table, response_table, root_table
 from experiments.page.frames import Rows, Tables, tabled
-from experiments.page.numbers import fixed, number
+from experiments.page.numbers import decimals_of, fixed
 from experiments.page.tables import Cell, Column, Columns, Row, right
 from experiments.page.words import CONDITION
 from experiments.published.library import library_models
@@ -43,7 +43,10 @@ def _find(settings: Seeded, track: Track) -> Found:
 
 def _facts(tables: Tables, _: Seeded) -> Mapping[str, Any]:
     """Return the report's sentences, and the roots with one row a condition."""
+    ours = tables["structures"].query("structure == 'output-error'")
     return {
+        "best": int(ours["best"].sum()),
+        "conditions": len(ours),
         "structure_sentences": structure_sentences(tables["structures"]),
         "order_sentences": order_sentences(tables["orders"]),
         "clock_sentences": clock_sentences(tables["clocks"]),
@@ -61,10 +64,14 @@ def _roots(frame: pd.DataFrame) -> Rows:
 
 
 def _root(root: Row) -> str:
-    text = f"{number(root['real'])} ± {number(root['real_spread'], 1)}"
-    if abs(root["imag"]) > 0.0:
-        text += f", {number(root['imag'])} i ± {number(root['imag_spread'], 1)}"
-    return text
+    text = _with_spread(root["real"], root["real_spread"])
+    return f"{text}, {_with_spread(root['imag'], root['imag_spread'])} i" if abs(root["imag"]) > 0.0 else text
+
+
+def _with_spread(value: float, spread: float) -> str:
+    """Return a number with what it may be off by, both with the decimals of the latter's first digit."""
+    decimals = decimals_of(0.0, 5.0 * spread, 5)
+    return f"{fixed(value, decimals)} ± {fixed(spread, decimals)}"
 
 
 def _gain(row: Row) -> Cell:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from estimation.finding import Outcome
 from estimation.notes import ChannelCode, EstimateCode
 from experiments.command.terminal import clauses
 from experiments.log_pages.channel_charts import channel_charts
@@ -62,13 +63,16 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
     to_do = [*left_unread(result), *(sentence(str(note)) for note in (*found.advice, *unlike))]
     noted = [sentence(one["text"]) for one in result["notes"]]
     against = list(dict.fromkeys(map(str, (*found.against, *found.gate.reasons))))
-    message = _shortened(result["message"], against)
+    title = _title(found)
+    message = _beyond(title, _shortened(result["message"], against))
+    opening = (title, message)
+    rows = [_row(name, one) for name, one in shown.items()]
     facts = {
         "result": result,
         "file": file,
-        "title": _title(found),
+        "title": title,
         "actuator": ACTUATORS.get(found.actuator, found.actuator),
-        "message": sentence(message),
+        "message": sentence(message) if message else "",
         "to_do": to_do,
         "doubts": [
             sentence(one)
@@ -78,15 +82,27 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
         "doubted": bool(against),
         "duration": f"{record.duration:g}",
         "channels": ", ".join(found.channels),
-        "notes": [one for one in noted if one not in (*to_do, *map(sentence, against))],
-        "quantities": pd.DataFrame([_row(name, one) for name, one in shown.items()]),
+        "notes": [
+            one
+            for one in noted
+            if one not in (*to_do, *map(sentence, against)) and not any(one.rstrip(".") in each for each in opening)
+        ],
+        "quantities": pd.DataFrame(rows),
         "probabilities": pd.DataFrame(
             [(in_words(name), percent_text(share)) for name, share in shares if share >= LEAST_SHARE],
             columns=["condition", "percent"],
         ),
         "charts": {"measured": channel_charts(record, found, Path(file).stem)},
     }
-    return render_page("log_pages/finding.html", facts, COLUMNS, {})
+    with_total = any(row["total"] != MISSING for row in rows)
+    columns = {**COLUMNS, "quantities": COLUMNS["quantities"][: None if with_total else -1]}
+    return render_page("log_pages/finding.html", facts, columns, {})
+
+
+def _beyond(title: str, message: str) -> str:
+    """Return of a message what the title does not say; all of it where the title says none of it."""
+    rest = message.removeprefix(f"{title[:1].lower()}{title[1:].rstrip('.')}; ")
+    return "" if sentence(rest) == title else rest
 
 
 def _shortened(message: str, against: Sequence[str]) -> str:
@@ -108,7 +124,7 @@ def _title(found: "Finding") -> str:
     if found.unknown:
         return "No verdict: the log does not fit any known condition."
     if len(found.named) == 1 and found.named[0] in SOUND:
-        return sentence(f"Found: {found.faults[0]}" if found.faults else SOUND[found.named[0]])
+        return sentence(str(found.faults[0]) if found.faults else SOUND[found.named[0]])
     if found.named:
         return f"Found: {either(found.named)}."
     oil = found.quantities.get("bulk_modulus")
@@ -117,15 +133,17 @@ def _title(found: "Finding") -> str:
     if any(one.value is not None for one in found.quantities.values()):
         passed = "which passed the consistency check" if found.gate.passed else "but do not rely on them"
         return f"Estimated values, {passed}."
-    return "No values: the log contains too little, or the model does not fit it."
+    if found.outcome is Outcome.MISMATCH:
+        return "No values: the model does not fit the log."
+    return "No values: the log contains too little."
 
 
 def _row(name: str, one: "Quantity") -> dict[str, str]:
-    _, unit = shop_unit(one.unit)
+    _, unit = _shown_unit(one.unit)
     value, *ends = _in_digits(one.value, one.ci95, one.unit)
     _, *total = _in_digits(one.value, one.ci95_total, one.unit)
     return {
-        "quantity": f"{name.replace('_', ' ')}{f' [{_whole(pretty_unit(unit))}]' if unit != '1' else ''}",
+        "quantity": f"{name.replace('_', ' ')} [{_whole(pretty_unit(unit))}]",
         "value": value,
         "interval": " to ".join(ends) or MISSING,
         "total": " to ".join(total) or MISSING,
@@ -133,9 +151,14 @@ def _row(name: str, one: "Quantity") -> dict[str, str]:
 
 
 def _in_digits(value: float | None, interval: tuple[float, float] | None, si_unit: str) -> list[str]:
-    scale, unit = shop_unit(si_unit)
+    scale, unit = _shown_unit(si_unit)
     ends = None if interval is None else [scale * end for end in interval]
     return [_whole(one) for one in alike_in_digits(None if value is None else scale * value, ends, unit)]
+
+
+def _shown_unit(si_unit: str) -> tuple[float, str]:
+    """Return the factor to the unit of the page, and that unit; shares are told in percent."""
+    return (100.0, "%") if si_unit == "1" else shop_unit(si_unit)
 
 
 def _whole(shown: str) -> str:

@@ -46,12 +46,12 @@ def _bulk_modulus_sentence(found: Mapping[Experiment, Recovery], truth: float) -
     second = (
         ""
         if alone.worst_error_percent is None
-        else f", and {alone.worst_error_percent:.2g} % with position and velocity alone on the nine steps"
+        else f" Without pressure, the error on the nine steps is at most {alone.worst_error_percent:.2g} %."
     )
     return (
-        f"With differential pressure logged, effective bulk modulus comes back in {conditions} of {sine.conditions} "
-        f"conditions from every first guess: {mean / 1e6:.1f} MPa on average, the truth being {truth / 1e6:.1f} MPa, "
-        f"and the worst of {sine.estimates + steps.estimates} estimates is {worst:.2g} % off{second}."
+        f"With differential pressure logged, bulk modulus is found in {conditions} of {sine.conditions} conditions from "
+        f"every first guess: {mean / 1e6:.1f} MPa on average, where {truth / 1e6:.1f} MPa is right. The worst of "
+        f"{sine.estimates + steps.estimates} estimates is {worst:.2g} % off.{second}"
     )
 
 
@@ -59,16 +59,16 @@ def _class_sentence(classes: tuple[ClassAccuracy, ...]) -> str:
     percent = {bank: tuple(f"{entry.percent:.3g} %" for entry in classes if entry.bank == bank) for bank in BANKS}
     nominal, spread = percent[WITH_PRESSURE]
     return (
-        f"The fault class is right in {nominal} of {classes[0].runs} runs with the tables' parameters, and in {spread} "
-        "with parameters spread around them, by mathematical models with pressure logged; without pressure these are "
-        f"{' and '.join(percent[WITHOUT_PRESSURE])}, by transfer functions {' and '.join(percent[TRANSFER_FUNCTIONS])}."
+        f"With pressure logged, mathematical models name the right condition in {nominal} of {classes[0].runs} runs, "
+        f"and in {spread} if leakage, friction and oil differ at random from the models. Without pressure these shares "
+        f"are {' and '.join(percent[WITHOUT_PRESSURE])}; transfer functions reach "
+        f"{' and '.join(percent[TRANSFER_FUNCTIONS])}."
     )
 
 
 def _limit_sentence(stuck: Recovery, published: Recovery) -> str:
     return (
-        f"Where the 10 Hz sine moves a piston that sticks and no pressure is logged, bulk modulus is not observable in "
-        f"{len(stuck.unobservable)} of {stuck.conditions} conditions, and the published filter recovers it in "
-        f"{published.recovered} of {published.conditions}: log differential pressure, or drive with larger, slower "
-        f"steps."
+        f"A 10 Hz sine without a pressure sensor does not show bulk modulus in {len(stuck.unobservable)} of "
+        f"{stuck.conditions} conditions, because friction holds the piston. There the published filter finds it in "
+        f"{published.recovered} of {published.conditions}. Log differential pressure, or drive with larger, slower steps."
     )

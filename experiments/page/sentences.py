@@ -13,10 +13,10 @@ def rig_in_words(name: str) -> str:
     Examples
     --------
     >>> rig_in_words("bench 7"), rig_in_words("paper")
-    ('rig bench 7', "the paper's actuator assumed (no rig file, or one still named paper)")
+    ('rig bench 7', "no rig file of your own: the paper's actuator is assumed")
     """
     if name == UNNAMED:
-        return f"the paper's actuator assumed (no rig file, or one still named {name})"
+        return "no rig file of your own: the paper's actuator is assumed"
     return f"rig {name}"
 
 

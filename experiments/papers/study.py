@@ -15,7 +15,7 @@ from experiments.page.tables import Cell, Column, Columns, Row, right
 from experiments.papers.claims import PAPERS, all_rows, figure_table, row_table
 from experiments.papers.figures import PAPERS_FIGURES
 from experiments.papers.parts import PapersSettings, gather, quick_papers
-from experiments.papers.verdict import TONES, Drawn, Verdict
+from experiments.papers.verdict import MISSED, TONES, Drawn, Verdict
 from experiments.running.progress import Track, in_one_piece
 from experiments.running.study import Found, Study
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
@@ -74,6 +74,10 @@ def _facts(tables: Tables, settings: PapersSettings) -> Mapping[str, Any]:
         "papers": {paper: (PAPERS[paper], name) for paper, name in SECTIONS.items()},
         "drawn": {kind.value: int((figures["drawn"] == kind.value).sum()) for kind in Drawn},
         "count": len(rows),
+        "agreed": int((~rows["verdict"].isin(MISSED)).sum()),
+        "missed": int((rows["verdict"] == Verdict.NOT_REPRODUCED).sum()),
+        "errata_count": int((rows["verdict"] == Verdict.ERRATUM).sum()),
+        "empty": int(rows["ours"].isna().sum()),
         "quick": settings == quick_papers(settings.seed),
     }
 

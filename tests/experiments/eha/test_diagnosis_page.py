@@ -86,7 +86,7 @@ def test_severities_of_which_the_log_says_nothing_are_in_no_state(diagnosed: tup
 
 
 def test_a_page_says_with_which_actuator_a_log_was_compared(page: str, diagnosed: tuple[Finding, Record]) -> None:
-    assert "diagnosis of run.csv, the paper&#39;s actuator assumed (no rig file" in page
+    assert "diagnosis of run.csv, no rig file of your own: the paper&#39;s actuator is assumed" in page
     found, log = diagnosed
     named = diagnosis_page({"file": "run.csv", "rig": "bench 7", **diagnosis_entries(found)}, found, log)
     assert "diagnosis of run.csv, rig bench 7<" in named

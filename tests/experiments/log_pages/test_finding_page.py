@@ -7,7 +7,7 @@ import pytest
 from estimation.finding import Finding, Gate, Outcome, Quantity
 from estimation.notes import ChannelCode, EstimateCode
 from experiments.log_pages.entries import message_of
-from experiments.log_pages.finding_page import _row, _shortened, _title
+from experiments.log_pages.finding_page import _beyond, _row, _shortened, _title
 
 PASSED, DOUBTED = Gate(True, ()), Gate(False, (EstimateCode.DIVERGED.note(),))
 
@@ -29,7 +29,11 @@ def found(**changes: object) -> Finding:
         ({}, "Bulk modulus is 207 MPa; the consistency check passed."),
         ({"quantities": {"load": Quantity(2.0, "N")}}, "Estimated values, which passed the consistency check."),
         ({"gate": DOUBTED}, "Estimated values, but do not rely on them."),
-        ({"quantities": {"bulk_modulus": Quantity(None, "Pa")}}, "No values: the log contains too little"),
+        ({"quantities": {"bulk_modulus": Quantity(None, "Pa")}}, "No values: the log contains too little."),
+        (
+            {"quantities": {"bulk_modulus": Quantity(None, "Pa")}, "outcome": Outcome.MISMATCH},
+            "No values: the model does not fit the log.",
+        ),
         ({"condition": "minor_leakage", "probabilities": {"minor_leakage": 0.9}}, "Found: minor leakage."),
         ({"condition": "minor_leakage", "unknown": True}, "No verdict: the log does not fit any known condition."),
         (
@@ -71,3 +75,14 @@ def test_bulk_modulus_is_given_in_mpa_and_no_number_breaks_before_its_power_of_t
     small = _row("spring", Quantity.normal(2.5e-11, 1e-13, "m/N"))
     assert " " not in small["value"]
     assert small["interval"].split(" ")[1] == "to"
+
+
+def test_what_the_title_says_is_not_said_again() -> None:
+    assert _beyond("Air in the oil: 4.9 %.", "air in the oil: 4.9 %; leakage is normal") == "leakage is normal"
+    assert _beyond("Found: minor leakage.", "minor leakage; it grows") == "minor leakage; it grows"
+    assert _beyond("No fault.", "no fault") == ""
+
+
+def test_a_share_is_told_in_percent() -> None:
+    row = _row("air_fraction", Quantity.normal(0.049, 1e-5, "1"))
+    assert (row["quantity"], row["value"], row["interval"]) == ("air fraction [%]", "4.900", "4.898 to 4.902")

@@ -77,4 +77,4 @@ def test_the_verdict_quotes_the_tables(study: Found) -> None:
     worst = max(found[key].worst_error_percent or 0.0 for key in (PRESSURE_SINE, PRESSURE_STEPS))
     assert f"{worst:.2g} % off" in bulk
     assert f"{100.0 * study.tables['classification']['accuracy'].iloc[0]:.3g} % of 9 runs" in classes
-    assert f"not observable in {len(found[POSITION_SINE].unobservable)} of 9 conditions" in limits
+    assert f"does not show bulk modulus in {len(found[POSITION_SINE].unobservable)} of 9 conditions" in limits
