@@ -15,7 +15,7 @@ from experiments.command.json_output import Result
 from experiments.command.terminal import short_names, table
 from experiments.log_pages.entries import BLANK, finding_entries, quantity_entry
 from experiments.log_pages.screens import messages_shown
-from experiments.page.numbers import percent_text
+from experiments.page.numbers import percent_text, reader_unit
 from faults.diaphragm_motor.diagnose import Match
 from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS, motor_with_fault
 from faults.diaphragm_motor.finding import motor_fault_finding, severity_of
@@ -130,7 +130,9 @@ def _faults_shown(results: Sequence[Result], options: Options) -> "Iterable[Rend
             size = one["severity"]
             cells = ("-", "-", "-")
             if size is not None:
-                cells = (f"{size['value']:.3g}", f"{size['ci95'][0]:.3g} to {size['ci95'][1]:.3g}", size["unit"])
+                scale, unit = reader_unit(size["unit"])
+                value, low, high = (f"{scale * each:.3g}" for each in (size["value"], *size["ci95"]))
+                cells = (value, f"{low} to {high}", unit)
             shown.add_row(name, one["fault"].replace("_", " "), percent_text(one["probability"]), *cells)
     yield shown
     yield from messages_shown(results)

@@ -12,7 +12,7 @@ from experiments.command.terminal import clauses
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.log_pages.entries import SOUND, either
 from experiments.page.condition_names import in_words
-from experiments.page.numbers import MISSING, alike_in_digits, number, percent_text, pretty_unit, shop_unit
+from experiments.page.numbers import MISSING, alike_in_digits, number, percent_text, pretty_unit, reader_unit
 from experiments.page.render import render_page
 from experiments.page.sentences import left_unread, sentence
 from experiments.page.tables import Column
@@ -139,7 +139,7 @@ def _title(found: "Finding") -> str:
 
 
 def _row(name: str, one: "Quantity") -> dict[str, str]:
-    _, unit = _shown_unit(one.unit)
+    _, unit = reader_unit(one.unit)
     value, *ends = _in_digits(one.value, one.ci95, one.unit)
     _, *total = _in_digits(one.value, one.ci95_total, one.unit)
     return {
@@ -151,14 +151,9 @@ def _row(name: str, one: "Quantity") -> dict[str, str]:
 
 
 def _in_digits(value: float | None, interval: tuple[float, float] | None, si_unit: str) -> list[str]:
-    scale, unit = _shown_unit(si_unit)
+    scale, unit = reader_unit(si_unit)
     ends = None if interval is None else [scale * end for end in interval]
     return [_whole(one) for one in alike_in_digits(None if value is None else scale * value, ends, unit)]
-
-
-def _shown_unit(si_unit: str) -> tuple[float, str]:
-    """Return the factor to the unit of the page, and that unit; shares are told in percent."""
-    return (100.0, "%") if si_unit == "1" else shop_unit(si_unit)
 
 
 def _whole(shown: str) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.command.json_output import Result
 from experiments.command.terminal import table
-from experiments.page.numbers import percent_text
+from experiments.page.numbers import percent_text, reader_unit
 from experiments.page.sentences import sentence
 
 if TYPE_CHECKING:
@@ -30,10 +30,11 @@ def quantities_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "
         total = any(entry.get("ci95_total") for entry in entries.values())
         shown = table("quantity", "value", "95 % interval", *(["with rig error"] if total else []), "unit", title=about)
         for name, entry in entries.items():
-            ends, whole = entry["ci95"], entry.get("ci95_total")
-            value = "-" if entry["value"] is None else f"{entry['value']:.{_digits(ends)}g}"
+            scale, unit = reader_unit(entry["unit"])
+            ends, whole = (_scaled(entry.get(which), scale) for which in ("ci95", "ci95_total"))
+            value = "-" if entry["value"] is None else f"{scale * entry['value']:.{_digits(ends)}g}"
             said = [_ends(ends), *([_ends(whole)] if total else [])]
-            shown.add_row(name.replace("_", " "), value, *said, entry["unit"])
+            shown.add_row(name.replace("_", " "), value, *said, unit)
         yield shown
         sure = result.get("probabilities", {}).get(result.get("condition"))
         probable = "" if sure is None else f", probability {percent_text(sure)} %"
@@ -61,6 +62,10 @@ def _digits(ends: Sequence[float] | None) -> int:
         return 4
     whole = min(floor(log10(largest)) + 1, 6)
     return min(max(4, whole, ceil(log10(largest / (ends[1] - ends[0]))) + 2), 12)
+
+
+def _scaled(ends: Sequence[float] | None, scale: float) -> list[float] | None:
+    return None if ends is None else [scale * end for end in ends]
 
 
 def _ends(ends: Sequence[float] | None) -> str:

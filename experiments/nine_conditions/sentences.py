@@ -49,8 +49,8 @@ def _bulk_modulus_sentence(found: Mapping[Experiment, Recovery], truth: float) -
         else f" Without pressure, the error on the nine steps is at most {alone.worst_error_percent:.2g} %."
     )
     return (
-        f"With differential pressure logged, bulk modulus is found in {conditions} of {sine.conditions} conditions from "
-        f"every first guess: {mean / 1e6:.1f} MPa on average, where {truth / 1e6:.1f} MPa is right. The worst of "
+        f"With differential pressure logged, bulk modulus is found in {conditions} of {sine.conditions} conditions "
+        f"from every first guess: {mean / 1e6:.1f} MPa on average, where {truth / 1e6:.1f} MPa is right. The worst of "
         f"{sine.estimates + steps.estimates} estimates is {worst:.2g} % off.{second}"
     )
 
@@ -70,5 +70,6 @@ def _limit_sentence(stuck: Recovery, published: Recovery) -> str:
     return (
         f"A 10 Hz sine without a pressure sensor does not show bulk modulus in {len(stuck.unobservable)} of "
         f"{stuck.conditions} conditions, because friction holds the piston. There the published filter finds it in "
-        f"{published.recovered} of {published.conditions}. Log differential pressure, or drive with larger, slower steps."
+        f"{published.recovered} of {published.conditions}. Log differential pressure, or drive with larger, slower "
+        "steps."
     )

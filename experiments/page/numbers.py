@@ -170,6 +170,22 @@ def exact(value: float) -> str:
     return (shown.rstrip("0").rstrip(".") if "." in shown else shown) + times + power
 
 
+def reader_unit(unit: str) -> tuple[float, str]:
+    """Return the unit in which a reader is told a quantity: that of a workshop, and percent for shares.
+
+    Returns
+    -------
+    tuple of float and str
+        Factor from SI, and the unit.
+
+    Examples
+    --------
+    >>> reader_unit("1"), reader_unit("N")
+    ((100.0, '%'), (1.0, 'N'))
+    """
+    return (100.0, "%") if unit == "1" else shop_unit(unit)
+
+
 def shop_unit(unit: str) -> tuple[float, str]:
     """Return the unit in which a workshop reads a severity.
 

@@ -94,7 +94,7 @@ _ALL = (
         "valve_leak",
         "valve_leak",
         _opened,
-        "opening of the shut valve; 1 is stuck open",
+        "opening of the shut valve; 100 % is stuck open",
         (0.0, 0.01, 0.02, 0.04, 0.07, 0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.0),
     ),
     *_at_each_place(
@@ -110,7 +110,7 @@ _ALL = (
         "depolarised",
         "polarisation",
         _reduced,
-        "share of its drive that the diaphragm has lost; 1 is dead",
+        "share of its drive that the diaphragm has lost; 100 % is dead",
         (0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0),
     ),
     *_at_each_place(

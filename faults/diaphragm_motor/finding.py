@@ -150,12 +150,13 @@ def _remedy(match: Match) -> Note:
 
 def _fault(match: Match) -> Note:
     fault = MOTOR_FAULTS[match.name]
-    low, high = match.interval
+    scale = 100.0 if fault.unit == "1" else 1.0
+    low, high = (scale * end for end in match.interval)
     return MotorFaultCode.FAULT_FOUND.note(
         fault=match.name.replace("_", " "),
         meaning=fault.meaning,
-        severity=match.severity,
+        severity=scale * match.severity,
         low=low,
         high=high,
-        unit="" if fault.unit == "1" else f" {fault.unit}",
+        unit=" %" if fault.unit == "1" else f" {fault.unit}",
     )

@@ -58,3 +58,14 @@ def test_a_diagnosis_says_how_probable_its_condition_is_and_what_to_do_next() ->
     assert "run.csv: ok: said, probability 87.3 %" in found
     assert "run.csv: next: look at the seal" in found
     assert "probability" not in shown({**said, "condition": None}, value=1e4, ci95=None)
+
+
+def test_a_share_is_told_in_percent_and_a_pressure_as_gauges_show_it() -> None:
+    entries = {
+        "air_fraction": {"value": 0.049, "ci95": [0.0489, 0.0491], "unit": "1"},
+        "bulk_modulus": {"value": 2.07e8, "ci95": [2.06e8, 2.08e8], "unit": "Pa"},
+    }
+    lines = shown({"quantities": entries}).splitlines()
+    air, oil = (next(line.split() for line in lines if name in line) for name in ("air", "bulk"))
+    assert air == ["air", "fraction", "4.9", "4.89", "to", "4.91", "%"]
+    assert oil == ["bulk", "modulus", "207", "206", "to", "208", "MPa"]
