@@ -12,6 +12,7 @@ from experiments.command.terminal import clauses
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.log_pages.entries import SOUND, either
 from experiments.page.condition_names import in_words
+from experiments.page.names_shown import quantity_name
 from experiments.page.numbers import MISSING, alike_in_digits, number, percent_text, pretty_unit, reader_unit
 from experiments.page.render import render_page
 from experiments.page.sentences import left_unread, sentence
@@ -65,7 +66,7 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
     against = list(dict.fromkeys(map(str, (*found.against, *found.gate.reasons))))
     title = _title(found)
     message = _beyond(title, _shortened(result["message"], against))
-    opening = (title, message)
+    opening = (title, sentence(message)) if message else (title,)
     rows = [_row(name, one) for name, one in shown.items()]
     facts = {
         "result": result,
@@ -143,7 +144,7 @@ def _row(name: str, one: "Quantity") -> dict[str, str]:
     value, *ends = _in_digits(one.value, one.ci95, one.unit)
     _, *total = _in_digits(one.value, one.ci95_total, one.unit)
     return {
-        "quantity": f"{name.replace('_', ' ')} [{_whole(pretty_unit(unit))}]",
+        "quantity": f"{quantity_name(name)} [{_whole(pretty_unit(unit))}]",
         "value": value,
         "interval": " to ".join(ends) or MISSING,
         "total": " to ".join(total) or MISSING,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.command.json_output import Result
 from experiments.command.terminal import table
+from experiments.page.names_shown import quantity_name
 from experiments.page.numbers import percent_text, reader_unit
 from experiments.page.sentences import sentence
 
@@ -34,7 +35,7 @@ def quantities_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "
             ends, whole = (_scaled(entry.get(which), scale) for which in ("ci95", "ci95_total"))
             value = "-" if entry["value"] is None else f"{scale * entry['value']:.{_digits(ends)}g}"
             said = [_ends(ends), *([_ends(whole)] if total else [])]
-            shown.add_row(name.replace("_", " "), value, *said, unit)
+            shown.add_row(quantity_name(name), value, *said, unit)
         yield shown
         sure = result.get("probabilities", {}).get(result.get("condition"))
         probable = "" if sure is None else f", probability {percent_text(sure)} %"

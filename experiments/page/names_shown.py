@@ -11,3 +11,14 @@ SHOWN: Mapping[str, str] = {
     "entrained_air": "entrained air",
 }
 """What each severity is called in short."""
+
+
+def quantity_name(name: str) -> str:
+    """Return what a table calls a quantity.
+
+    Examples
+    --------
+    >>> quantity_name("coulomb_friction"), quantity_name("air_fraction")
+    ('Coulomb friction', 'air fraction')
+    """
+    return name.replace("_", " ").replace("coulomb", "Coulomb")
