@@ -31,7 +31,10 @@ T = 2e-3
 """Sample time of the logs [s]."""
 
 LONG = {
-    "estimate": ("at_rest", "far_off", "frozen_encoder", "frozen_pressure", "frozen_velocity", "healthy", "stuck"),
+    "estimate": (
+        *("at_rest", "far_off", "faulty", "frozen_encoder", "frozen_pressure", "frozen_velocity", "healthy", "stuck"),
+        "under_load",
+    ),
     "diagnose": ("dead_pressure", "far_off", "frozen_encoder", "frozen_pressure"),
 }
 """Logs that take seconds each, or of which a verb says what it says of another: a call of the slow tests consists of

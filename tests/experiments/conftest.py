@@ -6,10 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from experiments.diaphragm_motor.study import DIAPHRAGM_MOTOR
+from experiments.diaphragm_motor.study import RIG, SWEEPS, claim_tables
 from experiments.motor_paper.study import MOTOR_PAPER
 from experiments.nine_conditions.figures import FIGURES
 from experiments.nine_conditions.settings import StudySettings
@@ -17,6 +18,7 @@ from experiments.nine_conditions.study import NINE_CONDITIONS
 from experiments.page import figure_files
 from experiments.page.frames import Tables
 from experiments.page.style import styled
+from experiments.piezo_stack import study as stack_study
 from experiments.piezo_stack.study import PIEZO_STACK, StackSettings
 from experiments.running.progress import untracked
 from experiments.running.study import Found, Seeded, write_result
@@ -46,21 +48,34 @@ def study() -> Found:
     return NINE_CONDITIONS.find(SMALL, untracked)
 
 
-@pytest.fixture(scope="session")
-def drawn(study: Found) -> dict[str, Figure]:
-    """Return every figure, drawn and laid out once."""
-    with styled():
-        figures = {name: draw(study.frames) for name, draw in FIGURES.items()}
-        for figure in figures.values():
-            figure.draw_without_rendering()
-    return figures
+class Drawn(dict[str, Figure]):
+    """Figures of the small study, each drawn and laid out when it is first asked for."""
+
+    def __init__(self, study: Found) -> None:
+        super().__init__()
+        self.study = study
+
+    def __missing__(self, name: str) -> Figure:
+        with styled():
+            self[name] = FIGURES[name](self.study.frames)
+            self[name].draw_without_rendering()
+        return self[name]
 
 
 @pytest.fixture(scope="session")
-def written(study: Found, drawn: dict[str, Figure], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of the written study, with the figures as they were drawn."""
+def drawn(study: Found) -> Drawn:
+    return Drawn(study)
+
+
+WRITTEN = "forms_on_sticking_plant"
+"""The figure that the written study shows; the others are empty there, since writing all of them takes 5 s."""
+
+
+@pytest.fixture(scope="session")
+def written(study: Found, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the written study, with one figure as it is drawn and the others empty."""
     folder = tmp_path_factory.mktemp("results") / "study"
-    figures = {name: lambda _, figure=figure: figure for name, figure in drawn.items()}
+    figures = {name: FIGURES[name] if name == WRITTEN else lambda _: Figure(figsize=(1.0, 1.0)) for name in FIGURES}
     write_result(replace(NINE_CONDITIONS, figures=figures), SMALL, study, folder)
     return folder
 
@@ -69,13 +84,18 @@ STACK = StackSettings(seed=7, quick=True, voltage_limit_v=140.0, power_limit_w=1
 
 
 @pytest.fixture(scope="session")
-def stack_tables() -> Tables:
-    return PIEZO_STACK.find(STACK, untracked).frames
+def stack_tables() -> Iterator[Tables]:
+    """Return the stack's tables but those of figure 12 left out, which `test_left_out` asks for itself."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stack_study, "figure_12_left_out", lambda *_: pd.DataFrame())
+        yield PIEZO_STACK.find(STACK, untracked).frames
 
 
 @pytest.fixture(scope="session")
 def motor_tables() -> Tables:
-    return DIAPHRAGM_MOTOR.find(Seeded(7), untracked).frames
+    """Return the motor's tables but the one of other sets of plates, which takes as long as most others together."""
+    sweeps = {name: sweep for name, sweep in SWEEPS.items() if name != "other sets"}
+    return claim_tables(RIG, 7, untracked, sweeps)
 
 
 @pytest.fixture(scope="session")

@@ -30,7 +30,7 @@ STARTS = (0.0, 2e8, 5e8)
 SPARSE = 5e-4  # s; enough for a form that takes its own steps between samples
 WIDE_STARTS = (0.0, 0.5e8, 1e8, 2e8, 3e8, 4e8, 5e8)
 EVERY_CONDITION = pytest.mark.parametrize(
-    "name", thinned(CONDITIONS, ["normal", "major_friction", "minor_leakage_minor_friction", "major_leakage"])
+    "name", thinned(CONDITIONS, ["major_friction", "minor_leakage_minor_friction"])
 )
 
 
@@ -189,11 +189,11 @@ def test_what_is_not_known_of_the_chamber_volume_is_not_known_of_bulk_modulus(fo
     assert np.log(high / low) == pytest.approx(2.0 * 1.96 * 0.05, rel=0.05)
 
 
-@pytest.mark.parametrize("form", ["pressure", pytest.param("auto", marks=pytest.mark.slow)])
-def test_all_18_foreign_logs_give_bulk_modulus_within_ten_percent(form: str, shared: Path) -> None:
+@pytest.mark.parametrize(("form", "every"), thinned([("pressure", 4), ("pressure", 1), ("auto", 1)], [("pressure", 4)]))
+def test_foreign_logs_give_bulk_modulus_within_ten_percent(form: str, every: int, shared: Path) -> None:
     logs = foreign_logs(shared)
     assert len(logs) == 18
-    for log, condition, truth in logs:
+    for log, condition, truth in logs[::every]:
         parameters = parameters_for(condition)
         for start in (0.5e8, 4e8):
             answer = estimate_bulk_modulus(log, parameters, form=form, start=start, start_std=1e8)

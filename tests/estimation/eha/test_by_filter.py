@@ -39,6 +39,7 @@ def filtered(log: Record, tuned: bool) -> BulkModulusEstimate:
     return estimate_bulk_modulus(log, FAULTY, form="pressure", tuned=tuned)
 
 
+@pytest.mark.slow
 def test_steps_of_the_model_do_not_show_in_a_tuned_filter_of_a_fast_log() -> None:
     found = filtered(run(1.0, 1e-4), tuned=True)
     assert found.std < 2e-5 * TRUTH

@@ -24,7 +24,7 @@ OTHERWISE = pytest.mark.slow
     ("form", "method", "fmi"),
     [
         ("pressure", "ekf", "3.0"),
-        ("pressure", "imm", "2.0"),
+        pytest.param("pressure", "imm", "2.0", marks=OTHERWISE),
         ("flow", "ekf", "3.0"),
         pytest.param("pressure", "ekf", "2.0", marks=OTHERWISE),
         pytest.param("pressure", "imm", "3.0", marks=OTHERWISE),

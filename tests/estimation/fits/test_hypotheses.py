@@ -84,6 +84,7 @@ def test_a_late_pressure_is_named_with_its_delay_and_brought_forward() -> None:
     assert np.std((mended - record[PRESSURE])[there]) < 0.1 * np.std(record[PRESSURE])
 
 
+@pytest.mark.slow
 def test_a_lag_and_a_delay_are_known_by_their_sum() -> None:
     (note,) = notes_of(explained(late(lagging(2e-3), 3)), HEALTHY)
     assert note.code is RigCode.PRESSURE_LATE
@@ -191,7 +192,7 @@ def test_a_log_that_begins_under_load_says_so() -> None:
     assert "start_load" in found.names
 
 
-@pytest.mark.parametrize("condition", ["major_leakage", "major_leakage_major_friction"])
+@pytest.mark.parametrize("condition", thinned(["major_leakage", "major_leakage_major_friction"], ["major_leakage"]))
 def test_an_encoder_homed_elsewhere_is_named_where_held_volumes_explain_the_log_too(condition: str) -> None:
     p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(5)
     record = simulate(CIRCUIT, make_drive("multisine", 4.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)

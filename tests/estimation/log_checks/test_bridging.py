@@ -111,9 +111,8 @@ def test_what_is_opened_is_the_volume_over_what_takes_it_up(linear: ProcessModel
     assert not np.any(problem.opened[:, 2])  # no pump moves the disturbance force
 
 
-@pytest.mark.parametrize(
-    "channel", ["motor_speed_rad_s", *(pytest.param(c, marks=pytest.mark.slow) for c in ("position_m", PRESSURE))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("channel", ["motor_speed_rad_s", "position_m", PRESSURE])
 def test_five_drop_outs_of_a_channel_do_not_move_the_flow_filter(channel: str) -> None:
     record = prbs()
     for first in (1100, 3000, 5200, 7100, 9000):

@@ -85,7 +85,7 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
             *(("estimate", suffix) for suffix in ("csv", "parquet", "mat", "txt")),
             *(("diagnose", "csv"), ("identify", "csv"), ("inspect", "txt")),
         ],
-        [("estimate", "txt"), ("inspect", "txt"), ("diagnose", "csv"), ("identify", "csv")],
+        [("inspect", "txt"), ("diagnose", "csv"), ("identify", "csv")],
     ),
 )
 def test_a_verb_on_a_log_imports_nothing_dear(logs: dict[str, Path], verb: str, suffix: str) -> None:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from experiments.diaphragm_motor.figures import MOTOR_FIGURES
 from experiments.diaphragm_motor.quoted import ML_MIN
-from experiments.diaphragm_motor.study import RIG
+from experiments.diaphragm_motor.study import RIG, SWEEPS
 from experiments.diaphragm_motor.sweeps import FREQUENCIES, PEAK, PUBLISHED_FLOW, SHARES, SWINGS, blocking_force
 from experiments.page.frames import Tables
 from experiments.page.style import styled
@@ -78,8 +78,9 @@ def test_the_piston_stands_at_its_blocking_force_and_moves_below_it(motor_tables
     assert operate(replace(RIG, load_force=found + 0.1), PEAK, 100.0).velocity < 1e-5
 
 
-def test_other_plates_give_the_published_peak_with_other_forces(motor_tables: Tables) -> None:
-    sets = motor_tables["other sets"]
+@pytest.mark.slow
+def test_other_plates_give_the_published_peak_with_other_forces() -> None:
+    sets = SWEEPS["other sets"](RIG)
     assert sets["frequency_hz"].to_numpy() == pytest.approx(PEAK, abs=5.0)
     assert sets["flow_m3_s"].to_numpy() == pytest.approx(PUBLISHED_FLOW, rel=0.01)
     assert sets["blocking_n"].max() > 3.0 * sets["blocking_n"].min()

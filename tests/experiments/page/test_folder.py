@@ -22,7 +22,7 @@ from experiments.running import study as runner
 from experiments.running.study import Found, write_result
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
-from tests.experiments.conftest import SMALL
+from tests.experiments.conftest import SMALL, WRITTEN
 
 
 @pytest.fixture
@@ -76,9 +76,8 @@ def test_transfer_functions_keep_every_digit(written: Path) -> None:
 
 
 def test_figures_are_the_same_at_every_run(written: Path, study: Found) -> None:
-    name = "forms_on_sticking_plant"
-    again = figure_files({name: FIGURES[name]}, study.frames)
-    assert again[f"figures/{name}.svg"] == (written / f"figures/{name}.svg").read_bytes()
+    again = figure_files({WRITTEN: FIGURES[WRITTEN]}, study.frames)
+    assert again[f"figures/{WRITTEN}.svg"] == (written / f"figures/{WRITTEN}.svg").read_bytes()
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -80,6 +80,7 @@ def test_every_foreign_log_gets_its_class_without_pressure(truth: dict[str, dict
     assert found == {log: row["name"] for log, row in truth.items()}  # measured: all 18; 15 are asked for
 
 
+@pytest.mark.slow
 def test_a_leaking_foreign_log_gets_its_class_without_pressure(truth: dict[str, dict[str, str]]) -> None:
     *_, log = (log for log, row in truth.items() if row["name"] == "major_leakage")
     (found,) = results("diagnose", log, "--no-pressure")

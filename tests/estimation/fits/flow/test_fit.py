@@ -29,7 +29,7 @@ def log(condition: str, seed: int, drive: str = "steps", duration: float = 10.0,
     return simulate(LUMPED, drive_signal, sample_time, p, sensors=BENCH, rng=rng)
 
 
-@pytest.mark.parametrize("condition", thinned(CONDITIONS, ["normal", "minor_leakage", "major_leakage_major_friction"]))
+@pytest.mark.parametrize("condition", thinned(CONDITIONS, ["major_leakage_major_friction"]))
 def test_bulk_modulus_and_leakage_come_back_without_knowing_the_condition(condition: str) -> None:
     p = parameters_for(CONDITIONS[condition])
     fit = fit_flow(log(condition, 11, duration=6.0), HEALTHY, 4e8)
@@ -164,7 +164,7 @@ def test_speeds_missing_at_reversals_do_not_bias_bulk_modulus() -> None:
     assert fit.reasons == ()
 
 
-@pytest.mark.parametrize("channel", ["motor_speed_rad_s", "position_m"])
+@pytest.mark.parametrize("channel", thinned(["motor_speed_rad_s", "position_m"], ["motor_speed_rad_s"]))
 def test_a_long_gap_of_one_channel_does_not_shut_the_check(channel: str) -> None:
     record = log("normal", 19, "multisine", 3.0)
     values = record[channel].copy()

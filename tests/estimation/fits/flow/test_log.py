@@ -52,6 +52,7 @@ def test_noise_of_position_does_not_pass_for_soft_oil(condition: str, monkeypatc
     assert value < true - 5.0 * std
 
 
+@pytest.mark.slow
 def test_noise_of_position_does_not_pass_for_soft_oil_where_speeds_are_missing() -> None:
     record, true = log("minor_leakage", 6)
     speed = record["motor_speed_rad_s"].copy()

@@ -42,6 +42,7 @@ from plant.eha.simulate import CIRCUIT, LUMPED, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 from tests.estimation.fits.short_logs import PAPER, made_fit, seen
+from tests.thinned import thinned
 
 QUANTUM = 1e-6
 
@@ -135,7 +136,7 @@ def test_residuals_show_a_play_where_there_is_one_and_none_where_there_is_none(c
     assert played.size > 5e-6
 
 
-@pytest.mark.parametrize("condition", ["normal", "minor_leakage_major_friction", "major_leakage"])
+@pytest.mark.parametrize("condition", thinned(["normal", "minor_leakage_major_friction", "major_leakage"], ["normal"]))
 def test_a_play_is_taken_up_within_the_interval_or_shuts_the_gate(condition: str) -> None:
     fit = fit_flow(logged(condition, "prbs", 5e-5), PAPER, PAPER.bulk_modulus)
     value, std = fit.parameters["bulk_modulus"]
