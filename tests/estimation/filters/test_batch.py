@@ -26,6 +26,7 @@ from plant.eha.simulate import LUMPED, simulate
 from plant.errors import HydrostateError
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
+from tests.thinned import thinned
 
 RULES: dict[str, tuple[Rule, str]] = {
     "ekf": (EKF, "none"),
@@ -73,7 +74,7 @@ def assert_batch_is_alone(rule: Rule, tasks: list[FilterProblem], workers: int =
 
 
 @EVERY_RULE
-@pytest.mark.parametrize("count", [33, 40])
+@pytest.mark.parametrize("count", thinned([33, 40], [33]))
 def test_every_rule_gives_the_same_bits_alone_and_in_a_batch(
     linear: ProcessModel, rule: Rule, robust: str, count: int
 ) -> None:

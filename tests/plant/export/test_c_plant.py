@@ -6,13 +6,12 @@ import pytest
 
 from plant.eha.drives import sine
 from plant.eha.model import EhaParameters
-from plant.eha.simulate import CIRCUIT, LUMPED, PLANTS, Plant, simulate
+from plant.eha.simulate import LUMPED, PLANTS, Plant, simulate
 from plant.errors import DriveError, HydrostateError
 from plant.export.c_plant import plant_in_c, substeps_of
 from plant.solvers.steps import parameter_row
 from plant.solvers.trajectory import compile_trajectory
 from tests.c_compiler import SANITIZED, compiled, ran
-from tests.thinned import thinned
 
 RIG = EhaParameters(leakage_coefficient=2e-11)
 DRIVE = sine(0.3, 1e-4, RIG.rated_speed, 5.0)
@@ -47,7 +46,8 @@ def test_a_plant_of_fixed_steps_is_what_simulate_runs(tmp_path: Path) -> None:
     assert np.max(np.abs(outputs(tmp_path, LUMPED) - wanted) / np.max(np.abs(wanted), axis=0)) < 1e-12
 
 
-@pytest.mark.parametrize("plant", thinned(PLANTS.values(), [CIRCUIT]))
+@pytest.mark.slow
+@EVERY_PLANT
 def test_it_runs_clean_under_sanitizers(plant: Plant, tmp_path: Path) -> None:
     assert np.all(np.isfinite(outputs(tmp_path, plant, *SANITIZED)))
 

@@ -89,7 +89,7 @@ def records(draw: st.DrawFn) -> Record:
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.parquet", "run.mat"])
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(record=records())
 def test_any_finite_record_comes_back_from_every_format(
     tmp_path_factory: pytest.TempPathFactory, name: str, record: Record
