@@ -84,7 +84,7 @@ def build_library(seed: int) -> dict[str, Any]:
 
     def described_entry(name: str) -> dict[str, Any]:
         speeds, velocities = circuit_passes(rig, name, stream(seed, "library", name))
-        around = determined_model(speeds, velocities)
+        around = _determined_model(speeds, velocities)
         models = {"model": bank[name].to_dict(), "around_mean": around.to_dict()}
         return {**models, **described(bank[name]), "table_6": printed_model(name)}
 
@@ -112,21 +112,11 @@ def build_library(seed: int) -> dict[str, Any]:
     }
 
 
-def determined_model(speeds: list[Array], velocities: list[Array]) -> LinearModel:
-    """Return the output-error model that BIC prefers among those the data determine.
+def _determined_model(speeds: list[Array], velocities: list[Array]) -> LinearModel:
+    """Return the output-error model, of order 1 at least, that BIC prefers among those the data determine.
 
-    Left out is a model whose pole a zero nearly cancels, decays slower than a pass lasts, or leaves the gain vague:
-    such a pole stands for what the passes' means differ by, and the gain would be that of a drift.
-
-    Parameters
-    ----------
-    speeds, velocities : list of ndarray, shape (n,)
-        As `circuit_passes` returns them.
-
-    Returns
-    -------
-    LinearModel
-        Of order 1 at least, which is always kept.
+    Left out is a model whose pole a zero nearly cancels, decays slower than a pass lasts, or leaves the gain
+    vague: such a pole stands for what the passes' means differ by, and the gain would be that of a drift.
     """
     found: list[tuple[float, LinearModel]] = []
     names = dict(zip(("input_name", "output_name"), CHANNELS, strict=True))

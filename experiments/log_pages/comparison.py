@@ -129,7 +129,7 @@ def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[s
         row |= {"first": pair[0], "second": pair[1], "difference": None, "interval": None, "changed": False}
         if len(known) == 2:
             row["difference"] = known[1]["value"] - known[0]["value"]
-            stds = [std for std in map(std_of, known) if std is not None]
+            stds = [std for std in map(_std_of, known) if std is not None]
             if len(stds) == 2:
                 half = NORMAL_95 * math.hypot(*stds)
                 row["interval"] = [row["difference"] - half, row["difference"] + half]
@@ -186,7 +186,7 @@ def quantities_of(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     return found
 
 
-def std_of(one: Mapping[str, Any]) -> float | None:
+def _std_of(one: Mapping[str, Any]) -> float | None:
     """Return the standard deviation of an entry, from its interval where it has no own [its unit]."""
     if one.get("std") is not None:
         return float(one["std"])

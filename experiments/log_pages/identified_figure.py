@@ -21,16 +21,8 @@ LEAST_COHERENCE = 0.1
 """Below, the empirical response says nothing and is left out."""
 
 
-def draw_identified(model: LinearModel, u: Array, y: Array, found: Validation, log: str) -> Figure:
-    """Draw measured and simulated output, the residual with its correlations, and the gain with its band.
-
-    Parameters
-    ----------
-    model : LinearModel
-        Fitted to the data; stable.
-    u, y : ndarray, shape (n,)
-        Input, no gaps, and output, NaN where missing [in their channels' units].
-    """
+def _draw_identified(model: LinearModel, u: Array, y: Array, found: Validation, log: str) -> Figure:
+    """Draw measured and simulated output, the residual with its correlations, and the gain with its band."""
     title = f"{log}: {model.structure} of order {model.denominator.size - 1}, fit {found.fit_percent:.1f} %"
     figure, axes = panels(title, 3, 2, 8.0, Margins(left=0.9, top=0.65, across=0.8, down=0.65))
     simulated = model.simulate(u, initial=model.initial_state)
@@ -102,4 +94,4 @@ def write_identified(model: LinearModel, u: Array, y: Array, found: Validation, 
     u, y : ndarray, shape (n,)
         Input and output [in their channels' units].
     """
-    write_png(lambda: draw_identified(model, u, y, found, log), path)
+    write_png(lambda: _draw_identified(model, u, y, found, log), path)

@@ -14,7 +14,7 @@ TINY = 1e-300
 """Least power that is drawn [output unit squared]: a level of nothing has no logarithm."""
 
 
-def draw_response(found: MeasuredResponse, title: str) -> Figure:
+def _draw_response(found: MeasuredResponse, title: str) -> Figure:
     """Draw the gain with its uncertainty, and the output's lines where the input is periodic, else the phase."""
     figure, axes = panels(f"{title}: {found.method.replace('-', ' ')}", 2, 1, 8.0, Margins(left=0.9, top=0.65))
     one, told = found.response, found.distortion
@@ -48,4 +48,4 @@ def _decibels(power: Array) -> Array:
 
 def write_response(found: MeasuredResponse, title: str, path: Path) -> None:
     """Write that picture as PNG."""
-    write_png(lambda: draw_response(found, title), path)
+    write_png(lambda: _draw_response(found, title), path)

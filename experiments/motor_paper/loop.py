@@ -43,14 +43,8 @@ WANTED_DAMPING = 0.5
 """Damping ratio that the derivative brings about [dimensionless]."""
 
 
-def gain_at_rest(p: VibrationParameters) -> float:
-    """Return the displacement that a newton gives at rest, equation 4 mended (errata M4).
-
-    Returns
-    -------
-    float
-        Gain [m/N].
-    """
+def _gain_at_rest(p: VibrationParameters) -> float:
+    """Return the displacement that a newton gives at rest, equation 4 mended [m/N] (errata M4)."""
     k1, k2 = p.diaphragm_stiffness, p.fluid_stiffness
     return k2 / (k1 + k2) / reduced_stiffness(p)
 
@@ -68,7 +62,7 @@ def designed(p: VibrationParameters) -> Mapping[str, Pid]:
     """
     omega = 2.0 * pi * p.natural_frequency
     zeta = p.damping / (2.0 * p.cylinder_mass * omega)
-    at_rest = gain_at_rest(p)
+    at_rest = _gain_at_rest(p)
     share = p.fluid_stiffness / (p.diaphragm_stiffness + p.fluid_stiffness)
     derivative = 2.0 * (WANTED_DAMPING - zeta) * omega * p.cylinder_mass / share
     gain, integral = PROPORTIONAL / at_rest, 2.0 * WANTED_DAMPING * omega / at_rest / SAFETY
@@ -142,7 +136,7 @@ def relay_table(p: VibrationParameters) -> pd.DataFrame:
     pandas.DataFrame
         Columns quantity, relay, model, unit.
     """
-    push = STEP / gain_at_rest(p)
+    push = STEP / _gain_at_rest(p)
 
     def controller(high: bool, error: float) -> tuple[float, bool]:
         now = relay(high, error)

@@ -25,7 +25,7 @@ ORDERS = (0.5, 1.0, 1.5)
 """Of Figures 7 to 9."""
 
 
-def vibration_models(p: VibrationParameters) -> "dict[str, control.StateSpace]":
+def _vibration_models(p: VibrationParameters) -> "dict[str, control.StateSpace]":
     """Return equations 1 to 4 as models of python-control (errata M1 to M4)."""
     return {
         "equations 1 and 2, signs mended": state_space(p),
@@ -57,7 +57,7 @@ def pole_table(p: VibrationParameters) -> Rows:
 
 
 def _all_models(p: VibrationParameters) -> dict[str, Any]:
-    return {**vibration_models(p), "equation 20, small voltages": linearised(HysteresisParameters())}
+    return {**_vibration_models(p), "equation 20, small voltages": linearised(HysteresisParameters())}
 
 
 @tabled
@@ -109,7 +109,7 @@ def response_table(p: VibrationParameters) -> pd.DataFrame:
     pandas.DataFrame
         Columns model, frequency_hz, gain [dimensionless], phase_deg.
     """
-    return pd.concat([response_rows(name, model) for name, model in vibration_models(p).items()], ignore_index=True)
+    return pd.concat([response_rows(name, model) for name, model in _vibration_models(p).items()], ignore_index=True)
 
 
 def response_rows(name: str, model: Any) -> pd.DataFrame:
@@ -184,19 +184,8 @@ def figures_7_to_9() -> Frames:
         }
 
 
-def with_order(p: VibrationParameters, order: float) -> VibrationParameters:
-    """Return a model whose damper has another order and the same size of force at 480 Hz (errata M5).
-
-    Parameters
-    ----------
-    order : float
-        Order of the damping [dimensionless].
-
-    Returns
-    -------
-    VibrationParameters
-        The same with fractional in place of viscous damping.
-    """
+def _with_order(p: VibrationParameters, order: float) -> VibrationParameters:
+    """Return a model whose damper has another order and the same size of force at 480 Hz (errata M5)."""
     size = p.damping * (2.0 * pi * TUNED_FREQUENCY) ** (1.0 - order)
     return replace(p, damping=0.0, fractional_damping=size, fractional_order=order)
 
@@ -211,7 +200,7 @@ def fractional_table(p: VibrationParameters) -> Frames:
         Columns order, frequency_hz, gain and imitated_gain [m/N].
     """
     for order in ORDERS:
-        q = with_order(p, order)
+        q = _with_order(p, order)
         imitated = np.abs(np.asarray(state_space(q)(2j * pi * FREQUENCIES)).ravel())
         columns = {
             "frequency_hz": FREQUENCIES,

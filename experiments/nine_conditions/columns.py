@@ -55,7 +55,7 @@ def report_frames(tables: Tables, settings: StudySettings) -> Tables:
     """
     named = {f"{spaced(name)}{SETTING_UNITS.get(name, '')}": value for name, value in asdict(settings).items()}
     return {
-        "filterpy by experiment": filterpy_by_experiment(tables["filterpy"]),
+        "filterpy by experiment": _filterpy_by_experiment(tables["filterpy"]),
         "recoveries": pd.DataFrame([asdict(entry) for entry in recoveries(tables["bulk_modulus"]).values()]),
         "estimates by condition": _estimates(tables["bulk_modulus"]),
         "models": _models(tables["transfer_functions"]),
@@ -74,14 +74,8 @@ def _estimates(frame: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(list(rows.values()), dtype=object)
 
 
-def filterpy_by_experiment(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return what filterpy's filter and ours end at, one row a condition and one column an experiment.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        The table ``filterpy``.
-    """
+def _filterpy_by_experiment(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return what filterpy's filter and ours end at, one row a condition and one column an experiment."""
     rows: dict[str, dict[str, object]] = {}
     for key, found in by_experiment(frame):
         for entry in found.to_dict("records"):

@@ -26,14 +26,8 @@ CLOCK_HZ = 5.0
 """How often the printed signal may switch [Hz]."""
 
 
-def printed_test_model(rig: EhaParameters, condition: str, seed: int, duration: float) -> LinearModel:
-    """Return the model that section 4's experiment gives of a circuit.
-
-    Parameters
-    ----------
-    duration : float
-        Length of the test [s].
-    """
+def _printed_test_model(rig: EhaParameters, condition: str, seed: int, duration: float) -> LinearModel:
+    """Return the model that section 4's experiment gives of a circuit."""
     rng = stream(seed, "Table 6 to the letter", condition)
     p, T = parameters_for(CONDITIONS[condition], rig), IDENTIFICATION_TIME
     drive = prbs(duration, T, p.rated_speed, 1.0 / CLOCK_HZ, rng)
@@ -67,7 +61,7 @@ def printed_test(rig: EhaParameters, seed: int, duration: float, track: Track = 
         whose 95 % interval meets the printed value within half a unit of its last digit.
     """
     published = as_printed("transfer_functions").set_index("condition")
-    done = side_by_side(lambda name: printed_test_model(rig, name, seed, duration), CONDITIONS)
+    done = side_by_side(lambda name: _printed_test_model(rig, name, seed, duration), CONDITIONS)
     done = track(done, len(CONDITIONS), description="Table 6 to the letter")
     for name, model in zip(CONDITIONS, done, strict=True):
         values = dict(zip(COEFFICIENTS, [*model.numerator, *model.denominator[1:]], strict=True))

@@ -155,7 +155,7 @@ def response_curves(models: Mapping[str, LinearModel], records: Mapping[str, Rec
     lowest, highest = RESPONSE_FREQUENCIES[[0, -1]]
     for name, model in models.items():
         response = model.frequency_response(RESPONSE_FREQUENCIES)
-        fitted = response_columns(RESPONSE_FREQUENCIES, response, np.ones(len(response)))
+        fitted = _response_columns(RESPONSE_FREQUENCIES, response, np.ones(len(response)))
         measured = measured_response(records[name], 1000, lowest, highest)
         yield {"condition": name, "source": "model", **fitted}
         yield {"condition": name, "source": "etfe", **measured}
@@ -174,30 +174,15 @@ def measured_response(record: Record, lag_window: int, lowest: float, highest: f
     Returns
     -------
     dict[str, ndarray]
-        As `response_columns`.
+        ``frequency_hz``, ``gain``, ``phase_deg``, ``coherence``.
     """
     found = etfe(record["motor_speed_rad_s"], record["velocity_m_s"], record.sample_time, lag_window=lag_window)
     inside = (found.frequency_hz >= lowest) & (found.frequency_hz <= highest)
-    return response_columns(found.frequency_hz[inside], found.response[inside], found.coherence[inside])
+    return _response_columns(found.frequency_hz[inside], found.response[inside], found.coherence[inside])
 
 
-def response_columns(frequency: np.ndarray, response: np.ndarray, coherence: np.ndarray) -> dict[str, np.ndarray]:
-    """Return a frequency response as columns of a table.
-
-    Parameters
-    ----------
-    frequency : ndarray, shape (n,)
-        Frequencies [Hz].
-    response : ndarray of complex, shape (n,)
-        The response [m/s per rad/s].
-    coherence : ndarray, shape (n,)
-        Between 0 and 1 [dimensionless].
-
-    Returns
-    -------
-    dict[str, ndarray]
-        ``frequency_hz``, ``gain``, ``phase_deg``, ``coherence``.
-    """
+def _response_columns(frequency: np.ndarray, response: np.ndarray, coherence: np.ndarray) -> dict[str, np.ndarray]:
+    """Return a frequency response as the columns ``frequency_hz``, ``gain``, ``phase_deg`` and ``coherence``."""
     phase = np.degrees(np.unwrap(np.angle(response)))
     return {"frequency_hz": frequency, "gain": np.abs(response), "phase_deg": phase, "coherence": coherence}
 

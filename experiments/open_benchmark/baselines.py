@@ -66,16 +66,8 @@ def rocket(series: Array, y: Names) -> Verdicts:
     return lambda other: classify(kernel_features(other / sizes, kernels))
 
 
-def ridge_on_features(series: Array, y: Names) -> Verdicts:
-    """Return a ridge classifier of simple features.
-
-    Parameters
-    ----------
-    series : ndarray, shape (logs, 4, samples)
-        Training logs, SI.
-    y : ndarray, shape (logs,)
-        Their conditions.
-    """
+def _ridge_on_features(series: Array, y: Names) -> Verdicts:
+    """Return a ridge classifier of simple features."""
     classify = ridge_classifier(simple_features(series), y)
     return lambda other: classify(simple_features(other))
 
@@ -105,7 +97,7 @@ def forest_on_features(series: Array, y: Names) -> Verdicts:
 
 LEARNT: Mapping[str, Callable[[Array, Names], Verdicts]] = {
     "random forest on simple features": forest_on_features,
-    "ridge on simple features": ridge_on_features,
+    "ridge on simple features": _ridge_on_features,
     "random kernels and ridge (ROCKET's scheme)": rocket,
 }
 """What learns from labelled logs, by what it is called."""

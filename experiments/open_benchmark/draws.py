@@ -20,18 +20,8 @@ MARGIN = 0.06
 """From where a drive may take the piston to the end stop [m]."""
 
 
-def draw_machine(condition: str, rng: np.random.Generator, base: EhaParameters | None = None) -> Machine:
-    """Return an actuator in a condition: Tables 3 and 4 and bulk modulus with their spread, and details of its own.
-
-    Parameters
-    ----------
-    condition : str
-        One of the nine.
-    rng : numpy.random.Generator
-        Source of the spread.
-    base : EhaParameters, optional
-        The healthy actuator; the paper's if not given.
-    """
+def _draw_machine(condition: str, rng: np.random.Generator, base: EhaParameters | None = None) -> Machine:
+    """Return an actuator in a condition: Tables 3 and 4 and bulk modulus with their spread, and details of its own."""
     nominal = machine_of(parameters_for(CONDITIONS[condition], base or EhaParameters()))
 
     def about(value: float, width: float = SPREAD) -> float:
@@ -73,7 +63,7 @@ def draw_plain(condition: str, drive: str, rng: np.random.Generator, base: EhaPa
     base : EhaParameters, optional
         The healthy actuator; the paper's if not given.
     """
-    machine = draw_machine(condition, rng, base)
+    machine = _draw_machine(condition, rng, base)
     travel = float(np.exp(rng.uniform(np.log(0.02), np.log(0.2))))
     closed = {"loop_gain": rng.uniform(4e4, 9e4), "speed_limit": EhaParameters().rated_speed}
     machine = machine._replace(stroke=2.0 * (travel + MARGIN), **(closed if drive in CLOSED else {}))

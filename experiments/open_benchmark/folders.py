@@ -73,16 +73,8 @@ def truth_of(made: MadeLog, split: str, index: int) -> dict[str, Any]:
     }
 
 
-def rig_text(name: str, note: str, entries: Mapping[str, float]) -> str:
-    """Return a rig file with the given entries only.
-
-    Parameters
-    ----------
-    name, note : str
-        What the rig is called, and a comment above it.
-    entries : Mapping[str, float]
-        Its parameters, SI.
-    """
+def _rig_text(name: str, note: str, entries: Mapping[str, float]) -> str:
+    """Return a rig file with the given entries only."""
     lines = [f"# {note}", f'name = "{name}"', "", "[parameters]"]
     return "\n".join([*lines, *(f"{entry} = {value!r}" for entry, value in entries.items())]) + "\n"
 
@@ -124,7 +116,7 @@ def write_set(kind: str, split: str, count: int, out: Path, first: int = 0) -> P
             row = truth_of(made, split, index)
             made.log.to_csv(folder / str(row["file"]), index=False, float_format="%.9g", lineterminator="\n")
             if made.setup.rig:
-                (folder / RIG).write_text(rig_text(kind, made.kind.strange, made.setup.rig), "utf-8")
+                (folder / RIG).write_text(_rig_text(kind, made.kind.strange, made.setup.rig), "utf-8")
             rows.append(row)
         with replacing(folder / TRUTH) as file:  # a folder with its truth is whole
             file.write(pd.DataFrame(rows).to_csv(index=False, lineterminator="\n").encode())

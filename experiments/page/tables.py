@@ -84,14 +84,8 @@ Columns: TypeAlias = Sequence[Column | str | Callable[[str], Column | None]]
 beside it, and returns how it is shown, or None."""
 
 
-def yes_or_no(good: bool) -> Cell:
-    """Return a cell that says yes, or no as what a reader should see.
-
-    Returns
-    -------
-    Cell
-        The word in its tone.
-    """
+def _yes_or_no(good: bool) -> Cell:
+    """Return a cell that says yes, or no as what a reader should see."""
     return Cell("yes", "good") if good else Cell("no", "bad")
 
 
@@ -191,7 +185,7 @@ def _by_type(column: Column, value: Any) -> Shown:
     if isinstance(value, str | Cell):
         return value
     if isinstance(value, bool):
-        return yes_or_no(value)
+        return _yes_or_no(value)
     if isinstance(value, int) and column.scale == 1.0:
         return right(str(value).replace("-", MINUS))
     return right(number(None if value is None else column.scale * float(value), column.digits))

@@ -118,27 +118,11 @@ def motor_drive(frequency: float, peak_to_peak: float, duration: float, sample_t
         )
     time = sample_time * np.arange(count)
     swing = 0.5 * peak_to_peak * np.minimum(time / RAMP, 1.0)
-    return checked_drive(swing * np.sin(2.0 * pi * frequency * time))
+    return _checked_drive(swing * np.sin(2.0 * pi * frequency * time))
 
 
-def checked_drive(voltage: Array) -> Array:
-    """Return a drive that does not depolarise the diaphragms (errata M27).
-
-    Parameters
-    ----------
-    voltage : ndarray, shape (n,)
-        Drive of the first diaphragm [V].
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        The same.
-
-    Raises
-    ------
-    DriveError
-        If it is no series, not finite, or leaves -150 to 150 V.
-    """
+def _checked_drive(voltage: Array) -> Array:
+    """Return a drive [V], or refuse one that would depolarise the diaphragms (errata M27)."""
     drive = checked_series(voltage)
     most = float(np.max(np.abs(drive)))
     if most > HIGHEST_VOLTAGE * (1.0 + 1e-9):
@@ -294,7 +278,7 @@ def simulate_motor(
     0.16
     """
     schedule: Schedule = ((0.0, parameters),) if isinstance(parameters, DiaphragmMotorParameters) else parameters
-    drive = checked_drive(voltage)
+    drive = _checked_drive(voltage)
     states, bent = run_schedule(schedule, drive, sample_time)
     first = schedule[0][1]
     read = electrode_voltages(bent, first, sample_time)
