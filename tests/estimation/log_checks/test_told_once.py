@@ -7,7 +7,6 @@ from benchmarks.diagnosis.coverage import Case, logged
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.log_checks.told_once import REST, middles, told_once
 from plant.log.record import Record
-from tests.thinned import thinned
 
 NAN = np.nan
 
@@ -28,10 +27,8 @@ def test_readings_that_are_equal_by_chance_all_count() -> None:
     assert told_once(still) is still
 
 
-@pytest.mark.parametrize(
-    ("drive", "condition", "seed"),
-    thinned([("steps", "major_leakage", 102), ("prbs", "normal", 201)], [("prbs", "normal", 201)]),
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("drive", "condition", "seed"), [("steps", "major_leakage", 102), ("prbs", "normal", 201)])
 def test_the_interval_of_a_tuned_filter_covers_where_the_piston_rests_between_moves(
     drive: str, condition: str, seed: int
 ) -> None:
