@@ -10,9 +10,9 @@ from estimation.fits.explaining.left_open import OPEN_DELIVERY
 from estimation.fits.explaining.objections import DOUBTED
 from estimation.fits.explaining.promises import Promise
 from estimation.fits.flow import fit as flow_fit
-from estimation.fits.flow.asked import asked_of
+from estimation.fits.flow.asked import ZERO_WORTH, asked_of
 from estimation.fits.greybox.chance import LARGEST_CHI_SQUARE
-from estimation.fits.hypotheses import DELIVERY, HYPOTHESES
+from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO, HYPOTHESES, LEAST_ZERO
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
@@ -49,6 +49,16 @@ def test_a_worn_pump_that_is_asked_for_stays_open_until_it_is_found() -> None:
         asked, remarks = asked_of(seen(log(0.2)), PAPER, sound, sound, loaded=False, moving=False)
     assert DELIVERY in asked
     assert [note.data["percent"] for note in remarks] == [pytest.approx(20.0)]
+
+
+def test_an_encoder_s_zero_is_asked_for_where_no_held_volumes_fit_better_or_the_log_was_homed_at_a_stop() -> None:
+    swinging, held = made_fit(400.0, 2e8, 1e5), made_fit(300.0, 2e8, 1e5)
+    record = log(0.2)
+    stop = seen(record.replace(position_m=record["position_m"] + 0.12))
+    with all_promise(Promise(2.0 * ZERO_WORTH, 2.0 * LEAST_ZERO, 0.03)):
+        for seen_log, best, wanted in ((seen(record), swinging, True), (seen(record), held, False), (stop, held, True)):
+            asked, _ = asked_of(seen_log, PAPER, swinging, best, loaded=False, moving=False)
+            assert (ENCODER_ZERO in asked) == wanted
 
 
 def test_a_short_log_is_not_asked_for_all_where_noise_alone_leaves_as_much_by_chance() -> None:

@@ -69,6 +69,8 @@ def test_a_stuck_piston_says_nothing_of_friction() -> None:
     stuck = blocks(pressure=True, travel=5e-5)
     assert is_stuck(stuck, ACTUATOR)
     assert not is_stuck(blocks(pressure=True), ACTUATOR)
+    few = ACTUATOR.circuit.presliding_displacement * np.array([4.0, 6.0])
+    assert [is_stuck(blocks(pressure=True, travel=travel), ACTUATOR) for travel in few.tolist()] == [True, False]
     believed = np.diag(believed_information(fit(0), stuck, stuck=True))
     assert [name for name, known in zip(COORDINATES, believed, strict=True) if known == 0.0] == [
         "friction_rest",
