@@ -29,7 +29,7 @@ study: $(VENV)/.installed
 papers: $(VENV)/.installed
 	$(BIN)/hydrostate papers --out results/papers --seed $(SEED)
 
-# Asserts stay as they are written: rewriting them costs each worker 5 s in a fresh clone. What failed runs once more
+# Asserts stay as they are written: rewriting them costs each worker some 4 s in a fresh clone. What failed runs once more
 # with rewritten ones, which show values.
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile --assert=plain -m "not slow" \
