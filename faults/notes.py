@@ -71,6 +71,11 @@ class ClassCode(Code):
         "without differential_pressure_pa, other faults are not excluded: {faults} would explain the log about as "
         "well; {condition}"
     )
+    BALANCE_REFUSED = (
+        "bulk modulus is refused, but the class stands: a circuit follows velocity to {velocity_percent:.2g} % and "
+        "pressure to {pressure_percent:.2g} %, and no worn pump, low relief valve or faulty make-up valve explains the "
+        "log better"
+    )
     WEAR_NOT_TOLD = (
         "the log does not tell a worn pump from a sound one: with a probability of {percent:.2g} %, the pump delivers "
         "less than {limit:.0f} % of its displacement, which is none of the nine conditions"

@@ -85,7 +85,7 @@ def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
     speed, pressure = (_means(bridged(record[name]), size, count) for name in (SPEED, PRESSURE))
     swept, rise = (np.diff(bridged(record[name])[::size][: count + 1]) for name in (POSITION, PRESSURE))
     pumped = p.pump_displacement * speed
-    losses = np.column_stack([pressure, np.where(np.abs(pumped) > 0.0, np.sign(pumped), 0.0), rise / span])
+    losses = np.column_stack([pressure, _biased(pumped, p.flow_bias), rise / span])
     blocks = np.arange(count)
     within = (blocks * size >= hold.start) & ((blocks + 1) * size <= hold.stop)
     away = ((blocks + 1) * size < hold.start) | (blocks * size > hold.stop)
@@ -94,7 +94,10 @@ def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
     away &= ~relieved
     if np.count_nonzero(away) < FEWEST or not np.any(within):
         return False
-    value, std = _fitted(losses[away], pumped[away] - p.piston_area * swept[away] / span)
+    took = pumped[away] - p.piston_area * swept[away] / span
+    value, _ = _fitted(losses[away], took)
+    losses[:, 1] = _biased(pumped, float(value[1]))
+    value, std = _fitted(losses[away], took)
     lost = np.sign(pumped) * np.minimum(np.abs(losses[:, :2] @ value[:2]), np.abs(pumped))
     left = np.where(relieved, 0.0, pumped - lost - losses[:, 2] * value[2])[within]
     uncertain = DEVIATIONS * np.abs(losses[within]) @ std + LOSSES_KNOWN * np.abs(lost[within])
@@ -104,6 +107,14 @@ def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
         abs(float(np.sum(left[k : k + length]))) > float(np.sum(allowed[k : k + length])) + least / span
         for k in range(0, max(1, len(left) - length + 1), max(1, length // 2))
     )
+
+
+def _biased(pumped: Array, bias: float) -> Array:
+    """Return the share of a flow bias that is lost: no more than is pumped.
+
+    At rest only noise is pumped, and its sign would hide the bias of a log that dwells.
+    """
+    return np.clip(pumped / bias, -1.0, 1.0) if bias > 0.0 else np.sign(pumped)
 
 
 def _means(values: Array, size: int, count: int) -> Array:

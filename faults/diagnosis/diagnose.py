@@ -23,6 +23,7 @@ from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.notes import RigCode
 from faults.diagnosis.advice import advice_for, oil_advice, volume_advice
 from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
+from faults.diagnosis.beyond_nine.balance_refused import class_without_balance
 from faults.diagnosis.beyond_nine.drift import over_drift
 from faults.diagnosis.beyond_nine.load import Loaded, under_load
 from faults.diagnosis.beyond_nine.wear import whatever_the_pump_delivers
@@ -122,6 +123,9 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     diagnosis = _from_the_rigs_oil(diagnosis, case.healthy)
     found = replace(found, notes=(*found.notes, *named), evidence=EhaEvidence(estimate, scores, diagnosis))
     left = doubts_after(case.doubts, estimate, log, around, diagnosis.scoreboard)
+    stands = class_without_balance(left, diagnosis, estimate, actuator_of(around))
+    if stands is not None:
+        left, found = (), replace(found, notes=(*found.notes, stands))
     against = distinct((*left, *diagnosis.against))
     if against:  # nominal models alone are no judges of a circuit with another oil, but they say what is off
         against = distinct((*against, *verdict.against))

@@ -8,7 +8,7 @@ the best of several sound circuits is taken.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -52,6 +52,12 @@ WORN = "a worn pump"
 
 EARLY = "a relief valve that opens early"
 """What that one is called."""
+
+STUCK = "a make-up valve that is stuck shut"
+"""What that one is called. One that never has to open leaves no trace, whatever it is."""
+
+SOUND = "a sound circuit"
+"""What one is called that differs from the rig file's in what no rig file knows."""
 
 DELIVERIES = (0.7, 0.8, 0.9)
 """Shares of its displacement that a worn pump delivers [dimensionless]."""
@@ -205,6 +211,33 @@ def circuits_with_faults(
         yield fault.presumed - GAIN, tried.fits
 
 
+def gains_of_others(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Mapping[str, float]:
+    """Return how much better other circuits explain a log, with pressure or without.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log in blocks.
+    fits : ClassFits
+        The circuits without a fault that were fitted to it.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    Mapping[str, float]
+        By what a fault is called: log-likelihood of the best circuit with it over that of the best sound one, with what
+        is presumed of its size; as `SOUND`, of that one over the rig file's [dimensionless].
+    """
+    runs = nominal_runs(blocks, actuator)
+    sound = sound_circuit(blocks, fits, actuator, runs)
+    gains = {SOUND: sound.score - float(np.max(fits.scores))}
+    for fault, tried in _with_each(blocks, sound, runs):
+        gain = tried.score - sound.score + fault.presumed
+        gains[fault.name] = max(gain, gains.get(fault.name, gain))
+    return gains
+
+
 def _with_each(blocks: Blocks, sound: Tried, runs: Array, behind: float = HOPELESS) -> Iterator[tuple[_Fault, Tried]]:
     """Yield each fault, and the circuit with it that explains a log best."""
     for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best, sound.actuator)):
@@ -309,7 +342,7 @@ def _faults(actuator: Actuator, pressure: float) -> Iterator[_Fault]:
         note = AgainstCode.MAKEUP_STUCK.note(side=side.upper())
         for share in SHUT:
             stuck = one_sided(sound, **{f"makeup_shut_{side}": share})
-            yield _Fault(note, "a make-up valve that is stuck shut", stuck)
+            yield _Fault(note, STUCK, stuck)
         for size in SEATS:
             leaking = one_sided(sound, **{f"seat_leakage_{side}": size * float(np.exp(major))})
             yield _Fault(AgainstCode.MAKEUP_LEAKS.note(), "a make-up valve that leaks", leaking)

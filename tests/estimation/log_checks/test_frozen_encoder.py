@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from estimation.log_checks.frozen_encoder import missed_motion
 from estimation.log_checks.sensor_check import sensor_objections
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
@@ -65,3 +66,23 @@ def test_an_encoder_that_freezes_for_good_is_named(absent: tuple[str, ...], leak
     assert [note.data["channel"] for note in sensor_objections(log.replace(**dict.fromkeys(absent)), HEALTHY)] == [
         POSITION
     ]
+
+
+def test_a_flow_bias_is_known_though_the_motor_rests_most_of_the_log() -> None:
+    p, rng, rows = HEALTHY, np.random.default_rng(0), np.arange(10_000)
+    bias = 6.0 * p.flow_bias
+    speed = np.where(rows % 2500 < 500, np.where(rows // 2500 % 2, -90.0, 90.0), 0.0)
+    hold = slice(6000, 7000)
+    speed[hold] = 0.9 * bias / p.pump_displacement  # all of it is lost
+    moved = np.sign(speed) * np.maximum(p.pump_displacement * np.abs(speed) - bias, 0.0) / p.piston_area
+    log = Record(
+        1e-3,
+        {
+            "motor_speed_rad_s": speed + 0.1 * rng.normal(size=len(rows)),
+            POSITION: 2e-4 * np.round(np.cumsum(moved) * 1e-3 / 2e-4),
+            PRESSURE: 1e3 * rng.normal(size=len(rows)),
+        },
+    )
+    assert not missed_motion(log, hold, p)
+    fast = np.where((rows >= hold.start) & (rows < hold.stop), 3.0 * speed, log["motor_speed_rad_s"])
+    assert missed_motion(log.replace(motor_speed_rad_s=fast), hold, p)

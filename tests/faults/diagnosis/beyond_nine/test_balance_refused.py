@@ -1,0 +1,81 @@
+"""A class stands without the balance of flows only where circuits follow the log closely and no fault explains it."""
+
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from estimation.eha.result import BulkModulusEstimate
+from estimation.finding import Gate, Outcome
+from estimation.notes import EstimateCode, RigCode
+from faults.diagnosis.beyond_nine import balance_refused
+from faults.diagnosis.beyond_nine.balance_refused import CLOSELY, MOST_GAINED, class_without_balance
+from faults.diagnosis.beyond_nine.other_faults import EARLY, SOUND, STUCK, WORN, gains_of_others
+from faults.diagnosis.circuit_verdict import Diagnosis
+from faults.diagnosis.circuits.class_regions import fit_classes
+from faults.diagnosis.evidence import Scoreboard
+from faults.notes import AgainstCode, ClassCode
+from plant.log.record import Record
+from plant.notes import Note
+from tests.faults.diagnosis.beyond_nine.test_other_faults import ACTUATOR, FAULTS, log_of
+from tests.faults.diagnosis.circuits.test_rivals import leaving, log
+
+CORRELATED = EstimateCode.PRESSURE_RESIDUALS_CORRELATED.note(correlation=0.4)
+BLOCKED = RigCode.MAKEUP_BLOCKED.note(side="A")
+NONE_BETTER = {SOUND: 1.0, WORN: -3.1, STUCK: 0.5, EARLY: -20.0}
+
+
+def stands(
+    monkeypatch: pytest.MonkeyPatch,
+    doubts: tuple[Note, ...] = (CORRELATED,),
+    against: tuple[Note, ...] = (),
+    form: str = "flow",
+    noises: float = 1.0,
+    gains: dict[str, float] = NONE_BETTER,
+) -> Note | None:
+    """Return what is said of a log of which a circuit leaves so many times the sensors' noise of velocity."""
+    one = log()
+    one = replace(one, speed=np.full_like(one.speed, 50.0), velocity=one.velocity * 10.0)
+    fits = cast("Any", type("Fits", (), {"best": leaving(noises, 1.0, one)}))
+    board = Scoreboard({}, one, fits, Record(1e-3, {"motor_speed_rad_s": np.zeros(2)}), None)
+    estimate = BulkModulusEstimate(Outcome.OK, 1e9, 1e7, 0.01, Gate(False, doubts), form, ("position_m",), {}, {})
+    monkeypatch.setattr(balance_refused, "gains_of_others", lambda *_: gains)
+    return class_without_balance(doubts, Diagnosis({}, against, {}, {}, {}, (), board), estimate, ACTUATOR)
+
+
+def test_a_class_stands_where_a_circuit_follows_closely_and_nothing_else_does_better(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    said = stands(monkeypatch)
+    assert said is not None
+    assert said.code is ClassCode.BALANCE_REFUSED
+    assert 0.0 < said.data["velocity_percent"] < 100.0 * CLOSELY[0]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"doubts": ()},
+        {"doubts": (CORRELATED, BLOCKED)},
+        {"against": (AgainstCode.OUTSIDE_CONDITIONS.note(),)},
+        {"form": "motion"},
+        {"noises": 40.0},
+        {"gains": NONE_BETTER | {WORN: -2.9}},
+        {"gains": NONE_BETTER | {STUCK: 4.1}},
+        {"gains": NONE_BETTER | {EARLY: 0.1}},
+        {"gains": NONE_BETTER | {SOUND: 3.1}},
+    ],
+    ids=str,
+)
+def test_it_does_not_stand_where(monkeypatch: pytest.MonkeyPatch, change: dict[str, Any]) -> None:
+    assert stands(monkeypatch, **change) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("fault", "name"), [(None, ""), ("valve A", STUCK), ("pump", WORN)])
+def test_with_pressure_circuits_tell_a_stuck_valve_and_a_worn_pump(fault: str | None, name: str) -> None:
+    one = log_of(FAULTS[fault][0], pressure=True) if fault else log_of(pressure=True)
+    gains = gains_of_others(one, fit_classes(one, ACTUATOR), ACTUATOR)
+    speaks = {other for other, gain in gains.items() if gain > MOST_GAINED.get(other, 0.0)}
+    assert name in speaks if fault else not speaks
