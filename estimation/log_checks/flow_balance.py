@@ -19,6 +19,12 @@ MOST_LOST = 0.25
 """Share of the flow at rated speed that is the largest flow bias [fraction]; judged: the leakiest actuator of the paper
 loses a fifth."""
 
+BIASES = 401
+"""Flow biases over which a balance is averaged [count]: a step moves the piston's factor by less than 0.1 %."""
+
+LEAST_SHARE = 1e-12
+"""Share of the flow that counts as left where nothing is, as of a log without noise [fraction]."""
+
 
 class FlowBalance(NamedTuple):
     """What the pumped flow goes into, by least squares: motion, leakage, flow bias and compression.
@@ -85,10 +91,11 @@ def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance
     swept, spread = (window.slope, window.of_slope) if moved == POSITION else (window.mean, window.of_mean)
     flow = p.pump_displacement * window.mean(speed)
     parts = [p.piston_area * swept(piston), compliance * window.slope(pressure), window.mean(pressure)]
-    parts += [np.ones_like(flow), window.mean(np.sign(speed))]  # a block in which the pump turns round has both signs
+    parts += [np.ones_like(flow)]
     noises = [p.piston_area**2 * spread * noise_x, compliance**2 * window.of_slope * noise_p]
-    noises += [window.of_mean * noise_p, 0.0, 0.0]
-    return _with_a_likely_bias(flow, parts, np.array(noises), MOST_LOST * p.pump_displacement * p.rated_speed)
+    noises += [window.of_mean * noise_p, 0.0]
+    sign = window.mean(np.sign(speed))  # a block in which the pump turns round has both
+    return _whatever_the_bias(flow, sign, parts, np.array(noises), MOST_LOST * p.pump_displacement * p.rated_speed)
 
 
 def _noise(values: Array) -> float:
@@ -127,52 +134,51 @@ class _Window:
         return between[: count * size].reshape(count, size) @ self._weights
 
 
-def _with_a_likely_bias(flow: Array, parts: Sequence[Array], noises: Array, most: float) -> FlowBalance | None:
-    """Return the balance of a flow by its parts, the last of which is the pump's sign; its factor is the flow bias.
+def _whatever_the_bias(
+    flow: Array, sign: Array, parts: Sequence[Array], noises: Array, most: float
+) -> FlowBalance | None:
+    """Return the balance of a flow by its parts, over the flow biases that it leaves open.
 
-    A pump that turns at one speed pumps what its sign says, so a bias would take up all flow where pressure is noisy.
-    It is none of a pump's below zero and above `most` [m^3/s]; of a speed in another unit all flows are as many times
-    too large as the piston's.
-    """
-    if np.ptp(flow) == 0.0:
-        return None
-    balance, bias = _balanced(flow, parts, noises)
-    if 0.0 <= bias <= most * max(1.0, balance.swept):
-        return balance
-    *others, sign = parts
-    lost = most * sign if bias > 0.0 else np.zeros_like(flow)
-    balance, _ = _balanced(flow - lost, others, noises[:-1])
-    if bias > 0.0 and balance.swept > 1.0:
-        balance, _ = _balanced(flow, [others[0] + lost, *others[1:]], noises[:-1])
-    return balance._replace(moving=float(np.std(parts[0])) / float(np.std(flow)))
-
-
-def _balanced(flow: Array, parts: Sequence[Array], noises: Array) -> tuple[FlowBalance, float]:
-    """Return the balance of a flow by its parts, and the factor of the last.
+    A pump that turns at one speed pumps what its sign says. Least squares then let a bias take up all flow, for the
+    less there is to explain, the less is left. So each bias counts by the share of the other flow that is left.
+    A bias is none of a pump's below zero and above `most` [m^3/s]; of a speed in another unit all flows are as many
+    times too large as the piston's.
 
     Noise in a part draws its factor towards zero, and those of parts that move like it elsewhere: by the inverse of the
     normal equations times the variance of noise, times the factor, once, squared and so on. Two orders are corrected,
     and deviations hold the second, so that where the series does not converge nothing is known.
     """
-    columns = np.column_stack(parts)
+    if np.ptp(flow) == 0.0:
+        return None
+    columns, wanted = np.column_stack(parts), np.column_stack([flow, sign])
     sizes = np.linalg.norm(columns, axis=0)
     absent = sizes == 0.0
     sizes[absent] = 1.0
     scaled = columns / sizes
     inverse = np.linalg.pinv(scaled.T @ scaled)
-    found = inverse @ (scaled.T @ flow)
-    rest = flow - scaled @ found
-    left = float(np.var(rest))
-    variance = left * _blocks_that_repeat(rest)
-    open_by = np.where(absent, np.inf, np.maximum(np.diag(inverse), 0.0))  # of what stands still nothing is known
+    found = inverse @ (scaled.T @ wanted)
     drawing = inverse * (len(flow) * noises / sizes**2)
-    first = drawing @ found
-    second = drawing @ first
-    value, std = (found + first + second) / sizes, np.sqrt(variance * open_by + second**2) / sizes
-    (swept, compressed), (swept_std, compressed_std) = (map(float, one[:2]) for one in (value, std))
+    second = drawing @ (drawing @ found)
+    factors, rest = found + drawing @ found + second, wanted - scaled @ found
+
+    swept_at_none = float(factors[0, 0] / sizes[0])
+    biases = most * max(1.0, swept_at_none) * np.linspace(0.0, 1.0, BIASES)
+    without = np.stack([np.ones(BIASES), -biases])
+    left, whole = (np.einsum("ib,ij,jb->b", without, np.cov(one.T, bias=True), without) for one in (rest, wanted))
+    share = np.maximum(left / np.where(whole > 0.0, whole, np.inf), LEAST_SHARE)
+    repeats = _blocks_that_repeat(rest @ without[:, int(np.argmin(share))])
+    weights = (np.min(share) / share) ** (0.5 * len(flow) / repeats)
+    weights /= np.sum(weights)
+
+    open_by = np.where(absent, np.inf, np.maximum(np.diag(inverse), 0.0))  # of what stands still nothing is known
+    variance = repeats * open_by[:2, None] * left + (second[:2] @ without) ** 2
+    told = factors[:2] @ without
+    mean = told @ weights
+    std = np.sqrt((variance + (told - mean[:, None]) ** 2) @ weights)
+    (swept, compressed), (swept_std, compressed_std) = ((one / sizes[:2]).tolist() for one in (mean, std))
+    explained = 1.0 - float(left @ weights) / float(np.var(flow))
     moving = float(np.std(parts[0])) / float(np.std(flow))
-    explained = 1.0 - left / float(np.var(flow))
-    return FlowBalance(swept, swept_std, compressed, compressed_std, explained, moving), float(value[-1])
+    return FlowBalance(swept, swept_std, compressed, compressed_std, explained, moving)
 
 
 def _blocks_that_repeat(rest: Array) -> float:
