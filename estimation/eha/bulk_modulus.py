@@ -330,4 +330,5 @@ def _fitted(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEs
         explanation=fit.explanation,
         remarks=fit.remarks,
         turning=fit.turning,
+        correlation=fit.correlation,
     )

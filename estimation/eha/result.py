@@ -61,6 +61,8 @@ class BulkModulusEstimate:
         `estimation.eha.named.NAMED`.
     turning : Turning
         Teeth of the pump and offset of the speed that were taken up.
+    correlation : float
+        Of the errors of leakage coefficient and flow bias, where a fit balances flows [dimensionless].
     """
 
     outcome: Outcome
@@ -81,6 +83,7 @@ class BulkModulusEstimate:
     remarks: tuple[Note, ...] = ()
     method: str = "least-squares"
     turning: Turning = EVENLY
+    correlation: float = 0.0
 
     @property
     def quantity(self) -> Quantity:

@@ -8,6 +8,7 @@ import numpy as np
 
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.teeth import EVENLY, Turning
+from plant.arrays import Array
 from plant.notes import Note
 
 if TYPE_CHECKING:
@@ -51,6 +52,8 @@ class FormFit:
         What the log leaves open, and is nothing against the fit.
     turning : Turning
         Teeth of the pump and offset of the speed that were taken up.
+    correlation : float
+        Of the errors of leakage coefficient and flow bias [dimensionless].
     """
 
     parameters: Mapping[str, tuple[float, float]]
@@ -61,6 +64,7 @@ class FormFit:
     explanation: "Explanation | None" = None
     remarks: tuple[Note, ...] = ()
     turning: Turning = EVENLY
+    correlation: float = 0.0
 
 
 def with_structure(found: Mapping[str, tuple[float, float]], structure: float) -> dict[str, tuple[float, float]]:
@@ -80,6 +84,25 @@ def with_structure(found: Mapping[str, tuple[float, float]], structure: float) -
     """
     value, std = found["bulk_modulus"]
     return {**found, "bulk_modulus": (value, float(np.hypot(std, structure * value)))}
+
+
+def weights_of(fits: Sequence[GreyBoxFit], temper: float = TEMPER, beforehand: Sequence[float] | None = None) -> Array:
+    """Return how likely each of several models of one log is.
+
+    Parameters
+    ----------
+    fits : sequence of GreyBoxFit
+        As of `weighed`, and so are the others.
+
+    Returns
+    -------
+    ndarray, shape (fits,)
+        Weights that sum to one [fraction].
+    """
+    costs = np.array([fit.cost for fit in fits])
+    weights = np.exp(-np.minimum((costs - np.min(costs)) / temper, 700.0))
+    weights *= 1.0 if beforehand is None else np.array(beforehand)
+    return np.asarray(weights / np.sum(weights), dtype=np.float64)
 
 
 def weighed(
@@ -105,11 +128,8 @@ def weighed(
     Mapping[str, tuple of float]
         Value and deviation by parameter [SI].
     """
-    costs = np.array([fit.cost for fit in fits])
-    weights = np.exp(-np.minimum((costs - np.min(costs)) / temper, 700.0))
-    weights *= 1.0 if beforehand is None else np.array(beforehand)
-    weights /= np.sum(weights)
-    best = fits[int(np.argmin(costs))]
+    weights = weights_of(fits, temper, beforehand)
+    best = min(fits, key=lambda fit: fit.cost)
     found: dict[str, tuple[float, float]] = {}
     for name in (name for name in best.values if all(name in fit.values for fit in fits)):
         values = np.array([fit.values[name] for fit in fits])

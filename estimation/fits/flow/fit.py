@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.fits.explaining.delivery import contradicted
 from estimation.fits.explaining.explain import WORTH, explain
-from estimation.fits.explaining.form_fit import DISCRETISED, FormFit, weighed, with_structure
+from estimation.fits.explaining.form_fit import DISCRETISED, FormFit, weighed, weights_of, with_structure
 from estimation.fits.explaining.left_open import share_lost, valves_unseen, wear_open
 from estimation.fits.explaining.objections import doubted, fit_explains_all, limits, objections
 from estimation.fits.explaining.speed_instead import speed_instead
@@ -17,6 +17,7 @@ from estimation.fits.explaining.tried import Explanation
 from estimation.fits.explaining.uneven_loss import UnevenLoss, loss_note, uneven_loss
 from estimation.fits.flow.asked import ALWAYS_ASKED, MOST_ASKED, asked_of, near_starts
 from estimation.fits.flow.log import homed_at_stop, without_strays
+from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, stiffer
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.flow.valley import lower_valley
@@ -225,14 +226,16 @@ def _losing_fit(plain: PlainFits, loss: UnevenLoss, sensed: ShownPlay) -> FormFi
     untaken, open_play = plain.play_untaken(one.play, sensed)
     value, std = one.values["bulk_modulus"], one.std["bulk_modulus"]
     found = {name: (each, one.std[name]) for name, each in one.values.items()}
+    found, correlation = with_lumped(found, [one], np.ones(1))
     return FormFit(
         parameters=with_structure(found, float(np.linalg.norm([UNEVEN, untaken, loss.opened]))),
         bound=std / value,
         chi_square=one.chi_square[0],
         reasons=play_left(one.play, sensed),
-        rig_slopes=one.rig_slopes,
+        rig_slopes=with_lumped_slopes(one.rig_slopes),
         remarks=(*plain.teeth, loss_note(loss), *open_play),
         turning=plain.turning,
+        correlation=correlation,
     )
 
 
@@ -272,15 +275,17 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
     if AIR_MIDWAY.name in strange.names:
         left = float(np.hypot(left, BUBBLES))
     most = share_lost(plain.log, one.values, plain.start.parameters.pump_displacement, strange.names)
+    found, correlation = with_lumped(strange.values, [one], np.ones(1))
     return FormFit(
-        parameters=with_structure(with_small_teeth(strange.values, one.small_teeth), left),
+        parameters=with_structure(with_small_teeth(found, one.small_teeth), left),
         bound=bound,
         chi_square=one.chi_square[0],
         reasons=(*shown, *contradicted(strange, plain.start.parameters)),
-        rig_slopes=one.rig_slopes,
+        rig_slopes=with_lumped_slopes(one.rig_slopes),
         explanation=strange,
         remarks=(*plain.teeth, *wear_open(strange.delivery_open, most), *open_play),
         turning=plain.turning,
+        correlation=correlation,
     )
 
 
@@ -288,7 +293,10 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     """Return what a log says that is believed to have nothing strange about it."""
     best = plain.best
     beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in plain.fits]
-    found = with_small_teeth(weighed(plain.fits, SURER, beforehand), best.small_teeth)
+    found, correlation = with_lumped(
+        weighed(plain.fits, SURER, beforehand), plain.fits, weights_of(plain.fits, SURER, beforehand)
+    )
+    found = with_small_teeth(found, best.small_teeth)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     untaken, open_play = plain.play_untaken(plain.swinging.play, sensed)
     reasons = (*objections(best, plain.log.passes_on), *play_left(plain.swinging.play, sensed)) or plain.teeth_left
@@ -300,9 +308,10 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
         bound=std / value,
         chi_square=best.chi_square[0],
         reasons=reasons,
-        rig_slopes=best.rig_slopes,
+        rig_slopes=with_lumped_slopes(best.rig_slopes),
         remarks=(*plain.teeth, *open_ends, *valves_unseen(best), *open_play),
         turning=plain.turning,
+        correlation=correlation,
     )
 
 

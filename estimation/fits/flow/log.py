@@ -1,5 +1,6 @@
 """`flow_log(record, parameters, ...)`: a log as the flow form sees it, with what its sensors' noise does to the fit."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -32,6 +33,11 @@ DRAIN_START = 0.05
 PRESUMED_STD = 1.0
 """Standard deviation of the logarithms of the last two about their first guesses, before the log is seen: where the
 make-up valves never open, no log tells a drain from leakage, and any drain would do [dimensionless]."""
+
+WITHIN: Mapping[str, float] = {"makeup_conductance": math.log(100.0)}
+"""Standard deviation of the logarithm of a make-up valve's conductance about what a search finds [dimensionless],
+judged: two factors of ten. Where a valve is barely felt, slopes leave factors of e^30 open, which no valve has, and
+leakage goes with them."""
 
 LEAST_LEAKAGE = 1e-3
 """Least first guess of a leakage, as a share of the rated pump flow [fraction]; a logarithm cannot start at zero."""
@@ -170,6 +176,7 @@ def flow_log(
             "speed_lead": (0.0, MOST_LEAD * record.sample_time / dict(FLOW_FORM.linear)["speed_lead"]),
             **dict.fromkeys((*CRACKS, BEND), (0.0, 1.0)),
         },
+        within=WITHIN,
     )
     log = averaged(log, LONGEST_STEP)
     felt = log.noise[0].passed_on * parameters.bulk_modulus > FELT_NOISE * log.noise[0].variance ** 0.5

@@ -217,7 +217,7 @@ def ways(speed: Array) -> Array:
 
 
 def opened(problem: Problem, theta: Array, errors: Array, bread: Array, slopes: Array) -> Array:
-    """Return the variance of unknowns from a motor that bends its course alike at each turn.
+    """Return the covariance of unknowns from a motor that bends its course alike at each turn.
 
     It filters the samples, by weights that are not fitted. What the residuals say of them, and what they leave open, is
     what the unknowns may be off by.
@@ -237,7 +237,7 @@ def opened(problem: Problem, theta: Array, errors: Array, bread: Array, slopes: 
 
     Returns
     -------
-    ndarray, shape (felt,)
+    ndarray, shape (felt, felt)
         [dimensionless]
     """
     columns = _answers(problem.coarse, theta, ways(problem.log.drives[:, 0]))
@@ -245,7 +245,7 @@ def opened(problem: Problem, theta: Array, errors: Array, bread: Array, slopes: 
     free = columns - slopes @ answers
     spread = np.linalg.inv(free.T @ free + IN_VOLUME.T @ IN_VOLUME / USUAL**2)
     weights = spread @ (free.T @ errors.ravel())
-    return np.einsum("ij,jk,ik->i", answers, spread + np.outer(weights, weights), answers)
+    return np.asarray(answers @ (spread + np.outer(weights, weights)) @ answers.T, dtype=np.float64)
 
 
 def vanished(problem: Problem, theta: Array, errors: Array, felt: NDArray[np.intp]) -> list[Array]:

@@ -1,4 +1,4 @@
-"""How surely a solution is known: what its slopes tell of the unknowns that are felt, and the variance of each."""
+"""How surely a solution is known: what its slopes tell of the unknowns that are felt, and their covariance."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from estimation.fits.greybox.course import opened, vanished
 from estimation.fits.greybox.covariance import automatic_lags, least_squares_covariance
 from estimation.fits.greybox.descent import Point
-from estimation.fits.greybox.drive_noise import drive_variance
+from estimation.fits.greybox.drive_noise import drive_covariance
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.greybox.within_bounds import bounded
 from plant.arrays import Array
@@ -69,6 +69,24 @@ class Information:
         return self.bread @ (self.slopes.T @ shift.ravel())
 
 
+def believed(problem: Problem) -> Array:
+    """Return one over the variance of each coordinate that counts in deviations beside what the log tells.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+
+    Returns
+    -------
+    ndarray, shape (unknowns,)
+        What is presumed of an unknown, and how far it may be from where a search ends; zero where nothing is known
+        [dimensionless].
+    """
+    within = [problem.log.within.get(name, np.inf) ** -2.0 for name in problem.model.unknowns]
+    return np.asarray(problem.prior + np.array(within), dtype=np.float64)
+
+
 def information(
     problem: Problem, theta: Array, errors: Array, slopes: Array, felt: NDArray[np.intp], *, warned: bool
 ) -> Information:
@@ -90,7 +108,7 @@ def information(
         Whether the caller is warned where unknowns are not separately determined.
     """
     fitted = slopes if len(felt) == len(theta) else slopes[:, felt]
-    left_over, prior, used = errors.ravel(), problem.prior[felt], int(np.count_nonzero(errors))
+    left_over, prior, used = errors.ravel(), believed(problem)[felt], int(np.count_nonzero(errors))
     lags = automatic_lags(left_over)
     fitted_bread, spread = least_squares_covariance(fitted, left_over, used, lags, prior, warned=warned)
     beside, bread = fitted, fitted_bread
@@ -100,7 +118,7 @@ def information(
     return Information(felt, errors, fitted, fitted_bread, beside, bread, spread)
 
 
-def variances(
+def covariance_of(
     problem: Problem,
     point: Point,
     told: Information,
@@ -109,7 +127,7 @@ def variances(
     disturbed: bool,
     undisturbed: Array | None,
 ) -> Array:
-    """Return the variance of each unknown that is felt: by noise of the outputs, and of the drives if wanted.
+    """Return the covariance of the unknowns that are felt: by noise of the outputs, and of the drives if wanted.
 
     Parameters
     ----------
@@ -128,16 +146,17 @@ def variances(
 
     Returns
     -------
-    ndarray, shape (felt,)
-        The variances [dimensionless]; infinite where nothing is known.
+    ndarray, shape (felt, felt)
+        The covariance [dimensionless]; infinite on the diagonal where nothing is known.
     """
     theta, felt, slopes, bread, spread = point.theta, told.felt, told.slopes, told.bread, told.spread
     tilt = bread[:, : len(felt)] @ problem.untilted(theta, told.errors)[felt]
     kept = spread if least is None else bounded(problem, point, least, felt, told.fitted_bread, spread)
-    variance = np.diag(kept) + (NOISE_DOUBT * tilt) ** 2
-    variance = variance + (drive_variance(problem, theta, bread, slopes, undisturbed) if disturbed else 0.0)
+    covariance = kept + NOISE_DOUBT**2 * np.outer(tilt, tilt)
+    covariance = covariance + (drive_covariance(problem, theta, bread, slopes, undisturbed) if disturbed else 0.0)
     if problem.log.course is not None and disturbed:  # a window's estimate of few turns is poor
-        variance = variance + np.maximum(np.diag(bread - spread), 0.0)
-        variance = variance + opened(problem, theta, told.errors, bread, slopes)
+        covariance = covariance + np.diag(np.maximum(np.diag(bread - spread), 0.0))
+        covariance = covariance + opened(problem, theta, told.errors, bread, slopes)
     # the window's estimate need not be positive: then nothing is known
-    return np.where(np.diag(spread) > 0.0, variance, np.inf)[: len(felt)]
+    covariance[~(np.diag(spread) > 0.0), ~(np.diag(spread) > 0.0)] = np.inf
+    return covariance[: len(felt), : len(felt)]

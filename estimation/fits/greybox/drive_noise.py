@@ -1,4 +1,4 @@
-"""`drive_variance(problem, theta, ...)`: what noise of the driving channels adds to the variance of a fit.
+"""`drive_covariance(problem, theta, ...)`: what noise of the driving channels adds to the covariance of a fit.
 
 It is measured once and acts on all later outputs, so that it is seen by drawing it.
 """
@@ -18,10 +18,10 @@ SAMPLES_KEPT = 50_000
 """Longest log whose draws are kept for the next one [samples]: 13 MB."""
 
 
-def drive_variance(
+def drive_covariance(
     problem: Problem, theta: Array, bread: Array, slopes: Array, undisturbed: Array | None = None
 ) -> Array | float:
-    """Return the variance that noise of the driving channels adds to each fitted coordinate.
+    """Return the covariance that noise of the driving channels adds to that of the fitted coordinates.
 
     Parameters
     ----------
@@ -38,8 +38,8 @@ def drive_variance(
 
     Returns
     -------
-    ndarray, shape (felt,), or float
-        The variance [dimensionless]; zero where no driving channel is noisy.
+    ndarray, shape (felt, felt), or float
+        The covariance [dimensionless]; zero where no driving channel is noisy.
     """
     log = problem.log
     if not any(spread > 0.0 for spread in log.drive_std):
@@ -49,11 +49,13 @@ def drive_variance(
         undisturbed = next(iter(rough.disturbed(theta, [log.drives])))
     if samples <= SAMPLES_KEPT:
         moved = rough.disturbed_together(theta, _noisy_drives(log)) - undisturbed[..., None]
-        return np.sum((bread @ (slopes.T @ moved.reshape(-1, DRAWS))) ** 2, axis=1) / DRAWS
+        answers = bread @ (slopes.T @ moved.reshape(-1, DRAWS))
+        return np.asarray(answers @ answers.T / DRAWS, dtype=np.float64)
     rng = np.random.default_rng(0)
     draws = (log.drives + spread * rng.standard_normal(log.drives.shape) for _ in range(DRAWS))
     each = ((errors - undisturbed).ravel() for errors in rough.disturbed(theta, draws))
-    return sum((bread @ (slopes.T @ moved)) ** 2 for moved in each) / DRAWS
+    answers = np.column_stack([bread @ (slopes.T @ moved) for moved in each])
+    return np.asarray(answers @ answers.T / DRAWS, dtype=np.float64)
 
 
 @lru_cache(maxsize=1)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from estimation.arrays import IntArray
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.deviations import Information, information, variances
+from estimation.fits.greybox.deviations import Information, believed, covariance_of, information
 from estimation.fits.greybox.lateness import changes_beside, lateness, left_by
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, shown_play
@@ -68,6 +68,9 @@ class GreyBoxFit:
         What the residuals say of a play of the encoder, where a fit was asked.
     slopes : ndarray, shape (outputs * blocks, unknowns)
         Derivatives of the normalised residuals there [dimensionless].
+    covariance : ndarray, shape (unknowns, unknowns)
+        Of the fitted coordinates from noise alone, with what is presumed; infinite variances where nothing is known
+        [dimensionless].
     teeth : Mapping[int, ShownTeeth]
         What they say of the pump's teeth, by their count in a turn, where a fit was asked.
     speed_offset : ShownOffset
@@ -91,6 +94,7 @@ class GreyBoxFit:
     late: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
     play: ShownPlay = NO_PLAY
     slopes: Array = field(default_factory=lambda: np.empty((0, 0)))
+    covariance: Array = field(default_factory=lambda: np.empty((0, 0)))
     teeth: Mapping[int, ShownTeeth] = field(default_factory=dict[int, ShownTeeth])
     speed_offset: ShownOffset = NO_OFFSET
     small_teeth: tuple[Mapping[str, float], Mapping[str, float]] = NOT_MOVED
@@ -276,8 +280,8 @@ def concluded(
     model, theta = problem.model, point.theta
     errors, all_slopes = problem.linearised(theta)
     effects = np.einsum("ij,ij->j", all_slopes, all_slopes)
-    felt = np.flatnonzero(effects > np.where(problem.prior > 0.0, 0.0, LEAST_EFFECT**2))
-    noise, rig, late = np.full(len(theta), np.inf), dict[str, Array](), dict[str, tuple[float, float]]()
+    felt = np.flatnonzero(effects > np.where(believed(problem) > 0.0, 0.0, LEAST_EFFECT**2))
+    whole, rig, late = np.diag(np.full(len(theta), np.inf)), dict[str, Array](), dict[str, tuple[float, float]]()
     play, teeth, offset = NO_PLAY, dict[int, ShownTeeth](), NO_OFFSET
     used, names = int(np.count_nonzero(errors)), [model.unknowns[place] for place in felt]
     if len(felt) and used > len(theta):
@@ -285,18 +289,18 @@ def concluded(
         left_over, slopes, bread = known_of.left_over, known_of.fitted_slopes, known_of.fitted_bread
         told = disturbed and asked
         here, moved = changes_beside(problem, theta) if told else (None, [])
-        variance = variances(problem, point, known_of, least=least, disturbed=disturbed, undisturbed=here)
+        covariance = covariance_of(problem, point, known_of, least=least, disturbed=disturbed, undisturbed=here)
         held, shifted = [one.count for one in problem.log.teeth], problem.log.speed_offset != 0.0
         counts = problem.log.counts if asked else held
         if (disturbed and counts) or shifted:
             teeth, offset = shown_teeth(problem, theta, left_over, bread, slopes, counts)
-            variance = variance + sum(teeth[count].opened for count in held if count in teeth)
-            variance = variance + (offset.opened if shifted and not held else 0.0)
-        noise[felt] = np.sqrt(variance)
-        noise[effects <= LEAST_EFFECT**2] = np.inf  # what is known of it is not from this log
+            opened = sum(teeth[count].opened for count in held if count in teeth)
+            covariance = covariance + np.diag(opened + (offset.opened if shifted and not held else np.zeros(len(felt))))
+        whole[np.ix_(felt, felt)] = covariance
         if told:
             rig = dict(answers_by_rig(with_steps(problem, steps), theta, known_of))
             late, play = _late_and_play(problem, known_of, moved, effects[felt] > LEAST_EFFECT**2)
+    noise = np.where(effects > LEAST_EFFECT**2, np.sqrt(np.diag(whole)), np.inf)  # else it is not known from this log
     # teeth that are taken up are not small, and the course of a slow log's motor looks like some
     asked_of_teeth = {} if problem.log.teeth or problem.log.course is not None else teeth
     sizes, values = dict(model.linear), model.values(theta)
@@ -315,6 +319,7 @@ def concluded(
         teeth=teeth,
         speed_offset=offset,
         small_teeth=small_teeth(asked_of_teeth, names),
+        covariance=whole,
         cost=point.cost,
         chi_square=chi_square,
         autocorrelation=autocorrelation,

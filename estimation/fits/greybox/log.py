@@ -92,6 +92,9 @@ class GreyBoxLog:
         sample to the next, in units of `GreyBoxModel.jump`; in order of time, none overlapping.
     presumed : Mapping[str, tuple of float]
         What is known of unknowns before the log is seen: value [SI] and standard deviation of its coordinate.
+    within : Mapping[str, float]
+        How far unknowns may be from where a search ends, wherever that is: standard deviation of the coordinate. It
+        counts in deviations alone.
     block : float
         Length over which residuals are averaged before they are squared [s].
     timed : tuple of str
@@ -118,6 +121,7 @@ class GreyBoxLog:
     uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
     gaps: Array = field(default_factory=lambda: np.empty((0, 3)))
     presumed: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
+    within: Mapping[str, float] = field(default_factory=dict[str, float])
     block: float = BLOCK
     timed: tuple[str, ...] = ()
     counts: tuple[int, ...] = ()

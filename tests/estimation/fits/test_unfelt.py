@@ -53,3 +53,16 @@ def test_a_lead_that_is_not_felt_by_its_unit_takes_up_no_channel_that_is_late() 
     assert held.late["motor_speed_rad_s"][1] > 10.0
     for channel, told in held.late.items():
         assert free.late[channel] == pytest.approx(told, rel=1e-3)
+
+
+def test_a_make_up_valve_that_is_barely_felt_leaves_no_leakage_open_that_no_valve_has() -> None:
+    """Its logarithm was known to e^30 or not at all, and leakage four times as well or as badly with it."""
+    sparse = seen(log(2.0), PAPER)
+    values = {"makeup_conductance": 1e-13, "makeup_opening": 1e3, "case_leakage": 1e-13, "speed_lead": 1e-5}
+    values |= {name: getattr(WORN, name) for name in (BULK_MODULUS, "leakage_coefficient", "flow_bias")}
+    deviations: list[float] = []
+    for within in (sparse.within, {"makeup_conductance": 30.0}):
+        problem = FreedProblem.of(FLOW_FORM, replace(sparse, within=within))
+        fit = concluded(problem, problem.at(problem.model.theta(values)), disturbed=False)
+        deviations.append(fit.std["leakage_coefficient"])
+    assert 2.0 * deviations[0] < deviations[1]

@@ -1,0 +1,111 @@
+"""`losses(fits, weights)`: lumped leakage coefficient and flow bias of a log, with what is known of the two together.
+
+The form knows two leaks: from chamber to chamber, and a drain of each port to the inner circuit. Equation 5.8 knows
+one, and Table 3 gives it: what flows across, and half of a port's drain (errata E17). A log often tells it far better
+than its parts.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from estimation.fits.greybox.fit import GreyBoxFit
+from plant.arrays import Array
+
+LEAKAGE, DRAIN, BIAS = "leakage_coefficient", "case_leakage", "flow_bias"
+
+OF_DRAIN = 0.5
+"""Share of a port's drain that is lumped leakage [fraction]: of two ports each takes half of the differential
+pressure."""
+
+MOST_ALIKE = 0.999
+"""Largest correlation of the two that is told [dimensionless]: a window's estimate of a covariance may have more than
+one."""
+
+
+def losses(fits: Sequence[GreyBoxFit], weights: Array) -> tuple[Array, Array]:
+    """Return lumped leakage coefficient and flow bias over several fits of a log, with their covariance.
+
+    Parameters
+    ----------
+    fits : sequence of GreyBoxFit
+        Of forms that balance flows.
+    weights : ndarray, shape (fits,)
+        How likely each is [fraction].
+
+    Returns
+    -------
+    tuple of ndarray, shapes (2,) and (2, 2)
+        Values [m^3/(s Pa), m^3/s] and their covariance; what fits disagree on is part of it, and it is infinite where a
+        log does not tell one of the two.
+    """
+    heavy = [(fit, weight) for fit, weight in zip(fits, weights, strict=True) if weight > np.finfo(np.float64).eps]
+    each = [_of(fit) for fit, _ in heavy]
+    shares = np.array([weight for _, weight in heavy]) / sum(weight for _, weight in heavy)
+    values = np.array([value for value, _ in each])
+    mean = shares @ values
+    apart = values - mean
+    within = np.tensordot(shares, np.array([covariance for _, covariance in each]), axes=1)
+    return mean, np.asarray(within + (apart.T * shares) @ apart, dtype=np.float64)
+
+
+def _of(fit: GreyBoxFit) -> tuple[Array, Array]:
+    """Return the same of one fit, whose unknowns are logarithms."""
+    names = (LEAKAGE, DRAIN, BIAS)
+    across, drain, bias = (fit.values[name] for name in names)
+    found = np.array([across + OF_DRAIN * drain, bias])
+    if math.isinf(fit.std[LEAKAGE]) or math.isinf(fit.std[BIAS]):
+        return found, np.diag([np.inf, np.inf])
+    places = [fit.model.unknowns.index(name) for name in names]
+    answers = np.array([[across, OF_DRAIN * drain, 0.0], [0.0, 0.0, bias]])
+    return found, answers @ fit.covariance[np.ix_(places, places)] @ answers.T
+
+
+def with_lumped(
+    found: Mapping[str, tuple[float, float]], fits: Sequence[GreyBoxFit], weights: Array
+) -> tuple[dict[str, tuple[float, float]], float]:
+    """Return what was found, its leakage coefficient the lumped one, and the correlation of that with the flow bias.
+
+    Parameters
+    ----------
+    found : Mapping[str, tuple of float]
+        Value and deviation by parameter [SI]; the leakage coefficient is that from chamber to chamber, at the end of a
+        log in which it changes.
+    fits : sequence of GreyBoxFit
+        As of `losses`, the likeliest first where it alone told what was found.
+    weights : ndarray, shape (fits,)
+        As of `losses`.
+
+    Returns
+    -------
+    tuple of (dict[str, tuple of float], float)
+        The same, and the correlation [dimensionless].
+    """
+    values, covariance = losses(fits, weights)
+    deviations = np.sqrt(np.diag(covariance))
+    if not np.all(np.isfinite(deviations)) or not np.all(deviations > 0.0):
+        return {**found, LEAKAGE: (found[LEAKAGE][0] + OF_DRAIN * found[DRAIN][0], found[LEAKAGE][1])}, 0.0
+    across = float(np.sum(weights * [fit.values[LEAKAGE] for fit in fits]) / np.sum(weights))
+    grown = found[LEAKAGE][0] / across
+    lumped = float(grown * values[0]), float(grown * deviations[0])
+    return {**found, LEAKAGE: lumped}, float(np.clip(covariance[0, 1] / np.prod(deviations), -MOST_ALIKE, MOST_ALIKE))
+
+
+def with_lumped_slopes(slopes: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, float]]:
+    """Return how what was found answers the rig, the leakage coefficient being the lumped one.
+
+    Parameters
+    ----------
+    slopes : Mapping[str, Mapping[str, float]]
+        By entry of the rig, and by parameter [SI].
+
+    Returns
+    -------
+    dict[str, dict[str, float]]
+        The same.
+    """
+    return {
+        entry: {**one, LEAKAGE: one[LEAKAGE] + OF_DRAIN * one[DRAIN]} if {LEAKAGE, DRAIN} <= set(one) else {**one}
+        for entry, one in slopes.items()
+    }

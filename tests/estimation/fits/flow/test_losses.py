@@ -1,0 +1,68 @@
+"""Lumped leakage: what a log tells of two leaks together, where it tells neither."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.fits.flow.losses import losses, with_lumped, with_lumped_slopes
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.models.flow import FLOW_FORM
+from plant.arrays import Array
+
+LEAKAGE, DRAIN, BIAS = "leakage_coefficient", "case_leakage", "flow_bias"
+ACROSS, DRAINED, BIASED = 5e-12, 4e-13, 2e-6
+
+
+def fit(across: float = ACROSS, apart: float = -0.99) -> GreyBoxFit:
+    """Return a fit with leaks of which the log tells the sum alone: a drain to 50 %, the rest to 2 %."""
+    unknowns = FLOW_FORM.unknowns
+    values = {**dict.fromkeys(unknowns, 1.0), LEAKAGE: across, DRAIN: DRAINED, BIAS: BIASED}
+    deviations = {LEAKAGE: 0.02, DRAIN: 0.5, BIAS: 0.01}
+    covariance = np.diag([deviations.get(name, 1.0) ** 2 for name in unknowns])
+    first, second = unknowns.index(LEAKAGE), unknowns.index(DRAIN)
+    covariance[first, second] = covariance[second, first] = apart * 0.02 * 0.5
+    std = {name: values[name] * deviations.get(name, 1.0) for name in unknowns}
+    return GreyBoxFit(FLOW_FORM, np.zeros(len(unknowns)), values, std, 0.0, (1.0,), (0.0,), covariance=covariance)
+
+
+def found(one: GreyBoxFit) -> dict[str, tuple[float, float]]:
+    return {name: (value, one.std[name]) for name, value in one.values.items()}
+
+
+def weights(*each: float) -> Array:
+    return np.array(each)
+
+
+def test_two_leaks_are_known_together_where_neither_is_known() -> None:
+    told, _ = with_lumped(found(fit()), [fit()], weights(1.0))
+    value, std = told[LEAKAGE]
+    assert value == pytest.approx(ACROSS + 0.5 * DRAINED)
+    assert std == pytest.approx(ACROSS * 0.02 * (2.0 * (1.0 - 0.99)) ** 0.5)
+    assert told[BIAS] == found(fit())[BIAS]
+
+
+def test_what_fits_disagree_on_is_not_known() -> None:
+    apart = [fit(), fit(1.1 * ACROSS)]
+    value, covariance = losses(apart, weights(0.5, 0.5))
+    assert value[0] == pytest.approx(1.05 * ACROSS + 0.5 * DRAINED)
+    assert covariance[0, 0] ** 0.5 > 0.05 * ACROSS
+    assert losses(apart, weights(1.0, 1e-30))[0][0] == pytest.approx(ACROSS + 0.5 * DRAINED)
+
+
+def test_a_leak_that_is_not_felt_leaves_the_sum_open() -> None:
+    unfelt = replace(fit(), std={**fit().std, LEAKAGE: np.inf})
+    told, correlation = with_lumped(found(unfelt), [unfelt], weights(1.0))
+    assert told[LEAKAGE] == (ACROSS + 0.5 * DRAINED, np.inf)
+    assert correlation == 0.0
+
+
+def test_a_leakage_that_changed_is_told_as_it_is_at_the_end() -> None:
+    ended = {**found(fit()), LEAKAGE: (3.0 * ACROSS, 3.0 * fit().std[LEAKAGE])}
+    (told, _), (once, _) = (with_lumped(one, [fit()], weights(1.0)) for one in (ended, found(fit())))
+    assert told[LEAKAGE] == pytest.approx(tuple(3.0 * each for each in once[LEAKAGE]))
+
+
+def test_both_leaks_answer_the_rig() -> None:
+    told = with_lumped_slopes({"piston_area": {LEAKAGE: 2.0, DRAIN: 4.0, BIAS: 1.0}})
+    assert told == {"piston_area": {LEAKAGE: 4.0, DRAIN: 4.0, BIAS: 1.0}}
