@@ -12,7 +12,7 @@ from estimation.notes import ChannelCode, SensorCode
 from experiments.log_pages.entries import quantity_entry
 from experiments.page.condition_names import in_words
 from faults.diagnosis.diagnose import diagnose_log
-from faults.diagnosis.severity import not_determined
+from faults.diagnosis.not_told import not_determined
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.rig import Rig
 from plant.errors import LogWarning

@@ -17,7 +17,7 @@ from experiments.page.sentences import sentence
 from experiments.page.severity_rows import severity_rows
 from experiments.page.words import in_words
 from faults.diagnosis.circuits.blocks import blocks_of
-from faults.diagnosis.severity import not_determined
+from faults.diagnosis.not_told import not_determined
 
 if TYPE_CHECKING:
     from estimation.finding import Finding

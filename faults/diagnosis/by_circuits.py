@@ -1,5 +1,7 @@
 """`diagnose_clean(log, actuator) -> Diagnosis`: what circuits say of a log, without its estimate of bulk modulus."""
 
+from functools import partial
+
 from estimation.log_checks.clean import CleanLog
 from faults.diagnosis.beyond_nine.sound_circuit import another_sound_circuit
 from faults.diagnosis.beyond_nine.wear import whatever_fault
@@ -10,7 +12,8 @@ from faults.diagnosis.circuits.class_regions import how_near
 from faults.diagnosis.circuits.open_classes import circuits_left_open
 from faults.diagnosis.circuits.out_of_model import reasons_against, sensors_disagree
 from faults.diagnosis.evidence import weigh
-from faults.diagnosis.severity import healthy_severities, limits_of, severities, what_is_not_told
+from faults.diagnosis.not_told import what_is_not_told
+from faults.diagnosis.severity import healthy_severities, limits_of, severities
 from faults.notes import AgainstCode
 
 
@@ -57,7 +60,8 @@ def _around(log: CleanLog, actuator: Actuator, numbers: Calibration) -> Diagnosi
     )
     probabilities = board.probabilities(numbers)
     circuits = circuits_left_open(board.blocks, board.fits, actuator, probabilities)
-    severity = severities(board.fits, actuator, numbers.widths(pressure), circuits)
+    told_by = partial(severities, board.fits, actuator, numbers.widths(pressure), circuits)
+    severity = told_by()
     found = Diagnosis(
         probabilities,
         against,
@@ -66,6 +70,7 @@ def _around(log: CleanLog, actuator: Actuator, numbers: Calibration) -> Diagnosi
         dict(limits_of(actuator)),
         tuple(what_is_not_told(board.fits, severity, pressure=pressure)),
         board,
+        told_by,
     )
     # a log that drifts is diagnosed again, where it does
     drifts = board.drift is not None or board.blocks.course is not None

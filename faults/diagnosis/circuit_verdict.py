@@ -1,10 +1,11 @@
 """What the fitted circuit and the banks say of a log, as `faults.diagnosis.diagnose` makes it and others change it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from estimation.finding import Quantity
 from faults.diagnosis.evidence import Scoreboard
+from faults.diagnosis.severity import KnownLosses
 from plant.notes import Note
 
 
@@ -28,6 +29,8 @@ class Diagnosis:
         What the log does not determine.
     scoreboard : Scoreboard
         The evidences, and the circuit that was fitted.
+    told_by : callable, optional
+        ``told_by(known)``: its severities where leakage and flow bias are known otherwise.
     """
 
     probabilities: Mapping[str, float]
@@ -37,6 +40,7 @@ class Diagnosis:
     limits: Mapping[str, float]
     not_told: tuple[Note, ...]
     scoreboard: Scoreboard
+    told_by: Callable[[KnownLosses], Mapping[str, Quantity]] | None = None
 
     @property
     def condition(self) -> str:

@@ -32,6 +32,7 @@ from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import LONGEST
 from faults.diagnosis.failed_search import doubts_after
+from faults.diagnosis.known_losses import by_the_balance
 from faults.diagnosis.models_verdict import models_verdict, ranked
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import healthy_severities, limits_of, with_bulk_modulus
@@ -120,7 +121,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
         without = _without_class(found, log, scores, distinct((*case.doubts, *verdict.against)))
         said = ClassCode.NO_CIRCUIT if isinstance(error, RigError) else ClassCode.NO_PROBABILITIES
         return replace(without, notes=(*found.notes, said.note(reason=error.message)))
-    diagnosis = _from_the_rigs_oil(diagnosis, case.healthy)
+    diagnosis = by_the_balance(_from_the_rigs_oil(diagnosis, case.healthy), estimate)
     found = replace(found, notes=(*found.notes, *named), evidence=EhaEvidence(estimate, scores, diagnosis))
     left = doubts_after(case.doubts, estimate, log, around, diagnosis.scoreboard)
     stands = class_without_balance(left, diagnosis, estimate, actuator_of(around))

@@ -1,9 +1,9 @@
 """How bad is it? A fitted circuit in the units of a shop, each number with a 95 % interval."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,25 +13,18 @@ from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.circuit_runs import friction_parts, parameter_rows
 from faults.diagnosis.circuits.class_regions import ClassFits
-from faults.diagnosis.circuits.not_shown import FRICTION_LAW, not_shown
 from faults.diagnosis.circuits.open_classes import OpenCircuit
-from faults.notes import ClassCode
 from plant.arrays import Array
 from plant.components.friction import quadratic_friction
 from plant.components.oil import ATMOSPHERE
 from plant.eha.circuit_parameters import CircuitParameters, circuit_values
 from plant.eha.steady_state import steady_state
-from plant.notes import Note
 
 DRAWS = 2_000
 """Circuits drawn from what a fit believes, for the intervals: their ends are right to 3 %."""
 
 OF_KIND = 0.2
 """How far bulk modulus differs between sound actuators of one kind [dimensionless]: what is less may be air."""
-
-VAGUE = 3.0
-"""Ratio of relative widths from which a combination is known and its parts are not [dimensionless]."""
-
 
 OF_FRICTION = frozenset({"velocity_lost", "added_friction", "pressure_rise"})
 """Severities that hang on friction."""
@@ -50,6 +43,21 @@ UNITS: Mapping[str, str] = {
 """The severities: leakage flow and bias at rated pressure (the relief setting); velocity lost and pressure rise in the
 steady state at rated speed, relative to the healthy actuator; friction at its rated velocity over the healthy; bulk
 modulus; the air at atmospheric pressure that would make the oil so soft."""
+
+
+class KnownLosses(NamedTuple):
+    """Leakage and flow bias that are known otherwise than by a fitted circuit.
+
+    Parameters
+    ----------
+    logarithms : ndarray, shape (2,)
+        Of both, as the first two coordinates of a circuit [dimensionless].
+    covariance : ndarray, shape (2, 2)
+        Of their errors [dimensionless].
+    """
+
+    logarithms: Array
+    covariance: Array
 
 
 def severities_at(point: Array, actuator: Actuator) -> Mapping[str, float]:
@@ -101,6 +109,7 @@ def severities(
     actuator: Actuator,
     widths: Mapping[str, float] | None = None,
     circuits: Sequence[OpenCircuit] = (),
+    known: KnownLosses | None = None,
 ) -> Mapping[str, Quantity]:
     """Return the severities of a fitted circuit with their intervals.
 
@@ -115,6 +124,9 @@ def severities(
     circuits : sequence of OpenCircuit, optional
         Those that the log leaves open, see `circuits_left_open`; the best alone if not given. Values are those of the
         likeliest, and intervals hold what all of them may be.
+    known : KnownLosses, optional
+        Leakage and flow bias in place of the circuit's. Its friction stays: what a fit made up for by leakage is not
+        what the derivatives say that it is.
 
     Returns
     -------
@@ -123,11 +135,23 @@ def severities(
         than the rig's.
     """
     among = circuits or [OpenCircuit(fits.best.coordinates, 1.0)]
-    found = _under(fits.spread, among, actuator, widths or {})
+    if known is not None:
+        among = [one._replace(coordinates=np.append(known.logarithms, one.coordinates[2:])) for one in among]
+    found = _under(_with_losses(fits.spread, known), among, actuator, widths or {})
     if not np.any(fits.moved):
         return found
-    bent = _under(fits.bent_spread, among, actuator, widths or {})
+    bent = _under(_with_losses(fits.bent_spread, known), among, actuator, widths or {})
     return found | {name: replace(found[name], ci95_total=bent[name].ci95) for name in OF_FRICTION}
+
+
+def _with_losses(spread: Array, known: KnownLosses | None) -> Array:
+    """Return a covariance of coordinates, of which the losses are known otherwise."""
+    if known is None:
+        return spread
+    out = np.array(spread)
+    out[:2], out[:, :2] = 0.0, 0.0
+    out[:2, :2] = known.covariance
+    return out
 
 
 def _under(
@@ -271,74 +295,3 @@ def _with_air(air: Quantity, modulus: Quantity, actuator: Actuator) -> Quantity:
         for one, stiff in ((air.ci95, modulus.ci95), (air.ci95_total, modulus.ci95_total))
     )
     return Quantity(air.value, air.unit, ends, ci95_total=total)
-
-
-def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure: bool) -> list[Note]:
-    """Return a note for each thing that the log does not determine.
-
-    Parameters
-    ----------
-    fits : ClassFits
-        The fit.
-    found : Mapping[str, Quantity]
-        Its severities [each in its unit].
-    pressure : bool
-        Whether differential pressure is logged.
-
-    Returns
-    -------
-    list[Note]
-        None for a log that tells all.
-    """
-    blind, said = not_shown(fits), list[Note]()
-    unseen = blind >= FRICTION_LAW
-    if unseen:
-        said.append(ClassCode.FRICTION_NOT_VISIBLE.note())
-    if "bulk_modulus" in blind:
-        said.append(ClassCode.BULK_MODULUS_NOT_VISIBLE.note())
-    flow, speed = found["leakage_flow"], found["velocity_lost"]
-    lost = [] if unseen else _velocity_lost(speed)  # which hangs on friction too
-    if not pressure:
-        said += [ClassCode.ONE_SCALE.note(), *lost]
-    elif _width(flow) > VAGUE * _extent(speed) / 100.0 and _width(flow) > 0.3:
-        said += [ClassCode.LEAKAGE_AND_BIAS_ALIKE.note(), *lost]
-    return said
-
-
-def not_determined(codes: Collection[object]) -> frozenset[str]:
-    """Return the severities of which a log says nothing: their values are those of a first belief.
-
-    Parameters
-    ----------
-    codes : collection of Code or str
-        Of what the log does not tell.
-
-    Returns
-    -------
-    frozenset[str]
-        Names of `UNITS`.
-
-    Examples
-    --------
-    >>> sorted(not_determined(["friction_not_visible"])), sorted(not_determined(["one_scale"]))
-    (['added_friction', 'pressure_rise', 'velocity_lost'], [])
-    """
-    said = set(map(str, codes))
-    if str(ClassCode.FRICTION_NOT_VISIBLE) not in said:
-        return frozenset()
-    # without pressure, a piston that yields on its seals shows bulk modulus over friction alone
-    return OF_FRICTION | OF_OIL if str(ClassCode.ONE_SCALE) in said else OF_FRICTION
-
-
-def _velocity_lost(speed: Quantity) -> list[Note]:
-    if speed.value is None or speed.ci95 is None:
-        return []
-    return [ClassCode.VELOCITY_LOST_TOLD.note(percent=speed.value, low=speed.ci95[0], high=speed.ci95[1])]
-
-
-def _extent(one: Quantity) -> float:
-    return float("nan") if one.ci95 is None else one.ci95[1] - one.ci95[0]
-
-
-def _width(one: Quantity) -> float:
-    return _extent(one) / abs(one.value) if one.value else float("inf")

@@ -28,7 +28,8 @@ from faults.diagnosis.circuits.class_regions import (
     spread_of,
 )
 from faults.diagnosis.circuits.region_scores import region_scores
-from faults.diagnosis.severity import limits_of, severities, severities_at, what_is_not_told, with_bulk_modulus
+from faults.diagnosis.not_told import what_is_not_told
+from faults.diagnosis.severity import limits_of, severities, severities_at, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.doubts import PRESSURE_GAIN, Spread

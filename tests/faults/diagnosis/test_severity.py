@@ -12,6 +12,7 @@ from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of
 from faults.diagnosis.circuits.class_fit import WEAK, PointFit
 from faults.diagnosis.circuits.class_regions import ClassFits
+from faults.diagnosis.not_told import what_is_not_told
 from faults.diagnosis.severity import (
     OF_KIND,
     UNITS,
@@ -19,7 +20,6 @@ from faults.diagnosis.severity import (
     limits_of,
     severities,
     severities_at,
-    what_is_not_told,
     with_bulk_modulus,
 )
 from faults.notes import ClassCode

@@ -7,7 +7,7 @@ from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import WEAK
 from faults.diagnosis.circuits.not_shown import BLIND, FRICTION_LAW, not_shown
 from faults.diagnosis.diagnose import diagnose_log
-from faults.diagnosis.severity import not_determined
+from faults.diagnosis.not_told import not_determined
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig

@@ -1,0 +1,84 @@
+"""What a log does not tell of how bad it is: notes, and the severities of which it says nothing."""
+
+from collections.abc import Collection, Mapping
+
+from estimation.finding import Quantity
+from faults.diagnosis.circuits.class_regions import ClassFits
+from faults.diagnosis.circuits.not_shown import FRICTION_LAW, not_shown
+from faults.diagnosis.severity import OF_FRICTION, OF_OIL
+from faults.notes import ClassCode
+from plant.notes import Note
+
+VAGUE = 3.0
+"""Ratio of relative widths from which a combination is known and its parts are not [dimensionless]."""
+
+
+def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure: bool) -> list[Note]:
+    """Return a note for each thing that the log does not determine.
+
+    Parameters
+    ----------
+    fits : ClassFits
+        The fit.
+    found : Mapping[str, Quantity]
+        Its severities [each in its unit].
+    pressure : bool
+        Whether differential pressure is logged.
+
+    Returns
+    -------
+    list[Note]
+        None for a log that tells all.
+    """
+    blind, said = not_shown(fits), list[Note]()
+    unseen = blind >= FRICTION_LAW
+    if unseen:
+        said.append(ClassCode.FRICTION_NOT_VISIBLE.note())
+    if "bulk_modulus" in blind:
+        said.append(ClassCode.BULK_MODULUS_NOT_VISIBLE.note())
+    flow, speed = found["leakage_flow"], found["velocity_lost"]
+    lost = [] if unseen else _velocity_lost(speed)  # which hangs on friction too
+    if not pressure:
+        said += [ClassCode.ONE_SCALE.note(), *lost]
+    elif _width(flow) > VAGUE * _extent(speed) / 100.0 and _width(flow) > 0.3:
+        said += [ClassCode.LEAKAGE_AND_BIAS_ALIKE.note(), *lost]
+    return said
+
+
+def not_determined(codes: Collection[object]) -> frozenset[str]:
+    """Return the severities of which a log says nothing: their values are those of a first belief.
+
+    Parameters
+    ----------
+    codes : collection of Code or str
+        Of what the log does not tell.
+
+    Returns
+    -------
+    frozenset[str]
+        Names of `UNITS`.
+
+    Examples
+    --------
+    >>> sorted(not_determined(["friction_not_visible"])), sorted(not_determined(["one_scale"]))
+    (['added_friction', 'pressure_rise', 'velocity_lost'], [])
+    """
+    said = set(map(str, codes))
+    if str(ClassCode.FRICTION_NOT_VISIBLE) not in said:
+        return frozenset()
+    # without pressure, a piston that yields on its seals shows bulk modulus over friction alone
+    return OF_FRICTION | OF_OIL if str(ClassCode.ONE_SCALE) in said else OF_FRICTION
+
+
+def _velocity_lost(speed: Quantity) -> list[Note]:
+    if speed.value is None or speed.ci95 is None:
+        return []
+    return [ClassCode.VELOCITY_LOST_TOLD.note(percent=speed.value, low=speed.ci95[0], high=speed.ci95[1])]
+
+
+def _extent(one: Quantity) -> float:
+    return float("nan") if one.ci95 is None else one.ci95[1] - one.ci95[0]
+
+
+def _width(one: Quantity) -> float:
+    return _extent(one) / abs(one.value) if one.value else float("inf")
