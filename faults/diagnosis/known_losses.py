@@ -42,8 +42,10 @@ def by_the_balance(diagnosis: Diagnosis, estimate: BulkModulusEstimate) -> Diagn
     severity = diagnosis.told_by(known)
     if _extent(severity["leakage_flow"]) >= _extent(diagnosis.severity["leakage_flow"]):
         return diagnosis
-    not_told = tuple(what_is_not_told(diagnosis.scoreboard.fits, severity, pressure=True))
-    return replace(diagnosis, severity=severity, not_told=not_told)
+    fits, both = diagnosis.scoreboard.fits, (diagnosis.severity, severity)
+    by_circuit, told = (what_is_not_told(fits, one, pressure=True) for one in both)
+    others = [note for note in diagnosis.not_told if note not in by_circuit]
+    return replace(diagnosis, severity=severity, not_told=(*told, *others))
 
 
 def _extent(one: Quantity) -> float:

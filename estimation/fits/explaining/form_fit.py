@@ -92,7 +92,11 @@ def weights_of(fits: Sequence[GreyBoxFit], temper: float = TEMPER, beforehand: S
     Parameters
     ----------
     fits : sequence of GreyBoxFit
-        As of `weighed`, and so are the others.
+        Of the same log.
+    temper : float
+        What a difference of log-likelihood is divided by [dimensionless].
+    beforehand : sequence of float, optional
+        Their weights before the log is seen [dimensionless]; equal ones if not given.
 
     Returns
     -------

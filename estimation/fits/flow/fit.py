@@ -226,7 +226,7 @@ def _losing_fit(plain: PlainFits, loss: UnevenLoss, sensed: ShownPlay) -> FormFi
     untaken, open_play = plain.play_untaken(one.play, sensed)
     value, std = one.values["bulk_modulus"], one.std["bulk_modulus"]
     found = {name: (each, one.std[name]) for name, each in one.values.items()}
-    found, correlation = with_lumped(found, [one], np.ones(1))
+    found, correlation = with_lumped(found, [one], np.ones(1), plain.start.parameters)
     return FormFit(
         parameters=with_structure(found, float(np.linalg.norm([UNEVEN, untaken, loss.opened]))),
         bound=std / value,
@@ -275,7 +275,7 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
     if AIR_MIDWAY.name in strange.names:
         left = float(np.hypot(left, BUBBLES))
     most = share_lost(plain.log, one.values, plain.start.parameters.pump_displacement, strange.names)
-    found, correlation = with_lumped(strange.values, [one], np.ones(1))
+    found, correlation = with_lumped(strange.values, [one], np.ones(1), plain.start.parameters)
     return FormFit(
         parameters=with_structure(with_small_teeth(found, one.small_teeth), left),
         bound=bound,
@@ -293,9 +293,8 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     """Return what a log says that is believed to have nothing strange about it."""
     best = plain.best
     beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in plain.fits]
-    found, correlation = with_lumped(
-        weighed(plain.fits, SURER, beforehand), plain.fits, weights_of(plain.fits, SURER, beforehand)
-    )
+    found, weights = weighed(plain.fits, SURER, beforehand), weights_of(plain.fits, SURER, beforehand)
+    found, correlation = with_lumped(found, plain.fits, weights, plain.start.parameters)
     found = with_small_teeth(found, best.small_teeth)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     untaken, open_play = plain.play_untaken(plain.swinging.play, sensed)

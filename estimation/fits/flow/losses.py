@@ -10,8 +10,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from estimation.fits.explaining.form_fit import DISCRETISED
 from estimation.fits.greybox.fit import GreyBoxFit
 from plant.arrays import Array
+from plant.eha.model import EhaParameters
 
 LEAKAGE, DRAIN, BIAS = "leakage_coefficient", "case_leakage", "flow_bias"
 
@@ -63,7 +65,7 @@ def _of(fit: GreyBoxFit) -> tuple[Array, Array]:
 
 
 def with_lumped(
-    found: Mapping[str, tuple[float, float]], fits: Sequence[GreyBoxFit], weights: Array
+    found: Mapping[str, tuple[float, float]], fits: Sequence[GreyBoxFit], weights: Array, p: EhaParameters
 ) -> tuple[dict[str, tuple[float, float]], float]:
     """Return what was found, its leakage coefficient the lumped one, and the correlation of that with the flow bias.
 
@@ -76,13 +78,19 @@ def with_lumped(
         As of `losses`, the likeliest first where it alone told what was found.
     weights : ndarray, shape (fits,)
         As of `losses`.
+    p : EhaParameters
+        The actuator. Leakage is known no better than the flow that its pump delivers at rated speed is balanced by the
+        form's steps, at the relief setting.
 
     Returns
     -------
     tuple of (dict[str, tuple of float], float)
-        The same, and the correlation [dimensionless].
+        The same, and the correlation [dimensionless]; as it was if the form knows no drain.
     """
+    if not {LEAKAGE, DRAIN, BIAS} <= set(found):
+        return {**found}, 0.0
     values, covariance = losses(fits, weights)
+    covariance[0, 0] += (DISCRETISED * p.pump_displacement * p.rated_speed / p.relief_pressure) ** 2
     deviations = np.sqrt(np.diag(covariance))
     if not np.all(np.isfinite(deviations)) or not np.all(deviations > 0.0):
         return {**found, LEAKAGE: (found[LEAKAGE][0] + OF_DRAIN * found[DRAIN][0], found[LEAKAGE][1])}, 0.0

@@ -13,6 +13,7 @@ from estimation.finding import Gate, Outcome
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.known_losses import by_the_balance, known_losses
 from faults.diagnosis.severity import severities
+from faults.notes import ClassCode
 from tests.faults.diagnosis.test_severity import ACTUATOR, NARROW, RIG, extent, fits
 
 LEAKAGE, BIAS = 1.02 * RIG.leakage_coefficient, 0.99 * RIG.flow_bias
@@ -48,6 +49,11 @@ def test_leakage_is_the_balances_and_friction_the_circuits() -> None:
     assert extent(told["velocity_lost"]) < extent(circuit["velocity_lost"])
     assert told["added_friction"].ci95 == pytest.approx(circuit["added_friction"].ci95, rel=0.2)
     assert told["added_friction"].value == circuit["added_friction"].value
+
+
+def test_notes_of_others_than_the_circuit_stay() -> None:
+    of_the_pump = ClassCode.WEAR_NOT_TOLD.note(percent=5.0, limit=90.0)
+    assert by_the_balance(replace(diagnosis(), not_told=(of_the_pump,)), estimate()).not_told == (of_the_pump,)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,73 @@
+"""What a log does not tell of how bad it is."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.finding import Quantity
+from faults.conditions import CONDITIONS, parameters_for
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_fit import WEAK
+from faults.diagnosis.not_told import what_is_not_told
+from faults.diagnosis.severity import severities
+from faults.notes import ClassCode
+from plant.eha.steady_state import steady_state
+from tests.faults.diagnosis.test_severity import ACTUATOR, NARROW, RIG, fits
+
+
+def not_told(spread: np.ndarray, condition: str = "normal", *, pressure: bool = True) -> set[str]:
+    found = fits(spread, list(CONDITIONS).index(condition))
+    return {note.code.name for note in what_is_not_told(found, severities(found, ACTUATOR), pressure=pressure)}
+
+
+FRICTION = ("friction_rest", "friction_quadratic", "friction_rated")
+
+
+def blind(*names: str) -> np.ndarray:
+    """Return a covariance that is the prior's in some coordinates and narrow in the others."""
+    sizes = np.array([WEAK[i, i] * 50.0 if name in names else 1e-4 for i, name in enumerate(COORDINATES)])
+    return np.diag(sizes)
+
+
+def test_what_a_log_does_not_narrow_is_said_to_be_not_visible() -> None:
+    assert not_told(NARROW) == set()
+    assert not_told(blind("bulk_modulus")) == {ClassCode.BULK_MODULUS_NOT_VISIBLE.name}
+    assert ClassCode.FRICTION_NOT_VISIBLE.name in not_told(blind(*FRICTION))
+    assert ClassCode.FRICTION_NOT_VISIBLE.name not in not_told(blind("friction_rest"))
+
+
+def test_leakage_and_bias_that_trade_places_are_not_told_apart_but_the_velocity_lost_is() -> None:
+    one, two = (COORDINATES.index(name) for name in ("leakage", "bias"))
+    leaking = parameters_for(CONDITIONS["minor_leakage"])
+    assert ACTUATOR.conditions[list(CONDITIONS).index("minor_leakage")][one] == np.log(leaking.leakage_coefficient)
+    apart = np.zeros(7)
+    apart[one] = leaking.flow_bias
+    apart[two] = -leaking.leakage_coefficient * steady_state(RIG.rated_speed, leaking)[1]
+    traded = 1e-3 * NARROW + 0.6**2 * np.outer(apart, apart) / (apart @ apart)
+    assert not_told(traded, "minor_leakage") == {
+        ClassCode.LEAKAGE_AND_BIAS_ALIKE.name,
+        ClassCode.VELOCITY_LOST_TOLD.name,
+    }
+
+
+def test_without_pressure_one_scale_is_never_told() -> None:
+    assert not_told(NARROW, pressure=False) == {ClassCode.ONE_SCALE.name, ClassCode.VELOCITY_LOST_TOLD.name}
+
+
+def test_a_velocity_without_a_number_is_not_told() -> None:
+    found = fits(NARROW)
+    known = severities(found, ACTUATOR)
+    for lost in (Quantity(None, "%"), replace(known["velocity_lost"], ci95=None)):
+        said = what_is_not_told(found, {**known, "velocity_lost": lost}, pressure=False)
+        assert [note.code for note in said] == [ClassCode.ONE_SCALE]
+
+
+def test_the_velocity_that_is_lost_is_told_with_its_interval() -> None:
+    found = fits(NARROW)
+    known = severities(found, ACTUATOR)
+    (said,) = (
+        note for note in what_is_not_told(found, known, pressure=False) if note.code is ClassCode.VELOCITY_LOST_TOLD
+    )
+    lost = known["velocity_lost"]
+    assert lost.ci95 is not None
+    assert (said.data["percent"], said.data["low"], said.data["high"]) == (lost.value, *lost.ci95)
