@@ -188,13 +188,14 @@ def _own(position: int, heading: Heading, channel: str, source: str) -> Column:
     if heading.stamped:
         return Column(position, name, channel)
     stem = next(stem for stem, owner in STEMS.items() if owner == channel)
-    unit = heading.unit
+    unit, named = heading.unit, Heading(name).unit
     if name != channel and heading.stem + "_" != stem and not (channel == TIME and heading.stem in TIMES):
         suffix = name.removeprefix(stem)
         unit = re.sub(r"([A-Za-z])([234])(?![0-9])", r"\1^\2", suffix.replace("_per_", "/").replace("_", "/"))
+        named = unit
     if unit is None:
         return Column(position, name, channel)
-    _require_one_unit(heading, channel, source)
+    _require_one_unit(heading, named, channel, source)
     factor, offset = _conversion(unit, channel, name, source)
     if name == channel and (factor, offset) != (1.0, 0.0):
         raise LogError(
@@ -224,17 +225,17 @@ def _foreign(headings: Sequence[Heading], channel: str, spec: str, source: str) 
         )
     heading = headings[positions[0]]
     if unit is None:
-        _require_one_unit(heading, channel, source)
+        _require_one_unit(heading, Heading(heading.name).unit, channel, source)
     logged, unit = (None, heading.unit) if unit is None else (heading.unit, unit)
     if unit is None or channel.startswith(TRUTH):
         return Column(positions[0], heading.name, channel)
     return Column(positions[0], heading.name, channel, *_conversion(unit, channel, heading.name, source, logged))
 
 
-def _require_one_unit(heading: Heading, channel: str, source: str) -> None:
-    """Refuse a column whose name has another unit in brackets than the file gives beside it."""
-    said, named = heading.said, Heading(heading.name).unit
-    if said is None or named is None or said == named or not converts(named, UNITS.get(channel, named)):
+def _require_one_unit(heading: Heading, named: str | None, channel: str, source: str) -> None:
+    """Refuse a column whose name says another unit, in brackets or at its end, than the file gives beside it."""
+    said = heading.said
+    if said is None or named is None or not all(converts(one, UNITS.get(channel, named)) for one in (said, named)):
         return
     if _conversion(said, channel, heading.name, source) != _conversion(named, channel, heading.name, source):
         raise LogError(

@@ -43,6 +43,8 @@ class Table:
         When its first row was taken, where the file gives a step.
     label : str
         What the group, struct or sheet is called in the file.
+    offset : float
+        Time of its first row [s], where the file gives a step; counted from `began`, if that is known.
     """
 
     source: str
@@ -52,6 +54,7 @@ class Table:
     step: float | None = None
     began: np.datetime64 | None = None
     label: str = ""
+    offset: float = 0.0
 
     def numbers(self, time: Column | None = None) -> dict[int, Array]:
         """Return every column that holds numbers or times.

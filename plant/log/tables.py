@@ -235,7 +235,7 @@ def _timed(
             return Timed(table.source, alike[0], channels, table.label)
     if step is None:
         raise missing_channels([TIME], list(table.headings), source)
-    time: Any = step * np.arange(rows)
+    time: Any = table.offset + step * np.arange(rows)
     if table.began is not None:
         time = table.began + np.rint(1e9 * time).astype("timedelta64[ns]")
     return Timed(table.source, time, channels, table.label)

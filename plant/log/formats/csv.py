@@ -178,5 +178,6 @@ def _read_cells(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Co
 def _rows(path: Path, layout: Layout) -> Generator[Iterator[list[str]]]:
     """Open what stands below the header, as the cells of each line."""
     with _text(path, layout) as text:
-        lines = (line.rstrip("\n") for line in islice(text, layout.skipped, None))
+        # files that were put behind each other have a mark of their order of bytes within
+        lines = (line.rstrip("\n").removeprefix("\ufeff") for line in islice(text, layout.skipped, None))
         yield (cells_of(line, layout.delimiter) if line else [] for line in lines)

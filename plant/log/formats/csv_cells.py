@@ -71,7 +71,7 @@ def read_cells(
             continue
         first = cells[0].strip().removeprefix("\ufeff")
         comment = COMMENT.match(first) and first not in MISSING
-        if comment or (first == names[0] and [first, *(cell.strip() for cell in cells[1:])] == names):
+        if comment or _are_names([first, *cells[1:]], names):
             body.skipped += 1
         elif len(cells) == len(names):
             block.append(_Row(line, row, cells))
@@ -86,6 +86,13 @@ def read_cells(
     for note in notes:
         warnings.warn(LogWarning(note, source), stacklevel=2)
     return found
+
+
+def _are_names(cells: Sequence[str], names: Sequence[str]) -> bool:
+    """Return whether a row is the header again; a column without a name has got its number."""
+    if cells[0] not in (names[0], "") or len(cells) != len(names):
+        return False
+    return [cell.strip() or f"column {place + 1}" for place, cell in enumerate(cells)] == list(names)
 
 
 class _Row(NamedTuple):

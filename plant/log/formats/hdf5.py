@@ -1,6 +1,8 @@
 """HDF5 logs, MAT 7.3 among them: vectors in groups, columns of a matrix, or fields of a table."""
 
 from collections import defaultdict
+from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -41,11 +43,7 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
     units: dict[str, dict[str, str | None]] = defaultdict(dict)
     texts: dict[str, str] = {}
     with h5py.File(path, "r") as file:
-        seen: list[Any] = []
-        file.visititems(lambda name, one: seen.append((name, one)) if len(seen) < MOST_OBJECTS else True)
-        for name, one in seen:
-            if not isinstance(one, h5py.Dataset) or name.startswith("#"):
-                continue
+        for name, one in _data_sets(h5py, file):
             group, _, leaf = name.rpartition("/")
             if _attribute(one, "MATLAB_class") == "char":
                 if leaf == METADATA:
@@ -68,6 +66,23 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
         table_of(str(path), columns, units=units[group], metadata=texts.get(group), label=group)
         for group, columns in groups.items()
     )
+
+
+def _data_sets(h5py: Any, file: Any) -> Iterator[tuple[str, Any]]:
+    """Return each data set by each of its names: one may have several, and groups may lie within each other."""
+    waiting, entered, count = [("", file)], set[int](), 0
+    while waiting:
+        name, one = waiting.pop()
+        count += 1
+        if isinstance(one, h5py.Dataset):
+            yield name, one
+        elif isinstance(one, h5py.Group) and (place := h5py.h5o.get_info(one.id).addr) not in entered:
+            entered.add(place)
+            within = [each for each in islice(one, MOST_OBJECTS) if not (one is file and each.startswith("#"))]
+            hard = [each for each in sorted(within) if isinstance(one.get(each, getlink=True), h5py.HardLink)]
+            waiting += [(f"{name}/{each}".lstrip("/"), one[each]) for each in reversed(hard)]
+        if count == MOST_OBJECTS:
+            return
 
 
 def _holds_numbers(one: Any) -> bool:

@@ -2,7 +2,10 @@
 
 import gc
 import sys
+from collections import Counter
+from collections.abc import Mapping
 from contextlib import redirect_stdout
+from functools import partial
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -11,11 +14,18 @@ import numpy as np
 
 from plant.errors import HydrostateError, LogError
 from plant.log.formats.extras import library
+from plant.log.formats.mdf_formula import evaluated
 from plant.log.formats.packed import most_unpacked, too_large
 from plant.log.table import Table, table_of
 
 VIRTUAL = (3, 6)
 """Types of channels of version 4 that are counted, and have no bytes in a record."""
+
+DEEPEST = 3
+"""How deeply one conversion may refer to another [count]."""
+
+IN_TIME = (0, 1)
+"""What a master channel of version 4 says that it counts: nothing, or seconds; others count angle, distance, rows."""
 
 
 def open_mdf(path: Path) -> tuple[Table, ...]:
@@ -58,28 +68,78 @@ def _tables(asammdf: Any, path: Path) -> tuple[Table, ...]:
             columns: dict[str, Any] = {}
             units: dict[str, str | None] = {}
             master = file.masters_db.get(number)
+            clock, unit = _clock(group, master)
+            names = _names(group)
             for place, channel in enumerate(group.channels):
+                formula, within = _taken_formula(channel)
                 if place == master:
+                    if formula is not None:
+                        raise LogError(f"its clock {channel.name[:80]!r} is converted by a formula", str(path))
                     continue
                 # by itself it leaves invalid samples out, of each channel others
                 signal = file.get(group=number, index=place, raw=False, ignore_invalidation_bits=True)
-                columns.setdefault("time", signal.timestamps)
-                columns.setdefault(_last(channel.name), _valid(signal))
-                units.setdefault(_last(channel.name), signal.unit or None)
+                columns.setdefault(clock, signal.timestamps)
+                columns.setdefault(names[place], _valid(signal, formula, str(path)))
+                units.setdefault(names[place], signal.unit or within)
             if columns:
                 label = str(getattr(group.channel_group, "acq_name", "") or f"group {number}")
-                made.append(table_of(str(path), columns, units={**units, "time": "s"}, label=label))
+                made.append(table_of(str(path), columns, units={**units, clock: unit}, label=label))
     if not made:
         raise LogError("it holds no channel", str(path))
     return tuple(made)
 
 
-def _valid(signal: Any) -> Any:
-    """Return the samples of a channel, NaN where the logger called them invalid."""
+def _clock(group: Any, master: int | None) -> tuple[str, str | None]:
+    """Return name and unit of what the samples of a group are counted by."""
+    if master is None or getattr(group.channels[master], "sync_type", IN_TIME[1]) in IN_TIME:
+        return "time", "s"
+    return _last(group.channels[master].name), group.channels[master].unit or None
+
+
+def _names(group: Any) -> list[str]:
+    """Return what channels are called: without their device, unless two then have one name."""
+    short = Counter(_last(one.name) for one in group.channels)
+    return [_last(one.name) if short[_last(one.name)] == 1 else one.name for one in group.channels]
+
+
+def _taken_formula(channel: Any) -> tuple[str | None, str | None]:
+    """Return the formula of a channel, and the unit beside it, and let asammdf return raw numbers in its place."""
+    conversion = channel.conversion
+    formula = _formula_in(conversion)
+    if formula is None:
+        return None, None
+    channel.conversion = None
+    return formula, str(getattr(conversion, "unit", "") or "").strip() or None
+
+
+def _formula_in(conversion: Any, depth: int = 0) -> str | None:
+    """Return the formula of a conversion; that of one which another refers to is no formula that is evaluated."""
+    if own := str(getattr(conversion, "formula", "") or "").strip(" \t\r\n\0"):
+        return own if depth == 0 else f"{own[:80]} in a part of its range"
+    within: Mapping[str, Any] = getattr(conversion, "referenced_blocks", None) or {}
+    if depth > DEEPEST:
+        return "formulas within formulas"
+    return next((said for one in within.values() if (said := _formula_in(one, depth + 1)) is not None), None)
+
+
+def _valid(signal: Any, formula: str | None, source: str) -> Any:
+    """Return the samples of a channel, NaN where the logger called them invalid, or what refuses them."""
     samples, invalid = signal.samples, signal.invalidation_bits
+    if formula is not None:
+        try:
+            if samples.dtype.kind not in "fiub":
+                raise ValueError("its raw samples are no numbers")
+            samples = evaluated(formula, samples)
+        except ValueError as error:
+            name, said = _last(signal.name)[:80], str(error)
+            return partial(_refuse, f"channel {name!r} is converted by {formula[:80]!r}: {said}", source)
     if invalid is None or samples.dtype.kind not in "fiub" or samples.shape != np.shape(invalid):
         return samples
     return np.where(invalid, np.nan, samples)
+
+
+def _refuse(message: str, source: str) -> Any:
+    raise LogError(message, source)
 
 
 def _record_bytes(group: Any) -> int:

@@ -1,5 +1,6 @@
 """Parquet and Feather logs, both of Arrow's tables."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -19,6 +20,9 @@ from plant.log.headings import Heading
 from plant.log.table import Table
 
 SCHEMA_KEY = b"hydrostate"
+
+SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+"""Units of time [s]."""
 
 MANY = 200
 """Columns that are read one by one, and so many at a time of a wider file [count]."""
@@ -41,30 +45,49 @@ def open_parquet(path: Path) -> Table:
     if 8 * file.metadata.num_rows > most:
         raise too_large(str(path), most)
     schema = file.schema_arrow
-    table = _table(path, schema, lambda place: file.read([schema.names[place]]).column(0))
+    before = _before(schema.names)
+
+    def column(place: int) -> Any:
+        name = schema.names[place]
+        return _named(file.read([name]), name, before[place])  # a.b is also the field b of a structure a
+
+    table = _table(path, schema, column)
     if len(schema.names) <= MANY:
         return table
 
     def read(chosen: Sequence[Column]) -> dict[Column, Array]:
-        return table.read(chosen) if len(chosen) <= MANY else _in_parts(path, file, chosen)
+        return table.read(chosen) if len(chosen) <= MANY else _in_parts(path, file, chosen, before)
 
     return replace(table, read=read)
 
 
-def _in_parts(path: Path, file: Any, chosen: Sequence[Column]) -> dict[Column, Array]:
+def _in_parts(path: Path, file: Any, chosen: Sequence[Column], before: Sequence[int]) -> dict[Column, Array]:
     """Return very many columns, some at a time: each reading of the file looks at the names of all."""
     names, out = file.schema_arrow.names, dict[Column, Array]()
     for first in range(0, len(chosen), MANY):
         part = chosen[first : first + MANY]
         held = file.read(list(dict.fromkeys(names[column.position] for column in part)))
-        out |= each_read(
-            part, lambda column, held=held: _values(_first(held, names[column.position]), column, str(path))
-        )
+
+        def values(column: Column, held: Any = held) -> Array:
+            return _values(_named(held, names[column.position], before[column.position]), column, str(path))
+
+        out |= each_read(part, values)
     return out
 
 
-def _first(table: Any, name: str) -> Any:
-    return table.column(table.schema.get_all_field_indices(name)[0])
+def _before(names: Sequence[str]) -> list[int]:
+    """Return how many columns before each have its name."""
+    seen, out = Counter[str](), list[int]()
+    for name in names:
+        out.append(seen[name])
+        seen[name] += 1
+    return out
+
+
+def _named(table: Any, name: str, before: int) -> Any:
+    """Return the column of a name that has so many others of that name before it."""
+    places = table.schema.get_all_field_indices(name)
+    return table.column(places[min(before, len(places) - 1)])
 
 
 def open_feather(path: Path) -> Table:
@@ -104,12 +127,17 @@ def _table(path: Path, schema: pa.Schema, read: Any) -> Table:
 
 
 def _said(field: "pa.Field[Any]") -> str | None:
-    """Return the unit that a field gives; a duration is in seconds here."""
+    """Return the unit that a field gives; a duration is in the one that its name says, or in seconds."""
     if pa.types.is_duration(field.type):
-        return "s"
+        return _unit_of_duration(field.name)
     metadata: Mapping[bytes, bytes] = field.metadata or {}
     said = metadata.get(b"unit") or metadata.get(b"units")
     return None if said is None else said.decode(errors="replace")
+
+
+def _unit_of_duration(name: str) -> str:
+    unit = Heading(name).unit or name.rpartition("_")[2]
+    return unit if SECONDS.get(unit) else "s"
 
 
 def _values(values: "pa.ChunkedArray[Any]", column: Column, source: str) -> Any:
@@ -120,7 +148,9 @@ def _values(values: "pa.ChunkedArray[Any]", column: Column, source: str) -> Any:
         whole: Any = values.cast(pa.timestamp("ns", kind.tz)).cast(pa.int64())
         return np.array(whole.fill_null(np.iinfo(np.int64).min).to_numpy(), dtype=np.int64).view("datetime64[ns]")
     if pa.types.is_duration(kind):
-        return from_arrow(values.cast(pa.duration("ns")).cast(pa.int64()).cast(pa.float64(), safe=False)) * 1e-9
+        unit = SECONDS[_unit_of_duration(column.name)]
+        whole = values.cast(pa.duration("ns")).cast(pa.int64())
+        return from_arrow(whole.cast(pa.float64(), safe=False)) * (1e-9 / unit)
     if len(values) and isinstance(values[0].as_py(), str):
         from plant.log.clock.stamps import is_stamp, read_stamps
 

@@ -11,7 +11,7 @@ from plant.log.formats.extras import library
 from plant.log.table import Table, table_of
 
 UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit")
-STEP, BEGAN = "wf_increment", "wf_start_time"
+STEP, BEGAN, OFFSET = "wf_increment", "wf_start_time", "wf_start_offset"
 
 
 def open_tdms(path: Path) -> tuple[Table, ...]:
@@ -20,7 +20,7 @@ def open_tdms(path: Path) -> tuple[Table, ...]:
     Returns
     -------
     tuple of Table
-        One for all channels of a group that have one length and one step.
+        One for all channels of a group that have one length, one step and one beginning.
 
     Raises
     ------
@@ -31,22 +31,25 @@ def open_tdms(path: Path) -> tuple[Table, ...]:
     size = path.stat().st_size
     groups: dict[Any, dict[str, Any]] = defaultdict(dict)
     units: dict[Any, dict[str, str | None]] = defaultdict(dict)
-    began: dict[Any, Any] = {}
     with path.open("rb") as stream, nptdms.TdmsFile.open(stream) as file:
         for group in file.groups():
+            starts: dict[Any, Any] = {}
             for channel in group.channels():
                 if len(channel) > size:
                     raise LogError(f"it ends before the {len(channel)} samples that {channel.name!r} has", str(path))
                 said = channel.properties
-                key = (group.name, len(channel), _number(said.get(STEP)))
-                unit = next((str(said[name]) for name in UNITS if said.get(name)), None)
+                alike = (group.name, len(channel), _number(said.get(STEP)))
+                start = (_stamp(said.get(BEGAN)), _offset(said.get(OFFSET)))
+                if start[0] is None and OFFSET not in said:
+                    start = starts.get(alike, start)  # only the first of a group may say it
+                starts.setdefault(alike, start)
+                key = (*alike, *start)
                 groups[key][channel.name] = channel[:]
-                units[key][channel.name] = unit
-                began.setdefault(key, _stamp(said.get(BEGAN)))
+                units[key][channel.name] = next((str(said[name]) for name in UNITS if said.get(name)), None)
     if not groups:
         raise LogError("it holds no channel", str(path))
     return tuple(
-        table_of(str(path), columns, units=units[key], label=key[0], step=key[2], began=began[key])
+        table_of(str(path), columns, units=units[key], label=key[0], step=key[2], began=key[3], offset=key[4])
         for key, columns in groups.items()
     )
 
@@ -58,6 +61,15 @@ def _number(value: Any) -> float | None:
     except (TypeError, ValueError):
         return None
     return step if 0.0 < step < 1e6 else None
+
+
+def _offset(value: Any) -> float:
+    """Return by how much the first sample is later than the beginning [s]."""
+    try:
+        offset = float(value)
+    except (TypeError, ValueError):
+        return 0.0
+    return offset if abs(offset) < 1e9 else 0.0
 
 
 def _stamp(value: Any) -> Any:

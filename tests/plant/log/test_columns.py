@@ -147,3 +147,10 @@ def test_two_units_of_one_column_are_refused_and_a_mapping_settles_it(mapping: d
     found = resolve_columns(headings, {"position_m": "Position [mm]:um"}, "a.csv")
     assert {one.channel: one.factor for one in found}["position_m"] == pytest.approx(1e-6)
     assert resolve_columns([Heading("Position [mm]", "mm")], None, "a.csv")[0].factor == pytest.approx(1e-3)
+
+
+def test_a_unit_at_the_end_of_a_name_and_another_beside_it_are_two() -> None:
+    with pytest.raises(LogError, match="says mm by its name and um beside it, wanted one"):
+        resolve_columns([Heading("time_s"), Heading("position_mm", "um")], None, "a.csv")
+    for said in ("mm", "counts", None):
+        assert resolve_columns([Heading("position_mm", said)], None, "a.csv")[0].factor == pytest.approx(1e-3)

@@ -292,3 +292,13 @@ def test_json_of_more_parts_than_a_log_is_refused(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(json_text, "MOST_PARTS", 31)
     with pytest.raises(LogError, match="JSON is read as"):
         open_tables(tmp_path / "log.json")
+
+
+def test_hdf5_gives_a_data_set_by_each_of_its_names_and_ends_where_groups_hold_each_other(tmp_path: Path) -> None:
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w") as file:
+        run = file.create_group("run")
+        run["position_m"] = np.arange(20.0)
+        run["a"], run["again"], file["#refs#"] = run["position_m"], file, run
+    tables = open_hdf5(path)
+    assert [(one.label, [heading.name for heading in one.headings]) for one in tables] == [("run", ["a", "position_m"])]

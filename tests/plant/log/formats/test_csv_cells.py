@@ -31,11 +31,24 @@ def read(path: Path) -> tuple[Record, list[Note]]:
     return record, [one.message.note for one in caught if isinstance(one.message, LogWarning)]
 
 
-@pytest.mark.parametrize("line", ["# pressed the button", "% half way", "//", HEADER, "#0.01,1,2,3"])
+@pytest.mark.parametrize("line", ["# pressed the button", "% half way", "//", HEADER, f"\ufeff{HEADER}", "#0.01,1,2,3"])
 def test_a_comment_or_the_header_again_among_the_rows_is_skipped(line: str, tmp_path: Path) -> None:
     record, notes = read(written(tmp_path, *ROWS[:40], line, *ROWS[40:]))
     assert len(record) == len(ROWS)
     assert notes == [LogCode.LINES_SKIPPED.note(count=1)]
+
+
+def test_a_mark_of_the_order_of_bytes_within_a_log_is_no_part_of_a_number(tmp_path: Path) -> None:
+    record, notes = read(written(tmp_path, *ROWS[:40], f"\ufeff{ROWS[40]}", *ROWS[41:]))
+    assert (len(record), notes) == (len(ROWS), [])
+
+
+def test_a_header_with_an_empty_name_is_skipped_where_it_comes_again(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    lines = [f",{line}" for line in (HEADER, *ROWS[:40], HEADER, *ROWS[40:])]
+    path.write_text("\n".join(lines) + "\n")
+    record, notes = read(path)
+    assert (len(record), notes) == (len(ROWS), [LogCode.LINES_SKIPPED.note(count=1)])
 
 
 @pytest.mark.parametrize(

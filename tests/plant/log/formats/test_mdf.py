@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from plant.errors import LogError
+from plant.log.columns import Column
 from plant.log.formats import mdf
 from plant.log.formats.mdf import open_mdf
 
@@ -104,3 +105,34 @@ def test_a_sample_that_the_logger_calls_invalid_is_missing_and_moves_no_other(tm
     for place, lost in ((1, 3), (2, 7)):
         assert table.headings[place].name in ("speed", "position")
         np.testing.assert_array_equal(found[place], np.where(marks % 10 == lost, np.nan, marks))
+
+
+@pytest.mark.parametrize("version", ["3.30", "4.10"])
+def test_a_formula_is_evaluated_or_refused_and_never_run_or_passed_over(tmp_path: Path, version: str) -> None:
+    raw = np.arange(1, 31, dtype=np.int16)
+    formulas = {"speed": "(X - 1)/100", "way": "pow(X, 2)", "force": "9**9**9**9", "other": "open(X).read()"}
+    with asammdf.MDF(version=version) as file:
+        for name, formula in formulas.items():
+            file.append([asammdf.Signal(raw, TIME, unit="mm", name=name, conversion={"formula": formula})])
+        path = Path(file.save(tmp_path / "log.mdf", overwrite=True))
+    speed, way, *others = open_mdf(path)
+    assert [one.said for one in (speed.headings[1], way.headings[1])] == ["mm", "mm"]
+    np.testing.assert_allclose(speed.numbers()[1], 0.01 * (raw - 1.0))
+    np.testing.assert_allclose(way.numbers()[1], raw.astype(float) ** 2)
+    assert np.isposinf(others[0].numbers()[1]).all()
+    with pytest.raises(LogError, match=r"channel 'other' is converted by 'open\(X"):
+        others[1].read([Column(1, "other", "other")])
+
+
+def test_a_group_that_is_counted_by_an_angle_has_no_time(tmp_path: Path) -> None:
+    signal = asammdf.Signal(TIME, TIME, name="speed", unit="rpm", master_metadata=("crank angle", 2))
+    with asammdf.MDF(version="4.10") as file:
+        file.append([signal])
+        (table,) = open_mdf(Path(file.save(tmp_path / "log.mf4", overwrite=True)))
+    assert [(one.name, one.said) for one in table.headings] == [("crank angle", "deg"), ("speed", "rpm")]
+
+
+def test_two_channels_of_one_name_keep_their_devices(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.mf4", [("way\\CAN", "mm", TIME), ("way\\XCP", "mm", 2.0 * TIME)])
+    (table,) = open_mdf(path)
+    assert [one.name for one in table.headings] == ["time", "way\\CAN", "way\\XCP"]

@@ -10,6 +10,7 @@ import pytest
 
 from plant.errors import LogError
 from plant.log.columns import Column
+from plant.log.files import read_record
 from plant.log.formats import parquet
 from plant.log.formats.parquet import open_feather, open_parquet
 
@@ -86,3 +87,26 @@ def test_a_table_of_very_many_columns_is_read_some_at_a_time_and_each_is_itself(
     assert {place: values.tolist() for place, values in found.items()} == {
         place: values.tolist() for place, values in enumerate(wide.values())
     }
+
+
+@pytest.mark.parametrize("kind", ["parquet", "feather"])
+def test_a_duration_is_in_the_unit_that_its_name_says(tmp_path: Path, kind: str) -> None:
+    since = pa.array(np.arange(20) * 10, pa.duration("ms"))
+    names = ["time_ms", "Time [us]", "elapsed_time"]
+    course = 0.01 * np.arange(20.0)
+    made = {name: {name: since, "motor_speed_rad_s": 90.0 * course, "position_m": course} for name in names}
+    for name, columns in made.items():
+        log = read_record(written(tmp_path / f"{name[:4]}.{kind}", kind, **columns))
+        assert log.sample_time == pytest.approx(0.01), name
+
+
+def test_a_name_with_a_point_is_no_field_of_a_structure(tmp_path: Path) -> None:
+    inner = pa.array([{"b": 5.0}] * 4)
+    path = tmp_path / "log.parquet"
+    table = pa.table([inner, np.arange(4.0), np.arange(4.0) + 9.0, np.arange(4.0)], names=["a", "a.b", "c", "c"])
+    pq.write_table(table, path)
+    for many in (parquet.MANY, 2):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(parquet, "MANY", many)
+            values = open_parquet(path).read([Column(place, "", f"true_{place}") for place in range(4)])
+        assert [one[1] for one in values.values()] == [1.0, 10.0, 1.0]

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant.errors import LogError
+from plant.errors import LogError, LogWarning
+from plant.log.files import read_record
 from plant.log.formats.tdms import open_tdms
 
 nptdms = pytest.importorskip("nptdms")
@@ -32,6 +33,28 @@ def test_channels_of_one_length_and_step_are_one_table(tmp_path: Path) -> None:
     assert (fast.label, fast.step, fast.began) == ("Bench", 0.01, START)
     np.testing.assert_array_equal(fast.numbers()[1], 2.0 * values)
     assert ([one.name for one in slow.headings], slow.step, slow.began) == (["Slow"], 0.04, None)
+
+
+def test_channels_that_begin_at_other_times_are_laid_beside_each_other_by_them(tmp_path: Path) -> None:
+    values, step = np.arange(40.0), 0.01
+    later = START + np.timedelta64(50, "ms")
+    path = written(
+        tmp_path / "log.tdms",
+        ("Bench", "motor_speed_rad_s", values, {"wf_increment": step, "wf_start_time": START}),
+        ("Bench", "velocity_m_s", values, {"wf_increment": step, "wf_start_time": later}),
+        ("Bench", "position_m", values, {"wf_increment": step, "wf_start_time": START, "wf_start_offset": 0.1}),
+    )
+    with pytest.warns(LogWarning, match="merged"):
+        log = read_record(path)
+    np.testing.assert_array_equal(log.channels["motor_speed_rad_s"], values[10:])
+    np.testing.assert_allclose(log.channels["velocity_m_s"], values[5:35])
+    np.testing.assert_allclose(log.channels["position_m"], values[:30])
+
+
+def test_a_beginning_without_a_date_is_the_first_time(tmp_path: Path) -> None:
+    offset = {"wf_increment": 0.01, "wf_start_offset": 0.25}
+    channels = [("Bench", name, np.arange(20.0), offset) for name in ("motor_speed_rad_s", "velocity_m_s")]
+    assert read_record(written(tmp_path / "log.tdms", *channels)).start_time == pytest.approx(0.25)
 
 
 @pytest.mark.parametrize("step", [0.0, -1.0, 1e7, "fast"])
