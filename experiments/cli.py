@@ -165,6 +165,7 @@ def main() -> None:
     gc.set_threshold(OBJECTS_AT_START)
     _with_streams()
     trust_sources()
+    os.environ["MPLBACKEND"] = "agg"  # figures go to files; a notebook's name for its screen is an error elsewhere
     for name in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{name}_NUM_THREADS", "1")
     if ALONE.keys() & set(sys.argv[1:2]):

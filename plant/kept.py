@@ -2,6 +2,7 @@
 
 import io
 import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -64,8 +65,10 @@ def read_kept(path: Path, kind: str) -> dict[str, Array]:
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:  # NumPy leaves open what is damaged
             values = {name: kept[name] for name in kept.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise HydrostateError(f"{path}: {wanted}: {error}") from error
+    except OSError as error:
+        raise HydrostateError(f"{path}: {wanted}: {error.strerror or error}") from error
+    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:  # NumPy's words speak of pickles
+        raise HydrostateError(f"{path}: {wanted}, the file holds none, or is damaged") from error
     if str(values.pop("format", "")) != kind:
         raise HydrostateError(f"{path}: {wanted}, the file is none of this version")
     return values

@@ -14,6 +14,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from experiments.command.output_paths import require_no_log
 from experiments.running.refusal import refused
 from plant.atomic import replacing
 from plant.errors import HydrostateError
@@ -102,19 +103,24 @@ def _harmless(value: Any) -> Any:
 _OF_FILES = (".csv", ".txt", ".xml", ".xlsx", ".html", ".png", ".pdf", ".toml", ".parquet", ".mat")
 """Endings of files: a folder of such a name would be a slip."""
 
+_IN_FOLDER = ("results.json", "results.csv")
+"""What is written into a folder."""
 
-def prepare_output(out: Path | None) -> None:
+
+def prepare_output(out: Path | None, logs: Iterable[Path] = ()) -> None:
     """Make the folder that results will be written to, before any work is done for them.
 
     Parameters
     ----------
     out : Path or None
         A folder, or a file that ends in ``.json``; None writes nothing.
+    logs : iterable of Path
+        What is read, and must not be overwritten.
 
     Raises
     ------
     HydrostateError
-        If the name is that of another file, or the folder cannot be made or written.
+        If the name is that of another file or of a log, or the folder cannot be made or written.
     """
     if out is None:
         return
@@ -127,6 +133,7 @@ def prepare_output(out: Path | None) -> None:
         raise HydrostateError(f"--out {out}: there is no permission to write there")
     if out != folder and out.is_dir():
         raise HydrostateError(f"--out {out}: a file is needed, got a folder")
+    require_no_log(f"--out {out}", [out] if out != folder else [out / name for name in _IN_FOLDER], logs)
 
 
 def write_results(results: Sequence[Result], out: Path) -> list[Path]:
@@ -144,7 +151,7 @@ def write_results(results: Sequence[Result], out: Path) -> list[Path]:
     """
     texts = {out: json_text(results) + "\n"}
     if out == _folder(out):
-        texts = {out / "results.json": texts[out], out / "results.csv": csv_text(results)}
+        texts = dict(zip((out / name for name in _IN_FOLDER), (texts[out], csv_text(results)), strict=True))
     for path, text in texts.items():
         write_whole(path, text)
     return list(texts)

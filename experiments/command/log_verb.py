@@ -113,7 +113,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     if beside and len(logs) > 1:
         raise HydrostateError("--with goes with one log, got several")
     report = page_place(asked.get("report"))
-    prepare_output(asked["out"])
+    prepare_output(asked["out"], logs)
     figures, pages = own_paths(question.options.get("figure"), logs), _Pages(own_paths(report, logs))
     questions = {question.about["plant"]: question}
 

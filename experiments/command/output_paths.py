@@ -1,7 +1,7 @@
 """Files that a command writes beside its results: refused before the work, and one of its own for each log."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -43,7 +43,33 @@ def own_paths(target: Path | None, owners: Sequence[Owner]) -> dict[Owner, Path]
     return {one: target.with_name(name) for one, name in zip(distinct, names, strict=True)}
 
 
-def require_place(option: str, path: Path | None, ending: str = "") -> None:
+def require_no_log(option: str, places: Iterable[Path], logs: Iterable[Path]) -> None:
+    """Refuse to write over a log, or over what `plant.log.files.write_record` left beside it.
+
+    Parameters
+    ----------
+    option : str
+        As the command line has it.
+    places : iterable of Path
+        What would be written.
+    logs : iterable of Path
+        What is read.
+
+    Raises
+    ------
+    HydrostateError
+        If one of the files is a log.
+    """
+    from plant.log.files import sidecar
+
+    there = [place for place in places if place.is_file()]
+    for log in logs if there else ():
+        for read in (log, sidecar(log)):
+            if read.is_file() and any(place.samefile(read) for place in there):
+                raise HydrostateError(f"{option}: {read} is read and would be overwritten; give another name")
+
+
+def require_place(option: str, path: Path | None, ending: str = "", logs: Iterable[Path] = ()) -> None:
     """Refuse a file that cannot be written, or not under this name, before the work and not after it.
 
     Parameters
@@ -54,11 +80,13 @@ def require_place(option: str, path: Path | None, ending: str = "") -> None:
         Where the file goes; None, not given, passes.
     ending : str
         How its name must end, such as ``.png``; any ending if empty.
+    logs : iterable of Path
+        What is read, and must not be overwritten.
 
     Raises
     ------
     HydrostateError
-        If it names a folder, a file in a folder that is not there, or another kind of file.
+        If it names a folder, a file in a folder that is not there, another kind of file, or a log.
     """
     if path is None:
         return
@@ -68,6 +96,7 @@ def require_place(option: str, path: Path | None, ending: str = "") -> None:
         raise HydrostateError(f"{option} must be a file, got the folder {str(path)!r}")
     if not path.parent.is_dir():
         raise HydrostateError(f"{option} {path}: there is no such folder")
+    require_no_log(option, [path], logs)
 
 
 def page_place(report: Path | None) -> Path | None:

@@ -23,9 +23,9 @@ def finish_study(study: "Study[Settings]", settings: Settings, out: Path, *, as_
     from rich.console import Console
 
     from experiments.running.study import run_study
-    from experiments.streams.endings import stop_at_sigterm
+    from experiments.streams.endings import stop_at_signals
 
-    stop_at_sigterm()
+    stop_at_signals()
     begin = perf_counter()
     written = run_study(study, settings, out, Console(stderr=True))
     manifest = str(written.with_name("manifest.json"))

@@ -91,7 +91,7 @@ def identify_channels(
     form = _form(fit)
     require_positive("--sample-time", fit.sample_time, "s")
     require_positive("--filter-hz", fit.filter_hz, "Hz")
-    prepare_output(out)
+    prepare_output(out, logs)
     figures = own_paths(fit.figure, logs)
     chosen = {"input": fit.input, "output": fit.output, "rig": rig.name, "seed": fit.seed}
 

@@ -77,7 +77,7 @@ def identify_columns(logs: Sequence[Path], fit: ColumnFit, *, as_json: bool, out
     require_known("--structure", fit.structure, (*FREE_STRUCTURES, STATE_SPACE))
     require_positive("--sample-time", fit.sample_time, "s")
     require_positive("--resample", fit.resampled, "s")
-    prepare_output(out)
+    prepare_output(out, logs)
     read: list[list[Record]] = []
     shared: dict[str, Identified] = {}
 

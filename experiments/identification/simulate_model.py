@@ -33,7 +33,7 @@ def simulate_model(logs: Sequence[Path], path: Path, fit: "ColumnFit", *, as_jso
     from estimation.identification.free_run.saved import load_models
 
     models = _models_of(load_models(path), fit.outputs)
-    prepare_output(out)
+    prepare_output(out, logs)
     require_positive("--sample-time", fit.sample_time, "s")
     simulated = own_paths(fit.simulated, logs)
 

@@ -9,6 +9,7 @@ import typer
 
 from experiments.actuators import offered
 from experiments.command.json_output import json_text, write_whole
+from experiments.command.output_paths import require_no_log
 from experiments.command.logs import read_log, run_logs
 from experiments.command.options import load_actuator, load_columns
 from experiments.command.terminal import emit, note, rendered, short_names, table
@@ -56,6 +57,8 @@ def compare_logs(
     def work(log: Path) -> dict[str, Any]:
         return {**chosen.blank, **about, **chosen.entries(chosen.run(read(log), actual, prepared))}
 
+    if out is not None:
+        require_no_log("--out", [out], logs)
     batch = run_logs(logs, work, {**chosen.blank, **about}, "diagnosing")
     if len(batch.done) < len(logs):
         raise typer.Exit(batch.exit_code)

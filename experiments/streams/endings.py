@@ -53,10 +53,14 @@ def end_told(told: EventSource) -> Generator[None]:
     told.end("ok", "")
 
 
-def stop_at_sigterm() -> None:
-    """Let a signal to end a process interrupt it, so that its last line is written."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+def stop_at_signals() -> None:
+    """Let a signal to end a process, or a terminal that is closed, interrupt it, so that its last line is written."""
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for name in ("SIGTERM", "SIGHUP"):  # Windows has no SIGHUP
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
+            signal.signal(number, signal.default_int_handler)
 
 
 def say_line(entries: Mapping[str, Any]) -> None:

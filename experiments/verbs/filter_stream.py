@@ -24,7 +24,7 @@ from experiments.command.options import (
 from experiments.command.output_paths import require_place
 from experiments.running.refusal import refused
 from experiments.streams.broker import published
-from experiments.streams.endings import end_told, say_line, stop_at_sigterm
+from experiments.streams.endings import end_told, say_line, stop_at_signals
 from experiments.streams.filtering import Filtering
 from experiments.streams.rows import STANDARD_INPUT, stream_input, warn_of_lost
 from plant.log.stream.source import BatchCounts, bounded_lines, is_stream, stream_lines
@@ -89,7 +89,7 @@ def filter_stream(
         for sink in sinks:
             sink(shown)
 
-    stop_at_sigterm()
+    stop_at_signals()
     from estimation.eha.online import StreamFilterOptions
 
     with ExitStack() as outputs:

@@ -82,7 +82,7 @@ def identify(
     """
     require_place("--figure", figure, ".png")
     require_place("--response", response, ".png")
-    require_place("--simulated", simulated)
+    require_place("--simulated", simulated, logs=logs)
     asked: dict[str, Any] = {
         "structure": structure,
         "numerator": numerator,

@@ -77,7 +77,7 @@ def inspect(
         raise HydrostateError("--write and --with go with one file, got several")
     pages = own_paths(page_place(report), logs)
     require_place("--write", write)
-    prepare_output(out)
+    prepare_output(out, logs)
     unwritten: list[str] = []
     written: list[Path] = []
     batch = run_logs(logs, work, BLANK, "looking")

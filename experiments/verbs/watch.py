@@ -19,7 +19,7 @@ from experiments.command.options import (
 )
 from experiments.command.output_paths import require_place
 from experiments.streams.broker import published
-from experiments.streams.endings import end_told, say_line, stop_at_sigterm
+from experiments.streams.endings import end_told, say_line, stop_at_signals
 from experiments.streams.heartbeat import beating
 from experiments.streams.metrics_endpoint import metrics_offered
 from experiments.streams.rows import STANDARD_INPUT, stream_input
@@ -85,7 +85,7 @@ def watch(
     told = Watched(STANDARD_INPUT if log == "-" else log)
     if lines_wanted(view):
         told.to(say_line)
-    stop_at_sigterm()
+    stop_at_signals()
 
     with ExitStack() as outputs, end_told(told):  # they hear of the end before they are closed
         _opened(told, outputs, publish, metrics, view)

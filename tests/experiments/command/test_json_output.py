@@ -68,6 +68,20 @@ def test_a_file_is_no_folder_for_results(tmp_path: Path) -> None:
     assert (tmp_path / "taken").read_text() == "mine"
 
 
+@pytest.mark.parametrize(
+    ("log", "out"), [("run.json", "run.json"), ("run.csv", "run.csv.json"), ("results.csv", "."), ("a/run.json", "b")]
+)
+def test_a_log_and_what_stands_beside_it_are_never_overwritten(log: str, out: str, tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").symlink_to("a")
+    for name in (log, "run.csv.json"):
+        (tmp_path / name).write_text("a log")
+    (tmp_path / "a" / "results.json").hardlink_to(tmp_path / log)
+    with pytest.raises(HydrostateError, match="is read and would be overwritten; give another name"):
+        prepare_output(tmp_path / out, [tmp_path / log])
+    prepare_output(tmp_path / out, [tmp_path / "other.csv"])
+
+
 def test_a_folder_that_may_not_be_written_and_a_folder_in_a_file_s_place_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

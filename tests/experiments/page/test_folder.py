@@ -20,6 +20,7 @@ from experiments.page.figure_files import figure_files
 from experiments.page.folder import check_target, held
 from experiments.running import study as runner
 from experiments.running.study import Found, write_result
+from experiments.streams.endings import stop_at_signals
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
 from tests.experiments.conftest import SMALL, WRITTEN
@@ -242,11 +243,18 @@ def test_a_result_reaches_the_disk_before_it_takes_its_name(
     assert {one.split(".tmp/")[-1] for one in synced} == set(_listing(tmp_path / "out"))
 
 
-def test_a_study_that_is_asked_to_end_is_interrupted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(runner, "run_study", lambda *_: os.kill(os.getpid(), signal.SIGTERM))
-    before = signal.getsignal(signal.SIGTERM)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_study_that_is_asked_to_end_is_interrupted(
+    number: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(runner, "run_study", lambda *_: os.kill(os.getpid(), number))
+    before = {one: signal.getsignal(one) for one in (signal.SIGTERM, signal.SIGHUP)}
     try:
         with pytest.raises(KeyboardInterrupt):
             finish_study(NINE_CONDITIONS, SMALL, tmp_path / "out", as_json=False)
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+        stop_at_signals()
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for one, was in before.items():
+            signal.signal(one, was)
