@@ -9,9 +9,9 @@ import typer
 
 from experiments.actuators import offered
 from experiments.command.json_output import json_text, write_whole
-from experiments.command.output_paths import require_no_log
 from experiments.command.logs import read_log, run_logs
 from experiments.command.options import load_actuator, load_columns
+from experiments.command.output_paths import require_no_log
 from experiments.command.terminal import emit, note, rendered, short_names, table
 from experiments.log_pages.comparison import compare_view, compared, plain_words, quantities_shown, title_of
 from plant.errors import HydrostateError
