@@ -17,6 +17,41 @@ FEWEST, MOST = 2, 0.1
 """How often it must come, and the share of the samples that it may have [count, fraction]; judged."""
 
 
+KNOWN, IN_A_ROW = 100, 50
+"""In a stream: samples before one can stand out, and as many in a row that are left out [count]; judged."""
+
+
+class LostInStream:
+    """The same of samples that come one by one: such a number is lost if it is farther from all before than they reach.
+
+    One that stays is believed after `IN_A_ROW` samples.
+
+    Examples
+    --------
+    >>> lost = LostInStream()
+    >>> any(lost.is_lost(0.01 * k) for k in range(KNOWN)), lost.is_lost(-9999.0), lost.is_lost(0.5)
+    (False, True, False)
+    """
+
+    def __init__(self) -> None:
+        self._low, self._high = float("inf"), float("-inf")
+        self._known = self._together = 0
+
+    def is_lost(self, value: float) -> bool:
+        """Return whether the next sample, as the stream has it, stands for a lost one [any unit]; NaN does not."""
+        if value != value:
+            return False
+        reach = self._high - self._low
+        stands_out = self._known >= KNOWN and max(self._low - value, value - self._high) > reach > 0.0
+        if stands_out and value in LOST_VALUES and self._together < IN_A_ROW:
+            self._together += 1
+            return True
+        self._together = 0
+        self._known += 1
+        self._low, self._high = min(self._low, value), max(self._high, value)
+        return False
+
+
 def without_lost(values: Array, channel: str) -> tuple[Array, list[Note]]:
     """Return a column without the number that stands for a lost sample, and what to say of it.
 

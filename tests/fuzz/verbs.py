@@ -126,7 +126,7 @@ def wrong_with(words: Sequence[str], ended: Run) -> str:
         return f"{ended.seconds:.1f} s"
     if ended.memory > MOST:
         return f"{ended.memory / 2**20:.0f} MB"
-    for token in ("internal error", "Traceback", "\x1b", "Warning: ", "Error: <", "0x7f"):
+    for token in ("internal error", "Traceback", "\x1b", "Warning: ", "Error: <", " at 0x7f"):
         if token in ended.err or token in ended.out:
             return f"{token!r} in {ended.err[-300:]!r}"
     if ended.code and not ended.err.strip():

@@ -15,6 +15,7 @@ from plant.log.columns import TIME, TRUTH, Column, listed, resolve_columns
 from plant.log.formats.cells import MOST_STRANGE, not_a_number, number, wrong_width
 from plant.log.guess import overlooked
 from plant.log.headings import cleaned
+from plant.log.lost_values import LostInStream
 
 FIRST_ROWS = 50
 """Rows from which the time between samples is found."""
@@ -43,7 +44,8 @@ class CsvStream:
 
     A row with too few or too many cells, or whose time is no number or does not increase, is left out. A cell that is
     no number is a missing sample. Both are counted in `left_out`, and the stream is refused when there are too many: as
-    in a log (`MOST_STRANGE`) in the long run, and at most `BURST` in a row.
+    in a log (`MOST_STRANGE`) in the long run, and at most `BURST` in a row. A usual number for lost samples, such as
+    -9999, is a missing sample too if it stands out; it is counted, but refuses nothing.
 
     Parameters
     ----------
@@ -92,6 +94,7 @@ class CsvStream:
         if not time:
             raise LogError(f"a column {TIME} is needed, or in another unit as time_ms, got {listed(names)}", source)
         self._columns = time + [one for one in columns if one.channel != TIME]
+        self._lost = {one.position: LostInStream() for one in columns if one.channel != TIME}
         read = {one.position for one in columns}
         left = [heading for place, heading in enumerate(cleaned(names)) if place not in read]
         for said in overlooked(left, [one.channel for one in columns]):
@@ -244,4 +247,9 @@ class CsvStream:
             raise not_a_number(self._source, column.name, place, cell) from error
         if value in (float("inf"), float("-inf")) or (column.channel == TIME and value != value):
             raise not_a_number(self._source, column.name, place, cell or "an empty cell")
+        if column.channel != TIME and self._lost[column.position].is_lost(value):
+            self.left_out += 1
+            said = f"column {column.name[:80]!r} has {value:g} in row {place + 1}, which stands for a lost sample"
+            self.first_left_out = self.first_left_out or said
+            return float("nan")
         return value * column.factor + column.offset

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from plant.errors import LogError, LogWarning
+from plant.log.lost_values import IN_A_ROW
 from plant.log.stream.csv_rows import CsvStream
 
 HEADER = "time_ms,motor_speed_rpm,position_mm\n"
@@ -183,3 +184,19 @@ def test_a_line_with_an_end_within_it_is_garbage_and_a_long_header_is_not_told_w
         CsvStream(['a\rb,"c\rd"\n'], source="bench")
     with pytest.raises(LogError, match="and 4990 more"):
         CsvStream([",".join(["name"] * 5002) + "\n"], source="bench")
+
+
+def test_a_number_that_stands_for_a_lost_sample_is_missing_unless_it_stays() -> None:
+    lines = [HEADER, *(f"{k},{900 + k % 7},{k % 9}\n" for k in range(400))]
+    for k in (201, 251, 301):
+        lines[k] = f"{k - 1},9999,-9999\n"
+    stream = CsvStream(lines, source="bench")
+    found = np.concatenate([piece for _, piece, _ in stream.samples(100)])
+    assert [np.flatnonzero(np.isnan(found[:, column])).tolist() for column in (0, 1)] == [[200, 250, 300]] * 2
+    assert stream.left_out == 6
+    assert stream.first_left_out == "column 'motor_speed_rpm' has 9999 in row 201, which stands for a lost sample"
+    lines[201:] = [f"{k},9999,{k % 9}\n" for k in range(200, 400)]
+    stream = CsvStream(lines, source="bench")
+    speed = np.concatenate([piece for _, piece, _ in stream.samples(100)])[:, 0]
+    assert np.isnan(speed).sum() == stream.left_out == IN_A_ROW
+    assert speed[-1] == pytest.approx(9999 * np.pi / 30)
