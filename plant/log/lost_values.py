@@ -38,7 +38,13 @@ class LostInStream:
         self._known = self._together = 0
 
     def is_lost(self, value: float) -> bool:
-        """Return whether the next sample, as the stream has it, stands for a lost one [any unit]; NaN does not."""
+        """Return whether the next sample stands for a lost one; NaN does not.
+
+        Parameters
+        ----------
+        value : float
+            As the stream has it [any unit].
+        """
         if value != value:
             return False
         reach = self._high - self._low

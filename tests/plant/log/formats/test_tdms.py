@@ -41,19 +41,20 @@ def test_channels_that_begin_at_other_times_are_laid_beside_each_other_by_them(t
     path = written(
         tmp_path / "log.tdms",
         ("Bench", "motor_speed_rad_s", values, {"wf_increment": step, "wf_start_time": START}),
-        ("Bench", "velocity_m_s", values, {"wf_increment": step, "wf_start_time": later}),
-        ("Bench", "position_m", values, {"wf_increment": step, "wf_start_time": START, "wf_start_offset": 0.1}),
+        ("Bench", "velocity_m_s", 1e-3 * values, {"wf_increment": step, "wf_start_time": later}),
+        ("Bench", "position_m", 1e-3 * values, {"wf_increment": step, "wf_start_time": START, "wf_start_offset": 0.1}),
     )
     with pytest.warns(LogWarning, match="merged"):
         log = read_record(path)
     np.testing.assert_array_equal(log.channels["motor_speed_rad_s"], values[10:])
-    np.testing.assert_allclose(log.channels["velocity_m_s"], values[5:35])
-    np.testing.assert_allclose(log.channels["position_m"], values[:30])
+    np.testing.assert_allclose(log.channels["velocity_m_s"], 1e-3 * values[5:35])
+    np.testing.assert_allclose(log.channels["position_m"], 1e-3 * values[:30])
 
 
 def test_a_beginning_without_a_date_is_the_first_time(tmp_path: Path) -> None:
     offset = {"wf_increment": 0.01, "wf_start_offset": 0.25}
-    channels = [("Bench", name, np.arange(20.0), offset) for name in ("motor_speed_rad_s", "velocity_m_s")]
+    values = np.arange(20.0)
+    channels = [("Bench", "motor_speed_rad_s", values, offset), ("Bench", "velocity_m_s", 1e-3 * values, offset)]
     assert read_record(written(tmp_path / "log.tdms", *channels)).start_time == pytest.approx(0.25)
 
 
