@@ -24,7 +24,7 @@ def beating(told: WatchEvents, every: float | None) -> Generator[None]:
 
     def beat() -> None:
         due = time.monotonic() + every
-        while not over.wait(max(due - time.monotonic(), 0.0)):
+        while not over.wait(min(max(due - time.monotonic(), 0.0), threading.TIMEOUT_MAX)):
             told.alive()
             due += every
 

@@ -1,10 +1,12 @@
 """Events of a watch as entries: what an alarm says of its cause, and what is not known."""
 
+import threading
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from experiments.streams.heartbeat import beating
 from experiments.streams.watch_events import WatchEvents
 from faults.watch.events import SLOW, Alarm, Change
 
@@ -55,3 +57,11 @@ def test_the_end_counts_the_alarms_whoever_ended_it(outcome: str, why: str, word
     events.events([alarm("flow")])
     events.end(outcome, why)
     assert lines[-1]["message"] == words
+
+
+def test_a_heartbeat_in_thousands_of_years_is_none_and_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    failed: list[object] = []
+    monkeypatch.setattr(threading, "excepthook", failed.append)
+    with beating(WatchEvents(lambda _: None), 1e20):
+        pass
+    assert failed == []
