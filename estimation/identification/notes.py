@@ -76,6 +76,10 @@ class IdentificationCode(Code):
         "neither dead zone nor saturation nor backlash at the input predicts {output!r} better on held-back data: the "
         "linear model was chosen"
     )
+    SIGN_NOT_MEASURED = (
+        "{output!r} seems to be measured without its sign: a linear model before its absolute value leaves {left:.0%} "
+        "of the error of the linear model on held-back data; use --structure wiener, or log the sign"
+    )
     UNRELATED = (
         "the inputs explain {output!r} no better than the same inputs in other orders would: it follows a course of "
         "its own, such as drift, which a slow model imitates; do not rely on the model"

@@ -168,9 +168,11 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
         bend = result["nonlinearity"]
         if bend is not None:
             values = ", ".join(
-                f"{name.replace('_', ' ')} {_with_interval(one)}" for name, one in bend.items() if name != "kind"
+                f"{name.removesuffix('_s').replace('_', ' ')} {_with_interval(one)}{' s' * name.endswith('_s')}"
+                for name, one in bend.items()
+                if name != "kind"
             )
-            place = "output" if "friction" in bend["kind"] else "input"
+            place = "output" if "friction" in bend["kind"] or bend["kind"] == "absolute-value" else "input"
             yield f"{result['output']}: {bend['kind'].replace('-', ' ')} at {result[place]}, {values}"
     yield (
         f"From {', '.join(results[0]['inputs'])}. Fits are of free runs: on the fitted logs, on blocks held back from "

@@ -6,7 +6,7 @@ from typing import Annotated
 from experiments.command.options import option
 from experiments.identification.of_channels import STRUCTURES
 
-ONLY_BETWEEN_COLUMNS = ("narx", "hammerstein", "state-space")
+ONLY_BETWEEN_COLUMNS = ("narx", "hammerstein", "wiener", "state-space")
 """Structures that are fitted between any columns only."""
 
 StructureName = Annotated[
@@ -15,7 +15,8 @@ StructureName = Annotated[
         "NAME",
         f"{', '.join([*STRUCTURES, *ONLY_BETWEEN_COLUMNS])}; auto takes the best on held-back data. "
         "With --input and --output also: narx (polynomial), hammerstein (dead zone, saturation or backlash before "
-        "a linear model), state-space (one model of all outputs; its order is the number of states).",
+        "a linear model), wiener (a linear model whose output is measured without its sign), state-space (one model "
+        "of all outputs; its order is the number of states).",
     ),
 ]
 

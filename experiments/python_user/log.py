@@ -219,8 +219,8 @@ class Log(Shown):
             Further experiments, where ``input`` and ``output`` are given.
         **options
             With ``input`` and ``output``, names or lists of them: ``structure`` ("output-error", "narx", "hammerstein",
-            "state-space", "auto"), ``order``, ``delay``, ``n_numerator``, ``sample_time`` [s], ``reference`` (columns
-            that drive a closed loop from outside); the data choose what is not given. Without these two, as
+            "wiener", "state-space", "auto"), ``order``, ``delay``, ``n_numerator``, ``sample_time`` [s], ``reference``
+            (columns that drive a closed loop from outside); the data choose what is not given. Without these two, as
             `estimation.identification.from_record.identify_record` takes them: ``n_denominator=3``.
 
         Returns

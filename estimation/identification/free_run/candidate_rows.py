@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from estimation.identification.free_run.choose_absolute import AbsoluteCandidate
 from estimation.identification.free_run.choose_hammerstein import HammersteinCandidate
 from estimation.identification.free_run.choose_linear import Candidate
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate
@@ -50,4 +51,19 @@ def polynomial_row(one: PolynomialCandidate) -> dict[str, Any]:
         "held_back_percent": 100.0 * (1.0 - one.held_back),
         "spread_percent": 100.0 * one.spread if np.isfinite(one.spread) else None,
         "bic": one.bic,
+    }
+
+
+def absolute_row(one: AbsoluteCandidate) -> dict[str, Any]:
+    """Return what is told of a candidate whose output is measured without its sign."""
+    form = one.fit.linear.form
+    return {
+        "structure": "wiener",
+        "nonlinearity": "absolute-value",
+        "order": form.order,
+        "numerator": list(form.sizes),
+        "delay": list(form.delays),
+        "held_back_percent": 100.0 * (1.0 - one.held_back),
+        "bic": one.bic,
+        "doubt": None,
     }

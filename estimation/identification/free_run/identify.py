@@ -9,13 +9,28 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimation.identification.fit.feedback import feedback_note
-from estimation.identification.free_run.candidate_rows import hammerstein_row, linear_row, polynomial_row
+from estimation.identification.free_run.absolute_dynamics import AbsoluteDynamics
+from estimation.identification.free_run.absolute_output import refitted_absolute
+from estimation.identification.free_run.believable import believable
+from estimation.identification.free_run.candidate_rows import (
+    absolute_row,
+    hammerstein_row,
+    linear_row,
+    polynomial_row,
+)
+from estimation.identification.free_run.choose_absolute import (
+    AbsoluteCandidate,
+    absolute_candidates,
+    chosen_absolute,
+    from_zero,
+    may_lack_sign,
+)
 from estimation.identification.free_run.choose_hammerstein import (
     HammersteinCandidate,
     hammerstein_candidates,
     worthwhile,
 )
-from estimation.identification.free_run.choose_linear import INTEGRATING, Candidate, chosen, linear_candidates
+from estimation.identification.free_run.choose_linear import Candidate, linear_candidates
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate, polynomial_candidates
 from estimation.identification.free_run.data import (
     Channels,
@@ -31,11 +46,10 @@ from estimation.identification.free_run.fallback import Fallback
 from estimation.identification.free_run.fewer_samples import on_fewer
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.hammerstein_fit import deviations, finished, refitted
-from estimation.identification.free_run.held_back import BLOCKS, halves_error, surely_better
+from estimation.identification.free_run.held_back import BLOCKS
 from estimation.identification.free_run.integrating import refitted_linear
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
-from estimation.identification.free_run.other_orders import wanders
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.transfer_function import linear_model
@@ -44,14 +58,15 @@ from estimation.identification.notes import IdentificationCode
 from plant.errors import HydrostateError, LogWarning, require_known
 from plant.notes import Note
 
-FREE_STRUCTURES = ("output-error", "narx", "hammerstein", "auto", *ADOPTED)
-"""Structures between any channels; auto chooses between the first three."""
+FREE_STRUCTURES = ("output-error", "narx", "hammerstein", "wiener", "auto", *ADOPTED)
+"""Structures between any channels; auto chooses between the first four."""
 
 WARNED = (
     IdentificationCode.TIME_CONSTANT_BEYOND_RECORD,
     IdentificationCode.NO_FIT,
     IdentificationCode.UNRELATED,
     IdentificationCode.INTEGRATES,
+    IdentificationCode.SIGN_NOT_MEASURED,
     IdentificationCode.FEEDBACK,
 )
 """Notes that are raised as warnings too; the others say only what was passed over."""
@@ -63,14 +78,11 @@ MOST_CHOSEN, MOST_COMPARED, MOST_FITTED = 10_000, 5_000, 100_000
 """Samples on which linear models are compared, on which nonlinear ones are compared with them, and on which a nonlinear
 model is fitted at the end."""
 
+SIGNLESS = 0.5
+"""Share of the linear model's held-back error that a model without a sign may leave: signs that are told are many."""
+
 CLEAR_MARGIN = 0.15
 """Share by which a nonlinear model must do better than the linear one on what was held back."""
-
-NEARLY_AS_GOOD = 0.02
-"""Share of held-back error that is given up for a model without cancelling or undetermined parts."""
-
-BELIEVED = 0.5
-"""Likewise, of the output's deviation, where no other model may be taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +130,7 @@ def identify_channels(
         unless the polynomial one is clearly better on blocks held back, or of one input the next. Of one input also
         ``"hammerstein"``: a dead zone, saturation or backlash in front of a linear model, where one of them is better
         there than none; and the keys of `other_structures.ADOPTED`, at the order that output error is given.
+        ``"wiener"``: linear, its output measured without a sign; of outputs that may be, ``"auto"`` tries it too.
     order, delay, n_numerator : int, optional
         Of every input; chosen by the free run on blocks held back where not given.
 
@@ -155,13 +168,21 @@ def _identified(
     orders = range(1, HIGHEST + 1) if order is None else (order,)
     delays = None if delay is None else (delay,) * len(data.inputs)
     linear = linear_candidates(part, list(orders), delays, n_numerator)
-    best, notes = _believable(linear, part, by)
+    best, notes = believable(linear, part, by)
     rows = [linear_row(one) for one in linear]
     related = not best.outlasts_block(part) or linear_explains(best.fit, part)
     notes = notes if related else [IdentificationCode.UNRELATED.note(output=data.output)]
     sound = related and not best.doubt
     if structure in ADOPTED:
         return _adopted(structure, best, data, by, rows, [] if related else notes)
+    asked = Asked(order, delay, n_numerator)
+    if structure in ("output-error", "auto", "wiener"):
+        signless = _without_sign(section(whole, MOST_COMPARED), by, asked, best, rows, surely=structure != "wiener")
+        if signless is not None and structure != "output-error":
+            return _absolute(signless, data, whole, rows)
+        if signless is not None:
+            left = signless.held_back / best.held_back
+            notes = [*notes, IdentificationCode.SIGN_NOT_MEASURED.note(output=data.output, left=left)]
     compared, judged, own = part, linear, best
     if structure != "output-error":
         compared, judged, own = on_fewer(linear, best, part, section(whole, MOST_COMPARED))
@@ -180,7 +201,6 @@ def _identified(
         straight = min([own, *(one for one in judged if not one.doubt)], key=lambda one: one.held_back)
         bar = (1.0 - CLEAR_MARGIN) * straight.held_back if structure == "auto" and sound else float("inf")
         bar = bar if nonlinear is None else min(bar, nonlinear.held_back)
-        asked = Asked(order, delay, n_numerator)
         polynomial = polynomial_candidates([own] if own.doubt else judged, compared, asked, bar)
         rows += [polynomial_row(one) for one in polynomial]
         better = min(polynomial, key=lambda one: (one.price, one.held_back), default=None)
@@ -239,10 +259,39 @@ def _nonlinear(taken: HammersteinCandidate, data: Channels, whole: Channels, row
     fit = finished(taken.fit, whole) if section(whole, MOST_COMPARED) is whole else refitted(taken.fit, part)
     dynamics = HammersteinDynamics.of(fit, deviations(fit, part))
     model = FreeRunModel(data.inputs, data.output, data.sample_time, "hammerstein", scaled(data)[1], dynamics)
+    return _told(model, data, taken.held_back, rows)
+
+
+def _told(model: FreeRunModel, data: Channels, held_back: float, rows: list[dict[str, Any]]) -> Identified:
+    """Return a nonlinear model with its quality, not to be believed where it has none."""
     quality = model.quality(data.u, data.y)
-    sound = quality.fit_percent > 0.0 and taken.held_back < 1.0
+    sound = quality.fit_percent > 0.0 and held_back < 1.0
     notes = () if sound else (IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent),)
-    return Identified(model, quality, 100.0 * (1.0 - taken.held_back), tuple(rows), notes, sound)
+    return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(rows), notes, sound)
+
+
+def _without_sign(
+    data: Channels, by: Scaling, asked: Asked, best: Candidate, rows: list[dict[str, Any]], *, surely: bool
+) -> AbsoluteCandidate | None:
+    """Return the best model of a size whose sign is not measured; None where there is none, or a linear one will do."""
+    if surely and not may_lack_sign(data, by):
+        return None
+    found = absolute_candidates(data, by, asked)
+    rows += [absolute_row(one) for one in found]
+    if not found and not surely:
+        raise HydrostateError(f"no model of {data.output!r} without its sign has poles quicker than a held-back block")
+    if not found:
+        return None
+    taken = chosen_absolute(found)
+    return None if surely and not taken.held_back < SIGNLESS * best.held_back else taken
+
+
+def _absolute(taken: AbsoluteCandidate, data: Channels, whole: Channels, rows: list[dict[str, Any]]) -> Identified:
+    """Return a model whose output has no sign, fitted to all data."""
+    by = scaled(data)[1]
+    fit = refitted_absolute(taken.fit, from_zero(section(whole, MOST_FITTED), by))
+    model = FreeRunModel(data.inputs, data.output, data.sample_time, "wiener", by, AbsoluteDynamics.of(fit, taken.zero))
+    return _told(model, data, taken.held_back, rows)
 
 
 def _adopted(
@@ -257,69 +306,6 @@ def _adopted(
     return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(rows), tuple(notes), sound and not said)
 
 
-def _believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> tuple[Candidate, list[Note]]:
-    """Return the candidate that may be believed, and notes on those that were passed over for it."""
-    notes: list[Note] = []
-    best = chosen(candidates)
-    # a time constant held at the record's length does nearly what an integrator does, and is no other explanation
-    free = [one for one in candidates if not (one.fit.bounded or one.fit.integrates)]
-    other = chosen(free or candidates)
-    bar = BELIEVED if other.doubt else INTEGRATING * other.held_back
-    beyond = [one for one in free if one.doubt == "time_constant"]
-    # where two poles are close to one, none can be given at one
-    alone = {one.form for one in beyond} - {one.form for one in candidates if one.fit.integrates}
-    integrating = [one for one in candidates if one.fit.integrates and one.doubt != "no_fit"]
-    integrating += [one for one in beyond if one.form in alone]
-    tempting = chosen(integrating) if integrating else None
-    if tempting is not None and tempting.held_back < bar and not wanders(tempting.fit, data):
-        # a pole that is estimated beyond the record is believed beside one at 1 alone, and where it is surely better
-        leaky = chosen(beyond) if beyond else tempting
-        surely = surely_better(leaky.block_errors, tempting.block_errors) and not wanders(leaky.fit, data)
-        tempting = leaky if surely else tempting
-        return replace(tempting, doubt=""), [IdentificationCode.INTEGRATES.note(output=data.output)]
-    if best.doubt == "time_constant":
-        radius = float(np.abs(np.roots(best.fit.f)).max())
-        slowest = -data.sample_time / float(np.log(radius)) if radius < 1.0 else float("inf")
-        notes.append(
-            IdentificationCode.TIME_CONSTANT_BEYOND_RECORD.note(
-                order=best.form.order, time_constant_s=slowest, duration_s=data.told * data.sample_time
-            )
-        )
-        return best, notes
-    passed = [one for one in candidates if one.doubt == "time_constant" and one.held_back < best.held_back]
-    if passed:
-        notes.append(
-            IdentificationCode.SLOW_MODELS_PASSED_OVER.note(count=len(passed), duration_s=data.told * data.sample_time)
-        )
-    beyond = list(notes)
-    simpler = [
-        one for one in candidates if not one.doubt and one is not best and one.form.n_values <= best.form.n_values
-    ]
-    near = [one for one in simpler if one.price <= (1.0 + NEARLY_AS_GOOD) * best.price]
-    if near and len(data.inputs) == 1 and _undetermined(best, data, by):
-        clean = [one for one in near if not _undetermined(one, data, by)]
-        if clean:
-            taken = min(clean, key=lambda one: one.price)
-            notes.append(IdentificationCode.SIMPLER_MODEL_TAKEN.note(order=best.form.order, taken=taken.form.order))
-            best = taken
-    # a block lies between outputs that pin a slower pole to the drift of this record: it has to win by more than
-    # chance, and halves of the record, which are pinned by nothing, and other orders of the inputs are judged beside
-    quick = [one for one in candidates if not (one.doubt or one.fit.bounded or one.outlasts_block(data))]
-    if quick and best.outlasts_block(data):
-        taken, said = _believable(quick, data, by)
-        if not (surely_better(best.block_errors, taken.block_errors) and _carries_on(best, taken, data)):
-            return taken, [*beyond, *said]
-    return best, notes
-
-
-def _carries_on(slow: Candidate, quick: Candidate, data: Channels) -> bool:
-    """Return whether a slow model leaves less than a quick one on blocks and halves together, and does not wander."""
-    if wanders(slow.fit, data):
-        return False
-    errors = [np.hypot(one.held_back, halves_error(one.fit, data)) for one in (slow, quick)]
-    return not errors[0] > errors[1]
-
-
 def _clearly_better(nonlinear: PolynomialCandidate, linear: Candidate) -> bool:
     """Return whether a nonlinear model wins by a margin over all blocks, and in half of them at least."""
     pairs = [
@@ -329,12 +315,6 @@ def _clearly_better(nonlinear: PolynomialCandidate, linear: Candidate) -> bool:
     ]
     won = sum(one < other for one, other in pairs)
     return nonlinear.price < (1.0 - CLEAR_MARGIN) * linear.held_back and 2 * won >= len(pairs)
-
-
-def _undetermined(one: Candidate, data: Channels, by: Scaling) -> bool:
-    """Return whether a pole and a zero cancel, or the steady gain is less than its standard deviation."""
-    model = linear_model(one.fit, data, by)
-    return bool(model.cancellations) or not model.dc_gain_std < abs(model.dc_gain)
 
 
 def _refitted(found: PolynomialCandidate, whole: Channels) -> PolynomialDynamics:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.arrays import Array
+from estimation.identification.free_run.absolute_dynamics import AbsoluteDynamics
 from estimation.identification.free_run.data import Scaling
 from estimation.identification.free_run.dynamics import Dynamics
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
@@ -28,7 +29,8 @@ FORMAT = "hydrostate-model"
 VERSION = 1
 
 KINDS: Mapping[str, Any] = {
-    one.kind: one for one in (LinearDynamics, PolynomialDynamics, HammersteinDynamics, StateSpaceDynamics)
+    one.kind: one
+    for one in (LinearDynamics, PolynomialDynamics, HammersteinDynamics, AbsoluteDynamics, StateSpaceDynamics)
 }
 """Dynamics by what a saved model calls them."""
 
@@ -84,11 +86,13 @@ class FreeRunModel:
 
     @property
     def nonlinearity(self) -> dict[str, Any] | None:
-        """Nonlinearity of the input or friction of the output, by kind and values in the channels' units, or None."""
+        """Nonlinearity of the input or of the output, by kind and values in the channels' units, or None."""
         if isinstance(self.dynamics, HammersteinDynamics):
             return self.dynamics.nonlinearity(self.scaling)
         if isinstance(self.dynamics, PolynomialDynamics):
             return self.dynamics.nonlinearity(self.scaling, self.sample_time)
+        if isinstance(self.dynamics, AbsoluteDynamics):
+            return self.dynamics.nonlinearity(self.sample_time)
         return None
 
     def simulate(self, u: ArrayLike, y: ArrayLike | None = None) -> Array:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.identification.free_run import choose_linear, held_back, identify, linear_fit
+from estimation.identification.free_run import believable, choose_linear, held_back, identify, linear_fit
 from estimation.identification.free_run.choose_linear import Candidate
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.least_squares import least_squares
@@ -191,15 +191,15 @@ def believed() -> dict[str, Any]:
     }
     told: dict[str, Any] = {}
     for name, given in rows.items():
-        best, notes = identify._believable(given, base, by)
+        best, notes = believable.believable(given, base, by)
         told[name] = [best.held_back, best.doubt, best.fit.bounded, [[str(one.code), dict(one.data)] for one in notes]]
     cancelled = fit_linear(Form(3, (3,), (1,)), base)
     clean = fit_linear(Form(2, (2,), (1,)), base)
     for name, error in (("as good", 1.019), ("not as good", 1.021)):
         given = [made(1.0, -9.0, fit=cancelled, form=cancelled.form), made(error, 0.0, fit=clean, form=clean.form)]
-        best, notes = identify._believable(given, base, by)
+        best, notes = believable.believable(given, base, by)
         told[f"simpler, {name}"] = [best.form.order, [[str(one.code), dict(one.data)] for one in notes]]
-    told["undetermined"] = [identify._undetermined(made(1.0, 0.0, fit=one), base, by) for one in (cancelled, clean)]
+    told["undetermined"] = [believable._undetermined(made(1.0, 0.0, fit=one), base, by) for one in (cancelled, clean)]
     nonlinear: Callable[..., Any] = lambda price, errors: SimpleNamespace(price=price, block_errors=errors)  # noqa: E731
     told["clearly better"] = [
         identify._clearly_better(nonlinear(price, errors), made(1.0, 0.0))

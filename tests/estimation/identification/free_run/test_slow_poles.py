@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from estimation.arrays import Array
-from estimation.identification.free_run import identify
+from estimation.identification.free_run import believable as module
+from estimation.identification.free_run.believable import believable
 from estimation.identification.free_run.choose_linear import (
     Candidate,
     candidate,
@@ -17,7 +18,6 @@ from estimation.identification.free_run.choose_linear import (
 )
 from estimation.identification.free_run.data import Channels, channels_from, halves, scaled
 from estimation.identification.free_run.held_back import BLOCKS, halves_error
-from estimation.identification.free_run.identify import _believable
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form, LinearFit
 from estimation.identification.free_run.other_orders import wanders
@@ -72,14 +72,14 @@ def test_a_slow_pole_wins_by_more_than_blocks_scatter(
     plain: tuple[Channels, Candidate], slow: tuple[float, ...], taken: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data, one = plain
-    monkeypatch.setattr(identify, "halves_error", lambda fit, _: float(fit.cost))
+    monkeypatch.setattr(module, "halves_error", lambda fit, _: float(fit.cost))
     models = {"quick": with_pole(one, 0.7, (0.1,) * 4), "slow": with_pole(one, 0.998, slow)}
     models["slow"] = replace(models["slow"], bic=one.bic - 100.0)
     _, by = scaled(data)
-    assert _believable(list(models.values()), data, by)[0] is models[taken]
+    assert believable(list(models.values()), data, by)[0] is models[taken]
     # where nothing quicker may be taken, the slow one is
     doubted = replace(models["quick"], doubt="no_fit")
-    assert _believable([doubted, models["slow"]], data, by)[0] is models["slow"]
+    assert believable([doubted, models["slow"]], data, by)[0] is models["slow"]
 
 
 @pytest.mark.parametrize(
@@ -98,26 +98,26 @@ def test_a_slow_pole_carries_on_where_nothing_pins_it(
     models = {"quick": with_pole(one, 0.7, (0.1,) * 4), "slow": with_pole(one, 0.998, (0.08,) * 4)}
     models["slow"] = replace(models["slow"], bic=one.bic - 100.0)
     told = dict(zip((0.998, 0.7), errors, strict=True))
-    monkeypatch.setattr(identify, "halves_error", lambda fit, _: told[round(-float(fit.f[1]), 3)])
-    assert _believable(list(models.values()), data, scaled(data)[1])[0] is models[taken]
+    monkeypatch.setattr(module, "halves_error", lambda fit, _: told[round(-float(fit.f[1]), 3)])
+    assert believable(list(models.values()), data, scaled(data)[1])[0] is models[taken]
 
 
 def test_a_slow_pole_that_only_the_measured_order_holds_is_not_taken(
     plain: tuple[Channels, Candidate], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data, one = plain
-    monkeypatch.setattr(identify, "halves_error", lambda *_: 0.1)
+    monkeypatch.setattr(module, "halves_error", lambda *_: 0.1)
     quick, slow = with_pole(one, 0.7, (0.1,) * 4), with_pole(one, 0.998, (0.01,) * 4)
     assert not wanders(slow.fit, data)
-    assert _believable([quick, slow], data, scaled(data)[1])[0] is slow
+    assert believable([quick, slow], data, scaled(data)[1])[0] is slow
     # a sum of its input begins at rest, not at the steady gain of 500 times the first input
     assert not wanders(LinearFit(one.fit.form, np.array([0.05, -0.9999, 0.0]), 1.0), data)
     theta = slow.fit.theta.copy()
     theta[0] *= 300.0
     loud = replace(slow, fit=LinearFit(slow.fit.form, theta, slow.fit.cost))
     assert wanders(loud.fit, data)
-    assert _believable([quick, loud], data, scaled(data)[1])[0] is quick
-    assert _believable([loud], data, scaled(data)[1])[0] is loud  # where nothing quicker may be taken
+    assert believable([quick, loud], data, scaled(data)[1])[0] is quick
+    assert believable([loud], data, scaled(data)[1])[0] is loud  # where nothing quicker may be taken
 
 
 def test_a_half_is_run_by_a_fit_to_the_other(plain: tuple[Channels, Candidate]) -> None:
@@ -137,7 +137,7 @@ def test_what_lies_beyond_the_record_is_still_told(plain: tuple[Channels, Candid
     data, one = plain
     beyond = with_pole(one, 0.9999, (0.09,) * 4, "time_constant")
     slow, quick = with_pole(one, 0.998, (0.07, 0.1, 0.1, 0.115)), with_pole(one, 0.7, (0.1,) * 4)
-    found, notes = _believable([beyond, slow, quick], data, scaled(data)[1])
+    found, notes = believable([beyond, slow, quick], data, scaled(data)[1])
     assert found is quick
     assert [note.code for note in notes] == [IdentificationCode.SLOW_MODELS_PASSED_OVER]
 
@@ -150,7 +150,7 @@ def test_the_drift_of_one_record_is_not_taken_for_a_slow_pole() -> None:
     data, by = scaled(channels(y + 0.25 * y.std() / drift.std() * drift, u))
     candidates = linear_candidates(data, [1, 2, 3], (1,))
     assert chosen(candidates).outlasts_block(data), "held-back blocks alone want the slow pole"
-    assert _believable(candidates, data, by)[0].fit.f == pytest.approx([1.0, -0.7], abs=0.03)
+    assert believable(candidates, data, by)[0].fit.f == pytest.approx([1.0, -0.7], abs=0.03)
 
 
 def test_an_output_that_rounding_left_no_spread_has_no_fit() -> None:

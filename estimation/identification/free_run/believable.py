@@ -1,0 +1,97 @@
+"""Which linear model may be believed: one that integrates, one that is slow, or a quicker or simpler one instead."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.identification.free_run.choose_linear import INTEGRATING, Candidate, chosen
+from estimation.identification.free_run.data import Channels, Scaling
+from estimation.identification.free_run.held_back import halves_error, surely_better
+from estimation.identification.free_run.other_orders import wanders
+from estimation.identification.free_run.transfer_function import linear_model
+from estimation.identification.notes import IdentificationCode
+from plant.notes import Note
+
+NEARLY_AS_GOOD = 0.02
+"""Share of held-back error that is given up for a model without cancelling or undetermined parts."""
+
+BELIEVED = 0.5
+"""Likewise, of the output's deviation, where no other model may be taken."""
+
+
+def believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> tuple[Candidate, list[Note]]:
+    """Return the candidate that may be believed, and notes on those that were passed over for it.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+        One at least.
+    data, by : Channels, Scaling
+        Scaled, and how.
+    """
+    notes: list[Note] = []
+    best = chosen(candidates)
+    # a time constant held at the record's length does nearly what an integrator does, and is no other explanation
+    free = [one for one in candidates if not (one.fit.bounded or one.fit.integrates)]
+    other = chosen(free or candidates)
+    bar = BELIEVED if other.doubt else INTEGRATING * other.held_back
+    beyond = [one for one in free if one.doubt == "time_constant"]
+    # where two poles are close to one, none can be given at one
+    alone = {one.form for one in beyond} - {one.form for one in candidates if one.fit.integrates}
+    integrating = [one for one in candidates if one.fit.integrates and one.doubt != "no_fit"]
+    integrating += [one for one in beyond if one.form in alone]
+    tempting = chosen(integrating) if integrating else None
+    if tempting is not None and tempting.held_back < bar and not wanders(tempting.fit, data):
+        # a pole that is estimated beyond the record is believed beside one at 1 alone, and where it is surely better
+        leaky = chosen(beyond) if beyond else tempting
+        surely = surely_better(leaky.block_errors, tempting.block_errors) and not wanders(leaky.fit, data)
+        tempting = leaky if surely else tempting
+        return replace(tempting, doubt=""), [IdentificationCode.INTEGRATES.note(output=data.output)]
+    if best.doubt == "time_constant":
+        radius = float(np.abs(np.roots(best.fit.f)).max())
+        slowest = -data.sample_time / float(np.log(radius)) if radius < 1.0 else float("inf")
+        notes.append(
+            IdentificationCode.TIME_CONSTANT_BEYOND_RECORD.note(
+                order=best.form.order, time_constant_s=slowest, duration_s=data.told * data.sample_time
+            )
+        )
+        return best, notes
+    passed = [one for one in candidates if one.doubt == "time_constant" and one.held_back < best.held_back]
+    if passed:
+        notes.append(
+            IdentificationCode.SLOW_MODELS_PASSED_OVER.note(count=len(passed), duration_s=data.told * data.sample_time)
+        )
+    beyond = list(notes)
+    simpler = [
+        one for one in candidates if not one.doubt and one is not best and one.form.n_values <= best.form.n_values
+    ]
+    near = [one for one in simpler if one.price <= (1.0 + NEARLY_AS_GOOD) * best.price]
+    if near and len(data.inputs) == 1 and _undetermined(best, data, by):
+        clean = [one for one in near if not _undetermined(one, data, by)]
+        if clean:
+            taken = min(clean, key=lambda one: one.price)
+            notes.append(IdentificationCode.SIMPLER_MODEL_TAKEN.note(order=best.form.order, taken=taken.form.order))
+            best = taken
+    # a block lies between outputs that pin a slower pole to the drift of this record: it has to win by more than
+    # chance, and halves of the record, which are pinned by nothing, and other orders of the inputs are judged beside
+    quick = [one for one in candidates if not (one.doubt or one.fit.bounded or one.outlasts_block(data))]
+    if quick and best.outlasts_block(data):
+        taken, said = believable(quick, data, by)
+        if not (surely_better(best.block_errors, taken.block_errors) and _carries_on(best, taken, data)):
+            return taken, [*beyond, *said]
+    return best, notes
+
+
+def _carries_on(slow: Candidate, quick: Candidate, data: Channels) -> bool:
+    """Return whether a slow model leaves less than a quick one on blocks and halves together, and does not wander."""
+    if wanders(slow.fit, data):
+        return False
+    errors = [np.hypot(one.held_back, halves_error(one.fit, data)) for one in (slow, quick)]
+    return not errors[0] > errors[1]
+
+
+def _undetermined(one: Candidate, data: Channels, by: Scaling) -> bool:
+    """Return whether a pole and a zero cancel, or the steady gain is less than its standard deviation."""
+    model = linear_model(one.fit, data, by)
+    return bool(model.cancellations) or not model.dc_gain_std < abs(model.dc_gain)

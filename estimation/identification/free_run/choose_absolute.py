@@ -1,0 +1,138 @@
+"""Whether an output is measured without its sign, and the model before it: by the free run on blocks held back."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.identification.free_run.absolute_output import (
+    AbsoluteFit,
+    AbsoluteProblem,
+    fit_absolute,
+    refitted_absolute,
+    signs_at_first,
+    signs_of,
+)
+from estimation.identification.free_run.choose_linear import CLEARLY, criteria, slowest_pole
+from estimation.identification.free_run.data import Channels, Scaling, blocks
+from estimation.identification.free_run.dense_polynomial import Asked
+from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled
+from estimation.identification.free_run.linear_fit import COARSE
+from estimation.identification.free_run.linear_problem import Form
+from estimation.progress import tell
+
+ORDERS = range(1, 6)
+"""Orders of the linear part."""
+
+BELOW, NEAR_ZERO = 0.05, 0.25
+"""How far the lowest hundredth of an output without a sign may lie below zero, and its lowest twentieth above it, both
+in its deviation: noise, and what a lag leaves of a change of sign [dimensionless]."""
+
+
+@dataclass(frozen=True, eq=False)
+class AbsoluteCandidate:
+    """A fit with its held-back error.
+
+    Parameters
+    ----------
+    block_errors : tuple of float
+        Root-mean-square free-run error of each block held back, over the output's deviation [dimensionless].
+    bic : float
+        Information criterion of the free run [dimensionless].
+    zero : float
+        The sensor's zero, in the data's scale.
+    """
+
+    fit: AbsoluteFit
+    block_errors: tuple[float, ...]
+    bic: float
+    zero: float
+
+    @property
+    def held_back(self) -> float:
+        """Root mean square over the blocks [dimensionless]."""
+        return pooled(self.block_errors)
+
+
+def may_lack_sign(data: Channels, by: Scaling) -> bool:
+    """Return whether an output is never below zero and comes near it, as a size does that changes its sign.
+
+    Parameters
+    ----------
+    data, by : Channels, Scaling
+        Scaled, and how.
+    """
+    output = np.concatenate(data.y)
+    low, near = np.nanquantile(output, [0.01, 0.05]) - _zero(by)
+    return bool(low > -BELOW and near < NEAR_ZERO)
+
+
+def absolute_candidates(data: Channels, by: Scaling, asked: Asked) -> list[AbsoluteCandidate]:
+    """Return models of several orders, each judged on blocks held back; none with a pole slower than a block.
+
+    Parameters
+    ----------
+    data, by : Channels, Scaling
+        Scaled, and how.
+    asked : Asked
+        Sizes that the data do not choose.
+    """
+    counted, m = from_zero(data, by), len(data.inputs)
+    forms = [
+        Form(order, (asked.n_numerator or order + (delay == 0),) * m, (delay,) * m)
+        for order in (ORDERS if asked.order is None else [asked.order])
+        for delay in ((0, 1) if asked.delay is None else [asked.delay])
+    ]
+    signs = signs_at_first(counted)
+    first = [_told(fit_absolute(form, counted, signs)) for form in forms]
+    # signs that one order has found are where the others may begin too
+    best = min(first, key=lambda fit: fit.cost)
+    found = list[AbsoluteCandidate]()
+    for fit in first:
+        again = _told(fit_absolute(fit.linear.form, counted, [signs_of(best, counted)]))
+        found.append(_judged(min(fit, again, key=lambda one: one.cost), counted, _zero(by)))
+    slow = float(np.exp(-(BLOCKS + 1.0) / data.told))
+    return [one for one in found if slowest_pole(one.fit.linear.f) <= slow]
+
+
+def chosen_absolute(candidates: list[AbsoluteCandidate]) -> AbsoluteCandidate:
+    """Return, of the models that do nearly as well on held-back blocks as the best one, that of the least BIC.
+
+    Parameters
+    ----------
+    candidates : list of AbsoluteCandidate
+        One at least.
+    """
+    least = min(one.held_back for one in candidates)
+    return min((one for one in candidates if one.held_back <= (1.0 + CLEARLY) * least), key=lambda one: one.bic)
+
+
+def from_zero(data: Channels, by: Scaling) -> Channels:
+    """Return the same data with the output counted from the sensor's zero.
+
+    Parameters
+    ----------
+    data, by : Channels, Scaling
+        Scaled, and how.
+    """
+    return replace(data, y=tuple(y - _zero(by) for y in data.y))
+
+
+def _zero(by: Scaling) -> float:
+    return -by.y_mean / by.y_std
+
+
+def _told(fit: AbsoluteFit) -> AbsoluteFit:
+    tell("outputs without a sign")
+    return fit
+
+
+def _judged(fit: AbsoluteFit, data: Channels, zero: float) -> AbsoluteCandidate:
+    """Return a fit with its errors on blocks held back, each by a fit to the others."""
+    target, errors = np.concatenate(data.y), list[float]()
+    problem = AbsoluteProblem(fit.linear.form, data)
+    for masks in blocks(data, BLOCKS):
+        part: AbsoluteFit = refitted_absolute(fit, data.without(masks), COARSE)
+        output: Array = problem.jacobian(part.theta)[0]
+        errors.append(block_error(output - target, np.concatenate(masks) & np.isfinite(target)))
+    return AbsoluteCandidate(fit, tuple(errors), criteria(fit.cost, fit.theta.size, data.n_samples)[0], zero)
