@@ -29,12 +29,17 @@ class Fallback:
         Fits of the linear model and of the polynomial one that left out one block each.
     error : float
         Of the linear model on blocks held back, over the output's deviation [dimensionless].
+    share : float
+        Samples that fits without a block come from, over those that both models were fitted to: of a long log,
+        structures are compared on a section, and what is taken is fitted to all. A variance falls with their number
+        [dimensionless].
     """
 
     linear: LinearDynamics
     linear_parts: tuple[LinearDynamics, ...]
     parts: tuple[Dynamics, ...]
     error: float
+    share: float = 1.0
 
     def errors(self, u: Array, y: Array, own: Array) -> tuple[float, float]:
         """Return the errors to be expected of the polynomial run and of the linear one.
@@ -73,8 +78,9 @@ class Fallback:
             Output, scaled, and what `errors` returns.
         """
         linear = self.linear.run(u, y)
-        straight = jackknife(linear, [one.run(u, y) for one in self.linear_parts])
-        undetermined = jackknife(own, [one.run(u, y) for one in self.parts])
+        known = float(np.sqrt(self.share))
+        straight = known * jackknife(linear, [one.run(u, y) for one in self.linear_parts])
+        undetermined = known * jackknife(own, [one.run(u, y) for one in self.parts])
         left = float(np.hypot(self.error, straight))
         return own if undetermined < left else linear, (undetermined, left)
 
@@ -85,6 +91,7 @@ class Fallback:
             "linear_parts": [one.to_dict() for one in self.linear_parts],
             "parts": [one.to_dict() for one in self.parts],
             "error": self.error,
+            "share": self.share,
         }
 
 

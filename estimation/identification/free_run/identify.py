@@ -326,4 +326,5 @@ def _fallback(taken: PolynomialCandidate, linear: Candidate, part: Channels, who
     """Return what is run where inputs do not determine a polynomial model."""
     others = tuple(LinearDynamics.of(refitted_linear(linear.fit, part.without(mask))) for mask in blocks(part, BLOCKS))
     parts = tuple(PolynomialDynamics.of(one) for one in taken.parts)
-    return Fallback(LinearDynamics.of(refitted_linear(linear.fit, whole)), others, parts, linear.held_back)
+    share = part.n_samples / max(part.n_samples, section(whole, MOST_FITTED).n_samples)
+    return Fallback(LinearDynamics.of(refitted_linear(linear.fit, whole)), others, parts, linear.held_back, share)

@@ -220,7 +220,8 @@ class PolynomialDynamics:
         if other is not None:
             straight = tuple(LinearDynamics.from_dict(one) for one in other["linear_parts"])
             parts = tuple(cls.from_dict(one) for one in other["parts"])
-            fallback = Fallback(LinearDynamics.from_dict(other["linear"]), straight, parts, float(other["error"]))
+            error, share = float(other["error"]), float(other.get("share", 1.0))
+            fallback = Fallback(LinearDynamics.from_dict(other["linear"]), straight, parts, error, share)
         return cls(variables, terms, np.array(values["values"], dtype=np.float64), friction, fallback)
 
     @classmethod

@@ -54,6 +54,17 @@ def test_the_linear_run_is_taken_where_it_errs_less(apart: float, linear_apart: 
     assert np.array_equal(one.judged(u, y, own)[0], own if taken == "own" else np.ones(9))
 
 
+def test_what_is_fitted_to_more_samples_is_better_determined() -> None:
+    parts = tuple(gain(2.0 + sign * 0.06) for sign in (1, -1, 1, -1))
+    few = Fallback(gain(1.0), (gain(1.0),) * 4, parts, 0.1)
+    u, y, own = np.ones((9, 1)), np.full(9, np.nan), np.full(9, 2.0)
+    assert few.errors(u, y, own) == pytest.approx((0.12, 0.1))
+    many = replace(few, share=0.25)  # four times as many
+    assert many.errors(u, y, own) == pytest.approx((0.06, 0.1))
+    assert np.array_equal(few.judged(u, y, own)[0], np.ones(9))
+    assert np.array_equal(many.judged(u, y, own)[0], own)
+
+
 def test_a_run_that_has_no_end_is_replaced() -> None:
     away: Any = Fails()
     u, y = np.ones((9, 1)), np.full(9, np.nan)
