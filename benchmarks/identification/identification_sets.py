@@ -29,7 +29,7 @@ from scipy.signal import lfilter
 from threadpoolctl import threadpool_limits
 
 from benchmarks.identification.identification_machines import machine_sets
-from benchmarks.identification.identification_sets_data import Part, PublicSet, public_sets
+from benchmarks.identification.identification_sets_data import DATA, Part, PublicSet, public_sets
 from benchmarks.identification.identification_simulated import simulated_sets
 from benchmarks.identification.paired_blocks import error_ratio
 from estimation.arrays import Array
@@ -86,6 +86,8 @@ def main(arguments: list[str]) -> int:
     made = [one for seed in range(*options.simulated) for one in simulated_sets(seed)]
     made += [one for seed in range(*options.machines) for one in machine_sets(seed)]
     chosen = made or public_sets(options.sets)
+    if not chosen:
+        parser.error(_no_set(options.sets))
     peers = [name for name in options.peers if _python(name).exists()] if not made else []
     names = ("first", "scipy", *options.ours, *peers)
     wide = {name: max(11, len(name)) for name in names}
@@ -113,6 +115,14 @@ def main(arguments: list[str]) -> int:
     print(f"default over the better of first and scipy: {lost} of {len(ratios)} lose more than 5 %,", end=" ")
     print(f"worst {max(ratios):.2f}-fold, geometric mean {mean:.3f}")
     return missed
+
+
+def _no_set(wanted: list[str]) -> str:
+    """Return why there is nothing to compare: no data, or no set whose name has one of these parts."""
+    known = ", ".join(one.name for one in public_sets())
+    if not known:
+        return f"no public set in {DATA}"
+    return f"no set's name has {' or '.join(map(repr, wanted))} in it; there are {known}"
 
 
 def _behind(one: PublicSet, test: str, runs: dict[str, dict[str, Array]]) -> list[str]:

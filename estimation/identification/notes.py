@@ -58,6 +58,10 @@ class IdentificationCode(Code):
         "{output!r} integrates its input over the whole record: the model has a pole close to 1, so its steady gain "
         "means nothing"
     )
+    SLOWER_THAN_PERIOD = (
+        "the model of {output!r} has a time constant of {time_constant_s:.3g} s, longer than its inputs take to repeat "
+        "themselves ({duration_s:.3g} s): its steady gain comes from the start of the record alone"
+    )
     SIMPLER_MODEL_TAKEN = (
         "the model of order {order} has a pole and a zero that nearly cancel, or a gain that is not determined; a "
         "model of order {taken} does nearly as well on held-back data and was chosen"

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.identification.free_run.choose_linear import INTEGRATING, Candidate, chosen
+from estimation.identification.free_run.choose_linear import INTEGRATING, Candidate, chosen, slowest_pole
 from estimation.identification.free_run.data import Channels, Scaling
 from estimation.identification.free_run.held_back import halves_error, surely_better
 from estimation.identification.free_run.other_orders import wanders
@@ -30,6 +30,19 @@ def believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> 
     data, by : Channels, Scaling
         Scaled, and how.
     """
+    best, notes = _believed(candidates, data, by)
+    prompt = [one for one in candidates if max(one.form.delays) <= 1]
+    if max(best.form.delays) > 1 and prompt:
+        # a dead time was looked for among many and with models of second order: it has to win by more than chance
+        other, said = _believed(prompt, data, by)
+        slower = other.outlasts_block(data) and not best.outlasts_block(data)
+        if not (other.doubt or slower or surely_better(best.block_errors, other.block_errors)):
+            return other, said
+    return best, notes
+
+
+def _believed(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> tuple[Candidate, list[Note]]:
+    """Return the same where a dead time is taken like any other size."""
     notes: list[Note] = []
     best = chosen(candidates)
     # a time constant held at the record's length does nearly what an integrator does, and is no other explanation
@@ -47,15 +60,10 @@ def believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> 
         leaky = chosen(beyond) if beyond else tempting
         surely = surely_better(leaky.block_errors, tempting.block_errors) and not wanders(leaky.fit, data)
         tempting = leaky if surely else tempting
-        return replace(tempting, doubt=""), [IdentificationCode.INTEGRATES.note(output=data.output)]
+        return replace(tempting, doubt=""), [_slow_note(tempting, data)]
     if best.doubt == "time_constant":
-        radius = float(np.abs(np.roots(best.fit.f)).max())
-        slowest = -data.sample_time / float(np.log(radius)) if radius < 1.0 else float("inf")
-        notes.append(
-            IdentificationCode.TIME_CONSTANT_BEYOND_RECORD.note(
-                order=best.form.order, time_constant_s=slowest, duration_s=data.told * data.sample_time
-            )
-        )
+        told = {"time_constant_s": _time_constant(best, data), "duration_s": data.told * data.sample_time}
+        notes.append(IdentificationCode.TIME_CONSTANT_BEYOND_RECORD.note(order=best.form.order, **told))
         return best, notes
     passed = [one for one in candidates if one.doubt == "time_constant" and one.held_back < best.held_back]
     if passed:
@@ -77,10 +85,26 @@ def believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> 
     # chance, and halves of the record, which are pinned by nothing, and other orders of the inputs are judged beside
     quick = [one for one in candidates if not (one.doubt or one.fit.bounded or one.outlasts_block(data))]
     if quick and best.outlasts_block(data):
-        taken, said = believable(quick, data, by)
+        taken, said = _believed(quick, data, by)
         if not (surely_better(best.block_errors, taken.block_errors) and _carries_on(best, taken, data)):
             return taken, [*beyond, *said]
     return best, notes
+
+
+def _time_constant(one: Candidate, data: Channels) -> float:
+    """Return the longest time constant [s]."""
+    radius = slowest_pole(one.fit.f)
+    return -data.sample_time / float(np.log(radius)) if radius < 1.0 else float("inf")
+
+
+def _slow_note(taken: Candidate, data: Channels) -> Note:
+    """Return what is said of a model that integrates, or is slower than its inputs repeat themselves."""
+    slowest = _time_constant(taken, data)
+    if taken.fit.integrates or slowest > data.duration:
+        return IdentificationCode.INTEGRATES.note(output=data.output)
+    return IdentificationCode.SLOWER_THAN_PERIOD.note(
+        output=data.output, time_constant_s=slowest, duration_s=data.told * data.sample_time
+    )
 
 
 def _carries_on(slow: Candidate, quick: Candidate, data: Channels) -> bool:

@@ -66,6 +66,7 @@ WARNED = (
     IdentificationCode.NO_FIT,
     IdentificationCode.UNRELATED,
     IdentificationCode.INTEGRATES,
+    IdentificationCode.SLOWER_THAN_PERIOD,
     IdentificationCode.SIGN_NOT_MEASURED,
     IdentificationCode.FEEDBACK,
 )
@@ -185,7 +186,9 @@ def _identified(
             notes = [*notes, IdentificationCode.SIGN_NOT_MEASURED.note(output=data.output, left=left)]
     compared, judged, own = part, linear, best
     if structure != "output-error":
-        compared, judged, own = on_fewer(linear, best, part, section(whole, MOST_COMPARED))
+        # a whole period, where there is one: a shorter section would say nothing of what is slower than itself
+        most = max(MOST_COMPARED, part.told) if part.told < part.longest else MOST_COMPARED
+        compared, judged, own = on_fewer(linear, best, part, section(whole, most))
     nonlinear = None
     if structure == "hammerstein" or (structure == "auto" and len(data.inputs) == 1):
         nonlinear = _worthwhile_nonlinearity(judged, own, compared, rows, surely=structure == "auto")

@@ -1,0 +1,20 @@
+"""The table of public sets says what it has where a name matches nothing."""
+
+import pytest
+
+from benchmarks.identification import identification_sets
+from benchmarks.identification.identification_sets_data import PublicSet
+
+
+def test_a_name_that_matches_no_set_is_refused_with_those_there_are(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    there = [PublicSet("cascaded tanks", True, 4.0, None, {}), PublicSet("dryer", False, 0.08, None, {})]  # type: ignore[arg-type]
+    monkeypatch.setattr(identification_sets, "public_sets", lambda wanted=(): [] if wanted else there)
+    with pytest.raises(SystemExit):
+        identification_sets.main(["dyer"])
+    assert "no set's name has 'dyer' in it; there are cascaded tanks, dryer" in capsys.readouterr().err
+    monkeypatch.setattr(identification_sets, "public_sets", lambda _=(): [])
+    with pytest.raises(SystemExit):
+        identification_sets.main([])
+    assert "no public set in " in capsys.readouterr().err
