@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from estimation.arrays import Array
+from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.least_squares import least_squares
 from estimation.identification.free_run.linear_fit import COARSE, fit_linear, steiglitz_mcbride
@@ -251,14 +251,17 @@ def _filtered(data: Channels, pole: float) -> Array:
 def _followed(form: Form, data: Channels, sign: Array) -> LinearFit:
     """Return the linear fit to outputs with signs that are told by the fit before, until none changes."""
     ends = np.cumsum([y.size for y in data.y])[:-1]
-    starts: Sequence[Array] = ()
-    for _ in range(PASSES):
-        signed = replace(data, y=tuple(part * y for part, y in zip(np.split(sign, ends), data.y, strict=True)))
-        problem = Problem(form, signed)
-        fit = fit_linear(form, signed, starts or steiglitz_mcbride(problem), least_gain=ROUGH)
-        starts = [fit.f]
-        again = np.where(problem.jacobian(fit.theta)[0] < 0.0, -1.0, 1.0)
+    fit = _signed_fit(form, data, sign, ends, ())
+    for _ in range(PASSES - 1):
+        again = signs_of(AbsoluteFit(0.0, fit), data)
         if np.array_equal(again, sign):
             break
         sign = again
+        fit = _signed_fit(form, data, sign, ends, [fit.f])
     return fit
+
+
+def _signed_fit(form: Form, data: Channels, sign: Array, ends: IntArray, starts: Sequence[Array]) -> LinearFit:
+    """Return the linear fit to outputs with signs, from given denominators or from the data's own."""
+    signed = replace(data, y=tuple(part * y for part, y in zip(np.split(sign, ends), data.y, strict=True)))
+    return fit_linear(form, signed, starts or steiglitz_mcbride(Problem(form, signed)), least_gain=ROUGH)

@@ -242,6 +242,18 @@ def test_a_backlash_is_said_with_its_interval(tmp_path: Path) -> None:
     assert model.nonlinearity["half_width"] == width
 
 
+def test_an_output_without_its_sign_is_said_at_the_output(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.uniform(-1.5, 1.5, 60), 5)
+    y = np.abs(filtered([0.0, 0.2], [1.0, -1.6, 0.8], u)) + 0.01 * rng.normal(size=300)
+    table = pd.DataFrame({"u": u, "speed": y}, index=0.02 * np.arange(300))
+    table.to_csv(tmp_path / "drive.csv", index_label="time_s")
+    arguments = ("--input", "u", "--output", "speed", "--order", 2, "--delay", 1)
+    said = run(tmp_path / "drive.csv", *arguments, "--structure", "auto").stdout
+    assert "speed: absolute value at speed, lag 0" in said
+    assert "measured without its sign" in " ".join(run(tmp_path / "drive.csv", *arguments).output.split())
+
+
 def test_a_test_log_whose_input_leaves_the_fitted_range_is_named(tmp_path: Path) -> None:
     for name, scale in (("fit", 1.0), ("alike", 1.0), ("wider", 3.0)):
         rng = np.random.default_rng(1)

@@ -38,6 +38,20 @@ def test_linear_models_are_judged_anew_and_keep_what_is_doubtful_of_them() -> No
     assert on_fewer(linear, best, whole, whole) == (whole, linear, best)
 
 
+def test_structures_are_compared_on_a_whole_period(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = log()
+    cut = one.longest * 2 // 3
+    twice = channels_from(
+        [np.concatenate([one.u[0][:cut]] * 2)], [np.concatenate([one.y[0][:cut]] * 2)], 1.0, one.inputs, "y"
+    )
+    compared = list[int]()
+    monkeypatch.setattr(identify, "MOST_COMPARED", cut // 2)
+    monkeypatch.setattr(identify, "polynomial_candidates", lambda *given: compared.append(given[1].n_samples) or [])
+    for data in (twice, one):
+        identify_channels(data, structure="auto", order=1, delay=1)
+    assert compared == [cut, cut // 2]
+
+
 def test_a_polynomial_model_that_was_compared_on_fewer_samples_is_fitted_to_all(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

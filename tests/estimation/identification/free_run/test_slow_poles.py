@@ -159,3 +159,39 @@ def test_an_output_that_rounding_left_no_spread_has_no_fit() -> None:
     fit = replace(fit_linear(Form(1, (1,), (1,)), data, [np.array([1.0, -0.5])]), cost=0.0)
     flat = replace(data, y=tuple(np.zeros(40) for _ in data.y))
     assert doubt_of(fit, flat) == "no_fit"
+
+
+@pytest.mark.parametrize(
+    ("late", "taken"),
+    [
+        ((0.08, 0.08, 0.08, 0.08), "late"),
+        ((0.03, 0.09, 0.10, 0.115), "prompt"),  # as much better, in one block
+    ],
+)
+def test_a_dead_time_wins_by_more_than_blocks_scatter(
+    plain: tuple[Channels, Candidate], late: tuple[float, ...], taken: str
+) -> None:
+    data, one = plain
+    models = {"prompt": with_pole(one, 0.7, (0.1,) * 4), "late": with_pole(one, 0.7, late)}
+    later = LinearFit(Form(1, (1,), (5,)), models["late"].fit.theta, one.fit.cost)
+    models["late"] = replace(models["late"], fit=later)
+    by = scaled(data)[1]
+    assert believable(list(models.values()), data, by)[0] is models[taken]
+    # a slow model is no reason to leave a dead time, nor is one that may not be taken
+    slow = with_pole(one, 0.9995, (0.1,) * 4)
+    for other in (slow, replace(models["prompt"], doubt="no_fit")):
+        assert believable([other, models["late"]], data, by)[0] is models["late"]
+
+
+def test_what_is_slower_than_its_inputs_repeat_themselves_does_not_integrate(
+    plain: tuple[Channels, Candidate],
+) -> None:
+    u = np.tile(steps(3)[: N // 4], 4)
+    data = channels(filtered([0.0, 0.3], [1.0, -0.7], u), u)
+    assert data.told == N // 4
+    within, beyond = (with_pole(plain[1], float(np.exp(-1.0 / length)), (0.1,)) for length in (0.9 * N, 1.1 * N))
+    note = module._slow_note(within, data)
+    assert note.code == IdentificationCode.SLOWER_THAN_PERIOD
+    assert note.data["time_constant_s"] == pytest.approx(0.9 * N)
+    integrates = replace(within, fit=replace(within.fit, integrates=True))
+    assert [module._slow_note(one, data).code for one in (beyond, integrates)] == [IdentificationCode.INTEGRATES] * 2
