@@ -27,7 +27,7 @@ class AbsoluteDynamics(OutputErrorDynamics):
     Parameters
     ----------
     zero : float
-        The sensor's zero [scaled].
+        The sensor's zero, over the output's deviation from its mean [dimensionless].
     lag : float
         Pole of the lag; zero where there is none [dimensionless].
     linear : LinearDynamics
@@ -115,6 +115,6 @@ class AbsoluteDynamics(OutputErrorDynamics):
         Parameters
         ----------
         zero : float
-            The sensor's zero [scaled].
+            The sensor's zero, over the output's deviation from its mean [dimensionless].
         """
         return cls(zero, fit.lag, LinearDynamics.of(fit.linear))

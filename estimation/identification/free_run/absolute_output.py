@@ -213,6 +213,11 @@ def signs_at_first(data: Channels) -> list[Array]:
     ----------
     data : Channels
         Scaled, the output counted from the sensor's zero.
+
+    Returns
+    -------
+    list of ndarray, shape (n,)
+        1 or -1 at every sample of all logs.
     """
     target = np.concatenate(data.y)
     known = np.isfinite(target)

@@ -40,7 +40,7 @@ class AbsoluteCandidate:
     bic : float
         Information criterion of the free run [dimensionless].
     zero : float
-        The sensor's zero, in the data's scale.
+        The sensor's zero, in the data's scale [dimensionless].
     """
 
     fit: AbsoluteFit
