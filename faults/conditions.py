@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Annotated, Literal, TypeAlias, get_args
 
 from plant.eha.model import EhaParameters
-from plant.eha.steady_state import steady_state
+from plant.eha.scales import PAPER_RIG, friction_scales, leakage_scales
 from plant.errors import HydrostateError, require_known
 from plant.units import SI
 
@@ -16,9 +16,6 @@ Level: TypeAlias = Literal["none", "minor", "major"]
 
 LEVELS: tuple[Level, ...] = get_args(Level)
 """The levels in rising order; a level's place is its severity."""
-
-PAPER_RIG = EhaParameters()
-"""The rig on which Tables 3 and 4 were measured."""
 
 HIGHEST_SEVERITY = 5.0
 """End of the extrapolation: above leakage 5.5 the paper's rig does not move at its rated speed."""
@@ -177,8 +174,8 @@ def severity(leakage: float, friction: float, base: EhaParameters = PAPER_RIG) -
 @lru_cache(maxsize=256)
 def _at_severity(leakage: float, friction: float, base: EhaParameters) -> EhaParameters:
     """Return the actuator as `severity` describes it; a batch asks for the same nine of one rig with every log."""
-    leaking = _changed(base, LEAKAGE_TABLE, leakage, _leakage_scales(base))
-    rubbing = _changed(base, FRICTION_TABLE, friction, _friction_scales(base))
+    leaking = _changed(base, LEAKAGE_TABLE, leakage, leakage_scales(base))
+    rubbing = _changed(base, FRICTION_TABLE, friction, friction_scales(base))
     return replace(base, **leaking, **rubbing)
 
 
@@ -200,33 +197,6 @@ def _changed(
         kept = getattr(base, name) - scale * healthy[name]
         changed[name] = scale * faulty + kept
     return changed
-
-
-def _rated_flow(p: EhaParameters) -> float:
-    return p.pump_displacement * p.rated_speed
-
-
-def _pressure_ratio(base: EhaParameters) -> float:
-    """Return the healthy pressure at rated speed over the paper's; 1 for an actuator that needs none."""
-    _, pressure = steady_state(base.rated_speed, base)
-    _, paper = steady_state(PAPER_RIG.rated_speed, PAPER_RIG)
-    return pressure / paper if pressure > 0.0 else 1.0
-
-
-def _leakage_scales(base: EhaParameters) -> Mapping[str, float]:
-    flow = _rated_flow(base) / _rated_flow(PAPER_RIG)
-    return {"leakage_coefficient": flow / _pressure_ratio(base), "flow_bias": flow}
-
-
-def _friction_scales(base: EhaParameters) -> Mapping[str, float]:
-    area = base.piston_area / PAPER_RIG.piston_area
-    velocity = _rated_flow(base) / _rated_flow(PAPER_RIG) / area
-    force = area * _pressure_ratio(base)
-    return {
-        "friction_quadratic": force / velocity**2,
-        "friction_linear": force / velocity,
-        "friction_coulomb": force,
-    }
 
 
 def _require_severity(name: str, value: float) -> None:

@@ -4,8 +4,9 @@ from collections.abc import Callable
 from math import exp
 
 from estimation.finding import NORMAL_95
+from estimation.fits.explaining.faults_tried import usual_leakage
 from estimation.fits.explaining.tried import Explanation
-from estimation.fits.flow.log import DRAIN_START, PRESUMED_STD, usual_leakage
+from estimation.fits.flow.log import DRAIN_START, PRESUMED_STD
 from estimation.notes import RigCode
 from plant.eha.model import EhaParameters
 from plant.notes import Note

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 LONGEST_STEP = 2.5e-4
 """Longest step of a form [s]; slower logs are sub-stepped."""
 
-FAULTS_TRIED = ((1.0, 1.0), (5.0, 6.0), (12.5, 6.0))
-"""Leakage and flow bias of the starts, as multiples of the healthy actuator's: the spread of Table 3."""
-
 TEMPER = 5.0
 """What a difference of log-likelihood is divided by before models are weighed. None is exact: on a log of the circuit
 the balance that explained it better by 5.6 put bulk modulus five deviations off, the other one not [dimensionless]."""

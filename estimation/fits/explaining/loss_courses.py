@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimation.fits.flow.log import usual_leakage
+from estimation.fits.explaining.faults_tried import usual_leakage
 from estimation.fits.greybox.log import GreyBoxLog
 from plant.arrays import Array
 from plant.eha.model import EhaParameters

@@ -80,7 +80,7 @@ def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
     largest, correlated = limits(noisy, fit.seen)
     if fit.chi_square[0] > largest:
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=fit.chi_square[0] ** 0.5))
-    if abs(fit.autocorrelation[0]) > correlated:
+    if abs(fit.autocorrelation[0]) > correlated and not _too_noisy(fit):
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_CORRELATED.note(correlation=fit.autocorrelation[0]))
     channel, late, gain = most_late(fit.late)
     wanted = LATE_SHARE * fit.cost * (1.0 - 1.0 / fit.chi_square[0]) if reasons else 0.0
@@ -88,6 +88,14 @@ def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
         when = "late" if late > 0.0 else "early"
         reasons.insert(0, EstimateCode.CHANNEL_LATE.note(channel=channel, milliseconds=1e3 * abs(late), when=when))
     return tuple(reasons)
+
+
+def _too_noisy(fit: GreyBoxFit) -> bool:
+    """Return whether residuals are smaller than expected and alternate: the motor's noise was taken for too large.
+
+    The random walk that it makes of pressure is then followed too closely. Intervals are too wide, not too narrow.
+    """
+    return fit.chi_square[0] < 1.0 and fit.autocorrelation[0] < 0.0
 
 
 def fit_explains(fit: GreyBoxFit, noisy: bool) -> bool:

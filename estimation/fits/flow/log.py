@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.arrays import Array
+from estimation.fits.explaining.faults_tried import usual_leakage
 from estimation.fits.explaining.form_fit import LONGEST_STEP
-from estimation.fits.greybox.averaged import averaged
-from estimation.fits.greybox.course import SLOW
+from estimation.fits.greybox.averaged import averaged, odd_block
+from estimation.fits.greybox.course import OWN_NOISE, SLOW
 from estimation.fits.greybox.log import GreyBoxLog, greybox_log
 from estimation.fits.greybox.speed_course import straightened
 from estimation.log_checks.bridging import bridged, within_gaps
@@ -38,9 +39,6 @@ WITHIN: Mapping[str, float] = {"makeup_conductance": math.log(100.0)}
 """Standard deviation of the logarithm of a make-up valve's conductance about what a search finds [dimensionless],
 judged: two factors of ten. Where a valve is barely felt, slopes leave factors of e^30 open, which no valve has, and
 leakage goes with them."""
-
-LEAST_LEAKAGE = 1e-3
-"""Least first guess of a leakage, as a share of the rated pump flow [fraction]; a logarithm cannot start at zero."""
 
 MOST_LEAD = 0.25
 """Standard deviation of the motor's lead before a log is seen, over the sample time [dimensionless]: it is a twelfth of
@@ -178,7 +176,7 @@ def flow_log(
         },
         within=WITHIN,
     )
-    log = averaged(log, LONGEST_STEP)
+    log = averaged(log, LONGEST_STEP, _block(log, parameters))
     felt = log.noise[0].passed_on * parameters.bulk_modulus > FELT_NOISE * log.noise[0].variance ** 0.5
     return replace(log, block=NOISY_BLOCK) if felt else log.taken_at(parameters.bulk_modulus)
 
@@ -252,6 +250,25 @@ def outruns_pump(log: GreyBoxLog, p: EhaParameters) -> bool:
     return p.piston_area * fastest > OUTRUNS * p.pump_displacement * float(np.max(np.abs(speed)))
 
 
+def _block(log: GreyBoxLog, p: EhaParameters) -> int:
+    """Return over how many samples a fast log is averaged: as many as leave corners of the pumped flow unnoticed.
+
+    Where a motor turns round, its pump loses nothing for a moment, and where it sets off its course has a corner. Means
+    over a time ``T`` in which speed changes by ``w`` pump wrongly by ``D w T / 8`` there. That is little oil, but small
+    chambers of stiff oil show it.
+    """
+    speed, (noise,) = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")], log.noise
+    rise = p.pump_displacement * p.bulk_modulus / p.chamber_volume
+    sensed = float(np.hypot(noise.variance**0.5, noise.passed_on * p.bulk_modulus))
+    block = odd_block(log.sample_time)
+    while 1 < block < len(speed):
+        changed = float(np.max(np.abs(speed[block:] - speed[:-block]))) - OWN_NOISE * log.drive_std[0]
+        if rise * changed * block * log.sample_time / 8.0 <= sensed / block**0.5:
+            break
+        block -= 2
+    return block
+
+
 def _swept_share(position: Array, p: EhaParameters) -> float:
     """Return the relative change of volume per piston travel, added over both chambers, by root mean square [1/m]."""
     area_1, area_2 = piston_areas(p)
@@ -282,19 +299,3 @@ def _balanced_across(open_gaps: Array, record: Record, drives: Array, p: EhaPara
         line = float(np.trapezoid(drives[before : after + 1, speed], dx=record.sample_time))
         out[before + 1 : after, speed] += (wanted - line) / ((after - before - 1) * record.sample_time)
     return out
-
-
-def usual_leakage(p: EhaParameters) -> float:
-    """Return the first guess of a leakage [m^3/(s Pa)].
-
-    Parameters
-    ----------
-    p : EhaParameters
-        The actuator.
-
-    Returns
-    -------
-    float
-        The healthy actuator's, or a little where it has none.
-    """
-    return max(p.leakage_coefficient, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed / p.relief_pressure)

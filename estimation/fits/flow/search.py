@@ -12,9 +12,9 @@ from math import ceil, prod
 import numpy as np
 
 from estimation.arrays import IntArray
-from estimation.fits.explaining.form_fit import FAULTS_TRIED
+from estimation.fits.explaining.faults_tried import FAULTS_TRIED, usual_bias, usual_leakage, worse
 from estimation.fits.explaining.wide_problem import flow_bounds
-from estimation.fits.flow.log import DRAIN_START, LEAST_LEAKAGE, OPENING_START, carried, outruns_pump, usual_leakage
+from estimation.fits.flow.log import DRAIN_START, OPENING_START, carried, outruns_pump
 from estimation.fits.flow.valley import FINISHING, Found, completed_form, from_valley
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import NEAR_ENOUGH, GreyBoxFit, Search, concluded, explained, roughly
@@ -41,7 +41,7 @@ GUESSED: Mapping[str, Sequence[float]] = {
     "bulk_modulus": (0.7, 1.0, 1.3),
 }
 """Multiples of the first start's unknowns in the guesses of which the likeliest is followed [dimensionless]: from the
-healthy actuator to the worst of Table 3."""
+healthy actuator to the worst of Table 3, leakage and flow bias as of the paper's rig."""
 
 GUESSED_WITHIN = 0.3
 """First radius of a search from the likeliest guess [dimensionless]: half the distance between guesses of leakage."""
@@ -91,14 +91,13 @@ def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]
     list of dict
         Values of the unknowns [SI]; those of the healthy actuator at the first guess come first.
     """
-    leakage = usual_leakage(p)
-    bias = max(p.flow_bias, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed)
+    leakage, bias = usual_leakage(p), usual_bias(p)
     moduli = sorted({bulk_modulus, p.bulk_modulus})
     return [
         {
             "bulk_modulus": modulus,
-            "leakage_coefficient": worse * leakage,
-            "flow_bias": biased * bias,
+            "leakage_coefficient": worse(p, "leakage_coefficient", leakage, leaking),
+            "flow_bias": worse(p, "flow_bias", bias, biased),
             "makeup_conductance": makeup,
             "makeup_opening": OPENING_START,
             "case_leakage": DRAIN_START * leakage,
@@ -106,7 +105,7 @@ def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]
             "relief_pressure": p.relief_pressure,
             "relief_conductance": p.relief_conductance,
         }
-        for worse, biased in FAULTS_TRIED
+        for leaking, biased in FAULTS_TRIED
         for makeup in MAKEUP_TRIED
         for modulus in moduli
     ]
@@ -225,7 +224,7 @@ def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[
     relieved = reaches_relief(log.measured, parameters.relief_pressure)
     forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
     afar = log.taken_at(parameters.bulk_modulus)
-    guess, near = _guess(forms[0], afar, starts)
+    guess, near = _guess(forms[0], afar, parameters, starts)
     if not near:  # in a wrong valley the whole log takes all steps that there are
         first = _searched(forms[0], log, afar, starts, hopeful=True)
         if _explains(first):
@@ -251,7 +250,7 @@ def _explains(one: _Rough) -> bool:
 
 
 def _guess(
-    form: GreyBoxModel, log: GreyBoxLog, starts: Sequence[Mapping[str, float]]
+    form: GreyBoxModel, log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]
 ) -> tuple[Mapping[str, float], bool]:
     """Return where the likeliest of many guesses about the first start leads, and whether that explains the log.
 
@@ -260,18 +259,22 @@ def _guess(
     search = _search(log)
     problem = FreedProblem.of(form, log.beginning(search.screened).coarsened())
     around = {STIFFNESS: 0.0, **starts[0]}
-    guesses = _guesses_about(around, problem.model)
+    guesses = _guesses_about(around, problem.model, parameters)
     likeliest = guesses[int(np.argmin(problem.costs(guesses, LANES)))]
     bounds = flow_bounds(form, guesses, log)
     found = descend(problem.at, likeliest, search.evaluations, bounds, search.near_enough, GUESSED_WITHIN)
     return problem.model.values(found.theta), explained(problem, found)
 
 
-def _guesses_about(around: Mapping[str, float], model: GreyBoxModel) -> list[Array]:
+def _guesses_about(around: Mapping[str, float], model: GreyBoxModel, p: EhaParameters) -> list[Array]:
     """Return all guesses about a start, each coordinate of which is made once."""
     places = [model.unknowns.index(name) for name in GUESSED]
+
+    def times(name: str, factor: float) -> float:
+        return factor * around[name] if name == "bulk_modulus" else worse(p, name, around[name], factor)
+
     tried = [
-        [model.theta({**around, name: factor * around[name]})[place] for factor in factors]
+        [model.theta({**around, name: times(name, factor)})[place] for factor in factors]
         for place, (name, factors) in zip(places, GUESSED.items(), strict=True)
     ]
     guesses = np.tile(model.theta(around), (prod(map(len, tried)), 1))

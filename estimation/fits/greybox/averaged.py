@@ -86,8 +86,8 @@ def block_means(values: Array, block: int) -> Array:
     return values[:whole].reshape(-1, block, *values.shape[1:]).mean(axis=1)
 
 
-def averaged(log: GreyBoxLog, longest_step: float) -> GreyBoxLog:
-    """Return a log whose drives and outputs are means over blocks of about `SHORTEST_SAMPLE`.
+def averaged(log: GreyBoxLog, longest_step: float, block: int | None = None) -> GreyBoxLog:
+    """Return a log whose drives and outputs are means over blocks.
 
     Both sides are filtered alike, which a linear model does not notice. The first sample stays where it is, as a model
     begins there; its drives are those of a straight line through the first block. A log with gaps in its drives, or one
@@ -99,13 +99,15 @@ def averaged(log: GreyBoxLog, longest_step: float) -> GreyBoxLog:
         The log.
     longest_step : float
         Longest step of the model [s].
+    block : int, optional
+        Samples a block, odd; that of `odd_block` if not given [count].
 
     Returns
     -------
     GreyBoxLog
         The log, at the longer sample time.
     """
-    block = odd_block(log.sample_time)
+    block = odd_block(log.sample_time) if block is None else block
     begun = block // 2 + 1
     if block == 1 or log.gaps.size or len(log.drives) < begun + block:
         return log

@@ -6,8 +6,9 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.fits.explaining.form_fit import FAULTS_TRIED, LONGEST_STEP, FormFit, weighed, with_structure
-from estimation.fits.flow.log import DRAIN_START, LEAST_LEAKAGE
+from estimation.fits.explaining.faults_tried import FAULTS_TRIED, usual_bias, usual_leakage, worse
+from estimation.fits.explaining.form_fit import LONGEST_STEP, FormFit, weighed, with_structure
+from estimation.fits.flow.log import DRAIN_START
 from estimation.fits.flow.search import LEAD_START
 from estimation.fits.greybox.averaged import block_means, samples_a_block
 from estimation.fits.greybox.descent import Point, descend
@@ -48,7 +49,7 @@ MOTION_CHANNELS = ("position_m",)
 """Channels that the motion form needs beside motor speed."""
 
 FRICTION_TRIED = ((1.0, 1.0, 1.0), (18.0, -3.5, 1.15), (68.0, 8.7, 1.25))
-"""Friction coefficients a_1, a_2, a_3 of the starts, as multiples of the healthy actuator's: the spread of Table 4."""
+"""Friction coefficients a_1, a_2, a_3 of the starts, as multiples of the healthy paper rig's: the spread of Table 4."""
 
 YIELDED = 2e-5
 """First guess of the deflection at which seals slide [m]; tens of micrometres in the literature on presliding."""
@@ -251,25 +252,24 @@ def _steps(drives: Array, sample_time: float) -> NDArray[np.int64]:
 
 def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
     healthy = EhaParameters()
-    leakage = max(p.leakage_coefficient, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed / p.relief_pressure)
-    bias = max(p.flow_bias, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed)
+    leakage, bias = usual_leakage(p), usual_bias(p)
     quadratic = p.friction_quadratic or healthy.friction_quadratic
     coulomb = p.friction_coulomb or healthy.friction_coulomb
     return [
         {
             "bulk_modulus": bulk_modulus,
-            "leakage_coefficient": worse * leakage,
-            "flow_bias": biased * bias,
+            "leakage_coefficient": worse(p, "leakage_coefficient", leakage, leaking),
+            "flow_bias": worse(p, "flow_bias", bias, biased),
             "makeup_conductance": p.makeup_conductance or healthy.makeup_conductance,
             "case_leakage": DRAIN_START * leakage,
             "speed_lead": LEAD_START,
-            "friction_quadratic": a1 * quadratic,
-            "friction_linear": a2 * p.friction_linear,
-            "friction_coulomb": a3 * coulomb,
-            "bristle_stiffness": a3 * coulomb / YIELDED,
+            "friction_quadratic": worse(p, "friction_quadratic", quadratic, a1),
+            "friction_linear": worse(p, "friction_linear", p.friction_linear, a2),
+            "friction_coulomb": worse(p, "friction_coulomb", coulomb, a3),
+            "bristle_stiffness": worse(p, "friction_coulomb", coulomb, a3) / YIELDED,
             "bristle_damping": DAMPING_START,
         }
-        for worse, biased in FAULTS_TRIED
+        for leaking, biased in FAULTS_TRIED
         for a1, a2, a3 in FRICTION_TRIED
     ]
 

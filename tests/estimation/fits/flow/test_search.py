@@ -187,13 +187,19 @@ def test_what_the_orifices_of_make_up_valves_leave_is_put_on_no_sensor() -> None
     assert fit.parameters["bulk_modulus"][0] == pytest.approx(Machine().bulk_modulus, rel=0.004)
 
 
-def test_guesses_about_a_start_are_all_multiples_of_it() -> None:
+def test_guesses_about_a_start_go_as_far_above_it_as_the_paper_rig_is_from_healthy_to_worst() -> None:
+    p = EhaParameters()
     start = {"leakage_coefficient": 2e-13, "flow_bias": 3e-6, "bulk_modulus": 1e9, "makeup_conductance": 1e-9}
-    around = {STIFFNESS: 0.0, **flow_starts(EhaParameters(), 1e9)[0], **start}
-    guesses = flow_search._guesses_about(around, MASS_FLOW_FORM)  # pyright: ignore[reportPrivateUsage]
+    around = {STIFFNESS: 0.0, **flow_starts(p, 1e9)[0], **start}
+    guesses = flow_search._guesses_about(around, MASS_FLOW_FORM, p)  # pyright: ignore[reportPrivateUsage]
     found = [MASS_FLOW_FORM.values(guess) for guess in guesses]
     assert len({tuple(one.values()) for one in found}) == len(found) == 45
     assert found[0]["bulk_modulus"] == pytest.approx(0.7e9)
     assert found[-1] == pytest.approx(
-        {**found[0], "leakage_coefficient": 25e-13, "flow_bias": 18e-6, "bulk_modulus": 1.3e9}
+        {
+            **found[0],
+            "leakage_coefficient": 2e-13 + 11.5 * p.leakage_coefficient,
+            "flow_bias": 3e-6 + 5.0 * p.flow_bias,
+            "bulk_modulus": 1.3e9,
+        }
     )

@@ -206,11 +206,12 @@ def test_first_guesses_spread_over_the_faults_and_none_is_zero() -> None:
     assert min(positive) > 0.0
     assert starts[0]["friction_coulomb"] == HEALTHY.friction_coulomb
     assert starts[0]["makeup_conductance"] == HEALTHY.makeup_conductance
-    leaks = sorted({start["leakage_coefficient"] / starts[0]["leakage_coefficient"] for start in starts})
+    usual = motion_fit._starts(HEALTHY, 1e8)
+    leaks = sorted({start["leakage_coefficient"] / HEALTHY.leakage_coefficient for start in usual})
     assert leaks == pytest.approx([1.0, 5.0, 12.5])
     own = motion_fit._starts(replace(HEALTHY, leakage_coefficient=3e-11), 1e8)
     assert own[0]["leakage_coefficient"] == 3e-11
-    linear = sorted({start["friction_linear"] / own[0]["friction_linear"] for start in own})
+    linear = sorted({start["friction_linear"] / HEALTHY.friction_linear for start in usual})
     assert linear == pytest.approx([-3.5, 1.0, 8.7])
 
 

@@ -1,0 +1,80 @@
+"""By how much leakage and friction of the paper's rig are multiplied to mean the same on another actuator.
+
+Section 3 defines leakage by the share of velocity it costs and friction by the share of pressure it adds, both in the
+normal state at rated speed.
+"""
+
+from collections.abc import Mapping
+
+from plant.eha.model import EhaParameters
+from plant.eha.steady_state import steady_state
+
+PAPER_RIG = EhaParameters()
+"""The rig on which Tables 3 and 4 were measured."""
+
+
+def leakage_scales(p: EhaParameters) -> Mapping[str, float]:
+    """Return the scales of leakage coefficient and flow bias.
+
+    Flow bias goes with the rated flow of the pump, the leakage coefficient with that flow over the differential
+    pressure at which the healthy actuator settles.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The healthy actuator.
+
+    Returns
+    -------
+    Mapping[str, float]
+        By parameter; 1 for the paper's rig [dimensionless].
+
+    Examples
+    --------
+    >>> leakage_scales(EhaParameters())
+    {'leakage_coefficient': 1.0, 'flow_bias': 1.0}
+    """
+    flow = _rated_flow(p) / _rated_flow(PAPER_RIG)
+    return {"leakage_coefficient": flow / _pressure_ratio(p), "flow_bias": flow}
+
+
+def friction_scales(p: EhaParameters) -> Mapping[str, float]:
+    """Return the scales of the three coefficients of friction.
+
+    Friction goes with that differential pressure times the piston's area, at the same share of the velocity that the
+    pump's rated flow would give without losses.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The healthy actuator.
+
+    Returns
+    -------
+    Mapping[str, float]
+        By parameter; 1 for the paper's rig [dimensionless].
+
+    Examples
+    --------
+    >>> friction_scales(EhaParameters())["friction_coulomb"]
+    1.0
+    """
+    area = p.piston_area / PAPER_RIG.piston_area
+    velocity = _rated_flow(p) / _rated_flow(PAPER_RIG) / area
+    force = area * _pressure_ratio(p)
+    return {
+        "friction_quadratic": force / velocity**2,
+        "friction_linear": force / velocity,
+        "friction_coulomb": force,
+    }
+
+
+def _rated_flow(p: EhaParameters) -> float:
+    return p.pump_displacement * p.rated_speed
+
+
+def _pressure_ratio(p: EhaParameters) -> float:
+    """Return the healthy pressure at rated speed over the paper's; 1 for an actuator that needs none."""
+    _, pressure = steady_state(p.rated_speed, p)
+    _, paper = steady_state(PAPER_RIG.rated_speed, PAPER_RIG)
+    return pressure / paper if pressure > 0.0 else 1.0

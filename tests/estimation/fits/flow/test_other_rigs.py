@@ -1,0 +1,92 @@
+"""The flow form on actuators that are not like the paper's: small chambers, stiff oil, pumps that fill them at once."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from estimation.fits.explaining.objections import objections
+from estimation.fits.flow.fit import fit_flow
+from estimation.fits.flow.log import flow_log, without_strays
+from estimation.fits.flow.plain import FitStart, Logged, plain_fits
+from estimation.fits.flow.search import flow_starts
+from estimation.fits.greybox.fit import GreyBoxFit
+from faults.conditions import severity
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import prbs
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+PAPER = EhaParameters()
+STIFF = EhaParameters(
+    pump_displacement=2.88e-7,
+    piston_area=3.11e-4,
+    chamber_volume=2.27e-5,
+    moving_mass=2.7,
+    bulk_modulus=9.68e8,
+    leakage_coefficient=1.9e-13,
+    flow_bias=1.81e-7,
+    friction_quadratic=1420.0,
+    friction_linear=85.6,
+    friction_coulomb=137.0,
+    relief_pressure=6e6,
+    relief_conductance=3.28e-10,
+    makeup_conductance=1.2e-9,
+    accumulator_pressure=3.7e5,
+    motor_speed_per_volt=24.2,
+    motor_speed_limit=194.0,
+)
+"""A cylinder of 20 mm whose pump fills a chamber in 0.8 s, with stiff oil that hardly leaks."""
+
+SUBSTEPS, LAG = 5, 2e-3
+
+
+def log(healthy: EhaParameters, leakage: float, sample_time: float, duration: float = 4.0, seed: int = 1) -> Record:
+    """A motor that lags twice behind a binary drive, whose course between samples is no straight line."""
+    rng = np.random.default_rng(seed)
+    fine = sample_time / SUBSTEPS
+    speed = prbs(duration, fine, healthy.rated_speed, 0.05, rng)
+    share = np.exp(-fine / LAG)
+    for _ in range(2):
+        speed = lfilter([1.0 - share], [1.0, -share], speed)
+    record = simulate(CIRCUIT, speed, fine, circuit_of(severity(leakage, 0.0, healthy)), sensors=BENCH, rng=rng)
+    return Record(sample_time, {name: record[name][::SUBSTEPS] for name in record})
+
+
+def seen(record: Record, p: EhaParameters) -> int:
+    """Return over how many samples a log is averaged."""
+    cleaned, variances = without_strays(record)
+    return round(flow_log(cleaned, p, {}, variances).sample_time / record.sample_time)
+
+
+def test_searches_begin_at_what_a_fault_is_on_this_rig() -> None:
+    major = severity(2.0, 0.0, STIFF)
+    assert major.leakage_coefficient > 20.0 * STIFF.leakage_coefficient
+    worst = max(flow_starts(STIFF, 9e8), key=lambda start: start["leakage_coefficient"])
+    assert worst["leakage_coefficient"] == pytest.approx(major.leakage_coefficient, rel=0.01)
+    assert worst["flow_bias"] == pytest.approx(major.flow_bias, rel=0.02)
+
+
+def test_means_are_shorter_where_stiff_chambers_show_the_corners_of_the_flow() -> None:
+    assert seen(log(PAPER, 1.0, 2e-4), PAPER) == 3
+    assert seen(log(STIFF, 1.0, 2e-4), STIFF) == 1
+
+
+def test_a_leaky_stiff_actuator_is_followed_to_the_true_bulk_modulus() -> None:
+    fit = fit_flow(log(STIFF, 2.0, 2e-4), STIFF, 1.2 * STIFF.bulk_modulus)
+    value, std = fit.parameters["bulk_modulus"]
+    assert fit.reasons == ()
+    assert value == pytest.approx(STIFF.bulk_modulus, abs=3.0 * std)
+    assert value == pytest.approx(STIFF.bulk_modulus, rel=0.01)
+
+
+def test_noise_that_was_taken_for_too_large_speaks_against_no_fit() -> None:
+    record, variances = without_strays(log(PAPER, 1.0, 1e-3))
+    fit: GreyBoxFit = plain_fits(Logged(record, variances), FitStart(PAPER, PAPER.bulk_modulus)).best
+    assert objections(fit, noisy=False) == ()
+    assert objections(replace(fit, chi_square=(0.5,), autocorrelation=(-0.4,)), noisy=False) == ()
+    assert len(objections(replace(fit, chi_square=(0.5,), autocorrelation=(0.4,)), noisy=False)) == 1
+    assert len(objections(replace(fit, chi_square=(1.2,), autocorrelation=(-0.4,)), noisy=False)) == 1

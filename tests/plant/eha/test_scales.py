@@ -1,0 +1,31 @@
+"""What the same leakage and friction are on an actuator of another size."""
+
+from dataclasses import replace
+
+import pytest
+
+from plant.eha.scales import PAPER_RIG, friction_scales, leakage_scales
+from plant.eha.steady_state import steady_state
+
+
+def test_the_paper_rig_is_its_own_measure() -> None:
+    assert set({**leakage_scales(PAPER_RIG), **friction_scales(PAPER_RIG)}.values()) == {1.0}
+
+
+def test_a_scaled_actuator_loses_the_same_share_of_velocity_and_adds_the_same_share_of_pressure() -> None:
+    """Three times the pump and twice the area; friction as the paper's share of the force."""
+    area, flow = 2.0, 3.0
+    p = replace(
+        PAPER_RIG,
+        pump_displacement=flow * PAPER_RIG.pump_displacement,
+        piston_area=area * PAPER_RIG.piston_area,
+        leakage_coefficient=flow * PAPER_RIG.leakage_coefficient,
+        flow_bias=flow * PAPER_RIG.flow_bias,
+        friction_quadratic=area * (area / flow) ** 2 * PAPER_RIG.friction_quadratic,
+        friction_linear=area * (area / flow) * PAPER_RIG.friction_linear,
+        friction_coulomb=area * PAPER_RIG.friction_coulomb,
+    )
+    assert leakage_scales(p) == pytest.approx({"leakage_coefficient": flow, "flow_bias": flow}, rel=1e-6)
+    assert friction_scales(p)["friction_linear"] == pytest.approx(area * area / flow, rel=1e-6)
+    (_, own), (_, paper) = (steady_state(one.rated_speed, one) for one in (p, PAPER_RIG))
+    assert own == pytest.approx(paper, rel=1e-6)
