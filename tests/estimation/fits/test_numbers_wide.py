@@ -131,7 +131,7 @@ def first_guesses_of_the_flow_form() -> dict[str, Any]:
     log_of = seen(log(0.5))
     costs = FreedProblem.costs
     with patch.object(FreedProblem, "costs", autospec=True, side_effect=costs) as asked:
-        found, near = _guess(FLOW_FORM, log_of, flow_starts(PAPER, 2e8))
+        found, near = _guess(FLOW_FORM, log_of, PAPER, flow_starts(PAPER, 2e8))
     guesses = np.array(asked.call_args.args[1])
     return {
         "count": len(guesses),
