@@ -18,6 +18,7 @@ from experiments.actuators import actuator, actuators
 from experiments.cli import app
 from experiments.command.json_output import json_text
 from experiments.log_pages.finding_page import finding_page
+from experiments.page.names_shown import quantity_name
 from plant.eha.rig import read_rig, rig_template
 from plant.errors import HydrostateError
 from plant.log.columns import UNITS
@@ -148,7 +149,7 @@ def test_the_page_says_what_was_found(looked: Looked) -> None:
     for name, found in looked.findings.items():
         result = {"file": "run.csv", "rig": "mine", **getattr(looked.kind, name).entries(found)}
         page = finding_page(result, found, looked.record)
-        assert all(one.replace("_", " ") in page for one in found.quantities)
+        assert all(quantity_name(one) in page for one in found.quantities)
         assert found.channels[0] in page
         assert "rig mine" in page
 

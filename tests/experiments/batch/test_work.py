@@ -76,7 +76,7 @@ def test_a_log_that_cannot_be_read_is_a_row_and_the_others_are_diagnosed(tmp_pat
     rows = table_of(run_task(Task(plan.rig, plan.groups))).to_pylist()
     assert [row["file"] for row in rows] == ["a.csv", "b.csv", "c.csv", "d.csv"]
     assert [row["outcome"] for row in rows] == ["mismatch", "failed", "failed", "failed"]
-    assert "in none of the nine conditions" in rows[0]["reason"]
+    assert "none of the nine conditions fits" in rows[0]["reason"]
     assert "the file is empty" in rows[2]["reason"]
     assert not any(str(tmp_path) in row["reason"] for row in rows)  # the row names its log
     assert "there is no such file" in rows[3]["reason"]

@@ -74,8 +74,9 @@ def test_sensitivities_are_the_derivatives_of_the_output() -> None:
         assert moved == pytest.approx(jacobian[:, k], abs=1e-6)
 
 
-def test_order_delay_and_offset_come_back_beside_a_mean_that_is_not_zero() -> None:
-    found = identify_channels(one_log(300))
+def test_delay_and_offset_come_back_beside_a_mean_that_is_not_zero() -> None:
+    """Of second order, which is told: two more poles do nearly what a dead time of three samples does."""
+    found = identify_channels(one_log(300), order=2)
     linear = found.model.linear
     assert linear is not None
     assert (linear.denominator.size - 1, linear.delay) == (2, 3)
