@@ -5,6 +5,7 @@ normal state at rated speed.
 """
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 from plant.eha.model import EhaParameters
 from plant.eha.steady_state import steady_state
@@ -73,8 +74,12 @@ def _rated_flow(p: EhaParameters) -> float:
     return p.pump_displacement * p.rated_speed
 
 
+@lru_cache(maxsize=256)
 def _pressure_ratio(p: EhaParameters) -> float:
-    """Return the healthy pressure at rated speed over the paper's; 1 for an actuator that needs none."""
+    """Return the healthy pressure at rated speed over the paper's; 1 for an actuator that needs none.
+
+    The starts of a search, and the nine conditions of each log of a batch, ask it of one rig.
+    """
     _, pressure = steady_state(p.rated_speed, p)
     _, paper = steady_state(PAPER_RIG.rated_speed, PAPER_RIG)
     return pressure / paper if pressure > 0.0 else 1.0

@@ -13,7 +13,7 @@ from estimation.identification.free_run.absolute_output import (
     signs_at_first,
     signs_of,
 )
-from estimation.identification.free_run.choose_linear import CLEARLY, criteria, slowest_pole
+from estimation.identification.free_run.choose_linear import criteria, slowest_pole, smallest
 from estimation.identification.free_run.data import Channels, Scaling, blocks
 from estimation.identification.free_run.dense_polynomial import Asked
 from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled
@@ -103,8 +103,7 @@ def chosen_absolute(candidates: list[AbsoluteCandidate]) -> AbsoluteCandidate:
     candidates : list of AbsoluteCandidate
         One at least.
     """
-    least = min(one.held_back for one in candidates)
-    return min((one for one in candidates if one.held_back <= (1.0 + CLEARLY) * least), key=lambda one: one.bic)
+    return smallest(candidates, min(one.held_back for one in candidates))
 
 
 def from_zero(data: Channels, by: Scaling) -> Channels:

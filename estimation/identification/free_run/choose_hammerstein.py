@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.free_run.choose_linear import CLEARLY, Candidate, criteria
+from estimation.identification.free_run.choose_linear import Candidate, criteria, smallest
 from estimation.identification.free_run.data import Channels, Scaling, blocks
 from estimation.identification.free_run.hammerstein_fit import (
     HammersteinFit,
@@ -102,9 +102,7 @@ def chosen_hammerstein(candidates: Sequence[HammersteinCandidate]) -> Hammerstei
         One at least; where all are doubtful, one of them is returned.
     """
     sound = [one for one in candidates if not one.doubt] or list(candidates)
-    least = min(one.held_back for one in sound)
-    near = [one for one in sound if one.held_back <= (1.0 + CLEARLY) * least]
-    return min(near, key=lambda one: one.bic)
+    return smallest(sound, min(one.held_back for one in sound))
 
 
 def worthwhile(

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -242,6 +243,35 @@ def chosen(candidates: Sequence[Candidate]) -> Candidate:
         One at least; where all are doubtful, the best of them is returned.
     """
     sound = [one for one in candidates if not one.doubt] or list(candidates)
-    least = min(one.price for one in sound)
-    near = [one for one in sound if one.held_back <= (1.0 + CLEARLY) * least]
+    return smallest(sound, min(one.price for one in sound))
+
+
+class Judged(Protocol):
+    """A model that was judged on blocks held back."""
+
+    @property
+    def held_back(self) -> float:
+        """Root mean square error over the blocks [dimensionless]."""
+        ...
+
+    @property
+    def bic(self) -> float:
+        """Information criterion of the free run [dimensionless]."""
+        ...
+
+
+Some = TypeVar("Some", bound=Judged)
+
+
+def smallest(candidates: Sequence[Some], least: float) -> Some:
+    """Return, of the models that do nearly as well on held-back blocks as the best one, that of the least BIC.
+
+    Parameters
+    ----------
+    candidates : sequence of Judged
+        One at least that does.
+    least : float
+        Held-back error of the best one [dimensionless].
+    """
+    near = [one for one in candidates if one.held_back <= (1.0 + CLEARLY) * least]
     return min(near, key=lambda one: one.bic)

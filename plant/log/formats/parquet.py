@@ -18,10 +18,11 @@ from plant.log.formats.cells import each_read, numbers
 from plant.log.formats.packed import most_unpacked, too_large
 from plant.log.headings import Heading
 from plant.log.table import Table
+from plant.units import USUAL
 
 SCHEMA_KEY = b"hydrostate"
 
-SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+SECONDS: Mapping[str, float] = {**{unit: factor for unit, (of, factor) in USUAL.items() if of == "s"}, "h": 3600.0}
 """Units of time [s]."""
 
 MANY = 200
