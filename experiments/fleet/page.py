@@ -119,9 +119,9 @@ def title_of(rows: Sequence[ActuatorRow]) -> str:
     rows : sequence of ActuatorRow
         In any order.
     """
-    known = [row for row in rows if row.last.named.actuator]
-    known = known if 2 * len(known) >= len(rows) else list(rows)
-    alone = [row for row in rows if row not in known]
+    known, alone = ([row for row in rows if bool(row.last.named.actuator) is each] for each in (True, False))
+    if len(known) < len(alone):
+        known, alone = list(rows), []
     counts = Counter(row.state for row in known)
     total = len(known) - counts["failed"]
     sick = sum(counts[name] for name in SICK)
