@@ -15,6 +15,7 @@ from experiments.papers.claims import figure_table, row_table
 from experiments.papers.parts import PapersSettings, gather, quick_papers, read_tables
 from experiments.papers.study import papers_study
 from experiments.papers.verdict import Ours, Row
+from experiments.piezo_stack.left_out import figure_12_left_out
 from experiments.running.progress import Track, untracked
 from experiments.running.study import Found, run_study
 from faults.conditions import CONDITIONS
@@ -143,7 +144,7 @@ def test_every_row_has_a_verdict_and_none_is_without_its_number(
     made: Mapping[str, Callable[[], Tables]] = {
         "study": lambda: {**study.frames, "printed equations": printed},
         "circuit": lambda: {name: make() for name, make in circuit.items()},
-        "piezo-stack": lambda: stack_tables,
+        "piezo-stack": lambda: {**stack_tables, "figure 12 left out": figure_12_left_out(parts.STACK_RIG, 7, 1, 1)},
         "diaphragm-motor": lambda: motor_tables,
         "motor-paper": lambda: motor_paper_tables,
     }
