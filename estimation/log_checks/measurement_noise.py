@@ -35,7 +35,8 @@ def measurement_variances(record: Record, channels: Sequence[str]) -> Mapping[st
     A second difference removes everything smooth and holds six times the variance of white noise; its median absolute
     deviation ignores the moments at which the piston really jumps. Differences of what a converter rounded are whole
     steps, and so would be their median; it is taken within its step. A channel that mostly repeats its last value is
-    taken for quantised: one twelfth of the squared quantum is the least that it can have.
+    taken for quantised: its median is that of a converter at rest, so the mean square of its small differences counts.
+    One twelfth of the squared quantum is the least that it can have.
 
     Parameters
     ----------
@@ -78,8 +79,9 @@ _remembered: dict[tuple[object, ...], float] = {}
 def _variance(values: Array, channel: str) -> float:
     values = values[np.isfinite(values)]  # a slow sensor has no three samples in a row
     bends = np.diff(values, n=2)
-    smallest = max(SMALLEST_VARIANCE.get(channel, 0.0), _quantum(values) ** 2 / 12.0)
-    if not len(bends):
+    rounded = _rounded_variance(values)
+    smallest = max(SMALLEST_VARIANCE.get(channel, 0.0), rounded)
+    if not len(bends) or rounded > 0.0:
         return smallest
     deviation = NORMAL_MAD * _grouped_median(np.abs(bends - median(bends)), _step(values)) / 6.0**0.5
     return float(max(deviation**2, smallest))
@@ -111,6 +113,23 @@ def _quantum(values: Array) -> float:
     moved = steps[steps > 0.0]
     held = np.count_nonzero(steps == 0.0)
     return float(np.min(moved)) if held > len(moved) > 0 else 0.0
+
+
+FLICKER = 2.5
+"""Second differences up to which a quantised channel is at rest, over its quantum [dimensionless]: one that flickers
+between two levels has differences of one and of two."""
+
+
+def _rounded_variance(values: Array) -> float:
+    """Return the variance of a channel that mostly does not move, by what it flickers between its levels; 0 for others.
+
+    Noise of a third of a quantum moves a converter seldom, so that the median of its differences is none, while the
+    noise of what it reads is a fifth more than rounding alone.
+    """
+    quantum = _quantum(values)
+    bends = np.abs(np.diff(values, n=2)) if quantum > 0.0 else np.zeros(0)
+    flickers = bends[bends <= FLICKER * quantum]
+    return max(quantum**2 / 12.0, float(np.mean(flickers**2)) / 6.0 if len(flickers) else 0.0)
 
 
 SMOOTH = 6
@@ -179,10 +198,11 @@ def struck_variance(values: Array) -> float:
 
 
 def _struck_variance(values: Array) -> float:
-    bends = np.diff(values, n=SMOOTH)
+    bends, present = np.diff(values, n=SMOOTH), values[np.isfinite(values)]
     bends = bends[np.isfinite(bends)]  # a difference across a missing sample holds the ringing
-    deviation = _grouped_median(np.abs(bends), _step(values[np.isfinite(values)])) if len(bends) else 0.0
-    return (NORMAL_MAD * deviation) ** 2 / comb(2 * SMOOTH, SMOOTH) if deviation > 0.0 else np.inf
+    deviation = _grouped_median(np.abs(bends), _step(present)) if len(bends) else 0.0
+    found = (NORMAL_MAD * deviation) ** 2 / comb(2 * SMOOTH, SMOOTH) if deviation > 0.0 else np.inf
+    return max(found, _rounded_variance(present))
 
 
 def _position_variance(position: Array) -> float:
