@@ -12,7 +12,7 @@ from estimation.log_checks.held import without_held
 from estimation.log_checks.held_alone import without_held_alone
 from estimation.log_checks.hum import without_hum
 from estimation.log_checks.late_velocity import without_late_velocity
-from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
+from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances, rounded_variance
 from estimation.log_checks.outliers import without_gross_outliers
 from estimation.log_checks.position_range import without_position_beyond_range
 from estimation.log_checks.sample_time import require_fast_enough
@@ -124,13 +124,15 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     mistakes = changes or channel_mistakes(sound.replace(**{PRESSURE: None}) if dead else sound, parameters)
     if mistakes:  # a sensor cannot be judged by channels of another meaning
         objections = steps = ()
-    sound, filtered = without_correlated_noise(sound)
+    every, (sound, filtered) = sound, without_correlated_noise(sound)
     left_out = (*held, *twice, *dropouts, *alone, *outliers, *clipped, *beyond, *steps, *hum, *offset, *late, *filtered)
-    variances = {**measurement_variances(sound, known), **_thinned_variances(sound, filtered)}
+    variances = {**measurement_variances(sound, known), **_thinned_variances(sound, filtered, every)}
     return CleanLog(sound, variances, left_out, objections, mistakes)
 
 
-def _thinned_variances(record: Record, filtered: tuple[Note, ...]) -> Mapping[str, float]:
-    """Return the variances of channels of which one sample in several was kept."""
+def _thinned_variances(record: Record, filtered: tuple[Note, ...], every: Record) -> Mapping[str, float]:
+    """Return the variances of channels of which one sample in several was kept; rounding shows where all are there."""
     found = {name: independent_variance(record[name]) for name in (str(note.data["channel"]) for note in filtered)}
-    return {name: max(one, SMALLEST_VARIANCE[PRESSURE]) for name, one in found.items() if one is not None}
+    rounded = {name: rounded_variance(every[name]) for name in found}
+    least = SMALLEST_VARIANCE[PRESSURE]
+    return {name: max(one, least, rounded[name]) for name, one in found.items() if one is not None}

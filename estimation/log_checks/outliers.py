@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.channel_names import POSITION, PRESSURES, VELOCITY
-from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.log_checks.measurement_noise import measurement_variances, rounded_variance
 from estimation.log_checks.order import percentile
 from estimation.notes import SensorCode
 from plant.arrays import Array
@@ -251,7 +251,8 @@ def without_gross_outliers(record: Record, channels: Sequence[str]) -> tuple[Rec
         shown = record
         if name in PRESSURES:  # one that clips shows its noise only while it moves
             shown = record.replace(**{name: np.where(np.diff(values, prepend=np.nan) == 0.0, np.nan, values)})
-        noise = measurement_variances(shown, (name,))[name] ** 0.5
+        variance = measurement_variances(shown, (name,))[name]
+        noise = max(variance, rounded_variance(values)) ** 0.5
         sound = without_outliers(values, noise)
         if name == VELOCITY and POSITION in record and _missing(sound) > _missing(values):
             span = max(CONFIRMING, 2.0 * record.sample_time)

@@ -11,6 +11,7 @@ from estimation.log_checks.measurement_noise import (
     position_variance,
     struck_variance,
 )
+from estimation.log_checks.outliers import without_gross_outliers
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.simulate import LUMPED, simulate
@@ -129,6 +130,25 @@ def test_blows_of_a_binary_drive_do_not_pass_for_noise() -> None:
     channel = "differential_pressure_pa"
     assert measurement_variances(Record(1e-3, {channel: struck}), [channel])[channel] > 1.5 * 25e6
     assert struck_variance(np.where(np.arange(15_000) % 40 == 7, np.nan, struck)) == pytest.approx(25e6, rel=0.3)
+
+
+@pytest.mark.parametrize("steps", [1.0, 2.0, 2.4, 3.0])
+@pytest.mark.parametrize("phase", [0.0, 0.25, 0.5])
+def test_a_coarse_converter_has_its_noise_wherever_between_two_steps_it_rests(steps: float, phase: float) -> None:
+    rng, step = np.random.default_rng(5), steps * 5e3
+    rests = 5.0 * step * np.repeat(rng.integers(-3, 4, 40), 500) + phase * step  # a drive of steps
+    read = step * np.rint((rests + rng.normal(0.0, 5e3, len(rests))) / step)
+    true = np.std(read - rests)
+    assert variance_of("differential_pressure_pa", read) ** 0.5 == pytest.approx(true, rel=0.13)
+    assert struck_variance(read) ** 0.5 == pytest.approx(true, rel=0.13)
+
+
+def test_a_converter_that_flickers_between_two_levels_has_no_gross_outliers() -> None:
+    rng, channel = np.random.default_rng(6), "differential_pressure_pa"
+    pressure = 2e4 * np.rint((2e5 * np.sin(1e-2 * np.arange(10_000)) + rng.normal(0.0, 2e3, 10_000)) / 2e4)
+    cleaned, said = without_gross_outliers(Record(1e-3, {channel: pressure}), [channel])
+    assert not said
+    assert not np.isnan(cleaned[channel]).any()
 
 
 @pytest.mark.parametrize("values", [np.zeros(100), np.arange(5.0), np.full(100, np.nan)])
