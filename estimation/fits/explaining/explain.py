@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from estimation.fits.explaining.finished import ALIKE, REACHED
+from estimation.fits.explaining.finished import ALIKE, REACHED, with_less_lag
 from estimation.fits.explaining.form_fit import weighed
 from estimation.fits.explaining.likeliest import NEARLY_AS_GOOD, apart, led_on, likeliest, ranked, settled_each
 from estimation.fits.explaining.promises import NOTHING_PROMISED, Promise, promised_beside, promising
@@ -99,6 +99,8 @@ def explain(
     left = left_by(wide, plain.cost)
     spared = Spared(skipping(wide, left), left, starts)
     finished = _alone(wide, plain.cost, (likely, others, gains), spared, accepted)
+    if finished[0].fits and not _explained(finished[0], accepted):
+        finished = ranked([*finished, *filter(None, [with_less_lag(wide, finished[0])])])
     if paired and finished[0].cost < hopeless and not _by_itself(wide, finished[0], accepted):
         first, second = finished[0], finished[1] if len(finished) > 1 else None
         pairs = _paired(wide, first, starts[0], accepted)

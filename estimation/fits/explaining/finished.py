@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.fits.explaining.settled import NEAR, at_end, coarse, descended
+from estimation.fits.explaining.settled import FINEST_DELAY, NEAR, at_end, coarse, descended
 from estimation.fits.explaining.thinned import FEW, left_by
 from estimation.fits.explaining.tried import Tried
 from estimation.fits.explaining.wide_log import balanced_by, balances_mass, delayed, usual_values
@@ -87,6 +87,35 @@ def finished(log: GreyBoxLog, tried: Tried, useful: float = np.inf) -> Tried:
     if best.meant and all(one.told(best.values[name], first.std.get(name, 0.0)) for one, name in found):
         return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
     return replace(best, void=True, fits=(replace(first, cost=NEVER),))
+
+
+def with_less_lag(log: GreyBoxLog, tried: Tried) -> Tried | None:
+    """Return a set of hypotheses with one more step of delay in place of its lag, fitted to the end.
+
+    With long model steps a lag and a delay that last alike leave nearly the same. In stiff oil short ones tell them
+    apart.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    tried : Tried
+        The set, fitted to the end.
+
+    Returns
+    -------
+    Tried or None
+        The set; none where its last hypothesis has no delays, or no lag to give.
+    """
+    last = tried.together[-1]
+    if len(last.delays) < 2 or min(last.delays) < 0.0:
+        return None
+    lag = last.free[0]
+    left = tried.values[lag] - FINEST_DELAY
+    if abs(left) > 0.5 * FINEST_DELAY:
+        return None
+    later = {**tried.delays, last.late: tried.delays.get(last.late, 0.0) + FINEST_DELAY}
+    return finished(log, replace(tried, delays=later, values={**tried.values, lag: max(left, 0.0)}), tried.cost)
 
 
 def _concluded(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxFit:

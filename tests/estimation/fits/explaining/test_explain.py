@@ -16,7 +16,7 @@ from estimation.fits.explaining.finished import CLOSE, NEVER, ROUNDS
 from estimation.fits.explaining.promises import NOTHING_PROMISED
 from estimation.fits.explaining.tried import Tried
 from estimation.fits.greybox.descent import Point
-from estimation.fits.hypotheses import HYPOTHESES
+from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
 from plant.eha.model import EhaParameters
 from tests.estimation.fits.short_logs import made_fit
 
@@ -189,7 +189,7 @@ def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
     def tried(cost: float, *together: str) -> Any:
         point, fit = Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), made_fit(cost, 2e8, 1e5, chi=chi)
         fit = replace(fit, std=dict.fromkeys(fit.values, 1.0))
-        return _Made(tuple(SimpleNamespace(name=name, free=(name,)) for name in together), point, {}, {}, {}, (fit,))  # pyright: ignore[reportArgumentType]
+        return _Made(tuple(Hypothesis(name, (name,)) for name in together), point, {}, {}, {}, (fit,))
 
     asked: list[str] = []
 
