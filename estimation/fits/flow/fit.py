@@ -24,7 +24,16 @@ from estimation.fits.flow.valley import lower_valley
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
 from estimation.fits.greybox.small_teeth import with_small_teeth
-from estimation.fits.hypotheses import AIR_MIDWAY, BEGUN, ENCODER_ZERO, HYPOTHESES, PLAY, PRESSURE_LATE, Hypothesis
+from estimation.fits.hypotheses import (
+    AIR_MIDWAY,
+    BEGUN,
+    ENCODER_ZERO,
+    HYPOTHESES,
+    OFFSET,
+    PLAY,
+    PRESSURE_LATE,
+    Hypothesis,
+)
 from estimation.models.completed_flow import CRACKS, balances_mass
 from estimation.models.flow import HELD_FLOW_FORM
 from estimation.notes import EstimateCode
@@ -242,9 +251,11 @@ def _losing_fit(plain: PlainFits, loss: UnevenLoss, sensed: ShownPlay) -> FormFi
 def _told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:
     """Return what says whether a fit explains the log, given whether it is asked how it begins.
 
-    That has so many valleys that one is believed only where sensors' noise is all that it leaves.
+    That has so many valleys that one is believed only where sensors' noise is all that it leaves. An offset of a log
+    that begins at rest is no such beginning.
     """
-    return partial(fit_explains_all, noisy=plain.log.passes_on) if begun else plain.explains
+    strictly = partial(fit_explains_all, noisy=plain.log.passes_on) if begun else plain.explains
+    return lambda fit: (plain.explains if OFFSET.free[0] in fit.values else strictly)(fit)
 
 
 def _elsewhere(plain: PlainFits, strange: Explanation) -> FitStart | None:

@@ -1,11 +1,13 @@
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from estimation.fits.flow.fit import fit_flow
+from estimation.fits.flow.fit import _told_by, fit_flow  # pyright: ignore[reportPrivateUsage]
 from estimation.fits.flow.log import speed_gaps
 from estimation.notes import EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
@@ -17,6 +19,7 @@ from plant.errors import LogError
 from plant.log.files import read_record
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, drop_samples
+from tests.estimation.fits.short_logs import made_fit
 from tests.thinned import thinned
 
 HEALTHY = EhaParameters()
@@ -40,6 +43,25 @@ def test_bulk_modulus_and_leakage_come_back_without_knowing_the_condition(condit
     assert through == pytest.approx(p.leakage_coefficient, rel=0.05, abs=0.0)
     assert fit.parameters["flow_bias"][0] == pytest.approx(p.flow_bias, rel=0.10)
     assert fit.reasons == ()
+
+
+@pytest.mark.parametrize(
+    ("begun", "chi", "offset", "explained"),
+    [
+        (True, 1.15, False, False),
+        (True, 1.15, True, True),
+        (False, 1.15, False, True),
+        (True, 1.05, False, True),
+        (True, 1.6, True, False),
+    ],
+)
+def test_what_a_log_begins_with_must_leave_noise_alone_and_an_offset_no_more_than_any_other_cause(
+    begun: bool, chi: float, offset: bool, explained: bool
+) -> None:
+    fit = made_fit(50.0, 2e8, 1e5, chi=chi)
+    fit = replace(fit, values={**fit.values, **({"pressure_offset": 1e5} if offset else {})}, seen=10_000.0)
+    plain: Any = SimpleNamespace(log=SimpleNamespace(passes_on=False), explains=lambda fit: fit.chi_square[0] < 1.44)
+    assert _told_by(plain, begun=begun)(fit) is explained
 
 
 @pytest.mark.slow
