@@ -102,7 +102,8 @@ def _estimated(
     kept: "dict[Any, Any] | None" = None,
 ) -> "Finding":
     from estimation.eha.bulk_modulus import DEFAULT_OPTIONS
-    from estimation.eha.estimate import estimate_log, finding_of
+    from estimation.eha.estimate import estimate_log, estimated, finding_of
+    from estimation.log_checks.clean import clean_log
 
     how, unused, open_choice = asked
     record = record.replace(**{channel: None for channel in unused if channel in record})
@@ -110,19 +111,23 @@ def _estimated(
         how = replace(how, tuned=True)
     if kept is None or how != DEFAULT_OPTIONS:
         return estimate_log(record, rig, how)
-    if (seen := _seen(record, rig, kept)) is not None:
-        return finding_of(*seen, rig)
-    found = estimate_log(record, rig)
-    kept[tuple(record)] = rig, found.evidence
-    return found
+    if (seen := _seen(record, rig, kept)) is None:
+        seen = estimated(clean_log(record, rig.parameters), rig, how)
+        kept[tuple(record)] = rig, seen
+    return finding_of(*seen, rig)
 
 
 def _seen(record: "Record", rig: "Rig[Any]", kept: "dict[Any, Any]") -> "tuple[CleanLog, BulkModulusEstimate] | None":
-    """Return a log with its estimate, all automatic, with which both verbs begin; None where none is kept."""
+    """Return a log, checked, with its estimate, all automatic: both verbs begin with them. None where none is kept."""
     from estimation.log_checks.clean import clean_log
 
-    of_rig, estimate = kept.get(tuple(record), (None, None))
-    return None if estimate is None or of_rig != rig else (clean_log(record, rig.parameters), estimate)
+    of_rig, (log, estimate) = kept.get(tuple(record), (None, (None, None)))
+    if estimate is None or of_rig != rig:
+        return None
+    if log is None:
+        log = clean_log(record, rig.parameters)
+        kept[tuple(record)] = rig, (log, estimate)
+    return log, estimate
 
 
 def _innovations(found: "Finding", log: str, path: Path) -> None:
@@ -186,9 +191,10 @@ def _diagnosed(
         return None if linear is None else score_transfer_functions(record, linear())
 
     waiting = scored if linear is None else begun(scored) or scored
-    found = diagnose_log(record, rig, None if kept is None else _seen(record, rig, kept))
-    if kept is not None:
-        kept[tuple(record)] = rig, found.evidence.estimate
+    seen = None if kept is None else _seen(record, rig, kept)
+    found = diagnose_log(record, rig, seen)
+    if kept is not None and seen is None:  # circuits ran beside the estimate, which has checked the log for itself
+        kept[tuple(record)] = rig, (None, found.evidence.estimate)
     try:
         scores = waiting()
     except LogError as error:

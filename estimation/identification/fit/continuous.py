@@ -1,5 +1,7 @@
 """Transfer functions in continuous time with dead time, fitted to sampled data whose input is held between samples."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from estimation.arrays import Array
@@ -24,6 +26,9 @@ DIFFERENCE = 1e-6
 
 LONGEST = 10.0
 """Dead time looked for at most [samples]."""
+
+MOST_INITIAL = 2
+"""Samples for each pole that are left of an experiment without its dead time, or it stays as it is [count]."""
 
 MOST_EVALUATIONS = 60
 """Of the simulated output, a start."""
@@ -69,9 +74,25 @@ def fit_continuous(
     names = (input_name, output_name)
     given = experiments_from(u, y, names, n_excited=2 * n_poles, n_wanted=n_wanted)
     problem = _Problem(given.scaled(), sample_time, n_zeros, n_poles, dead_time)
-    found = [problem.descend(start) for start in problem.starts()]
+    early = problem.without_whole_samples()
+    found = [early.descend(start) for start in early.starts()]
     values = min(found, key=lambda one: one[0])[1]
     return problem.result(values, data_hash(given, sample_time), names)
+
+
+class _At(NamedTuple):
+    """A model at one point: discrete numerator, denominator and delay, derivatives by them, and by initial states.
+
+    The residual is that with initial states at their best.
+    """
+
+    values: Array
+    b: Array
+    f: Array
+    delay: int
+    main: Array
+    initial: Array
+    residual: Array
 
 
 class _Problem:
@@ -82,6 +103,19 @@ class _Problem:
     ) -> None:
         self.data, self.sample_time = data, sample_time
         self.n_zeros, self.n_poles, self.dead_time = n_zeros, n_poles, dead_time
+        self._last: _At | None = None
+
+    def without_whole_samples(self) -> "_Problem":
+        """Return the same fit with a known dead time of less than a sample, see `Experiments.advanced`.
+
+        A dead time of 200 samples has 200 initial values, which take up next to all of a search's time.
+        """
+        whole = 0 if self.dead_time is None else int(np.floor(self.dead_time / self.sample_time + 1e-9))
+        least = whole + MOST_INITIAL * self.n_poles
+        if whole == 0 or not all(self.data.used[part][least:].any() for part in self.data.slices):
+            return self
+        rest = max(self.dead_time - whole * self.sample_time, 0.0)
+        return _Problem(self.data.advanced(whole), self.sample_time, self.n_zeros, self.n_poles, rest)
 
     def discrete(self, values: Array) -> tuple[Array, Array, int]:
         """Return numerator, denominator, delay at one sample a unit of time."""
@@ -89,8 +123,13 @@ class _Problem:
         late = self.dead_time / self.sample_time if self.dead_time is not None else values[-1]
         return held_input_model(values[:n_b], values[n_b : n_b + self.n_poles], max(float(late), 0.0), 1.0)
 
-    def parts(self, values: Array) -> tuple[Array, Array]:
-        """Return Jacobian by continuous values and initial states, and the residual, initial states at their best."""
+    def _at(self, values: Array) -> _At:
+        """Return what both the residual and the Jacobian take; of the last point it is kept, since a search asks twice.
+
+        The derivative by the continuous values is left to `parts`: a residual alone is asked for more often.
+        """
+        if self._last is not None and np.array_equal(self._last.values, values):
+            return self._last
         b, f, delay = self.discrete(values)
         form = Structure(b.size - delay, self.n_poles, delay)
         theta = np.concatenate([b[delay:], f[1:], np.zeros(form.n_states * self.data.count)])
@@ -98,7 +137,14 @@ class _Problem:
         n_main = form.n_numerator + form.n_denominator
         initial = jacobian[:, n_main:]
         residual = residual - initial @ np.linalg.lstsq(initial, residual, rcond=None)[0]
-        moved = np.zeros((n_main, values.size))
+        self._last = _At(values.copy(), b, f, delay, jacobian[:, :n_main], initial, residual)
+        return self._last
+
+    def parts(self, values: Array) -> tuple[Array, Array]:
+        """Return Jacobian by continuous values and initial states, and the residual, initial states at their best."""
+        at = self._at(values)
+        b, f, delay = at.b, at.f, at.delay
+        moved = np.zeros((at.main.shape[1], values.size))
         for k in range(values.size):
             step = DIFFERENCE * max(abs(values[k]), 1e-3 * np.abs(values).max())
             if k == values.size - 1 and self.dead_time is None:
@@ -109,7 +155,7 @@ class _Problem:
             known = np.pad(other_b, (0, b.size))[: b.size]  # a dead time beyond a whole sample has one value more
             moved[: b.size - delay, k] = (known - b)[delay:] / step
             moved[b.size - delay :, k] = (other_f[1:] - f[1:]) / step
-        return np.concatenate([jacobian[:, :n_main] @ moved, initial], axis=1), residual
+        return np.concatenate([at.main @ moved, at.initial], axis=1), at.residual
 
     def descend(self, start: Array) -> tuple[float, Array]:
         """Return cost and values of the minimum that one start leads to."""
@@ -118,7 +164,7 @@ class _Problem:
         def residual(values: Array) -> Array:
             if (self.dead_time is None and values[-1] < 0.0) or not stable(self.discrete(values)[1][1:]):
                 return refused
-            return self.parts(values)[1]
+            return self._at(values).residual
 
         def jacobian(values: Array) -> Array:
             columns, _ = self.parts(values)

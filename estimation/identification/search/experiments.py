@@ -69,6 +69,34 @@ class Experiments:
         y_scale = float(np.sqrt(np.sum(self.y**2) / self.n_used))
         return replace(self, u=self.u / u_scale, y=self.y / y_scale, u_scale=u_scale, y_scale=y_scale)
 
+    def advanced(self, samples: int) -> "Experiments":
+        """Return the outputs brought forward, without the last inputs, whose answers are not there.
+
+        A model that is late by so many samples has as many more initial values, which give it any output before its
+        input arrives. Without them it is the same criterion, to the last sample that counts.
+
+        Parameters
+        ----------
+        samples : int
+            By how many [samples].
+
+        Returns
+        -------
+        Experiments
+            Each shorter by so many samples, one or more of which are there.
+
+        Examples
+        --------
+        >>> both = Experiments(np.arange(7.0), np.arange(7.0), np.ones(7, dtype=bool), np.array([0, 4, 7]))
+        >>> late = both.advanced(2)
+        >>> late.u.tolist(), late.y.tolist(), late.bounds.tolist()
+        ([0.0, 1.0, 4.0], [2.0, 3.0, 6.0], [0, 2, 3])
+        """
+        early = np.concatenate([np.arange(part.start, part.stop - samples) for part in self.slices])
+        late = np.concatenate([np.arange(part.start + samples, part.stop) for part in self.slices])
+        bounds = self.bounds - samples * np.arange(self.bounds.size)
+        return replace(self, u=self.u[early], y=self.y[late], used=self.used[late], bounds=bounds)
+
     def measured(self) -> Array:
         """Return the output with NaN where it is missing, shape (n,)."""
         return np.where(self.used, self.y, np.nan)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -89,8 +89,9 @@ class PointFit:
     slopes: Array
 
 
+@lru_cache(maxsize=2)
 def nominal_runs(blocks: Blocks, actuator: Actuator) -> Array:
-    """Return what the nine nominal circuits do under a log's motor speed.
+    """Return what the nine nominal circuits do under a log's motor speed, kept for what is asked of the log next.
 
     Parameters
     ----------
@@ -102,9 +103,11 @@ def nominal_runs(blocks: Blocks, actuator: Actuator) -> Array:
     Returns
     -------
     ndarray, shape (9, n, outputs)
-        Velocity [m/s] and pressure [Pa].
+        Velocity [m/s] and pressure [Pa]; it cannot be written to, since whoever asks again gets the same.
     """
-    return predicted(blocks, parameter_rows(actuator.conditions, actuator.circuit, actuator.rated))
+    runs = predicted(blocks, parameter_rows(actuator.conditions, actuator.circuit, actuator.rated))
+    runs.flags.writeable = False
+    return runs
 
 
 def scales_of(blocks: Blocks, fitted: Array) -> Array:

@@ -129,15 +129,22 @@ def fits(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
     return asked
 
 
+def _checked_again(*_: object) -> None:
+    raise AssertionError("a log that was checked is checked again")
+
+
 @pytest.mark.parametrize("verbs", [("estimate", "diagnose"), ("diagnose", "estimate")])
 def test_both_verbs_of_a_log_share_its_estimate_and_say_what_each_says_alone(
-    log: hs.Log, fits: list[tuple[str, ...]], verbs: tuple[str, str]
+    log: hs.Log, fits: list[tuple[str, ...]], verbs: tuple[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     alone = [getattr(hs.Log(log.record, log.rig), verb)().to_dict() for verb in verbs]
     assert len(fits) == 2
     both = hs.Log(log.record, log.rig)
     assert [getattr(both, verb)().to_dict() for verb in verbs] == alone
     assert len(fits) == 3
+    with monkeypatch.context() as stood_in:
+        stood_in.setattr("estimation.log_checks.clean.clean_log", _checked_again)
+        assert [getattr(both, verb)().to_dict() for verb in verbs] == alone
     copied = pickle.loads(pickle.dumps(both))  # noqa: S301 - our own
     assert copied.estimate().to_dict() == both.estimate().to_dict()
     assert len(fits) == 4

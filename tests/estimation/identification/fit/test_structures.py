@@ -1,6 +1,7 @@
 """ARX, ARMAX, Box-Jenkins, instrumental variables, subspace and continuous time on systems whose truth is known."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,10 @@ from estimation.identification import (
     fit_instrumental,
     fit_subspace,
 )
+from estimation.identification.fit import continuous, output_error
 from estimation.identification.notes import IdentificationCode
+from estimation.identification.search.criterion import Structure
+from estimation.identification.search.experiments import experiments_from
 from plant.errors import HydrostateError, LogWarning
 
 FORM = {"n_numerator": 2, "n_denominator": 2, "delay": 1}
@@ -136,6 +140,28 @@ def test_a_continuous_model_comes_back_with_its_dead_time(late: float) -> None:
     assert fitted.dc_gain == pytest.approx(1.0, abs=4.0 * fitted.dc_gain_std)
     if late:
         assert abs(fitted.dead_time - late) < 3.0 * fitted.dead_time_std < 2e-4
+
+
+def test_a_long_dead_time_has_no_initial_values_to_search_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    searched: list[int] = []
+
+    def descended(form: Structure, *given: Any) -> tuple[float, np.ndarray]:
+        searched.append(form.n_initial)
+        return output_error.descend_from(form, *given)
+
+    truth = LinearModel(np.array([2e4]), np.array([1.0, 120.0, 2e4]), 1e-3, "u", "y", continuous=True)
+    u, y = record(truth, [1.0], [1.0], 0.1, 14, n=2_000)
+    late = np.concatenate([np.full(70, y[0]), y[:-70]])
+    late[900:920] = np.nan
+    monkeypatch.setattr(continuous, "descend_from", descended)
+    forms = {"n_zeros": 0, "n_poles": 2}
+    found = fit_continuous([u, u[:90]], [late, late[:90]], 1e-3, n_zeros=0, n_poles=2, dead_time=0.07)
+    assert searched == [3]
+    assert (deviations(found, truth) < 3.0).all()
+    assert found.dead_time == 0.07
+    both = experiments_from([u, u[:72]], [late, late[:72]], ("u", "y"), n_excited=2, n_wanted=1)
+    short = continuous._Problem(both, 1e-3, 0, 2, 0.07)  # nothing is left of an experiment of 72 samples
+    assert short.without_whole_samples() is short
 
 
 def test_a_held_input_makes_continuous_and_discrete_the_same() -> None:

@@ -116,3 +116,11 @@ def test_a_search_that_cannot_come_to_what_is_wanted_ends_after_a_step_or_two(be
         there = fit_freely(log(), ACTUATOR, "minor_leakage", start, wanted=whole.cost - below)
     assert (len(runs) <= 2) == ends
     assert (there.cost == whole.cost) == (not ends)
+
+
+def test_nominal_circuits_of_a_log_run_once_and_nobody_changes_them() -> None:
+    first = class_fit.nominal_runs(log(), ACTUATOR)
+    assert class_fit.nominal_runs(log(), ACTUATOR) is first
+    assert not first.flags.writeable
+    others = replace(ACTUATOR, conditions=ACTUATOR.conditions + 0.1)
+    assert not np.array_equal(class_fit.nominal_runs(log(), others), first)
