@@ -27,7 +27,7 @@ DIFFERENCE = 1e-6
 LONGEST = 10.0
 """Dead time looked for at most [samples]."""
 
-MOST_INITIAL = 2
+LEAST_LEFT = 2
 """Samples for each pole that are left of an experiment without its dead time, or it stays as it is [count]."""
 
 MOST_EVALUATIONS = 60
@@ -110,8 +110,10 @@ class _Problem:
 
         A dead time of 200 samples has 200 initial values, which take up next to all of a search's time.
         """
-        whole = 0 if self.dead_time is None else int(np.floor(self.dead_time / self.sample_time + 1e-9))
-        least = whole + MOST_INITIAL * self.n_poles
+        if self.dead_time is None:
+            return self
+        whole = int(np.floor(self.dead_time / self.sample_time + 1e-9))
+        least = whole + LEAST_LEFT * self.n_poles
         if whole == 0 or not all(self.data.used[part][least:].any() for part in self.data.slices):
             return self
         rest = max(self.dead_time - whole * self.sample_time, 0.0)

@@ -154,7 +154,6 @@ def test_a_long_dead_time_has_no_initial_values_to_search_for(monkeypatch: pytes
     late = np.concatenate([np.full(70, y[0]), y[:-70]])
     late[900:920] = np.nan
     monkeypatch.setattr(continuous, "descend_from", descended)
-    forms = {"n_zeros": 0, "n_poles": 2}
     found = fit_continuous([u, u[:90]], [late, late[:90]], 1e-3, n_zeros=0, n_poles=2, dead_time=0.07)
     assert searched == [3]
     assert (deviations(found, truth) < 3.0).all()
