@@ -32,6 +32,7 @@ from estimation.fits.motion.search import (
     likeliest,
     rough,
 )
+from estimation.fits.motion.weakly_held import MOST_MOVED, far_too_weak, unseen
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from estimation.models.motion import MOTION_FORMS, MotionParameters
@@ -76,10 +77,6 @@ STRUCTURE = 0.005
 """Relative standard deviation of bulk modulus from friction being of no known law: on the foreign bench, whose
 presliding is of another make, noise alone explains a tenth to a half of the errors. Judged from that one bench
 [fraction]."""
-
-MOST_MOVED = 0.03
-"""Share of bulk modulus by which a misfit that does not show may move it, above which it is not believed [fraction]: as
-much as noise may (`estimation.eha.result.LARGEST_BOUND`)."""
 
 UNLIKELY = 72.0
 """Difference of log-likelihood from which a structure counts for nothing beside the other [dimensionless]."""
@@ -133,46 +130,26 @@ def fit_motion(
     log = motion_log(record, parameters, uncertainties or {}, noise)
     starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))
     ended = likeliest([MotionSearch.of(form, log, starts) for form in MOTION_FORMS])
-    fits, others = _fitted(ended)
+    found, spared = _concluded(ended, log, sparing=True)
+    if spared and not found.reasons:  # held after all: then it is looked for on other scales too
+        found, _ = _concluded(ended, log, sparing=False)
+    return found
+
+
+def _concluded(ended: list[Ended], log: GreyBoxLog, *, sparing: bool) -> tuple[FormFit, bool]:
+    """Return what a log says from where its searches ended, and whether it was spared the search on other scales."""
+    fits, others, spared = _fitted(ended, sparing=sparing)
     best = min(fits, key=lambda fit: fit.cost)
     found = weighed(fits)
     value, std = found["bulk_modulus"]
     apart = max((abs(float(np.log(other / value))) for other in others), default=0.0)
-    bound, moved = float(np.hypot(std / value, apart)), unseen(best, len(log.measured)) * std / value
+    bound = float(np.hypot(std / value, apart))
+    moved = unseen(best.chi_square[0], len(log.measured)) * std / value
     believed = with_structure(found, float(np.linalg.norm([STRUCTURE, apart, moved])))
     reasons = _objections(fits, best, others, share_of_motion(best.chi_square[0], log))
     if not reasons and moved > MOST_MOVED:
         reasons = (EstimateCode.WEAKLY_HELD.note(percent=100.0 * moved, noise_percent=100.0 * std / value),)
-    return FormFit(believed, bound, best.chi_square[0], reasons, best.rig_slopes)
-
-
-def unseen(fit: GreyBoxFit, samples: int) -> float:
-    """Return by how many deviations a misfit that no test of the residuals shows may move what is fitted.
-
-    The sum of n squared residuals has a standard deviation of ``sqrt(2 n)``. A misfit of that size does not show, and
-    one that looks like the change of an unknown moves it by the root of that, in deviations. What a log holds firmly
-    is not moved far by so many; what it holds weakly is.
-
-    Parameters
-    ----------
-    fit : GreyBoxFit
-        The fit.
-    samples : int
-        How many residuals it has.
-
-    Returns
-    -------
-    float
-        12 for 10,000 residuals that are explained [dimensionless].
-
-    Examples
-    --------
-    >>> from types import SimpleNamespace
-    >>> round(unseen(SimpleNamespace(chi_square=(1.0,)), 20_000), 1)
-    14.2
-    """
-    shown = float(np.clip(fit.chi_square[0], 1.0, EXPLAINED) - 1.0) * samples
-    return float(np.sqrt(1.0 + shown + np.sqrt(2.0 * samples)))
+    return FormFit(believed, bound, best.chi_square[0], reasons, best.rig_slopes), spared
 
 
 def share_of_motion(chi_square: float, log: GreyBoxLog) -> float:
@@ -274,10 +251,11 @@ def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
     ]
 
 
-def _fitted(ended: list[Ended]) -> tuple[list[GreyBoxFit], list[float]]:
-    """Return the fits of both structures to the whole log, and other bulk moduli that explain it.
+def _fitted(ended: list[Ended], *, sparing: bool = False) -> tuple[list[GreyBoxFit], list[float], bool]:
+    """Return the fits of both structures to the whole log, other bulk moduli that explain it, and what was spared.
 
     Other scales are looked for wherever the end explains the log, though no search said so: a gate passes on the end.
+    They may be spared where the log holds bulk modulus far too weakly; what it was on the way is another one then.
     """
     first, second = sorted(ended, key=lambda one: (not one.explains, one.point.cost))
     search, best, others = first.search, first.point, list[float]()
@@ -286,8 +264,9 @@ def _fitted(ended: list[Ended]) -> tuple[list[GreyBoxFit], list[float]]:
         wanted = _wanted(part, best, BEGINNING)
         best = descend(part.at, best.theta, FINISHING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
     asked = best.cost < explained(part)
+    spared = sparing and asked and far_too_weak(part, best, whole)
     if asked:
-        best, others = _rescaled(part, best, search)
+        best, others = (best, [bulk_modulus(part, best)]) if spared else _rescaled(part, best, search)
     hopeful = asked and not disagree([bulk_modulus(part, best), *others])
     if hopeful:
         best = descend(whole.at, best.theta, FINISHING, bounds)
@@ -299,7 +278,7 @@ def _fitted(ended: list[Ended]) -> tuple[list[GreyBoxFit], list[float]]:
     told = best.cost < explained(whole) and not disagree([bulk_modulus(whole, best), *others])
     if told and not hopeful:
         best = descend(whole.at, best.theta, FINISHING, bounds)
-    return [concluded(whole, best), *_rival(second, best, told=told)], others
+    return [concluded(whole, best), *_rival(second, best, told=told)], others, spared
 
 
 def _wanted(problem: FreedProblem, begun: Point, share: float = 1.0) -> float:

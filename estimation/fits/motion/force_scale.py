@@ -135,6 +135,12 @@ def bulk_modulus(problem: FreedProblem, point: Point) -> float:
     return problem.model.values(point.theta)["bulk_modulus"]
 
 
+def deviation(problem: FreedProblem, point: Point) -> float:
+    """Return the relative standard deviation of bulk modulus at a point if residuals are white [fraction]."""
+    place = problem.model.unknowns.index("bulk_modulus")
+    return float(np.sqrt(np.linalg.pinv(point.gram, hermitian=True)[place, place]))
+
+
 def _moved(values: Mapping[str, float]) -> Iterator[list[dict[str, float]]]:
     """Yield where an optimum is left for: all forces on another scale, then another stiffness alone."""
     scaled: list[dict[str, float]] = []
@@ -152,7 +158,7 @@ def _ended(problem: FreedProblem, best: Point, moved: Sequence[Mapping[str, floa
     near = descend_together(way.near.at_each, starts, way.nearing, way.bounds, way.near_enough)
     starts = [one.theta for one in near]
     found = descend_together(problem.at_each, starts, way.finishing, way.bounds, way.enough, wanted=way.explained)
-    alike, here = max(ALMOST, NEARBY * _deviation(problem, best)), np.log(bulk_modulus(problem, best))
+    alike, here = max(ALMOST, NEARBY * deviation(problem, best)), np.log(bulk_modulus(problem, best))
     apart = [abs(np.log(bulk_modulus(problem, one)) - here) for one in found]
     close = [i for i in range(len(found)) if found[i].cost < way.explained and alike < apart[i] < FAR_AWAY]
     starts, enough = [found[i].theta for i in close], way.near_enough
@@ -160,9 +166,3 @@ def _ended(problem: FreedProblem, best: Point, moved: Sequence[Mapping[str, floa
     for i, one in zip(close, ends, strict=True):
         found[i] = one
     return found
-
-
-def _deviation(problem: FreedProblem, point: Point) -> float:
-    """Return the relative standard deviation of bulk modulus at a point if residuals are white [fraction]."""
-    place = problem.model.unknowns.index("bulk_modulus")
-    return float(np.sqrt(np.linalg.pinv(point.gram, hermitian=True)[place, place]))

@@ -107,7 +107,7 @@ def test_a_long_log_is_searched_on_its_beginning_and_ends_on_the_whole(
     first = next(one for one in ended if one.explains)
     assert first.point.cost == first.search.part.at(first.point.theta).cost
     assert len(first.search.part.log.measured) == 1000
-    fits, _ = motion_fit._fitted(ended)
+    fits, _, _ = motion_fit._fitted(ended)
     assert fits[0].cost == first.search.whole.at(fits[0].theta).cost
     assert fits[0].cost < first.search.whole.at(first.point.theta).cost - 20.0  # likelier by far
 
@@ -158,7 +158,7 @@ def test_without_a_variance_the_noise_of_motor_speed_is_read_off_the_log(monkeyp
         return []
 
     monkeypatch.setattr(motion_fit, "likeliest", ended)
-    monkeypatch.setattr(motion_fit, "_fitted", lambda _: ([found(2e8), found(2e8)], []))
+    monkeypatch.setattr(motion_fit, "_fitted", lambda *_, **__: ([found(2e8), found(2e8)], [], False))
     read = measurement_variances(record, ("motor_speed_rad_s",))
     for variances in (None, read, {"motor_speed_rad_s": 4.0 * read["motor_speed_rad_s"]}):
         fit_motion(record, HEALTHY, 0.0, variances=variances)
@@ -257,7 +257,7 @@ def test_the_other_law_goes_on_on_the_whole_log_from_where_it_stands_better(
         Ended(second, second.part.at(own), explains=False),
         Ended(first, first.part.at(there), explains=True),
     ]
-    fits, _ = motion_fit._fitted(ended)
+    fits, _, _ = motion_fit._fitted(ended)
     assert [fit.model for fit in fits] == [first.whole.model, second.whole.model]
     (start,) = begun
     assert np.array_equal(start, own if near else fits[0].theta)
@@ -278,7 +278,7 @@ def test_what_the_searches_leave_unexplained_is_fitted_on_and_tried_on_other_sca
     monkeypatch.setattr(motion_fit, "rescaled", lambda _, best, __: (best, [9e7]))
     if not late:
         monkeypatch.setattr(motion_fit, "explained", lambda _: 0.0)
-    fits, others = motion_fit._fitted(ended)
+    fits, others, _ = motion_fit._fitted(ended)
     assert others == ([9e7] if late else [])
     assert fits[0].cost < second.whole.at(there).cost
     assert fits[0].cost == second.whole.at(fits[0].theta).cost
@@ -312,7 +312,7 @@ def test_the_other_law_is_not_fitted_where_no_number_is_told(
     there = first.whole.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
     ended = [Ended(one, one.part.at(there), explains=one is first) for one in (first, second)]
     monkeypatch.setattr(motion_fit, "rescaled", lambda _, best, __: (best, [9e7] if disagreeing else []))
-    fits, others = motion_fit._fitted(ended)
+    fits, others, _ = motion_fit._fitted(ended)
     assert len(fits) == (1 if disagreeing else 2)
     assert others == ([9e7] if disagreeing else [])
     assert bool(motion_fit._objections(fits, fits[0], others, 0.01)) == disagreeing
@@ -332,7 +332,7 @@ def test_what_nothing_explains_is_fitted_by_one_law_and_not_to_the_last_digit(
 
     monkeypatch.setattr(motion_fit, "descend", noted)
     monkeypatch.setattr(motion_fit, "explained", lambda _: 0.0)
-    fits, others = motion_fit._fitted(ended)
+    fits, others, _ = motion_fit._fitted(ended)
     assert len(fits) == 1
     assert others == []
     assert min(shares) > 0.0

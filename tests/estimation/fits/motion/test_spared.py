@@ -56,5 +56,5 @@ def test_the_beginning_of_a_log_is_searched_on_further_than_the_whole(
     monkeypatch.setattr(motion_fit, "_rival", lambda *_, **__: [])
     search: Any = SimpleNamespace(part=part, whole=whole, bounds=None)
     ended = [Ended(search, BEGUN, explains=False)] * 2
-    assert motion_fit._fitted(ended) == (["concluded"], [])
+    assert motion_fit._fitted(ended) == (["concluded"], [], False)
     assert tuple(asked) == spared

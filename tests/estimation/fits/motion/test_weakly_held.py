@@ -1,0 +1,93 @@
+"""A log that holds bulk modulus far too weakly is spared the search on other scales; one that is believed never is."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.motion import fit as motion_fit
+from estimation.fits.motion import weakly_held
+from estimation.fits.motion.fit import fit_motion
+from estimation.fits.motion.search import Ended
+from estimation.fits.motion.weakly_held import FAR_TOO_WEAK, MOST_MOVED, far_too_weak, unseen
+from estimation.models.motion import MOTION_FORMS
+from estimation.notes import EstimateCode
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+WHOLE = 20_000
+
+
+def problem_of(samples: int) -> Any:
+    return SimpleNamespace(log=SimpleNamespace(measured=np.zeros((samples, 1))), at=None)
+
+
+def at(cost: float) -> Point:
+    return Point(np.ones(1), cost, np.zeros(1), np.zeros((1, 1)))
+
+
+@pytest.mark.parametrize("samples", [WHOLE // 4, WHOLE])
+@pytest.mark.parametrize("size", [0.99, 1.01])
+def test_a_beginning_counts_as_what_the_whole_log_will_hold(
+    samples: int, size: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    needed = FAR_TOO_WEAK * MOST_MOVED / unseen(1.0, WHOLE) * np.sqrt(WHOLE / samples)
+    monkeypatch.setattr(weakly_held, "deviation", lambda *_: size * needed)
+    assert far_too_weak(problem_of(samples), at(0.5 * samples), problem_of(WHOLE)) == (size > 1.0)
+
+
+def test_a_misfit_that_shows_holds_a_log_more_weakly() -> None:
+    assert unseen(1.1, WHOLE) > 3.0 * unseen(1.0, WHOLE)
+    assert unseen(0.5, WHOLE) == unseen(1.0, WHOLE)
+
+
+@pytest.mark.parametrize(("std", "asked"), [(1e6, [True]), (1e5, [True, False])])
+def test_a_log_that_holds_bulk_modulus_after_all_is_asked_on_other_scales(
+    std: float, asked: list[bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sparing: list[bool] = []
+
+    def fitted(_: Any, *, sparing: bool) -> Any:
+        noted(sparing)
+        fit = GreyBoxFit(
+            MOTION_FORMS[0], np.zeros(1), {"bulk_modulus": 2e8}, {"bulk_modulus": std}, 50.0, (1.0,), (0.0,)
+        )
+        return [fit], [2e8], sparing
+
+    noted = sparing.append
+    monkeypatch.setattr(motion_fit, "likeliest", lambda _: [])
+    monkeypatch.setattr(motion_fit, "_fitted", fitted)
+    position = 1e-3 * np.sin(0.01 * np.arange(2000)) + 1e-6 * np.random.default_rng(1).standard_normal(2000)
+    record = Record(1e-3, {"motor_speed_rad_s": np.zeros(2000), "position_m": position})
+    found = fit_motion(record, EhaParameters(), 2e8, variances={"motor_speed_rad_s": 1e-4})
+    assert sparing == asked
+    weak = [note.code for note in found.reasons] == [EstimateCode.WEAKLY_HELD]
+    assert weak == (len(asked) == 1)
+
+
+@pytest.mark.parametrize("sparing", [True, False])
+def test_what_bulk_modulus_was_on_the_way_stands_for_the_scales_that_are_spared(
+    sparing: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ends: list[list[float]] = []
+
+    def noted(moduli: list[float]) -> bool:
+        ends.append(moduli)
+        return False
+
+    monkeypatch.setattr(motion_fit, "explained", lambda _: 1.0)
+    monkeypatch.setattr(motion_fit, "far_too_weak", lambda *_: True)
+    monkeypatch.setattr(motion_fit, "bulk_modulus", lambda *_: 2e8)
+    monkeypatch.setattr(motion_fit, "_rescaled", lambda *_: (at(0.5), [3e8]))
+    monkeypatch.setattr(motion_fit, "descend", lambda *_, **__: at(0.5))
+    monkeypatch.setattr(motion_fit, "concluded", lambda *_: "concluded")
+    monkeypatch.setattr(motion_fit, "_rival", lambda *_, **__: [])
+    monkeypatch.setattr(motion_fit, "disagree", noted)
+    search: Any = SimpleNamespace(part=problem_of(10), whole=problem_of(10), bounds=None)
+    ended = [Ended(search, at(0.5), explains=True)] * 2
+    others = [2e8] if sparing else [3e8]
+    assert motion_fit._fitted(ended, sparing=sparing) == (["concluded"], others, sparing)
+    assert ends == [[2e8, *others]] * 2
