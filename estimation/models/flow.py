@@ -113,9 +113,11 @@ def chamber_rates(
     volume_1, volume_2 = chamber_volumes(position, p)
     dp = p1 - p2
     into_1, into_2 = inner_flows(pressures, p, cracks, bend)
-    at_1, at_2 = port_flows(pumped, leaked_flow(dp, p.leakage_coefficient, p), dp, dp / beta if by_mass else 0.0)
     stiffness_1 = beta - (p1 - ATMOSPHERE) if by_mass else beta
     stiffness_2 = beta - (p2 - ATMOSPHERE) if by_mass else beta
+    # density goes with the inverse of that stiffness
+    swelling = (dp / stiffness_1, dp / stiffness_2) if by_mass else (0.0, 0.0)
+    at_1, at_2 = port_flows(pumped, leaked_flow(dp, p.leakage_coefficient, p), dp, swelling)
     return (
         stiffness_1 * (at_1 - area_1 * velocity + into_1) / volume_1,
         stiffness_2 * (area_2 * velocity - at_2 + into_2) / volume_2,
@@ -142,7 +144,7 @@ def leaked_flow(dp: Scalar, leakage: Scalar, p: SimpleNamespace) -> Scalar:
     return leakage * dp + sign(dp) * p.relief_conductance * maximum(absolute(dp) - p.relief_pressure, 0.0)
 
 
-def port_flows(pumped: Scalar, leaked: Scalar, dp: Scalar, swelling: Scalar) -> tuple[Scalar, Scalar]:
+def port_flows(pumped: Scalar, leaked: Scalar, dp: Scalar, swelling: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
     """Return the flow into chamber 1 and that out of chamber 2, each as the volume that it has there.
 
     A flow is counted at its outlet for the pump, at its inlet for a leak: the denser side is chamber 1 if ``dp > 0``.
@@ -153,16 +155,18 @@ def port_flows(pumped: Scalar, leaked: Scalar, dp: Scalar, swelling: Scalar) -> 
         Flow of the pump, and of leakage and relief [m^3/s].
     dp : float or Expression
         Differential pressure [Pa].
-    swelling : float or Expression
-        Relative growth of oil that goes from chamber 1 to chamber 2; 0 where volumes are balanced [fraction].
+    swelling : tuple of float or Expression
+        Relative growth of oil that goes from chamber 1 to chamber 2, of its volume in chamber 2 and of that in chamber
+        1; 0 where volumes are balanced [fraction].
 
     Returns
     -------
     tuple of float or Expression
         Flows [m^3/s].
     """
-    at_1 = pumped * where(pumped > 0.0, 1.0, 1.0 - swelling) - leaked * where(dp > 0.0, 1.0, 1.0 - swelling)
-    at_2 = pumped * where(pumped > 0.0, 1.0 + swelling, 1.0) - leaked * where(dp > 0.0, 1.0 + swelling, 1.0)
+    grown, shrunk = 1.0 + swelling[0], 1.0 - swelling[1]
+    at_1 = pumped * where(pumped > 0.0, 1.0, shrunk) - leaked * where(dp > 0.0, 1.0, shrunk)
+    at_2 = pumped * where(pumped > 0.0, grown, 1.0) - leaked * where(dp > 0.0, grown, 1.0)
     return at_1, at_2
 
 

@@ -94,6 +94,11 @@ def _bubbles(pressure: Scalar, air: Scalar) -> Scalar:
     return air / maximum(pressure, 0.05 * VAPOUR)
 
 
+def _oil(pressure: Scalar, p: SimpleNamespace) -> Scalar:
+    """Return the tangent bulk modulus of oil alone [Pa], to which by mass its volume is proportional."""
+    return p.bulk_modulus - p.by_mass * (pressure - ATMOSPHERE)
+
+
 def _stiffness(pressure: Scalar, air: Scalar, p: SimpleNamespace) -> Scalar:
     """Return the tangent bulk modulus of a chamber [Pa]: liquid, air that softens as 1/p^2, and vapour.
 
@@ -105,7 +110,7 @@ def _stiffness(pressure: Scalar, air: Scalar, p: SimpleNamespace) -> Scalar:
     short = ratio * ratio
     before = where(p.air_onset < 0.0, air / p.stated_pressure, 0.0)
     softer = bubbles / above - before / p.stated_pressure
-    oil = p.bulk_modulus - p.by_mass * (pressure - ATMOSPHERE)
+    oil = _oil(pressure, p)
     room = 1.0 + p.by_mass * (bubbles - before)
     return oil * room / maximum(1.0 + short * short + softer * oil, STIFFEST)
 
@@ -140,7 +145,8 @@ def _rates(
     into_1 = fed_1 - p.drain_share_a * drain * (p1 - supply)
     into_2 = fed_2 - p.drain_share_b * drain * (p2 - supply)
     air = _air(elapsed, p)
-    swelling = p.by_mass * (dp / p.bulk_modulus + _bubbles(p2, air) - _bubbles(p1, air))
+    freed = _bubbles(p2, air) - _bubbles(p1, air)
+    swelling = (p.by_mass * (dp / _oil(p1, p) + freed), p.by_mass * (dp / _oil(p2, p) + freed))
     at_1, at_2 = port_flows(pumped, leaked, dp, swelling)
     rise = _stiffness(p1, air, p) * (at_1 - area_1 * velocity + into_1) / volume_1
     fall = _stiffness(p2, air, p) * (area_2 * velocity - at_2 + into_2) / volume_2

@@ -79,7 +79,7 @@ def flow_forms() -> dict[str, Any]:
                 drives = (speeds, (0.01, 0.0103), 2e-3)
                 told[name][f"{where}, {how}"] = list(form.rates(state, drives, ROD, 0.25))
     told["ports"] = [
-        flow.port_flows(pumped, leaked, dp, 0.01)
+        flow.port_flows(pumped, leaked, dp, (0.01, 0.01))
         for pumped in (-1e-5, 0.0, 1e-5)
         for leaked, dp in ((2e-6, 1e6), (-2e-6, -1e6), (0.0, 0.0), (1e-6, 0.5))
     ]
