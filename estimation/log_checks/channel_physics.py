@@ -214,7 +214,9 @@ def _reversed(record: Record, long: ChannelBlocks, balance: FlowBalance | None) 
         opposed = power * len(long.pumped) ** 0.5 < -REFUTED and balance.compressed < -TOLD * balance.compressed_std
         with_pressure = balance.compressed > TOLD * balance.compressed_std
         apart = apart or (together < 0.0 and balance.swept < -max(TOLD * balance.swept_std, 0.3))
-        with_pump = with_pump or balance.swept > max(TOLD * balance.swept_std, 0.3)
+        goes_along = balance.swept > max(TOLD * balance.swept_std, 0.3)
+        with_pump = with_pump or goes_along
+        apart = apart and not goes_along  # a spring drives a piston back while a pump that leaks it all goes on
     moved = _moved(record)
     if apart:
         channel = SPEED if opposed else moved if with_pressure else f"{SPEED} or {moved}"

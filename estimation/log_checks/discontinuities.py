@@ -40,6 +40,9 @@ LASTS = 0.5
 BROKEN = 8.0
 """Deviations of noise by which another channel jumps in the same row if rows were lost [dimensionless]."""
 
+STOPS = 0.1
+"""Share of its way up to a stop that a piston goes on behind it, or stays short of it [fraction]; judged."""
+
 REST = 10
 """Rows that position repeats before it jumps if it was held by its logger [samples]."""
 
@@ -70,7 +73,9 @@ def without_discontinuities(record: Record) -> tuple[Record, tuple[Note, ...]]:
     moved = _steps_of_position(record)
     places = [step.row for step in moved]
     pressed = (
-        step for step in _steps_of_pressure(record) if _beside(step.row, places) or not _driven(record, step.row)
+        step
+        for step in _steps_of_pressure(record)
+        if _beside(step.row, places) or not (_driven(record, step.row) or _meets_stop(record, step.row))
     )
     if not (steps := [*moved, *pressed]):
         return record, ()
@@ -148,6 +153,20 @@ def _beside(row: int, places: list[int]) -> bool:
 def _driven(record: Record, row: int) -> bool:
     """Return whether the motor jumps about a row, which may move pressure within it."""
     return any(_jumps(record[SPEED], one) for one in range(row - 2, row + 3))
+
+
+def _meets_stop(record: Record, row: int) -> bool:
+    """Return whether the piston stops for good about a row, as far out as it ever goes: it has met a stop.
+
+    What the pump delivers, or a load pulls, then goes into pressure at once.
+    """
+    position = record[POSITION]
+    first, before, after, last = (row + k for k in (-NEAR - APART, -NEAR, NEAR, NEAR + APART))
+    if first < 0 or last >= len(position):
+        return False
+    came, went = abs(position[before] - position[first]), abs(position[last] - position[after])
+    ends = np.nanmin(position), np.nanmax(position)
+    return bool(went < STOPS * came and min(abs(position[after] - end) for end in ends) < STOPS * came)
 
 
 def _without(values: Array, rows: list[int]) -> Array:
