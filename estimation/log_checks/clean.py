@@ -22,6 +22,7 @@ from estimation.log_checks.unit_change import unit_changes
 from estimation.log_checks.velocity_offset import without_velocity_offset
 from estimation.notes import SensorCode
 from plant.eha.model import EhaParameters
+from plant.eha.scales import natural_frequency
 from plant.log.record import Record
 from plant.notes import Note
 
@@ -124,7 +125,7 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     mistakes = changes or channel_mistakes(sound.replace(**{PRESSURE: None}) if dead else sound, parameters)
     if mistakes:  # a sensor cannot be judged by channels of another meaning
         objections = steps = ()
-    every, (sound, filtered) = sound, without_correlated_noise(sound)
+    every, (sound, filtered) = sound, without_correlated_noise(sound, natural_frequency(parameters))
     left_out = (*held, *twice, *dropouts, *alone, *outliers, *clipped, *beyond, *steps, *hum, *offset, *late, *filtered)
     variances = {**measurement_variances(sound, known), **_thinned_variances(sound, filtered, every)}
     return CleanLog(sound, variances, left_out, objections, mistakes)

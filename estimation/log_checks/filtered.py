@@ -24,6 +24,10 @@ FEWEST_WINDOWS = 8
 BANDS = (0.2, 0.3, 0.4, 0.5)
 """Edges of the bands that are compared [cycles/sample]: in a log that is fast enough, the actuator is slower."""
 
+FASTEST_RING = 0.1
+"""Natural frequency up to which the bands hold noise alone [cycles/sample]: half of where they begin, for what rings
+does so with a width, and a rig file is up to a third off."""
+
 CHANCE, FLATTEST = 3.2, 0.9
 """Noise is white if the least power of a band over the largest exceeds 1 less the first over the root of the count of
 windows, or the second where they are many [dimensionless]. White noise of 1 to 20 s at 1 kHz fails in 1 log of 1000; a
@@ -43,13 +47,15 @@ MOST_ROWS = 40
 """Rows over which noise may be alike [count]."""
 
 
-def without_correlated_noise(record: Record) -> tuple[Record, tuple[Note, ...]]:
+def without_correlated_noise(record: Record, rings_at: float = 0.0) -> tuple[Record, tuple[Note, ...]]:
     """Return a log whose pressures have noise that is independent from sample to sample.
 
     Parameters
     ----------
     record : Record
         The log.
+    rings_at : float
+        Natural frequency of the piston on its oil [Hz]. A log in which that is near the bands is left as it is.
 
     Returns
     -------
@@ -57,6 +63,8 @@ def without_correlated_noise(record: Record) -> tuple[Record, tuple[Note, ...]]:
         The log, and a note for each channel that keeps one sample in several.
     """
     changed, notes = dict[str, Array](), list[Note]()
+    if rings_at * record.sample_time > FASTEST_RING:
+        return record, ()
     for name in PRESSURES:
         if name not in record or (rows := independent_rows(record[name], record.sample_time)) == 1:
             continue

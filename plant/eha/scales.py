@@ -4,6 +4,7 @@ Section 3 defines leakage by the share of velocity it costs and friction by the 
 normal state at rated speed.
 """
 
+import math
 from collections.abc import Mapping
 from functools import lru_cache
 
@@ -68,6 +69,30 @@ def friction_scales(p: EhaParameters) -> Mapping[str, float]:
         "friction_linear": force / velocity,
         "friction_coulomb": force,
     }
+
+
+def natural_frequency(p: EhaParameters) -> float:
+    """Return the natural frequency of the piston on its oil, pump and valves shut, in the middle position.
+
+    Source: Merritt, Hydraulic Control Systems (1967), section 6-2, for two chambers of ``2 V_0`` each.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    float
+        [Hz]
+
+    Examples
+    --------
+    >>> round(natural_frequency(EhaParameters()))
+    39
+    """
+    stiffness = p.bulk_modulus * p.piston_area**2 / p.chamber_volume
+    return (stiffness / p.moving_mass) ** 0.5 / (2.0 * math.pi)
 
 
 def _rated_flow(p: EhaParameters) -> float:

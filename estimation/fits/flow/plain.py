@@ -12,6 +12,7 @@ from estimation.fits.explaining.objections import fit_explains, limits
 from estimation.fits.explaining.toothed import toothed
 from estimation.fits.flow.log import carried, flow_log
 from estimation.fits.flow.search import balanced, flow_starts
+from estimation.fits.flow.swept import swept_evenly
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play import ShownPlay, play_untaken
@@ -186,7 +187,8 @@ def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
     unturned = with_course(log, fitted, parameters)
     log, fits, teeth, left = toothed(unturned, fitted, explains, largest, start.speed_offset)
     turning = Turning(log.teeth, log.speed_offset)
-    log = carried(log, parameters, _swinging(fits).values)
+    found = _swinging(fits).values
+    log = swept_evenly(carried(log, parameters, found), parameters, found)
     return PlainFits(start, starts, fitted, unturned, log, fits, explains, teeth, left, turning)
 
 

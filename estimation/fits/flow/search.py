@@ -15,6 +15,7 @@ from estimation.arrays import IntArray
 from estimation.fits.explaining.faults_tried import FAULTS_TRIED, usual_bias, usual_leakage, worse
 from estimation.fits.explaining.wide_problem import flow_bounds
 from estimation.fits.flow.log import DRAIN_START, OPENING_START, carried, outruns_pump
+from estimation.fits.flow.swept import swept_evenly
 from estimation.fits.flow.valley import FINISHING, Found, completed_form, from_valley
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import NEAR_ENOUGH, GreyBoxFit, Search, concluded, explained, roughly
@@ -141,7 +142,8 @@ def balanced(
     near = min((one for one in rough if not _held(one.problem)), key=lambda one: one.point.cost)
     likely = [one for one in rough if one is near or one.point.cost < least + RIVAL]
     behind = [one for one in rough if not (_held(one.problem) or one in likely)]
-    log, bent = carried(log, parameters, near.values), outruns_pump(log, parameters)
+    bent = outruns_pump(log, parameters)
+    log = swept_evenly(carried(log, parameters, near.values), parameters, near.values)
     first = rough[0] if rough[0] in likely else near  # whose kernel has fewer runs side by side
     steps = sparing_steps(first.problem.on(log), first.point.theta)
     done = each(lambda one: _finished(one, log, steps, bent=bent), likely)

@@ -278,3 +278,18 @@ def test_a_piston_that_pressure_cannot_move_tells_no_unit_of_speed() -> None:
     most = 0.7 * HEALTHY.friction_coulomb / HEALTHY.piston_area
     stuck = scaled(PRESSURE, most / float(np.max(np.abs(log[PRESSURE]))))(log)
     assert channel_mistakes(stuck, HEALTHY) == ()
+
+
+def test_a_spring_that_drives_a_piston_back_while_its_pump_goes_on_reverses_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The pump leaks all that it delivers; the balance of flows still says that pump and piston count alike."""
+    time = 1e-3 * np.arange(6000)
+    speed = -60.0 + 2.0 * np.cos(2.0 * time)
+    channels = {SPEED: speed, POSITION: 1e-5 * time - 1e-6 * np.sin(2.0 * time), PRESSURE: np.full(6000, -5e6)}
+    record = Record(1e-3, channels)
+    sound = FlowBalance(swept=1.0, swept_std=0.02, compressed=1.0, compressed_std=0.01, explained=0.999, moving=0.5)
+    monkeypatch.setattr(channel_physics, "flow_balance", lambda *_: sound)
+    before = channel_physics._reversed(record, channel_physics.channel_blocks(record, HEALTHY, 0.05), None)
+    assert [note.code for note in before] == [ChannelCode.CHANNEL_REVERSED]
+    assert channel_mistakes(record, HEALTHY) == ()

@@ -52,6 +52,13 @@ def test_no_sample_is_left_out_of_a_log_with_white_noise_or_none(drive: str, sen
         assert without_correlated_noise(record) == (record, ())
 
 
+def test_a_log_as_slow_as_its_actuator_rings_is_left_as_it_is() -> None:
+    record = log("steps")
+    smooth = record.replace(**{PRESSURE: averaged(record[PRESSURE], 4)})
+    assert without_correlated_noise(smooth, 99.0)[1]
+    assert without_correlated_noise(smooth, 101.0) == (smooth, ())
+
+
 @pytest.mark.parametrize("rows", [2, 3, 4, 5])
 @pytest.mark.parametrize("drive", ["steps", "multisine"])
 def test_an_averaged_pressure_keeps_samples_that_share_no_noise(drive: str, rows: int) -> None:
