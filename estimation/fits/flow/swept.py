@@ -1,4 +1,4 @@
-"""`swept_evenly(log, ...)`: positions whose straight lines between samples leak what the own course of a piston does."""
+"""`swept_evenly(log, ...)`: positions whose straight lines between samples leak as the piston's own course does."""
 
 from collections.abc import Mapping
 from dataclasses import replace
