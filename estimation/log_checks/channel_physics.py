@@ -121,7 +121,7 @@ def channel_mistakes(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     if balance is not None and balance.explained < EXPLAINED:
         balance = None
     units = tuple(_or_of_time(one, record.sample_time) for one in _pump_units(record, long, p, balance))
-    return _reversed(record, long, balance) or units or _pressure_units(middle, p, balance)
+    return _reversed(record, middle, long, balance) or units or _pressure_units(middle, p, balance)
 
 
 def _repeats_one_row(record: Record) -> bool:
@@ -200,13 +200,17 @@ def _moved(record: Record) -> str:
     return " and ".join(name for name in (POSITION, VELOCITY) if name in record)
 
 
-def _reversed(record: Record, long: ChannelBlocks, balance: FlowBalance | None) -> tuple[Note, ...]:
+def _reversed(
+    record: Record, middle: ChannelBlocks, long: ChannelBlocks, balance: FlowBalance | None
+) -> tuple[Note, ...]:
     """Say which of pump, piston and pressure counts the other way: two of the three go together.
 
     Oil yields to pressure, and what slides and leaks takes power: where neither is so, pump and pressure are opposed.
+    Of a sine whose half period is a long block, such blocks tell the phase at which they begin: a piston that lags a
+    little may then seem opposed. In shorter blocks it is not.
     """
     together, _ = gone_together(long.piston, long.pumped)
-    apart = together < OPPOSED and alike(long.piston, long.pumped)[0] < OPPOSED
+    apart = all(alike(one.piston, one.pumped)[0] < OPPOSED for one in (middle, long)) and together < OPPOSED
     with_pump = together > FOLLOWS
     opposed = with_pressure = False
     if balance is not None and long.pumped is not None:

@@ -10,6 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from estimation.fits.explaining.faithful import faithfully
 from estimation.fits.explaining.finished import ALIKE, REACHED, with_less_lag
 from estimation.fits.explaining.form_fit import weighed
 from estimation.fits.explaining.likeliest import NEARLY_AS_GOOD, apart, led_on, likeliest, ranked, settled_each
@@ -97,7 +98,7 @@ def explain(
     plain = _plain_point(wide, starts[0])
     likely, others, gains = promising(wide, (), starts[0], asked)
     left = left_by(wide, plain.cost)
-    spared = Spared(skipping(wide, left), left, starts)
+    spared = Spared(faithfully(wide, starts[0], skipping(wide, left)), left, starts)
     finished = _alone(wide, plain.cost, (likely, others, gains), spared, accepted)
     if finished[0].fits and not _explained(finished[0], accepted):
         finished = ranked([*finished, *filter(None, [with_less_lag(wide, finished[0])])])
@@ -139,7 +140,7 @@ def _alone(
     too little is not tried then, nor is a start from which the first hypothesis came nowhere.
     """
     (likely, others, gains), starts, every = asked, spared.starts, spared.every
-    faint = every == 1 and len(log.drives) >= FEW
+    faint = skipping(log, spared.left) == 1 and len(log.drives) >= FEW
     begun = [[*screened(log, (likely[0],), starts, every=every)]]
     if faint:
         places = [i for i, start in enumerate(starts) if start in hopeful(starts, begun)]
@@ -191,9 +192,10 @@ def _paired(
     likely, others, gains = promising(late, first.together, first.values, reached)
     begun = [_begun_again(log, first), {**plain, **own_starts(log, first.together[-1])[0]}]
     left = left_by(log, first.cost)
-    spared = Spared(skipping(log, left), left, begun)
+    every = faithfully(log, first.coarse or first.values, skipping(log, left), first.together, first.delays)
+    spared = Spared(every, left, begun)
     long, useful = len(log.drives) >= FEW, min(first.cost, rivalled) - WORTH
-    faint = long and spared.every == 1
+    faint = long and skipping(log, left) == 1
     if long:  # none is told that does not explain the log
         useful = min(useful, (REACHED if len(reached) < len(asked) else NEARLY) * first.cost / left)
     far, rest = [one for one in others if one.far], [one for one in others if not one.far]

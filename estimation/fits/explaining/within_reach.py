@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.fits.explaining.faithful import faithfully
 from estimation.fits.explaining.finished import REACHED, UNFINISHED
 from estimation.fits.explaining.settled import FINEST_DELAY, NEAR, at_end, coarse
 from estimation.fits.explaining.thinned import FEW, SHORT_STEP, left_by, skipping
@@ -72,7 +73,8 @@ def _all_together(log: GreyBoxLog, tried: Tried, left: float) -> tuple[float, di
     """Return what all hypotheses together leave over the noise, and where they end [SI]."""
     taken = {one.name for one in tried.together}
     more = [replace(one, instead=()) for one in HYPOTHESES if one.name not in taken]
-    every = max(skipping(log, left), round(SHORT_STEP / log.sample_time))
+    asked = max(skipping(log, left), round(SHORT_STEP / log.sample_time))
+    every = faithfully(log, tried.coarse or tried.values, asked, tried.together, tried.delays)
     row = coarse(log, tried.delays, tried.together, every)
     if not np.isfinite(row.measured).any():  # a pressure that comes slower, between the samples that are left
         row = coarse(log, tried.delays, tried.together)

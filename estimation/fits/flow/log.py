@@ -178,7 +178,19 @@ def flow_log(
     )
     log = averaged(log, LONGEST_STEP, _block(log, parameters))
     felt = log.noise[0].passed_on * parameters.bulk_modulus > FELT_NOISE * log.noise[0].variance ** 0.5
-    return replace(log, block=NOISY_BLOCK) if felt else log.taken_at(parameters.bulk_modulus)
+    return _noisy(log, parameters) if felt else log.taken_at(parameters.bulk_modulus)
+
+
+def _noisy(log: GreyBoxLog, p: EhaParameters) -> GreyBoxLog:
+    """Return a log whose output's noise has a part that goes with the oil's stiffness, and leaks off.
+
+    Position that is off by ``d`` compresses oil by ``b A d / V``, and in a time ``V / (b L)`` that has leaked off. Means
+    over `NOISY_BLOCK` are then off by ``A d / (L T)``, whatever the oil's stiffness. Without that bound, oil as stiff
+    as steel explained any log of a leaky actuator.
+    """
+    lost = (0.5 * log.sample_time * NOISY_BLOCK) ** 0.5 / p.chamber_volume
+    by = {"passed_over": ("chamber_volume", p.chamber_volume), "lost_by": ("leakage_coefficient", "case_leakage")}
+    return replace(log, noise=(replace(log.noise[0], **by, lost=lost),), block=NOISY_BLOCK)
 
 
 def carried(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float]) -> GreyBoxLog:

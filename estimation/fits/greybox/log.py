@@ -37,12 +37,42 @@ class OutputNoise:
         Standard deviation of what a driving channel's noise adds at once, over `passed_by` [SI].
     passed_by : str
         The unknown that the driving channel's noise is multiplied by, one that is fitted as a logarithm.
+    passed_over : tuple of str and float
+        The parameter that it is divided by, with the value that `passed_on` holds already [SI].
+    lost_by : tuple of str
+        Parameters by which it is lost again before the next samples.
+    lost : float
+        How much of it a unit of `passed_by` and of these loses [SI].
     """
 
     variance: float
     walk: float = 0.0
     passed_on: float = 0.0
     passed_by: str = ""
+    passed_over: tuple[str, float] = ("", 1.0)
+    lost_by: tuple[str, ...] = ()
+    lost: float = 0.0
+
+    def passing(self, values: Mapping[str, float]) -> tuple[float, dict[str, float]]:
+        """Return what a driving channel's noise adds to the output, and how that goes with each unknown.
+
+        Parameters
+        ----------
+        values : Mapping[str, float]
+            The unknowns [SI].
+
+        Returns
+        -------
+        tuple of float and dict
+            Standard deviation [SI], and the derivative of its logarithm by the logarithm of each unknown
+            [dimensionless].
+        """
+        divisor, usual = self.passed_over
+        felt = values.get(self.passed_by, 0.0) * usual / values.get(divisor, usual)
+        losses = {name: self.lost * felt * values.get(name, 0.0) for name in self.lost_by}
+        kept = 1.0 / (1.0 + sum(losses.values()))
+        goes = {name: -kept * loss for name, loss in losses.items()}
+        return self.passed_on * felt * kept, {self.passed_by: kept, divisor: -kept, **goes}
 
     def scaled(self, variance: float, walk: float = 1.0) -> "OutputNoise":
         """Return the noise times a factor.

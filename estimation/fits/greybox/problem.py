@@ -279,7 +279,7 @@ class Problem:
         if not self.log.passes_on:
             return np.zeros(len(self.log.noise))
         values = self.model.values(theta)
-        return np.array([(one.passed_on * values.get(one.passed_by, 0.0)) ** 2 for one in self.log.noise])
+        return np.array([one.passing(values)[0] ** 2 for one in self.log.noise])
 
     def _variances(self, theta: Array) -> Array:
         return self._white + self._passing(theta) if self._passes_on else self._white
@@ -287,10 +287,11 @@ class Problem:
     def _tilts(self, theta: Array) -> Iterator[tuple[int, int, float]]:
         """Yield each output whose variance moves with an unknown: its place, the unknown's, the share that moves."""
         if self.log.passes_on:
-            share = self._passing(theta) / self._variances(theta)
+            share, values = self._passing(theta) / self._variances(theta), self.model.values(theta)
             for i, noise in enumerate(self.log.noise):
-                if noise.passed_by in self.model.unknowns:  # fitted as logarithms
-                    yield i, self.model.unknowns.index(noise.passed_by), float(share[i])
+                for name, slope in noise.passing(values)[1].items():
+                    if name in self.model.unknowns:  # fitted as logarithms
+                        yield i, self.model.unknowns.index(name), float(share[i]) * slope
 
     def _tilted(self, theta: Array, errors: Array, slopes: Array) -> Array:
         """Return the derivatives of normalised residuals, those that were taken while the variance was held."""
