@@ -199,7 +199,7 @@ def _apart(members: Sequence[Member], near: tuple[int, ...]) -> list[Member]:
 
 def _same(one: Member, other: Member, near: tuple[int, ...]) -> bool:
     places = list(near)
-    deviation = np.sqrt(np.diag(other.covariance)[places])
+    deviation = np.sqrt(np.maximum(np.diag(other.covariance)[places], 0.0))  # rounding may leave less
     return bool(np.all(np.abs(one.mean - other.mean)[places] < NEAR * deviation))
 
 

@@ -1,4 +1,4 @@
-"""`faithfully(log, tried...)`: how many samples may be one while hypotheses are compared, so that costs stay what they are.
+"""`faithfully(log, values, every)`: how many samples may be one while hypotheses are compared, so that costs stay.
 
 A long model step errs where make-up valves and relief fill a chamber faster, and where the pumped flow has a corner. On
 the paper's rig that is 2 % of the cost at steps of 4 ms; where chambers are small and oil is stiff it was up to a

@@ -184,9 +184,9 @@ def flow_log(
 def _noisy(log: GreyBoxLog, p: EhaParameters) -> GreyBoxLog:
     """Return a log whose output's noise has a part that goes with the oil's stiffness, and leaks off.
 
-    Position that is off by ``d`` compresses oil by ``b A d / V``, and in a time ``V / (b L)`` that has leaked off. Means
-    over `NOISY_BLOCK` are then off by ``A d / (L T)``, whatever the oil's stiffness. Without that bound, oil as stiff
-    as steel explained any log of a leaky actuator.
+    Position that is off by ``d`` compresses oil by ``b A d / V``, which leaks off in a time ``V / (b L)``. So means
+    over ``T`` are off by ``A d / (L T)`` at most, whatever the oil's stiffness. Without that bound, oil as stiff as
+    steel explained any log of a leaky actuator.
     """
     lost = (0.5 * log.sample_time * NOISY_BLOCK) ** 0.5 / p.chamber_volume
     by = {"passed_over": ("chamber_volume", p.chamber_volume), "lost_by": ("leakage_coefficient", "case_leakage")}

@@ -22,6 +22,12 @@ BLOCK = 1e-3
 """Usual length over which residuals are averaged before they are squared [s]."""
 
 
+SHARP = 4.0
+"""How sharply what a driving channel's noise adds comes to the most that losses leave of it [dimensionless]; judged. By
+an impulse response and white noise it is less about the corner, but a quantised position is no white noise: with 1 a
+leaky stiff actuator kept 1.3 times its noise, bulk modulus 1.5 % low; with 4 1.05 times, and 0.2 %."""
+
+
 @dataclass(frozen=True)
 class OutputNoise:
     """Noise of an output.
@@ -42,7 +48,7 @@ class OutputNoise:
     lost_by : tuple of str
         Parameters by which it is lost again before the next samples.
     lost : float
-        How much of it a unit of `passed_by` and of these loses [SI].
+        How much of it a unit of `passed_by` and of these loses, over what is left at most [SI].
     """
 
     variance: float
@@ -70,9 +76,10 @@ class OutputNoise:
         divisor, usual = self.passed_over
         felt = values.get(self.passed_by, 0.0) * usual / values.get(divisor, usual)
         losses = {name: self.lost * felt * values.get(name, 0.0) for name in self.lost_by}
-        kept = 1.0 / (1.0 + sum(losses.values()))
-        goes = {name: -kept * loss for name, loss in losses.items()}
-        return self.passed_on * felt * kept, {self.passed_by: kept, divisor: -kept, **goes}
+        lost = sum(losses.values())
+        kept = 1.0 / (1.0 + lost**SHARP)
+        goes = {name: -(1.0 - kept) * loss / lost for name, loss in losses.items() if loss > 0.0}
+        return self.passed_on * felt * kept ** (1.0 / SHARP), {self.passed_by: kept, divisor: -kept, **goes}
 
     def scaled(self, variance: float, walk: float = 1.0) -> "OutputNoise":
         """Return the noise times a factor.

@@ -290,6 +290,16 @@ def test_a_spring_that_drives_a_piston_back_while_its_pump_goes_on_reverses_noth
     record = Record(1e-3, channels)
     sound = FlowBalance(swept=1.0, swept_std=0.02, compressed=1.0, compressed_std=0.01, explained=0.999, moving=0.5)
     monkeypatch.setattr(channel_physics, "flow_balance", lambda *_: sound)
-    before = channel_physics._reversed(record, channel_physics.channel_blocks(record, HEALTHY, 0.05), None)
+    short, long = (channel_physics.channel_blocks(record, HEALTHY, length) for length in (0.02, 0.05))
+    before = channel_physics._reversed(record, short, long, None)
     assert [note.code for note in before] == [ChannelCode.CHANNEL_REVERSED]
     assert channel_mistakes(record, HEALTHY) == ()
+
+
+@pytest.mark.parametrize(("begins", "sign", "named"), [(-80.0, 1.0, False), (0.0, 1.0, False), (0.0, -1.0, True)])
+def test_a_piston_that_lags_a_sine_is_not_opposed_to_it(begins: float, sign: float, *, named: bool) -> None:
+    """Half a period is a long block: its means tell the phase at which blocks begin, and a lag turns their sign."""
+    angle = 20.0 * np.pi * 1e-3 * np.arange(3001) + np.deg2rad(begins)
+    position = -sign * 1e-3 * np.cos(angle - np.deg2rad(60.0))
+    found = channel_mistakes(Record(1e-3, {SPEED: 100.0 * np.sin(angle), POSITION: position}), HEALTHY)
+    assert (ChannelCode.CHANNEL_REVERSED in [note.code for note in found]) == named

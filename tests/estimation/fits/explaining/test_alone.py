@@ -11,14 +11,14 @@ import pytest
 
 from estimation.fits.explaining import explain
 from estimation.fits.explaining.promises import Promise
-from estimation.fits.explaining.thinned import FEW, Spared
+from estimation.fits.explaining.thinned import FAINT, FEW, Spared
 from estimation.fits.explaining.tried import Tried
 from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import DELIVERY, OFFSET, Hypothesis
 
 COST = attrgetter("cost")
 
-LONG: Any = SimpleNamespace(drives=np.zeros((FEW, 1)))
+LONG: Any = SimpleNamespace(drives=np.zeros((FEW, 1)), sample_time=1e-3)
 
 
 def hypothesis(name: str, *, far: bool = False) -> Hypothesis:
@@ -35,11 +35,12 @@ LIKELY, FAR, SOME, NONE = hypothesis("likely"), hypothesis("far", far=True), hyp
 @pytest.fixture(autouse=True)
 def reached(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(explain, "within_reach", lambda _, __, asked: asked)
+    monkeypatch.setattr(explain, "faithfully", lambda _, __, every, *___: every)
 
 
-@pytest.mark.parametrize(("every", "asked"), [(1, "far some"), (2, "far some none")])
+@pytest.mark.parametrize(("left", "asked"), [(1.5, "far some"), (5.0, "far some none")])
 def test_what_promises_too_little_is_not_tried_where_little_is_left(
-    every: int, asked: str, monkeypatch: pytest.MonkeyPatch
+    left: float, asked: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[tuple[str, list[Any]]] = []
 
@@ -57,9 +58,9 @@ def test_what_promises_too_little_is_not_tried_where_little_is_left(
     starts: Any = [*ends]
     # 120 are needed of 1000 to come as low as what is known
     gains = {"far": 0.0, "some": 121.0 / explain.TRUSTED, "none": 119.0 / explain.TRUSTED}
-    spared = Spared(every, 1.5, starts)
+    spared = Spared(1, left, starts)
     explain._alone(LONG, 1000.0, ([LIKELY], [FAR, SOME, NONE], gains), spared, lambda _: False)  # pyright: ignore[reportPrivateUsage]
-    assert told == [(asked, ["a"] if every == 1 else [*ends])]
+    assert told == [(asked, ["a"] if left < FAINT else [*ends])]
 
 
 @pytest.mark.parametrize(("likely", "other", "order"), [(500.0, 50.0, [50.0, 500.0]), (50.0, 500.0, [50.0, 500.0])])

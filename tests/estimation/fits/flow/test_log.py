@@ -114,13 +114,29 @@ def test_the_slope_of_the_cost_holds_what_the_variance_changes_by(kind: type[Pro
         STIFFNESS: 0.0,
     }
     theta = problem.model.theta(start)
-    place = problem.model.unknowns.index("bulk_modulus")
-    step = 1e-3 * np.eye(len(theta))[place]
-    slope = (problem.at(theta + step).cost - problem.at(theta - step).cost) / 2e-3
-    gradient = problem.at(theta).gradient[place]
-    assert gradient == pytest.approx(slope, rel=0.01)
-    held = gradient + problem.untilted(theta, problem.residuals(theta))[place]
-    assert abs(held - gradient) > 0.05 * abs(gradient)  # the test can tell
+    for unknown, least in (("bulk_modulus", 0.05), ("leakage_coefficient", 0.0)):
+        place = problem.model.unknowns.index(unknown)
+        step = 1e-3 * np.eye(len(theta))[place]
+        slope = (problem.at(theta + step).cost - problem.at(theta - step).cost) / 2e-3
+        gradient = problem.at(theta).gradient[place]
+        assert gradient == pytest.approx(slope, rel=0.01)
+        held = gradient + problem.untilted(theta, problem.residuals(theta))[place]
+        assert abs(held - gradient) > least * abs(gradient)  # the test can tell
+
+
+def test_noise_of_position_leaks_off_and_goes_with_stiffness_over_volume() -> None:
+    """Else oil as stiff as steel, or twice the volume with twice the modulus, would explain any leaky actuator."""
+    noise = flow_log(*_sound(log("normal", 7, duration=4.0)[0])).noise[0]
+
+    def passed(modulus: float, volume: float = 1.0, leakage: float = 1e-10, case: float = 0.0) -> float:
+        values = {"bulk_modulus": modulus, "leakage_coefficient": leakage, "case_leakage": case}
+        return noise.passing({**values, "chamber_volume": volume * HEALTHY.chamber_volume})[0]
+
+    assert passed(2e8, leakage=0.0) == pytest.approx(2e8 * noise.passed_on)
+    assert passed(4e8, 2.0) == pytest.approx(passed(2e8))
+    assert passed(1e14) == pytest.approx(passed(1e12), rel=0.01)
+    assert passed(1e14, leakage=0.0, case=1e-10) == pytest.approx(passed(1e14))
+    assert passed(1e14, leakage=2e-10) == pytest.approx(0.5 * passed(1e14), rel=0.01)
 
 
 def _sound(record: Record) -> tuple[Record, EhaParameters, dict[str, float], dict[str, float]]:
