@@ -79,7 +79,8 @@ class OutputNoise:
         lost = sum(losses.values())
         kept = 1.0 / (1.0 + lost**SHARP)
         goes = {name: -(1.0 - kept) * loss / lost for name, loss in losses.items() if loss > 0.0}
-        return self.passed_on * felt * kept ** (1.0 / SHARP), {self.passed_by: kept, divisor: -kept, **goes}
+        goes |= {name: slope for name, slope in ((self.passed_by, kept), (divisor, -kept)) if name in values}
+        return self.passed_on * felt * kept ** (1.0 / SHARP), goes
 
     def scaled(self, variance: float, walk: float = 1.0) -> "OutputNoise":
         """Return the noise times a factor.

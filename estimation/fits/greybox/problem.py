@@ -289,9 +289,8 @@ class Problem:
         if self.log.passes_on:
             share, values = self._passing(theta) / self._variances(theta), self.model.values(theta)
             for i, noise in enumerate(self.log.noise):
-                for name, slope in noise.passing(values)[1].items():
-                    if name in self.model.unknowns:  # fitted as logarithms
-                        yield i, self.model.unknowns.index(name), float(share[i]) * slope
+                for name, slope in noise.passing(values)[1].items():  # fitted as logarithms
+                    yield i, self.model.unknowns.index(name), float(share[i]) * slope
 
     def _tilted(self, theta: Array, errors: Array, slopes: Array) -> Array:
         """Return the derivatives of normalised residuals, those that were taken while the variance was held."""
