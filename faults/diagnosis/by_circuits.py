@@ -61,7 +61,7 @@ def _around(log: CleanLog, actuator: Actuator, numbers: Calibration) -> Diagnosi
     probabilities = board.probabilities(numbers)
     circuits = circuits_left_open(board.blocks, board.fits, actuator, probabilities)
     told_by = partial(severities, board.fits, actuator, numbers.widths(pressure), circuits)
-    severity = told_by()
+    severity = told_by(None, None)
     found = Diagnosis(
         probabilities,
         against,

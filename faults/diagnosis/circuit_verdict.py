@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from estimation.finding import Quantity
 from faults.diagnosis.evidence import Scoreboard
-from faults.diagnosis.severity import KnownLosses
+from faults.diagnosis.severity import KnownFriction, KnownLosses
 from plant.notes import Note
 
 
@@ -30,7 +30,7 @@ class Diagnosis:
     scoreboard : Scoreboard
         The evidences, and the circuit that was fitted.
     told_by : callable, optional
-        ``told_by(known)``: its severities where leakage and flow bias are known otherwise.
+        ``told_by(losses, rubbing)``: its severities where leakage and flow bias, or friction, are known otherwise.
     """
 
     probabilities: Mapping[str, float]
@@ -40,7 +40,7 @@ class Diagnosis:
     limits: Mapping[str, float]
     not_told: tuple[Note, ...]
     scoreboard: Scoreboard
-    told_by: Callable[[KnownLosses], Mapping[str, Quantity]] | None = None
+    told_by: Callable[[KnownLosses | None, KnownFriction | None], Mapping[str, Quantity]] | None = None
 
     @property
     def condition(self) -> str:

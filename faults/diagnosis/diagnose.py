@@ -121,7 +121,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
         without = _without_class(found, log, scores, distinct((*case.doubts, *verdict.against)))
         said = ClassCode.NO_CIRCUIT if isinstance(error, RigError) else ClassCode.NO_PROBABILITIES
         return replace(without, notes=(*found.notes, said.note(reason=error.message)))
-    diagnosis = by_the_balance(_from_the_rigs_oil(diagnosis, case.healthy), estimate)
+    diagnosis = by_the_balance(_from_the_rigs_oil(diagnosis, case.healthy), estimate, log.record, case.healthy)
     found = replace(found, notes=(*found.notes, *named), evidence=EhaEvidence(estimate, scores, diagnosis))
     left = doubts_after(case.doubts, estimate, log, around, diagnosis.scoreboard)
     stands = class_without_balance(left, diagnosis, estimate, actuator_of(around))

@@ -1,26 +1,30 @@
-"""`by_the_balance(diagnosis, estimate)`: severities of a log whose leakage and flow bias the balance of flows tells.
+"""`by_the_balance(diagnosis, estimate, record, p)`: severities by the balances of flows and of forces.
 
 A fitted circuit tells leakage with the whole motion: where its seals yield otherwise than real ones do, it makes up for
 that by leakage. The balance of flows knows pump, piston and pressure, and nothing of friction. Where it explains a log,
 leakage is known some twenty times as well by it, and what hangs on leakage in the steady state is better known too.
+Friction is told by `known_friction` then, which knows nothing of the pump.
 """
 
 from dataclasses import replace
-from math import inf
 
 import numpy as np
 
 from estimation.eha.result import BulkModulusEstimate
-from estimation.finding import Outcome, Quantity
+from estimation.finding import Outcome
 from faults.diagnosis.circuit_verdict import Diagnosis
-from faults.diagnosis.not_told import what_is_not_told
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.known_friction import friction_by_forces
+from faults.diagnosis.not_told import extent, what_is_not_told
 from faults.diagnosis.severity import KnownLosses
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
 
 LOSSES = ("leakage_coefficient", "flow_bias")
 
 
-def by_the_balance(diagnosis: Diagnosis, estimate: BulkModulusEstimate) -> Diagnosis:
-    """Return a diagnosis whose severities have the leakage and the flow bias that the balance of flows tells.
+def by_the_balance(diagnosis: Diagnosis, estimate: BulkModulusEstimate, record: Record, p: EhaParameters) -> Diagnosis:
+    """Return a diagnosis whose severities have what the balances of flows and of forces tell.
 
     Parameters
     ----------
@@ -28,28 +32,37 @@ def by_the_balance(diagnosis: Diagnosis, estimate: BulkModulusEstimate) -> Diagn
         Of a log.
     estimate : BulkModulusEstimate
         Of that log.
+    record : Record
+        That log, as it was diagnosed.
+    p : EhaParameters
+        The healthy actuator.
 
     Returns
     -------
     Diagnosis
-        The same one where the balance does not explain the log without further causes, where the circuit tells leakage
-        better, or is not that of the whole log: its leakage drifts or changes.
+        With the leakage and the flow bias of the one, and the friction of the other, each where it is told better than
+        by the circuit. The same one where the balance of flows does not explain the log without further causes, or
+        where the circuit is not that of the whole log: its leakage drifts or changes.
     """
-    known, blocks = known_losses(estimate), diagnosis.scoreboard.blocks
+    losses, blocks = known_losses(estimate), diagnosis.scoreboard.blocks
     changes = blocks.course is not None or blocks.earlier is not None or diagnosis.scoreboard.onset is not None
-    if known is None or changes or diagnosis.scoreboard.drift is not None or diagnosis.told_by is None:
+    if losses is None or changes or diagnosis.scoreboard.drift is not None or diagnosis.told_by is None:
         return diagnosis
-    severity = diagnosis.told_by(known)
-    if _extent(severity["leakage_flow"]) >= _extent(diagnosis.severity["leakage_flow"]):
+    circuits = diagnosis.severity
+    severity = diagnosis.told_by(losses, None)
+    if extent(severity["leakage_flow"]) >= extent(circuits["leakage_flow"]):
+        losses, severity = None, circuits
+    rubbing = friction_by_forces(record, p, actuator_of(p).rated)
+    if rubbing is not None:
+        rubbed = diagnosis.told_by(losses, rubbing)
+        if extent(rubbed["added_friction"]) < extent(severity["added_friction"]):
+            severity = rubbed
+    if severity is circuits:
         return diagnosis
-    fits, both = diagnosis.scoreboard.fits, (diagnosis.severity, severity)
-    by_circuit, told = (what_is_not_told(fits, one, pressure=True) for one in both)
+    fits = diagnosis.scoreboard.fits
+    by_circuit, told = (what_is_not_told(fits, one, pressure=True) for one in (circuits, severity))
     others = [note for note in diagnosis.not_told if note not in by_circuit]
     return replace(diagnosis, severity=severity, not_told=(*told, *others))
-
-
-def _extent(one: Quantity) -> float:
-    return inf if one.ci95 is None else one.ci95[1] - one.ci95[0]
 
 
 def known_losses(estimate: BulkModulusEstimate) -> KnownLosses | None:

@@ -1,6 +1,7 @@
 """What a log does not tell of how bad it is: notes, and the severities of which it says nothing."""
 
 from collections.abc import Collection, Mapping
+from math import inf, nan
 
 from estimation.finding import Quantity
 from faults.diagnosis.circuits.class_regions import ClassFits
@@ -40,7 +41,7 @@ def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure
     lost = [] if unseen else _velocity_lost(speed)  # which hangs on friction too
     if not pressure:
         said += [ClassCode.ONE_SCALE.note(), *lost]
-    elif _width(flow) > VAGUE * _extent(speed) / 100.0 and _width(flow) > 0.3:
+    elif _width(flow) > VAGUE * extent(speed) / 100.0 and _width(flow) > 0.3:
         said += [ClassCode.LEAKAGE_AND_BIAS_ALIKE.note(), *lost]
     return said
 
@@ -76,9 +77,12 @@ def _velocity_lost(speed: Quantity) -> list[Note]:
     return [ClassCode.VELOCITY_LOST_TOLD.note(percent=speed.value, low=speed.ci95[0], high=speed.ci95[1])]
 
 
-def _extent(one: Quantity) -> float:
-    return float("nan") if one.ci95 is None else one.ci95[1] - one.ci95[0]
+def extent(one: Quantity) -> float:
+    """Return how far apart the ends of a severity's interval are [its unit]; infinite where it has none."""
+    return inf if one.ci95 is None else one.ci95[1] - one.ci95[0]
 
 
 def _width(one: Quantity) -> float:
-    return _extent(one) / abs(one.value) if one.value else float("inf")
+    if one.ci95 is None:
+        return nan
+    return extent(one) / abs(one.value) if one.value else inf

@@ -11,8 +11,9 @@ from estimation.finding import Quantity
 from estimation.log_checks.order import percentile
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
-from faults.diagnosis.circuits.circuit_runs import friction_parts, parameter_rows
+from faults.diagnosis.circuits.circuit_runs import COLUMN, friction_parts, parameter_rows
 from faults.diagnosis.circuits.class_regions import ClassFits
+from faults.diagnosis.circuits.friction_shape import FORCES
 from faults.diagnosis.circuits.open_classes import OpenCircuit
 from plant.arrays import Array
 from plant.components.friction import quadratic_friction
@@ -60,6 +61,24 @@ class KnownLosses(NamedTuple):
     covariance: Array
 
 
+class KnownFriction(NamedTuple):
+    """Friction that is known otherwise than by a fitted circuit.
+
+    Parameters
+    ----------
+    forces : ndarray, shape (3,)
+        At rest, its quadratic part at rated velocity, and all of it there [N].
+    covariance : ndarray, shape (3, 3)
+        Of their errors [N^2].
+    bent : ndarray, shape (3, 3)
+        The same where the law of friction may have another shape [N^2].
+    """
+
+    forces: Array
+    covariance: Array
+    bent: Array
+
+
 def severities_at(point: Array, actuator: Actuator) -> Mapping[str, float]:
     """Return the severities of a circuit.
 
@@ -78,10 +97,16 @@ def severities_at(point: Array, actuator: Actuator) -> Mapping[str, float]:
     return {name: float(values[0]) for name, values in _of_circuits(point[None], actuator).items()}
 
 
-def _of_circuits(points: Array, actuator: Actuator) -> Mapping[str, Array]:
-    """Return the severities of many circuits, each of shape (n,)."""
+def _of_circuits(points: Array, actuator: Actuator, forces: Array | None = None) -> Mapping[str, Array]:
+    """Return the severities of many circuits, each of shape (n,); ``forces``, shape (n, 3), are other friction."""
     healthy = actuator.circuit
-    p = circuit_values(parameter_rows(points, healthy, actuator.rated))
+    rows = parameter_rows(points, healthy, actuator.rated)
+    if forces is not None:
+        rest, bent, whole = forces.T
+        rows[:, COLUMN["friction_coulomb"]] = rest
+        rows[:, COLUMN["friction_linear"]] = (whole - rest - bent) / actuator.rated
+        rows[:, COLUMN["friction_quadratic"]] = bent / actuator.rated**2
+    p = circuit_values(rows)
     velocity, pressure = steady_state(healthy.rated_speed, p)
     sound_velocity, sound_pressure = _settled(healthy)
     rubbing, sound = (
@@ -110,6 +135,7 @@ def severities(
     widths: Mapping[str, float] | None = None,
     circuits: Sequence[OpenCircuit] = (),
     known: KnownLosses | None = None,
+    rubbing: KnownFriction | None = None,
 ) -> Mapping[str, Quantity]:
     """Return the severities of a fitted circuit with their intervals.
 
@@ -127,6 +153,8 @@ def severities(
     known : KnownLosses, optional
         Leakage and flow bias in place of the circuit's. Its friction stays: what a fit made up for by leakage is not
         what the derivatives say that it is.
+    rubbing : KnownFriction, optional
+        Friction in place of the circuit's.
 
     Returns
     -------
@@ -137,10 +165,11 @@ def severities(
     among = circuits or [OpenCircuit(fits.best.coordinates, 1.0)]
     if known is not None:
         among = [one._replace(coordinates=np.append(known.logarithms, one.coordinates[2:])) for one in among]
-    found = _under(_with_losses(fits.spread, known), among, actuator, widths or {})
+    straight, curved = (None, None) if rubbing is None else ((rubbing.forces, one) for one in rubbing[1:])
+    found = _under(_with_losses(fits.spread, known), among, actuator, widths or {}, straight)
     if not np.any(fits.moved):
         return found
-    bent = _under(_with_losses(fits.bent_spread, known), among, actuator, widths or {})
+    bent = _under(_with_losses(fits.bent_spread, known), among, actuator, widths or {}, curved)
     return found | {name: replace(found[name], ci95_total=bent[name].ci95) for name in OF_FRICTION}
 
 
@@ -155,13 +184,25 @@ def _with_losses(spread: Array, known: KnownLosses | None) -> Array:
 
 
 def _under(
-    spread: Array, among: Sequence[OpenCircuit], actuator: Actuator, widths: Mapping[str, float]
+    spread: Array,
+    among: Sequence[OpenCircuit],
+    actuator: Actuator,
+    widths: Mapping[str, float],
+    rubbing: tuple[Array, Array] | None,
 ) -> dict[str, Quantity]:
-    """Return the severities of the likeliest circuit, with intervals of all under a covariance of their coordinates."""
+    """Return the severities of the likeliest circuit, with intervals of all under a covariance of their coordinates.
+
+    ``rubbing`` are forces of friction and their covariance, in place of the circuits'.
+    """
     centre = max(among, key=lambda one: one.probability).coordinates
-    drawn = _centres(among) + _normal_draws(len(centre)) @ np.linalg.cholesky(spread).T
+    draws = _normal_draws(len(centre))
+    drawn, forces, known = _centres(among) + draws @ np.linalg.cholesky(spread).T, None, None
+    if rubbing is not None:
+        known = rubbing[0][None]
+        forces = known + draws[:, FORCES] @ np.linalg.cholesky(rubbing[1]).T
     with np.errstate(all="ignore"):  # friction that falls faster than leakage holds has no steady state
-        table, best = _of_circuits(drawn, actuator), severities_at(centre, actuator)
+        table = _of_circuits(drawn, actuator, forces)
+        best = {name: float(values[0]) for name, values in _of_circuits(centre[None], actuator, known).items()}
     found: dict[str, Quantity] = {}
     unresolved = _unresolved(actuator)
     for name, value in best.items():

@@ -1,0 +1,150 @@
+"""`friction_by_forces(record, p, rated)`: friction of a piston that slides, by the balance of forces alone.
+
+A fitted circuit tells friction with the whole motion, and what its seals do at reversals is judged. While a piston
+slides one way, what pressure pushes it with beyond its inertia is its friction, whatever pump and seals do. The three
+parts of the law are regressed on the velocities at which it slid; a steady force, as of a load or a sensor's zero, has
+another sign than friction by direction and is fitted beside them.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from estimation.arrays import IntArray
+from estimation.log_checks.channel_names import PRESSURE
+from faults.diagnosis.circuits.friction_shape import BEND, FADES
+from faults.diagnosis.circuits.model_doubt import SELDOM_KNOWN
+from faults.diagnosis.severity import KnownFriction
+from plant.arrays import Array
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.model import EhaParameters, load_on_rod
+from plant.log.record import Record
+
+POSITION = "position_m"
+
+WINDOW = 0.02
+"""Time over which forces are averaged [s]: sensors' noise averages, and velocity is nearly the same."""
+
+HALF_STEP = 1e-3
+"""Half of the time over which velocity is read off positions [s]."""
+
+SLIDES = 25.0
+"""Travel since a reversal from which a piston slides, in the rig's presliding displacements [dimensionless], judged:
+0.5 mm on the paper's actuator. Seals that yield by 0.05 mm one way have then yielded ten times that."""
+
+SLOWEST = 1e-3
+"""Velocity below which a piston may stick [m/s]."""
+
+FEWEST = 30
+"""Windows from which three parts of friction are told."""
+
+LASTS = 5
+"""Windows over which residuals are averaged, to see what lasts of them: a tenth of a second."""
+
+NOISE_ONLY = 2.0
+"""Residuals over the sensors' noise, by root mean square, above which the law is not that of this piston
+[dimensionless]. It is 1.0 to 1.4 on plain training logs."""
+
+CLIPPED, ROUNDS = 3.0, 6
+"""Deviations from which a residual counts linearly [dimensionless], and rounds of weights."""
+
+MOST_ALIKE = 1e12
+"""Largest condition of the normal equations [dimensionless]: beyond, a log does not tell the parts."""
+
+
+def friction_by_forces(record: Record, p: EhaParameters, rated: float) -> KnownFriction | None:
+    """Return the friction of a log whose piston slides.
+
+    Parameters
+    ----------
+    record : Record
+        Position and differential pressure, at any rate [m, Pa].
+    p : EhaParameters
+        The actuator; of it the area, the mass and the load on the rod.
+    rated : float
+        Its rated velocity [m/s].
+
+    Returns
+    -------
+    KnownFriction or None
+        None where one of the channels is not logged, where areas differ, so that differential pressure is no force,
+        where the piston hardly slides, and where more than the sensors' noise is left.
+    """
+    if not {POSITION, PRESSURE} <= set(record.channels) or p.area_difference or rated <= 0.0:
+        return None
+    position, pressure = (np.asarray(record[name], dtype=np.float64) for name in (POSITION, PRESSURE))
+    step = record.sample_time
+    half, length = max(1, round(HALF_STEP / step)), max(2, round(WINDOW / step))
+    if len(position) < 4 * half + length:
+        return None
+    noise = _noise(position, 3), _noise(pressure, 2)
+    position, known = np.nan_to_num(position), np.isfinite(position + pressure)
+    velocity = np.zeros(len(position))
+    velocity[half:-half] = (position[2 * half :] - position[: -2 * half]) / (2 * half * step)
+    way = np.where(known & (np.abs(velocity) >= SLOWEST), np.sign(velocity), 0.0)
+    way[:half], way[-half:] = 0.0, 0.0
+    yields = circuit_of(p).presliding_displacement
+    first = _windows(position, way, SLIDES * yields, length)
+    if len(first) < FEWEST:
+        return None
+    last, time = first + length, length * step
+    pushed = _mean(np.nan_to_num(pressure), first, length) * p.piston_area
+    pushed = pushed - load_on_rod(_mean(position, first, length), p)
+    inertia = p.moving_mass * (velocity[last] - velocity[first]) / time
+    direction = way[first]
+    speed = np.abs(position[last] - position[first]) / time / rated
+    square = _mean(velocity**2, first, length) / rated**2
+    columns = np.stack([1.0 - speed, square - speed, speed, direction, direction * inertia], axis=1)
+    least = (p.piston_area * noise[1]) ** 2 / length + (p.moving_mass * noise[0] / (half * step * time)) ** 2
+    bends = BEND * np.exp(-speed[:, None] / np.array(FADES))
+    return _told(columns, direction * (pushed - inertia), least, bends)
+
+
+def _windows(position: Array, way: Array, slides: float, length: int) -> IntArray:
+    """Return the first samples of windows in which the piston slides one way and has done so for a while."""
+    turns = np.concatenate([[0], np.flatnonzero(np.diff(way)) + 1, [len(way)]])
+    found = [np.empty(0, dtype=np.int64)]
+    for begin, end in pairwise(turns):
+        travel = np.abs(position[begin:end] - position[begin])
+        if way[begin] != 0.0 and end - begin > length and travel[-1] >= slides:
+            found.append(np.arange(begin + int(np.argmax(travel >= slides)), end - length, length))
+    return np.concatenate(found)
+
+
+def _mean(values: Array, first: IntArray, length: int) -> Array:
+    """Return means over windows by trapezoids."""
+    sums = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))])
+    return np.asarray((sums[first + length] - sums[first]) / length, dtype=np.float64)
+
+
+def _noise(values: Array, order: int) -> float:
+    """Return the deviation of a channel's white noise, which its differences of some order show."""
+    apart = np.abs(np.diff(values, order))
+    apart = apart[np.isfinite(apart)]
+    return 1.4826 * float(np.median(apart)) / math.sqrt(math.comb(2 * order, order)) if len(apart) else math.inf
+
+
+def _told(columns: Array, forces: Array, least: float, bends: Array) -> KnownFriction | None:
+    """Return the regression of forces, whose noise has some variance at the least [N^2]; bends are shares of rest."""
+    count, unknowns = columns.shape
+    prior = np.zeros((unknowns, unknowns))
+    prior[-1, -1] = SELDOM_KNOWN["moving_mass"] ** -2
+    weights, power = np.ones(count), least
+    for _ in range(ROUNDS):
+        weighted = columns.T * weights
+        normal = weighted @ columns + prior * power
+        if not np.linalg.cond(normal[:-1, :-1]) < MOST_ALIKE:
+            return None
+        found = np.linalg.solve(normal, weighted @ forces)
+        left = forces - columns @ found
+        power = max(least, float(weights @ left**2) / max(1.0, float(np.sum(weights)) - unknowns))
+        weights = 1.0 / np.maximum(1.0, np.abs(left) / (CLIPPED * math.sqrt(power)))
+    if power > NOISE_ONLY**2 * least:
+        return None
+    together = left[: count // LASTS * LASTS].reshape(-1, LASTS).sum(axis=1)
+    lasting = float(np.mean(together**2)) / LASTS / power * count / (count - unknowns)
+    inverse = np.linalg.inv(normal)
+    covariance = (inverse * power * max(1.0, lasting))[:3, :3]
+    bent = (inverse @ (columns.T * weights) @ bends)[:3] * found[0]
+    return KnownFriction(found[:3], covariance, covariance + bent @ bent.T)
