@@ -130,21 +130,22 @@ def _told(columns: Array, forces: Array, least: float, bends: Array) -> KnownFri
     count, unknowns = columns.shape
     prior = np.zeros((unknowns, unknowns))
     prior[-1, -1] = SELDOM_KNOWN["moving_mass"] ** -2
-    weights, power = np.ones(count), least
+    power, left = least, np.zeros(count)
+    weighed, inverse, found = columns.T, prior, np.zeros(unknowns)
     for _ in range(ROUNDS):
-        weighted = columns.T * weights
-        normal = weighted @ columns + prior * power
+        weights = 1.0 / np.maximum(1.0, np.abs(left) / (CLIPPED * math.sqrt(power)))
+        weighed = columns.T * weights
+        normal = weighed @ columns + prior * power
         if not np.linalg.cond(normal[:-1, :-1]) < MOST_ALIKE:
             return None
-        found = np.linalg.solve(normal, weighted @ forces)
+        inverse = np.linalg.inv(normal)
+        found = inverse @ (weighed @ forces)
         left = forces - columns @ found
         power = max(least, float(weights @ left**2) / max(1.0, float(np.sum(weights)) - unknowns))
-        weights = 1.0 / np.maximum(1.0, np.abs(left) / (CLIPPED * math.sqrt(power)))
     if power > NOISE_ONLY**2 * least:
         return None
     together = left[: count // LASTS * LASTS].reshape(-1, LASTS).sum(axis=1)
     lasting = float(np.mean(together**2)) / LASTS / power * count / (count - unknowns)
-    inverse = np.linalg.inv(normal)
-    covariance = (inverse * power * max(1.0, lasting))[:3, :3]
-    bent = (inverse @ (columns.T * weights) @ bends)[:3] * found[0]
-    return KnownFriction(found[:3], covariance, covariance + bent @ bent.T)
+    covariance = np.asarray((inverse * power * max(1.0, lasting))[:3, :3], dtype=np.float64)
+    bent = (inverse @ weighed @ bends)[:3] * found[0]
+    return KnownFriction(found[:3], covariance, np.asarray(covariance + bent @ bent.T, dtype=np.float64))

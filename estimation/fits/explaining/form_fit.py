@@ -129,7 +129,24 @@ def weighed(
     Mapping[str, tuple of float]
         Value and deviation by parameter [SI].
     """
-    weights = weights_of(fits, temper, beforehand)
+    return averaged(fits, weights_of(fits, temper, beforehand))
+
+
+def averaged(fits: Sequence[GreyBoxFit], weights: Array) -> Mapping[str, tuple[float, float]]:
+    """Return values and deviations over several models of one log under given weights, see `weighed`.
+
+    Parameters
+    ----------
+    fits : sequence of GreyBoxFit
+        Of the same log, with the same unknowns.
+    weights : ndarray, shape (fits,)
+        As `weights_of` returns them [fraction].
+
+    Returns
+    -------
+    Mapping[str, tuple of float]
+        Value and deviation by parameter [SI].
+    """
     best = min(fits, key=lambda fit: fit.cost)
     found: dict[str, tuple[float, float]] = {}
     for name in (name for name in best.values if all(name in fit.values for fit in fits)):

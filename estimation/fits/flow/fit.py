@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.fits.explaining.delivery import contradicted
 from estimation.fits.explaining.explain import WORTH, explain
-from estimation.fits.explaining.form_fit import DISCRETISED, FormFit, weighed, weights_of, with_structure
+from estimation.fits.explaining.form_fit import DISCRETISED, FormFit, averaged, weights_of, with_structure
 from estimation.fits.explaining.left_open import share_lost, valves_unseen, wear_open
 from estimation.fits.explaining.objections import doubted, fit_explains_all, limits, objections
 from estimation.fits.explaining.speed_instead import speed_instead
@@ -304,8 +304,8 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     """Return what a log says that is believed to have nothing strange about it."""
     best = plain.best
     beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in plain.fits]
-    found, weights = weighed(plain.fits, SURER, beforehand), weights_of(plain.fits, SURER, beforehand)
-    found, correlation = with_lumped(found, plain.fits, weights, plain.start.parameters)
+    weights = weights_of(plain.fits, SURER, beforehand)
+    found, correlation = with_lumped(averaged(plain.fits, weights), plain.fits, weights, plain.start.parameters)
     found = with_small_teeth(found, best.small_teeth)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     untaken, open_play = plain.play_untaken(plain.swinging.play, sensed)

@@ -14,8 +14,13 @@ from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.known_losses import by_the_balance, known_losses
 from faults.diagnosis.severity import severities
 from faults.notes import ClassCode
+from plant.log.record import Record
+from tests.faults.diagnosis.test_known_friction import WHOLE
+from tests.faults.diagnosis.test_known_friction import record as sliding
 from tests.faults.diagnosis.test_severity import ACTUATOR, NARROW, RIG, extent, fits
 
+HEALTHY = RIG.friction_coulomb + RIG.friction_linear * ACTUATOR.rated + RIG.friction_quadratic * ACTUATOR.rated**2
+NOTHING = Record(1e-3, {"motor_speed_rad_s": np.zeros(9)})
 LEAKAGE, BIAS = 1.02 * RIG.leakage_coefficient, 0.99 * RIG.flow_bias
 
 
@@ -39,21 +44,33 @@ def diagnosis(**changed: Any) -> Diagnosis:
     known, told_by = fits(NARROW), partial(severities, fits(NARROW), ACTUATOR, {}, ())
     whole = {"onset": None, "drift": None, "blocks": SimpleNamespace(course=None, earlier=None)} | changed
     board = cast(Any, SimpleNamespace(fits=known, **whole))
-    return Diagnosis({}, (), told_by(), {}, {}, (), board, told_by)
+    return Diagnosis({}, (), told_by(None, None), {}, {}, (), board, told_by)
+
+
+def told(one: Diagnosis, by: BulkModulusEstimate, log: Record = NOTHING) -> Diagnosis:
+    return by_the_balance(one, by, log, RIG)
 
 
 def test_leakage_is_the_balances_and_friction_the_circuits() -> None:
-    circuit, told = diagnosis().severity, by_the_balance(diagnosis(), estimate()).severity
-    assert told["leakage_flow"].value == pytest.approx(6e4 * (LEAKAGE * RIG.relief_pressure + BIAS))
-    assert extent(told["leakage_flow"]) < 0.1 * extent(circuit["leakage_flow"])
-    assert extent(told["velocity_lost"]) < extent(circuit["velocity_lost"])
-    assert told["added_friction"].ci95 == pytest.approx(circuit["added_friction"].ci95, rel=0.2)
-    assert told["added_friction"].value == circuit["added_friction"].value
+    circuit, found = diagnosis().severity, told(diagnosis(), estimate()).severity
+    assert found["leakage_flow"].value == pytest.approx(6e4 * (LEAKAGE * RIG.relief_pressure + BIAS))
+    assert extent(found["leakage_flow"]) < 0.1 * extent(circuit["leakage_flow"])
+    assert extent(found["velocity_lost"]) < extent(circuit["velocity_lost"])
+    assert found["added_friction"].ci95 == pytest.approx(circuit["added_friction"].ci95, rel=0.2)
+    assert found["added_friction"].value == circuit["added_friction"].value
+
+
+def test_friction_is_that_of_the_balance_of_forces_where_it_knows_it_better() -> None:
+    circuit, forces = told(diagnosis(), estimate()).severity, told(diagnosis(), estimate(), sliding()).severity
+    assert forces["added_friction"].value == pytest.approx(WHOLE - HEALTHY, abs=20.0)
+    assert extent(forces["added_friction"]) < 0.5 * extent(circuit["added_friction"])
+    assert extent(forces["pressure_rise"]) < 0.5 * extent(circuit["pressure_rise"])
+    assert forces["leakage_flow"] == circuit["leakage_flow"]
 
 
 def test_notes_of_others_than_the_circuit_stay() -> None:
     of_the_pump = ClassCode.WEAR_NOT_TOLD.note(percent=5.0, limit=90.0)
-    assert by_the_balance(replace(diagnosis(), not_told=(of_the_pump,)), estimate()).not_told == (of_the_pump,)
+    assert told(replace(diagnosis(), not_told=(of_the_pump,)), estimate()).not_told == (of_the_pump,)
 
 
 @pytest.mark.parametrize(
@@ -69,14 +86,14 @@ def test_notes_of_others_than_the_circuit_stay() -> None:
 )
 def test_a_balance_that_is_refused_or_needs_another_cause_tells_no_leakage(changed: dict[str, Any]) -> None:
     assert known_losses(estimate(**changed)) is None
-    assert by_the_balance(one := diagnosis(), estimate(**changed)) is one
+    assert told(one := diagnosis(), estimate(**changed)) is one
 
 
 @pytest.mark.parametrize("changed", [{"onset": object()}, {"drift": object()}])
 def test_a_leakage_that_changes_within_a_log_is_not_that_of_the_whole(changed: dict[str, Any]) -> None:
-    assert by_the_balance(one := diagnosis(**changed), estimate()) is one
+    assert told(one := diagnosis(**changed), estimate()) is one
 
 
 def test_what_the_circuit_knows_better_stays() -> None:
     open_by = {"leakage_coefficient": (LEAKAGE, 0.5 * LEAKAGE), "flow_bias": (BIAS, 0.5 * BIAS)}
-    assert by_the_balance(one := diagnosis(), estimate(others=open_by)) is one
+    assert told(one := diagnosis(), estimate(others=open_by)) is one

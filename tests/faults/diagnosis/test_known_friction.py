@@ -1,0 +1,91 @@
+"""Friction by the balance of forces, on records made of Newton's second law alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.known_friction import FEWEST, friction_by_forces
+from faults.diagnosis.severity import severities
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from tests.faults.diagnosis.test_severity import ACTUATOR, NARROW, extent, fits
+
+RIG = EhaParameters()
+RATED = actuator_of(RIG).rated
+REST, BENT, WHOLE = 480.0, 900.0, 2300.0
+STEP = 1e-3
+
+
+def record(seed: int = 0, *, mass: float = RIG.moving_mass, load: float = 0.0, by_place: float = 0.0) -> Record:
+    """A piston under two sines of velocity, rated velocity at the most, with a bench's noise."""
+    rng, time = np.random.default_rng(seed), np.arange(0.0, 6.0, STEP)
+    pace = np.array([0.7, 2.0]) * 2.0 * np.pi
+    sizes = 0.5 * RATED / pace
+    position = sizes @ (1.0 - np.cos(np.outer(pace, time)))
+    velocity = (sizes * pace) @ np.sin(np.outer(pace, time))
+    acceleration = (sizes * pace**2) @ np.cos(np.outer(pace, time))
+    speed = np.abs(velocity) / RATED
+    friction = REST + (WHOLE - REST - BENT) * speed + BENT * speed**2
+    friction *= 1.0 + by_place * np.sin(2.0 * np.pi * position / 0.02)
+    force = mass * acceleration + np.sign(velocity) * friction + load
+    noise = rng.standard_normal(len(time))
+    channels = {
+        "position_m": np.round(position / 1e-6) * 1e-6,
+        "differential_pressure_pa": force / RIG.piston_area + 5e3 * noise,
+    }
+    return Record(STEP, channels)
+
+
+@pytest.mark.parametrize("load", [0.0, 200.0])
+def test_friction_at_rated_velocity_is_told_as_well_as_is_said(load: float) -> None:
+    found = [friction_by_forces(record(seed, load=load), RIG, RATED) for seed in range(12)]
+    z = [(one.forces[2] - WHOLE) / one.covariance[2, 2] ** 0.5 for one in found if one is not None]
+    assert len(z) == len(found)
+    assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.5
+    assert all(one is not None and one.covariance[2, 2] ** 0.5 < 5.0 for one in found)
+
+
+def test_a_mass_that_is_a_tenth_off_is_not_taken_for_friction() -> None:
+    found = friction_by_forces(record(mass=1.1 * RIG.moving_mass), RIG, RATED)
+    assert found is not None
+    assert abs(found.forces[2] - WHOLE) < 3.0 * found.covariance[2, 2] ** 0.5
+
+
+def test_a_law_of_another_shape_leaves_more_open() -> None:
+    found = friction_by_forces(record(), RIG, RATED)
+    assert found is not None
+    assert np.all(np.diag(found.bent) > np.diag(found.covariance))
+
+
+def test_no_friction_is_told_where_the_law_does_not_hold_or_a_log_does_not_show_it() -> None:
+    one = record()
+    for other in (
+        record(by_place=0.2),
+        Record(STEP, {"position_m": one["position_m"]}),
+        Record(STEP, {**one.channels, "position_m": 1e-3 * one["position_m"]}),
+        Record(STEP, {name: one[name][: FEWEST * 20] for name in one.channels}),
+    ):
+        assert friction_by_forces(other, RIG, RATED) is None
+    assert friction_by_forces(one, replace(RIG, area_difference=0.1), RATED) is None
+
+
+def test_samples_that_are_missing_are_left_out() -> None:
+    one, whole = record(), friction_by_forces(record(), RIG, RATED)
+    holed = np.where(np.arange(len(one)) % 500 < 100, np.nan, one["differential_pressure_pa"])
+    found = friction_by_forces(Record(STEP, {**one.channels, "differential_pressure_pa": holed}), RIG, RATED)
+    assert whole is not None
+    assert found is not None
+    assert found.forces[2] == pytest.approx(whole.forces[2], abs=5.0 * found.covariance[2, 2] ** 0.5)
+    assert found.covariance[2, 2] > whole.covariance[2, 2]
+
+
+def test_severities_take_the_friction_and_leave_leakage() -> None:
+    known = friction_by_forces(record(), RIG, RATED)
+    circuit, told = severities(fits(NARROW), ACTUATOR), severities(fits(NARROW), ACTUATOR, rubbing=known)
+    assert known is not None
+    healthy = RIG.friction_coulomb + RIG.friction_linear * RATED + RIG.friction_quadratic * RATED**2
+    assert told["added_friction"].value == pytest.approx(known.forces[2] - healthy)
+    assert extent(told["added_friction"]) == pytest.approx(2.0 * 1.96 * known.covariance[2, 2] ** 0.5, rel=0.1)
+    assert told["leakage_flow"] == circuit["leakage_flow"]
