@@ -26,6 +26,10 @@ POSITION = "position_m"
 WINDOW = 0.02
 """Time over which forces are averaged [s]: sensors' noise averages, and velocity is nearly the same."""
 
+RESOLVED = 10
+"""Samples in a window at least: slower logs do not show what pressure and velocity do within one. At 100 Hz, friction
+under binary drives was six deviations off."""
+
 HALF_STEP = 1e-3
 """Half of the time over which velocity is read off positions [s]."""
 
@@ -68,15 +72,15 @@ def friction_by_forces(record: Record, p: EhaParameters, rated: float) -> KnownF
     Returns
     -------
     KnownFriction or None
-        None where one of the channels is not logged, where areas differ, so that differential pressure is no force,
+        None where one of the channels is not logged, or too slowly, where areas differ, so that differential pressure is no force,
         where the piston hardly slides, and where more than the sensors' noise is left.
     """
     if not {POSITION, PRESSURE} <= set(record.channels) or p.area_difference or rated <= 0.0:
         return None
     position, pressure = (np.asarray(record[name], dtype=np.float64) for name in (POSITION, PRESSURE))
     step = record.sample_time
-    half, length = max(1, round(HALF_STEP / step)), max(2, round(WINDOW / step))
-    if len(position) < 4 * half + length:
+    half, length = max(1, round(HALF_STEP / step)), round(WINDOW / step)
+    if length < RESOLVED or len(position) < 4 * half + length:
         return None
     noise = _noise(position, 3), _noise(pressure, 2)
     position, known = np.nan_to_num(position), np.isfinite(position + pressure)

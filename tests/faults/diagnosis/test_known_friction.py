@@ -66,6 +66,7 @@ def test_no_friction_is_told_where_the_law_does_not_hold_or_a_log_does_not_show_
         Record(STEP, {"position_m": one["position_m"]}),
         Record(STEP, {**one.channels, "position_m": 1e-3 * one["position_m"]}),
         Record(STEP, {name: one[name][: FEWEST * 20] for name in one.channels}),
+        Record(10.0 * STEP, {name: one[name][::10] for name in one.channels}),
     ):
         assert friction_by_forces(other, RIG, RATED) is None
     assert friction_by_forces(one, replace(RIG, area_difference=0.1), RATED) is None
