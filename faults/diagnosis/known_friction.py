@@ -72,8 +72,8 @@ def friction_by_forces(record: Record, p: EhaParameters, rated: float) -> KnownF
     Returns
     -------
     KnownFriction or None
-        None where one of the channels is not logged, or too slowly, where areas differ, so that differential pressure is no force,
-        where the piston hardly slides, and where more than the sensors' noise is left.
+        None where one of the channels is not logged, or too slowly, where areas differ, so that differential pressure
+        is no force, where the piston hardly slides, and where more than the sensors' noise is left.
     """
     if not {POSITION, PRESSURE} <= set(record.channels) or p.area_difference or rated <= 0.0:
         return None

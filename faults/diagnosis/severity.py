@@ -211,7 +211,8 @@ def _under(
             continue
         finite = table[name][~np.isnan(table[name])]
         low, high = (percentile(finite, percent) if len(finite) else np.nan for percent in (2.5, 97.5))
-        stretch = widths.get(name, 1.0)
+        of_forces = rubbing is not None and name in OF_FRICTION  # factors were fitted to errors of circuits
+        stretch = 1.0 if of_forces else widths.get(name, 1.0)
         least = unresolved.get(name, 0.0)
         ends = value - stretch * (value - low) - least, value + stretch * (high - value) + least
         if name == "bulk_modulus" and stretch != 1.0:  # never negative, however wide

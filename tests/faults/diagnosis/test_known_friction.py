@@ -89,4 +89,8 @@ def test_severities_take_the_friction_and_leave_leakage() -> None:
     healthy = RIG.friction_coulomb + RIG.friction_linear * RATED + RIG.friction_quadratic * RATED**2
     assert told["added_friction"].value == pytest.approx(known.forces[2] - healthy)
     assert extent(told["added_friction"]) == pytest.approx(2.0 * 1.96 * known.covariance[2, 2] ** 0.5, rel=0.1)
+    assert (
+        severities(fits(NARROW), ACTUATOR, {"added_friction": 2.0}, rubbing=known)["added_friction"]
+        == told["added_friction"]
+    )  # factors were fitted to circuits
     assert told["leakage_flow"] == circuit["leakage_flow"]
