@@ -6,17 +6,19 @@ leakage is known some twenty times as well by it, and what hangs on leakage in t
 Friction is told by `known_friction` then, which knows nothing of the pump.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
+from math import isfinite
 
 import numpy as np
 
 from estimation.eha.result import BulkModulusEstimate
-from estimation.finding import Outcome
+from estimation.finding import Outcome, Quantity
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.known_friction import friction_by_forces
 from faults.diagnosis.not_told import extent, what_is_not_told
-from faults.diagnosis.severity import KnownLosses
+from faults.diagnosis.severity import OF_FRICTION, KnownLosses
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 
@@ -55,7 +57,7 @@ def by_the_balance(diagnosis: Diagnosis, estimate: BulkModulusEstimate, record: 
     rubbing = friction_by_forces(record, p, actuator_of(p).rated)
     if rubbing is not None:
         rubbed = diagnosis.told_by(losses, rubbing)
-        if extent(rubbed["added_friction"]) < extent(severity["added_friction"]):
+        if _told_better(rubbed, severity):
             severity = rubbed
     if severity is circuits:
         return diagnosis
@@ -63,6 +65,12 @@ def by_the_balance(diagnosis: Diagnosis, estimate: BulkModulusEstimate, record: 
     by_circuit, told = (what_is_not_told(fits, one, pressure=True) for one in (circuits, severity))
     others = [note for note in diagnosis.not_told if note not in by_circuit]
     return replace(diagnosis, severity=severity, not_told=(*told, *others))
+
+
+def _told_better(rubbed: Mapping[str, Quantity], severity: Mapping[str, Quantity]) -> bool:
+    """Return whether friction is told better, and all that hangs on it is told: a law may have no steady state."""
+    narrower = (extent(rubbed[name]) < extent(severity[name]) for name in ("added_friction", "pressure_rise"))
+    return all(narrower) and all(isfinite(extent(rubbed[name])) for name in OF_FRICTION)
 
 
 def known_losses(estimate: BulkModulusEstimate) -> KnownLosses | None:

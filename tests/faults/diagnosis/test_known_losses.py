@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimation.eha.result import BulkModulusEstimate
-from estimation.finding import Gate, Outcome
+from estimation.finding import Gate, Outcome, Quantity
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.known_losses import by_the_balance, known_losses
 from faults.diagnosis.severity import severities
@@ -66,6 +66,19 @@ def test_friction_is_that_of_the_balance_of_forces_where_it_knows_it_better() ->
     assert extent(forces["added_friction"]) < 0.5 * extent(circuit["added_friction"])
     assert extent(forces["pressure_rise"]) < 0.5 * extent(circuit["pressure_rise"])
     assert forces["leakage_flow"] == circuit["leakage_flow"]
+
+
+def test_the_circuits_friction_stays_where_the_balance_of_forces_has_no_steady_state() -> None:
+    one = diagnosis()
+    assert one.told_by is not None
+    by_circuit = one.told_by
+
+    def without(losses: Any, rubbing: Any) -> Any:
+        found = dict(by_circuit(losses, rubbing))
+        return found if rubbing is None else found | {"velocity_lost": Quantity(None, "%")}
+
+    found = told(replace(one, told_by=without), estimate(), sliding()).severity
+    assert found == by_circuit(known_losses(estimate()), None)
 
 
 def test_notes_of_others_than_the_circuit_stay() -> None:
