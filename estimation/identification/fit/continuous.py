@@ -114,7 +114,7 @@ class _Problem:
             return self
         whole = int(np.floor(self.dead_time / self.sample_time + 1e-9))
         least = whole + LEAST_LEFT * self.n_poles
-        if whole == 0 or not all(self.data.used[part][least:].any() for part in self.data.slices):
+        if whole == 0 or not self.data.goes_on_behind(least):
             return self
         rest = max(self.dead_time - whole * self.sample_time, 0.0)
         return _Problem(self.data.advanced(whole), self.sample_time, self.n_zeros, self.n_poles, rest)

@@ -14,6 +14,9 @@ from estimation.identification.free_run.linear_problem import Form, LinearFit, P
 from estimation.identification.search.criterion import Structure, held_within
 from estimation.identification.search.experiments import Experiments
 
+LONG_DEAD_TIME = 20
+"""Dead time beyond which outputs are brought forward in place of a free state of as many values [samples]."""
+
 FIRST_STEPS = 20
 """Evaluations of each of several starts."""
 
@@ -120,6 +123,8 @@ def _searched(problem: Problem) -> list[Array]:
         u = np.concatenate([one[:, index] for one in data.u])
         pair = Experiments(u, np.where(problem.used, problem.y, 0.0), problem.used, bounds)
         structure = Structure(size, form.order, delay)
+        if delay > LONG_DEAD_TIME and pair.goes_on_behind(delay + form.order):
+            pair, structure = pair.advanced(delay), Structure(size, form.order)
         # what is found there is a start: the best after a few steps goes on alone
         begun = screened(structure, pair)[0][1]
         # the initial state of a section is not the record's

@@ -97,6 +97,10 @@ class Experiments:
         bounds = self.bounds - samples * np.arange(self.bounds.size)
         return replace(self, u=self.u[early], y=self.y[late], used=self.used[late], bounds=bounds)
 
+    def goes_on_behind(self, samples: int) -> bool:
+        """Return whether each experiment has outputs behind so many samples."""
+        return all(self.used[part][samples:].any() for part in self.slices)
+
     def measured(self) -> Array:
         """Return the output with NaN where it is missing, shape (n,)."""
         return np.where(self.used, self.y, np.nan)

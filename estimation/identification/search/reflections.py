@@ -4,6 +4,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.search.descent import solve_damped
+from estimation.identification.search.jit import compiled
 
 FARTHEST = 2.0
 """Change of a coordinate in one step at most: what is left of the distance to one shrinks some 50-fold [dimensionless].
@@ -54,13 +55,36 @@ def denominator(reflected: Array) -> tuple[Array, Array]:
     [-1.5, 0.56]
     """
     n = reflected.size
-    row, slopes = np.zeros(0), np.zeros((0, n))
-    for size, last in enumerate(reflected):
-        by_last = np.append(row[::-1], 1.0)
-        slopes = np.vstack([slopes + last * slopes[::-1], np.zeros((1, n))])
-        slopes[:, size] = by_last
-        row = np.append(row, 0.0) + last * by_last
+    row, slopes = np.zeros(n), np.zeros((n, n))
+    _raise_order(np.ascontiguousarray(reflected), row, slopes)
     return row, slopes
+
+
+@compiled
+def _raise_order(reflected: Array, row: Array, slopes: Array) -> None:
+    """Fill a denominator behind its 1 and its derivative, both zero before, one order after the other (Levinson).
+
+    Parameters
+    ----------
+    reflected, row : ndarray, shape (n,)
+        Reflection coefficients, and receives the denominator.
+    slopes : ndarray, shape (n, n)
+        Receives the derivative.
+    """
+    for size in range(reflected.size):
+        last = reflected[size]
+        for i in range(size // 2 + size % 2):
+            j = size - 1 - i
+            for k in range(size):
+                near, far = slopes[i, k], slopes[j, k]
+                slopes[i, k] = near + last * far
+                slopes[j, k] = far + last * near
+            slopes[i, size], slopes[j, size] = row[j], row[i]
+            first, other = row[i], row[j]
+            row[i] = first + last * other
+            row[j] = other + last * first
+        row[size] = last
+        slopes[size, size] = 1.0
 
 
 def stable_step(

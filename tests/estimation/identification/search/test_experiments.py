@@ -32,6 +32,17 @@ def test_gaps_are_bridged_for_starts_only() -> None:
     assert np.isfinite(data.bridged()[0][1]).all()
 
 
+def test_outputs_brought_forward_answer_the_inputs_beside_them_in_every_experiment() -> None:
+    u, y = np.arange(1.0, 41.0) % 7, np.sin(np.arange(40.0))
+    data = experiments_from([u, u[:20]], [y, y[:20]], **WANTED)
+    late = data.advanced(3)
+    for moved, part in zip(late.slices, data.slices, strict=True):
+        np.testing.assert_array_equal(late.u[moved], data.u[part][:-3])
+        np.testing.assert_array_equal(late.y[moved], data.y[part][3:])
+    assert data.goes_on_behind(19)
+    assert not data.goes_on_behind(20)
+
+
 def test_one_output_for_each_input_is_wanted() -> None:
     u = np.arange(40.0) % 7
     with pytest.raises(HydrostateError, match="as many inputs as outputs are needed, got 2 and 1"):
