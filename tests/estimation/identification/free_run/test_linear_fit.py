@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from estimation.arrays import Array
+from estimation.identification.fit.output_error import screened
+from estimation.identification.free_run import linear_fit
 from estimation.identification.free_run.choose_linear import _forms, candidate, chosen, linear_candidates
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
 from estimation.identification.free_run.identify import identify_channels
@@ -16,7 +18,9 @@ from estimation.identification.free_run.linear_problem import Form, Problem
 from estimation.identification.free_run.other_structures import adopt
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
+from estimation.identification.search.criterion import Structure
 from estimation.identification.search.descent import stable
+from estimation.identification.search.experiments import Experiments
 from plant.errors import HydrostateError, LogWarning
 
 F = [1.0, -1.5, 0.7]
@@ -35,6 +39,22 @@ def plant(u: Array, seed: int, noise: float = 0.02, offset: float = 5.0) -> Arra
 def one_log(n: int = 600, seed: int = 1) -> Channels:
     u = 3.0 + steps(n, seed)
     return channels_from([u[:, None]], [plant(u, seed + 100)], 0.1, ["valve"], "level")
+
+
+def test_a_long_dead_time_adds_no_states_to_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    u = steps(400, 3, 20)
+    y = filtered([*[0.0] * 60, 0.5], [1.0, -0.5], u - u[0]) + 0.02 * np.random.default_rng(3).normal(size=u.size)
+    data = scaled(channels_from([u[:, None]], [y], 0.1, ["valve"], "level"))[0]
+    searched: list[int] = []
+
+    def spied(structure: Structure, pair: Experiments) -> list[tuple[float, Array]]:
+        searched.append(structure.n_states)
+        return screened(structure, pair)
+
+    monkeypatch.setattr(linear_fit, "screened", spied)
+    found = fit_linear(Form(1, (1,), (60,)), data)
+    assert searched == [1]
+    assert found.f[1] == pytest.approx(-0.5, abs=0.05)
 
 
 @pytest.mark.parametrize("order", [0, 1, 2, 5])
