@@ -48,6 +48,11 @@ class Task:
     rig: Rig[Any]
     groups: tuple[Group, ...]
     plant: str = DEFAULT
+    rigs: Mapping[str, Rig[Any]] = field(default_factory=dict[str, Rig[Any]])
+
+    def rig_of(self, series: Series) -> Rig[Any]:
+        """Return the rig of a series: that of a log's folder, if it has one, else the study's."""
+        return _rig_of(series, self.rig, self.rigs)
 
     @property
     def keys(self) -> list[str]:
@@ -63,11 +68,14 @@ class Plan:
     ----------
     blocks : tuple
         Series, and what is done with each of them, a block at a time.
+    rigs : Mapping[str, Rig]
+        Of the folders that have one of their own.
     """
 
     study: Study
     rig: Rig[Any]
     blocks: tuple[tuple[tuple[Series, ...], tuple[Work, ...]], ...]
+    rigs: Mapping[str, Rig[Any]] = field(default_factory=dict[str, Rig[Any]])
 
     def __len__(self) -> int:
         return sum(len(series) * len(works) for series, works in self.blocks)
@@ -86,7 +94,8 @@ class Plan:
         for series, works in self.blocks:
             encoded = [_bytes(asdict(work)) for work in works]
             for one in series:
-                begun = _hash(_content(one), common)
+                own = self.rigs.get(one.folder) if isinstance(one, Log) else None
+                begun = _hash(_content(one) if own is None else [*_content(one), _numbers(own)], common)
                 out.append(Group(one, tuple([_key(begun, text) for text in encoded]), works))
         return tuple(out)
 
@@ -118,7 +127,15 @@ class Plan:
             yield self._task(gathered)
 
     def _task(self, gathered: "_Gathered") -> Task:
-        return Task(self.rig, tuple(gathered.groups), self.study.plant)
+        return Task(self.rig, tuple(gathered.groups), self.study.plant, self.rigs)
+
+    def rig_of(self, series: Series) -> Rig[Any]:
+        """Return the rig of a series: that of a log's folder, if it has one, else the study's."""
+        return _rig_of(series, self.rig, self.rigs)
+
+
+def _rig_of(series: Series, rig: Rig[Any], rigs: Mapping[str, Rig[Any]]) -> Rig[Any]:
+    return rigs.get(series.folder, rig) if isinstance(series, Log) else rig
 
 
 def _left(group: Group, done: Collection[str]) -> Group:
@@ -171,10 +188,11 @@ def plan_study(study: Study, folder: Path) -> Plan:
             raise StudyError(f"runs[{place}] must be at most {MOST_SERIES:,} series, got up to {count:,}: lower seeds")
     kind = actuator(study.plant)
     rig = kind.read_rig(folder / study.rig if study.rig else None)
+    rigs = {name: kind.read_rig(folder / file) for name, file in study.rigs.items()}
     listed = _simulated if kind.name == DEFAULT else partial(simulated_of, kind)
-    series = [*map(listed, study.runs), *(_logs(one, place, folder) for place, one in enumerate(study.logs))]
+    series = [*map(listed, study.runs), *(_logs(one, place, folder, rigs) for place, one in enumerate(study.logs))]
     works = [_works(one.methods, one.starts_pa) for one in (*study.runs, *study.logs)]
-    return Plan(study, rig, tuple(zip(map(tuple, series), works, strict=True)))
+    return Plan(study, rig, tuple(zip(map(tuple, series), works, strict=True)), rigs)
 
 
 def _count(runs: Runs) -> int:
@@ -190,15 +208,21 @@ def package_version(name: str) -> str:
     return version(name)
 
 
-def config_hash(study: Study, rig: Rig[Any]) -> str:
-    """Return a hash of a study's content and its rig's.
+def config_hash(study: Study, rig: Rig[Any], rigs: Mapping[str, Rig[Any]]) -> str:
+    """Return a hash of a study's content, and of its rigs'.
+
+    Parameters
+    ----------
+    rigs : Mapping[str, Rig]
+        Of folders that have one of their own.
 
     Returns
     -------
     str
         32 hexadecimal digits.
     """
-    return _hash([study.model_dump(mode="json"), _numbers(rig)]).hexdigest()[:32]
+    told = study.model_dump(mode="json", exclude=None if rigs else {"rigs"})
+    return _hash([told, _numbers(rig), *map(_numbers, rigs.values())]).hexdigest()[:32]
 
 
 def _simulated(runs: Runs) -> Iterator[Simulated]:
@@ -220,7 +244,23 @@ def _works(methods: tuple[Method, ...], starts: tuple[float, ...]) -> tuple[Work
     )
 
 
-def _logs(logs: Logs, place: int, folder: Path) -> Iterator[Log]:
+def nearest_folder(file: str, folders: Collection[str]) -> str:
+    """Return which of several folders is the nearest above a file; empty where none is.
+
+    Parameters
+    ----------
+    file : str
+        Path with slashes, as those of the folders.
+
+    Examples
+    --------
+    >>> nearest_folder("a/b/c/run.csv", ["a", "a/b"]), nearest_folder("ab/run.csv", ["a"])
+    ('a/b', '')
+    """
+    return max((one for one in folders if file.startswith(f"{one.rstrip('/')}/")), key=len, default="")
+
+
+def _logs(logs: Logs, place: int, folder: Path, rigs: Mapping[str, Rig[Any]]) -> Iterator[Log]:
     pattern = str(folder / logs.glob)
     found = sorted(path for path in glob(pattern, recursive=True) if Path(path).is_file())  # noqa: PTH207 -- absolute too
     if not found:
@@ -232,7 +272,9 @@ def _logs(logs: Logs, place: int, folder: Path) -> Iterator[Log]:
         path = Path(name)
         relative = path.relative_to(folder) if path.is_relative_to(folder) else path
         columns = tuple(sorted(logs.columns.items()))
-        yield Log(relative.as_posix(), str(path.resolve()), content_of(path), path.stat().st_size, columns)
+        file = relative.as_posix()
+        own = nearest_folder(file, rigs)
+        yield Log(file, str(path.resolve()), content_of(path), path.stat().st_size, columns, own)
 
 
 def _content(series: Series) -> list[Any]:

@@ -8,18 +8,15 @@ from experiments.batch.cases import Plan
 from experiments.batch.folder import Folder
 from experiments.batch.part_store import PartStore
 from experiments.batch.series import Log
+from experiments.batch.standing import READ, standing_of
 from experiments.command.log_verb import page_of
 from experiments.command.logs import caught, read_log
 from experiments.fleet.log_pages import file_name
-from experiments.fleet.rows import log_rows
 from experiments.running.refusal import refused
 from plant.errors import HydrostateError
 
 PAGES = "pages"
 """Sub-folder of a store that holds them."""
-
-READ = ("file", "verb", "outcome", "found_condition", "reason", "quantities", "against")
-"""Columns of a store that say how bad a log is."""
 
 
 def write_log_pages(plan: Plan, store: PartStore, most: int) -> list[str]:
@@ -47,17 +44,18 @@ def write_log_pages(plan: Plan, store: PartStore, most: int) -> list[str]:
         for work in one.works
         if isinstance(one.series, Log) and work.verb == "diagnose"
     }
-    rows = [one for one in log_rows(store.rows(list(READ)).to_pylist(), {}, {}) if one.file in logs]
-    worst = sorted((one for one in rows if one.state != "failed"), key=lambda one: one.order)
+    rows = standing_of(store.rows(list(READ)))
+    worst = [one for one in rows if one.file in logs and one.state != "failed"]
     unwritten: list[str] = []
     for one in worst[:most]:
         series, work = logs[one.file]
+        rig = plan.rig_of(series)
         options = {**chosen.options, "seed": 0} | ({} if work.pressure else {"no_pressure": True})
         try:
             with caught():
-                record = read_log(Path(series.path), plan.rig.columns, dict(series.columns), kind.required)
-                found = chosen.run(record, *chosen.prepare(plan.rig, options))
-            result = {**chosen.blank, "file": one.file, "rig": plan.rig.name, **chosen.entries(found)}
+                record = read_log(Path(series.path), rig.columns, dict(series.columns), kind.required)
+                found = chosen.run(record, *chosen.prepare(rig, options))
+            result = {**chosen.blank, "file": one.file, "rig": rig.name, **chosen.entries(found)}
             page = page_of(chosen, result, found, record).encode()
             with refused(f"page of {one.file} cannot be written"):
                 store.folder.write(f"{PAGES}/{file_name(one.file)}", page)

@@ -12,7 +12,9 @@ from markupsafe import Markup
 
 from experiments.batch.compare import in_sentences
 from experiments.batch.figures import way_in_words
+from experiments.batch.standing import standing_in_words, with_standing
 from experiments.batch.summary import MOST_LISTED, NEAR_PERCENT
+from experiments.fleet.rows import STATES, LogRow
 from experiments.page.frames import Tables
 from experiments.page.names_shown import SHOWN
 from experiments.page.numbers import MISSING, decimals_of, fixed, number, pretty_unit, shop_unit
@@ -49,6 +51,11 @@ def _log(row: Row) -> Cell:
     """Return the name of a log, which leads to its page where there is one."""
     name = _or_dash(row["file"])
     return Cell(Markup('<a href="{}">{}</a>').format(row["page"], name) if row["page"] else name, "name")
+
+
+def _state(name: Any) -> Cell:
+    """Return how far a log is towards a limit, as a fleet tells it."""
+    return Cell(MISSING) if pd.isna(name) else Cell(STATES[name], f"fleet-{name}")
 
 
 def _times(margin: float | None) -> Cell:
@@ -89,6 +96,8 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
     "classes": (_condition("class"), Column("logs"), Column("percent", "of logs", "%", words=decimals(1))),
     "logs": (
         Column("file", "log", of_row=_log),
+        Column("state", words=_state),
+        _text("worst"),
         _text("verb", "asked"),
         Column("outcome", words=lambda value: spaced(_or_dash(value))),
         _condition("found_condition", "class"),
@@ -117,6 +126,7 @@ def render_batch_report(
     files: Mapping[str, bytes],
     done: int,
     pages: Mapping[str, str] = MappingProxyType({}),
+    worst: Sequence[LogRow] = (),
 ) -> str:
     """Return the report of a batch study as one HTML page.
 
@@ -132,6 +142,8 @@ def render_batch_report(
         Cases that are done [count].
     pages : Mapping[str, str]
         Path of a log's own page from the report, by log.
+    worst : sequence of LogRow
+        Logs that were diagnosed, the worst first, from `experiments.batch.standing.standing_of`.
 
     Returns
     -------
@@ -139,7 +151,12 @@ def render_batch_report(
         The page; it loads nothing.
     """
     listed = {name: one_row_a_log(table) if name in LISTED else table for name, table in tables.items()}
+    if "logs" in listed:
+        listed["logs"] = with_standing(listed["logs"], worst)
     shown = {name: _shown(listed[name], pages) for name in COLUMNS if name in listed}
+    logs_alone = "logs" in shown and manifest["cases"] == len(tables["logs"]) == done
+    if logs_alone:
+        shown["logs"] = _without_repetition(shown["logs"])
     columns = {
         name: [column for column in COLUMNS[name] if table[column.source].notna().any()]
         for name, table in shown.items()
@@ -152,11 +169,21 @@ def render_batch_report(
         "rows": {name: len(table) for name, table in listed.items()},
         "failed": int(tables["outcomes"]["failed"].sum()) if "outcomes" in tables else 0,
         "most_listed": MOST_LISTED,
+        "standing": standing_in_words(worst),
+        "logs_alone": logs_alone,
         "found": _classes_in_words(tables["classes"]) if "classes" in tables else "",
         "pictures": {path.removeprefix("figures/").removesuffix(".svg") for path in files},
         **shown,
     }
     return render_page("batch/report.html", facts, columns, files)
+
+
+def _without_repetition(logs: pd.DataFrame) -> pd.DataFrame:
+    """Return the table of logs without what every row says, and what severities say beside it; the CSV file has all."""
+    empty: dict[str, None] = {"verb": None} if logs["verb"].nunique() == 1 else {}
+    if logs["quantities"].notna().any():
+        empty |= dict.fromkeys(("runner_up", "margin", "bulk_modulus_pa", "bulk_modulus_std_pa"))
+    return logs.assign(**empty)
 
 
 def _classes_in_words(classes: pd.DataFrame) -> str:

@@ -5,6 +5,7 @@ from experiments.batch.folder import Folder
 from experiments.batch.log_pages import pages_in
 from experiments.batch.pages import render_batch_report
 from experiments.batch.part_store import PartStore
+from experiments.batch.standing import standing_of
 from experiments.batch.summary import frame_of, summary_tables
 from experiments.page.figure_files import figure_files
 from experiments.page.folder import csv_files
@@ -36,7 +37,7 @@ def write_report(store: PartStore, folder: Folder) -> str:
     drawings = {name: draw for name, draw in BATCH_FIGURES.items() if _drawable(name.replace("_", " "), tables)}
     figures = figure_files(drawings, tables)
     logs = tables["logs"]["file"].dropna().tolist() if "logs" in tables else []
-    page = render_batch_report(manifest, tables, figures, len(rows), pages_in(folder, logs)).encode()
+    page = render_batch_report(manifest, tables, figures, len(rows), pages_in(folder, logs), standing_of(rows)).encode()
     numbered = {name: table.reset_index() if table.index.name else table for name, table in tables.items()}
     with refused(f"report {folder.name} cannot be written"):
         for name, content in {**figures, **csv_files("tables", numbered), REPORT: page}.items():

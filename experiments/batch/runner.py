@@ -192,7 +192,7 @@ def manifest_of(plan: Plan, source: str) -> Mapping[str, Any]:
         "source": source,
         "question": plan.study.question,
         "cases": len(plan.keys),
-        "config_hash": config_hash(plan.study, plan.rig),
+        "config_hash": config_hash(plan.study, plan.rig, plan.rigs),
         "seeds": sorted({seed for runs in plan.study.runs for seed in runs.seed_list}),
         "config": plan.study.model_dump(mode="json"),
         "rig": plan.rig.name,

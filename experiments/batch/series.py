@@ -55,6 +55,8 @@ class Log:
         Hash of its bytes, see `content_of`.
     size : int
         Its length [byte].
+    folder : str
+        The folder whose rig file is the log's, as the study names it; empty for the study's own rig file.
     """
 
     file: str
@@ -62,6 +64,7 @@ class Log:
     content: str
     size: int
     columns: tuple[tuple[str, str], ...]
+    folder: str = ""
 
     @property
     def samples(self) -> int:

@@ -183,12 +183,15 @@ class Study(_Table):
         The kind of actuator that its runs and logs are of.
     rig : str
         The healthy actuator's rig file, relative to the study file; empty for the paper's.
+    rigs : dict[str, str]
+        Rig files of folders, both relative to the study file; a log takes that of the nearest folder above it.
     """
 
     name: Annotated[str, Field(min_length=1, max_length=100, pattern=NAME)]
     question: str = ""
     plant: str = DEFAULT
     rig: str = ""
+    rigs: dict[str, str] = {}
     runs: tuple[Runs, ...] = ()
     logs: tuple[Logs, ...] = ()
 

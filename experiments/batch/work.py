@@ -175,7 +175,7 @@ class _Prepared:
 
 
 def _prepared(series: Series, task: Task) -> _Prepared:
-    rig, kind = task.rig, actuator(task.plant)
+    rig, kind = task.rig_of(series), actuator(task.plant)
     other = None if kind.name == DEFAULT else kind
     if isinstance(series, Log):
         with _one_at_a_time, caught() as said:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.fleet.dates import told_date, told_dates
+from experiments.fleet.dates import HOURS, told_date, told_dates
 from experiments.fleet.naming import place_of, table_rows
 from experiments.fleet.rows import LogRow
 from faults.trend.crossing import HORIZON
@@ -98,7 +98,10 @@ class Outlook:
             return f"{span_of(*ends)} logs" if low != high else f"{ends[0]:.0f} log{'' if round(ends[0]) == 1 else 's'}"
         ahead = [self.days_apart * end for end in ends]
         places = [(self.logs[-1].named.place or 0.0) + days for days in ahead]
-        return told_dates(places, ahead) if low != high else told_date(places[0], ahead[0])
+        if low != high:
+            return told_dates(places, ahead)
+        farthest = self.days_apart * float(self.trend.crossing.quantiles[-1])
+        return told_date(places[0], max(ahead[0], min(farthest, HOURS)))  # of an interval of days, no hour
 
     @property
     def words(self) -> str:
@@ -123,11 +126,14 @@ class Outlook:
         if self.past or self.left is None or self.left[1] <= 0.0 or len(self.logs) - self.trend.begin < FEWEST:
             return f": {self.words}"
         low, middle, high = self.left
-        logs = f"about {middle:.0f} log{'' if round(middle) == 1 else 's'}"
+        logs = (
+            f"in about {middle:.0f} log{'' if round(middle) == 1 else 's'}" if middle >= 1.0 else "before the next log"
+        )
         if self.days_apart is None:
             half = self.when(1, 3).removesuffix(" logs")
-            return f" reaches its limit in {logs} (50 %: {half}; 90 %: {span_of(low, high)})"
-        return f" reaches its limit in {logs}: {self.when(2, 2)} (50 %: {self.when(1, 3)}; 90 %: {self.when(0, 4)})"
+            return f" reaches its limit {logs} (50 % interval: {half} logs; 90 %: {span_of(low, high)} logs)"
+        ends = f"50 % interval: {self.when(1, 3)}; 90 %: {self.when(0, 4)}"
+        return f" reaches its limit {logs}: {self.when(2, 2)} ({ends})"
 
 
 def span_of(low: float, high: float, horizon: float = HORIZON) -> str:

@@ -9,7 +9,7 @@ import pandas as pd
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.rows import STATES, LogRow
 from experiments.page.names_shown import SHOWN
-from experiments.page.numbers import MISSING, alike_in_digits, fixed, shop_unit
+from experiments.page.numbers import MISSING, alike_in_digits, fixed, number, shop_unit
 from experiments.page.render import render_page
 from experiments.page.scripting import data_block
 from experiments.page.tables import Cell, Column, right
@@ -92,7 +92,8 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     columns = [
         Column("state", words=lambda name: Cell(STATES[name], f"fleet-{name}")),
         Column("of the limit", unit="%", words=lambda share: right(fixed(share, 1))),
-        Column("logs left", digits=3),
+        Column("logs left", words=lambda left: right(number(left, 2))),
+        Column("last log", words=lambda day: Cell(day, "name")),
     ]
     shown = [next((one for one in columns if one.source == each["label"]), each["label"]) for each in COLUMNS]
     named = (Column("log", words=lambda name: Cell(name, "name")), *UNREAD[1:])
@@ -124,20 +125,25 @@ def title_of(rows: Sequence[ActuatorRow]) -> str:
         known, alone = list(rows), []
     counts = Counter(row.state for row in known)
     total = len(known) - counts["failed"]
-    sick = sum(counts[name] for name in SICK)
+    sick, certain = sum(counts[name] for name in SICK), counts["over"]
     stray = sum(row.state in SICK for row in alone)
     if not total:
         return "No log could be read."
     if total == 1 and not stray:
         return (
-            "The actuator nears a limit." if counts["alarm"] else f"The actuator is past {'a' if sick else 'no'} limit."
+            "The actuator nears a limit."
+            if counts["alarm"]
+            else f"The actuator is {'probably ' if sick and not certain else ''}past {'a' if sick else 'no'} limit."
         )
     more = [
+        f", {sick - certain} more probably" if certain and sick > certain else "",
         f"; {counts['alarm']} {'nears' if counts['alarm'] == 1 else 'near'} one" if counts["alarm"] else "",
         f"; {counts['unknown']} {'has' if counts['unknown'] == 1 else 'have'} no verdict" if counts["unknown"] else "",
         f"; {stray} of {len(alone)} logs without an actuator {'is' if stray == 1 else 'are'} past one" if stray else "",
     ]
-    who = f"{sick} of {total} actuators {'is' if sick == 1 else 'are'}" if sick else f"None of {total} actuators is"
+    told = certain or sick
+    who = f"{told} of {total} actuators {'is' if told == 1 else 'are'}" if sick else f"None of {total} actuators is"
+    who += " probably" if sick and not certain else ""
     return f"{who} past a limit{''.join(more)}."
 
 
@@ -154,7 +160,7 @@ def rig_hint(rows: Sequence[ActuatorRow]) -> str:
         return ""
     return (
         f"{len(unknown)} of {len(rows)} actuators fit none of the nine conditions. If they are of another size than "
-        "the rig file says, move their logs into a folder of their own, and give its rig file (--rig)."
+        "the rig file says, move their logs into a folder of their own, with their rig file in it as rig.toml."
     )
 
 

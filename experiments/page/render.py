@@ -13,7 +13,7 @@ from experiments.page.figure_files import image_of
 from experiments.page.numbers import exact, number
 from experiments.page.scripting import with_scripts
 from experiments.page.sentences import rig_in_words
-from experiments.page.tables import Columns, html_table
+from experiments.page.tables import Columns, folded_tables, html_table
 
 _HEADING = re.compile(r'<section id="([^"]+)"[^>]*>\s*<h2>([^:<]*)')
 _BEFORE_UNIT = re.compile(r"(?<=\d) (?=%|(?:V|Hz|kHz|mm|ms|psi|MPa|bar|N|s|L/min)\b)")
@@ -28,7 +28,8 @@ def render_page(
     ----------
     template : str
         The page's words, by their path below ``experiments``; it extends ``page/templates/page.html``. There
-        ``table(name, caption)``, ``figure(name, caption)`` and ``chart(name, caption)`` stand for what they name.
+        ``table(name, caption)``, ``folded(name, by, count)``, ``figure(name, caption)`` and ``chart(name, caption)``
+        stand for what they name.
     facts : Mapping[str, Any]
         What was found, by name: data frames that the page shows, `Charts` by name under ``charts``, and what else its
         words need.
@@ -46,6 +47,9 @@ def render_page(
     def table(name: str, caption: str, *, cards: bool = False) -> Markup:
         return html_table(facts[name], columns[name], " ".join(caption.split()), cards=cards)
 
+    def folded(name: str, by: str, count: str) -> Markup:
+        return folded_tables(facts[name], columns[name], by, count)
+
     def figure(name: str, caption: str) -> Markup:
         caption = " ".join(caption.split())
         image = image_of(files[f"figures/{name}.svg"], caption)
@@ -55,7 +59,8 @@ def render_page(
     def chart(name: str, caption: str) -> Markup:
         return facts["charts"][name].html(name, " ".join(caption.split()))
 
-    made = {"table": table, "figure": figure, "chart": chart, "headings_of": _headings_of, "errata_of": linked_errata}
+    made = {"table": table, "folded": folded, "figure": figure, "chart": chart}
+    made |= {"headings_of": _headings_of, "errata_of": linked_errata}
     page = _templates().get_template(template).render({**facts, **made})
     return with_scripts(_BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", page))
 

@@ -156,6 +156,30 @@ def html_table(frame: pd.DataFrame, columns: Columns, caption: str, *, cards: bo
     ).format(caption, Markup(' class="cards whole"') if cards else "", caption, head, rows)
 
 
+def folded_tables(frame: pd.DataFrame, columns: Columns, by: str, count: str) -> Markup:
+    """Return a long data frame as a table for each group of rows, which a click opens; paper shows all of them.
+
+    Parameters
+    ----------
+    by : str
+        Column that names the group of a row; groups stand in the order of their first rows.
+    count : str
+        Column whose values are counted in the line of a group.
+    """
+    made: list[Markup] = []
+    others = [one for one in columns if by not in (one, getattr(one, "source", None))]
+    for name, group in frame.groupby(by, sort=False):
+        counts = group[count].value_counts()
+        told = ", ".join(f"{number} {value}" for value, number in counts.items())
+        line = f"{name}: {len(group)} row{'' if len(group) == 1 else 's'} ({told})"
+        made.append(
+            Markup('<details class="group"><summary>{}</summary>{}</details>').format(
+                line, html_table(group, others, f"Rows of {name}.", cards=True)
+            )
+        )
+    return Markup("\n").join(made)
+
+
 def _named(frame: pd.DataFrame, columns: Columns) -> Iterator[Column]:
     told = {entry.source if isinstance(entry, Column) else entry for entry in columns}
     for entry in columns:

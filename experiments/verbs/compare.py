@@ -44,6 +44,8 @@ def compare(
         return
     if files:
         other = second if files[0] == first else first
+        if not Path(other).exists():
+            raise HydrostateError(f"{other}: there is no such file")
         raise HydrostateError(f"{files[0]} is a log, and {other} is none: compare takes two logs, or two stores")
     names = [Path(place.rstrip("/")).name for place in (first, second)]
     if names[0] == names[1]:

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 PAGE = "index.html"
 
+RIG = "rig.toml"
+"""Name of a rig file that lies among logs."""
+
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".gz", ".zst", ".parquet", ".feather", ".arrow", ".mat", ".h5", ".hdf5")
 OTHERS = (".tdms", ".mf4", ".mdf", ".xlsx")
 """Endings of files that are taken for logs; the second need a package for their format."""
@@ -59,7 +62,8 @@ def fleet(
     """Write the page of a fleet: which actuators are faulty, how badly, with links to the pages of their logs.
 
     The command diagnoses the logs of a folder into a store beside the page; run it again to continue where it stopped.
-    The last line of standard output is the path of the page.
+    Logs of actuators of another size go into a folder of their own, with their rig file in it as rig.toml. The last
+    line of standard output is the path of the page.
     """
     from experiments.batch.part_store import open_store
     from experiments.fleet.actuators import actuator_rows
@@ -73,11 +77,13 @@ def fleet(
     if Path(place).is_file():
         raise HydrostateError(f"{place}: must be a folder with logs or a store, got a file")
     store = open_store(place)
-    from_logs = store.manifest() is None
+    from_logs, rigs = store.manifest() is None, dict[str, Path]()
     if from_logs:
         logs = _logs_in(Path(place), out)
         _names([one.relative_to(place).as_posix() for one in logs], pattern, names)
-        store = _diagnosed(Path(place), logs, out, plant, rig, load_columns(columns), workers or os.cpu_count() or 1)
+        rigs = rigs_of_folders(Path(place), logs, rig)
+        rig = rigs.pop("", None)
+        store = _diagnosed(Path(place), logs, out, plant, rig, rigs, load_columns(columns), workers)
     table = store.rows(["file", "verb", "outcome", "found_condition", "reason", "quantities", "against"]).to_pylist()
     files = [row["file"] for row in table if row["file"]]
     named, unnamed = _names(files, pattern, names, Path(place).name if from_logs else "")
@@ -87,7 +93,7 @@ def fleet(
     if not rows:
         raise HydrostateError(f"{place}: must contain logs that were diagnosed (verb diagnose), but there are none")
     base = Path(place) if from_logs else Path()
-    links = write_pages(rows, out, pages, _page_writer(base, plant, rig, columns))
+    links = write_pages(rows, out, pages, _page_writer(base, plant, rig, rigs, columns))
     write_whole(out / PAGE, fleet_page(rows, links, Path(place).name), "--out", parents=True)
     _warn(rows, repairs, unnamed)
     failed = sum(one.state == "failed" for row in rows for one in row.logs)
@@ -201,8 +207,9 @@ def _diagnosed(
     out: Path,
     plant: str | None,
     rig: Path | None,
+    rigs: Mapping[str, Path],
     columns: Mapping[str, str],
-    workers: int,
+    workers: int | None,
 ) -> "PartStore":
     """Diagnose the logs of a folder into a store; Ctrl-C ends without a page, which would lack actuators."""
     from experiments.batch.cases import plan_study
@@ -218,12 +225,13 @@ def _diagnosed(
         "name": "fleet",
         "plant": kind.name,
         "rig": str(rig.resolve()) if rig else "",
+        "rigs": {name: str(file.resolve()) for name, file in rigs.items()},
         "logs": globs,
     }
     plan = plan_study(parse_study(content, f"{folder}"), folder)
     store = open_store(out / "store")
     with store.writing():
-        tally, before = run_plan(plan, store, "fleet", RunSettings(workers=workers))
+        tally, before = run_plan(plan, store, "fleet", RunSettings(workers=workers or os.cpu_count() or 1))
     if tally.stopped:
         done, total = before + tally.done, len(plan.keys)
         note(f"{tally.stopped}: {done} of {total} logs are kept in {store.name}; the same command goes on from there")
@@ -231,11 +239,44 @@ def _diagnosed(
     return store
 
 
-def _page_writer(base: Path, plant: str | None, rig: Path | None, columns: Any) -> Callable[[str, Path], bool]:
+def rigs_of_folders(folder: Path, logs: Sequence[Path], given: Path | None = None) -> dict[str, Path]:
+    """Return the rig files that lie among logs, each for the logs at and below its folder, and tell of them.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the fleet.
+    logs : sequence of Path
+        Its logs.
+    given : Path or None
+        Rig file of the logs in no folder that has one of its own, in place of that in the fleet's folder.
+
+    Returns
+    -------
+    dict[str, Path]
+        By the path of the folder from the fleet's, with slashes; empty for the fleet's own.
+    """
+    above = {one for log in logs for one in log.parents if one == folder or folder in one.parents}
+    found = {
+        "" if one == folder else one.relative_to(folder).as_posix(): one / RIG
+        for one in sorted(above)
+        if (one / RIG).is_file()
+    }
+    for name, file in found.items():
+        if name or given is None:
+            note(f"rig file of {f'the logs in {name}' if name else 'logs in no folder that has its own'}: {file}")
+    return found if given is None else {**found, "": given}
+
+
+def _page_writer(
+    base: Path, plant: str | None, rig: Path | None, rigs: Mapping[str, Path], columns: Any
+) -> Callable[[str, Path], bool]:
     """Return what writes the page of a log, and says whether the log is still there."""
     from experiments.actuators import offered
+    from experiments.batch.cases import nearest_folder
 
-    kind, bench = load_actuator(plant, rig)
+    kind, common = load_actuator(plant, rig)
+    own = {name: kind.read_rig(file) for name, file in rigs.items()}
     chosen, mapping = offered(kind, "diagnose"), load_columns(columns)
 
     def write(file: str, path: Path) -> bool:
@@ -244,6 +285,7 @@ def _page_writer(base: Path, plant: str | None, rig: Path | None, columns: Any) 
         from experiments.command.log_verb import page_of  # which pages of a store alone need not load
         from experiments.command.logs import caught, read_log
 
+        bench = own.get(nearest_folder(file, own), common)
         with caught():
             record = read_log(base / file, bench.columns, mapping, kind.required)
             found = chosen.run(record, *chosen.prepare(bench, {**chosen.options, "seed": 0}))

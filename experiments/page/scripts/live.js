@@ -17,8 +17,10 @@
   const histories = document.querySelector(".histories");
   const state = document.querySelector(".live-state");
   const alarms = document.querySelector(".alarms tbody");
+  const todo = document.querySelector(".alarm-todo");
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   const digits = (value) => (value === null || value === undefined ? "–" : Number(value.toPrecision(4)).toString().replace("-", "−"));
+  const clock = (seconds) => new Date(1000 * seconds).toLocaleString("sv"); // 2026-11-28 06:16:32, as in file names
   const charts = new Map();
   let points = [];
   let dirty = false;
@@ -50,15 +52,16 @@
     const raised = one.events.filter((event) => event.event === "alarm");
     const last = raised.at(-1);
     const count = raised.length === 1 ? "1 alarm" : `${raised.length} alarms`;
-    const before = last ? `${count}, the last at ${new Date(1000 * last.received).toLocaleString()}: ${last.message}. ` : "";
+    const before = last ? `${count}, the last at ${clock(last.received)}: ${last.message}. ` : "";
     const now = last && one.state === "watching" ? "Watching" : said;
     state.textContent = `${before}${now[0].toUpperCase()}${now.slice(1)}.`;
     state.classList.toggle("alarmed", raised.length > 0);
+    todo.hidden = !raised.length;
     const rows = one.events.toReversed().map((event) =>
       element(
         "tr",
         {},
-        element("th", { scope: "row" }, new Date(1000 * event.received).toLocaleString()),
+        element("th", { scope: "row" }, clock(event.received)),
         element("td", { class: "number", "data-head": "time [s]" }, digits(event.time_s)),
         element("td", { "data-head": "event", class: event.event === "alarm" ? "bad" : "" }, event.event),
         element("td", { "data-head": "message" }, event.message ?? ""),

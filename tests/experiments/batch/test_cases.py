@@ -6,7 +6,7 @@ import pytest
 
 from estimation.engine.kernels import LANES
 from experiments.batch import cases
-from experiments.batch.cases import plan_study
+from experiments.batch.cases import Plan, config_hash, plan_study
 from experiments.batch.study_file import StudyError, parse_study
 from tests.experiments.batch.conftest import small_plan
 
@@ -85,3 +85,24 @@ def test_more_series_than_can_be_listed_are_refused_before_they_are() -> None:
     study = parse_study({"name": "s", "runs": [{"seeds": 1_000_000, "methods": [DIAGNOSE]}]}, "s.toml")
     with pytest.raises(StudyError, match=r"runs\[0\] must be at most 1,000,000 series, got up to 9,000,000"):
         plan_study(study, Path())
+
+
+def test_a_log_takes_the_rig_file_of_the_nearest_folder_and_its_key_hashes_it(tmp_path: Path) -> None:
+    for name in ("small/a.csv", "large/b.csv", "large/worn/c.csv"):
+        (tmp_path / name).parent.mkdir(exist_ok=True, parents=True)
+        (tmp_path / name).write_text(f"{name}\n", encoding="utf-8")
+
+    def plan(area: float, **more: object) -> Plan:
+        (tmp_path / "large" / "rig.toml").write_text(f"name = 'large'\n[parameters]\npiston_area = {area}\n")
+        logs = [{"glob": "**/*.csv", "methods": [DIAGNOSE]}]
+        return plan_study(parse_study({"name": "two sizes", "logs": logs, **more}, "two.toml"), tmp_path)
+
+    rigs = {"rigs": {"large": "large/rig.toml"}}
+    one, more, none = plan(3e-3, **rigs), plan(4e-3, **rigs), plan(3e-3)
+    given = [(task, group.series) for task in one.tasks(set(), 1) for group in task.groups]
+    areas = {series.file: task.rig_of(series).parameters.piston_area for task, series in given}  # pyright: ignore
+    assert areas == {"large/b.csv": 3e-3, "large/worn/c.csv": 3e-3, "small/a.csv": one.rig.parameters.piston_area}
+    shared = [set(one.keys) & set(other.keys) for other in (more, none)]
+    small = next(group.keys[0] for group in one.groups if group.series.file == "small/a.csv")  # pyright: ignore
+    assert shared == [{small}, {small}]
+    assert config_hash(one.study, one.rig, one.rigs) != config_hash(more.study, more.rig, more.rigs)

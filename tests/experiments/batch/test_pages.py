@@ -1,6 +1,7 @@
 """Cells of a batch's page: quantities of another actuator in words, and a dash where there is nothing."""
 
 import json
+import re
 
 import numpy as np
 import pandas as pd
@@ -8,8 +9,10 @@ import pyarrow as pa
 
 from experiments.batch.pages import _or_dash, _quantities, _times, one_row_a_log, render_batch_report
 from experiments.batch.rows import SCHEMA
+from experiments.batch.standing import standing_in_words, standing_of
 from experiments.batch.summary import frame_of, summary_tables
 from experiments.page.numbers import MISSING
+from tests.experiments.fleet.conftest import store_row
 
 
 def test_quantities_are_told_with_their_intervals_and_those_without_a_value_are_left_out() -> None:
@@ -83,3 +86,21 @@ def test_the_report_says_first_how_many_cases_failed() -> None:
     page = render_batch_report({**manifest, "cases": 3, "versions": {}}, tables, {}, 3)
     assert "All 3 cases are done; 2 failed." in " ".join(page.split())
     assert "Found in the logs: minor leakage in 1, no class in 2." in page
+
+
+def test_a_report_of_logs_opens_with_the_worst_and_lists_them_first() -> None:
+    rows = [store_row(f"/home/ann/{name}.csv", leakage) for name, leakage in (("a", 1.0), ("b", 5.0), ("c", 3.1))]
+    rows.append({**store_row("/home/ann/d.csv", 1.0), "outcome": "failed", "quantities": None, "found_condition": None})
+    table = pa.Table.from_pylist([{"plant": "log", **row} for row in rows], schema=SCHEMA)
+    worst = standing_of(table)
+    others = "1 probably past one, 1 within limits, 1 could not be read"
+    said = f"1 of 4 logs is past a limit; {others}. Start with b.csv, c.csv."
+    assert standing_in_words(worst) == said
+    manifest = dict.fromkeys(("study", "question", "source", "config_hash", "rig", "python", "machine", "commit"), "x")
+    tables = summary_tables(frame_of(table))
+    page = render_batch_report({**manifest, "cases": 4, "versions": {}}, tables, {}, 4, worst=worst)
+    assert said in page
+    assert re.findall(r'data-head="log">(.)\.csv', page) == ["b", "c", "a", "d"]
+    assert page.index('<section id="logs">') < page.index('<section id="outcomes">')
+    assert 'class="fleet-over" data-head="state">past a limit<' in page
+    assert "200 % of the limit" in page.replace("\N{NO-BREAK SPACE}", " ")

@@ -42,6 +42,9 @@ def test_actuators_that_near_a_limit_are_in_the_title_and_named_where_none_is_pa
     assert (title_of([near]), sickest_of([near])) == ("The actuator nears a limit.", ["A"])
     assert title_of([near, sound]) == "None of 2 actuators is past a limit; 1 nears one."
     assert title_of([sick, near, near]) == "1 of 3 actuators is past a limit; 2 near one."
+    maybe = row("D", "likely")
+    assert title_of([sick, maybe, near]) == "1 of 3 actuators is past a limit, 1 more probably; 1 nears one."
+    assert title_of([maybe, near]) == "1 of 2 actuators is probably past a limit; 1 nears one."
     assert sickest_of([sick, near]) == ["C"]
 
 

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from experiments.page.numbers import TIMES, exact, fixed, number, percent_text, pretty_unit
-from experiments.page.tables import Cell, Column, html_table
+from experiments.page.tables import Cell, Column, folded_tables, html_table
 
 
 @pytest.mark.parametrize(
@@ -67,3 +67,11 @@ def test_a_cell_carries_its_tone() -> None:
 )
 def test_a_probability_is_never_nought_and_never_a_hundred(probability: float, said: str) -> None:
     assert percent_text(probability) == said
+
+
+def test_a_long_table_is_folded_by_group_with_its_counts_and_without_the_column_that_names_it() -> None:
+    frame = pd.DataFrame({"where": ["T 1", "T 2", "T 1"], "claim": ["a", "b", "c"], "verdict": ["yes", "no", "no"]})
+    html = folded_tables(frame, ("where", Column("claim"), "verdict"), "where", "verdict")
+    lines = [one.split("</summary>")[0] for one in html.split("<summary>")[1:]]
+    assert lines == ["T 1: 2 rows (1 yes, 1 no)", "T 2: 1 row (1 no)"]
+    assert html.count("<td") == 2 * len(frame)

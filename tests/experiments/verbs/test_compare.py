@@ -63,3 +63,10 @@ def test_two_logs_are_compared_on_the_terminal_on_a_page_and_for_a_program(tmp_p
     assert leak["interval"][0] > 2.0
     same = CliRunner().invoke(app, ["compare", logs[0], logs[0]])
     assert (same.exit_code, "twice" in same.output) == (2, True)
+
+
+def test_a_log_that_is_not_there_is_told_as_such(tmp_path: Path) -> None:
+    (tmp_path / "before.csv").touch()
+    done = CliRunner().invoke(app, ["compare", str(tmp_path / "before.csv"), str(tmp_path / "after.csv")])
+    assert done.exit_code == 2
+    assert "after.csv: there is no such file" in " ".join(done.stderr.split())

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from experiments.batch import run_on_terminal
 from experiments.batch.runner import Tally
 from experiments.cli import app
+from experiments.verbs.fleet import rigs_of_folders
 
 
 def invoke(*arguments: object) -> tuple[int, str, str]:
@@ -193,3 +194,15 @@ def test_an_interrupted_fleet_writes_no_page_and_says_how_to_go_on(
     assert (code, out) == (130, "")
     assert "interrupted: 1 of 2 logs are kept in" in said
     assert not (tmp_path / "fleet" / "index.html").exists()
+
+
+def test_rig_files_that_lie_among_logs_are_found_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    logs = [tmp_path / name for name in ("a.csv", "large/b.csv", "small/deep/c.csv")]
+    for folder in (tmp_path, tmp_path / "large"):
+        folder.mkdir(exist_ok=True)
+        (folder / "rig.toml").touch()
+    assert rigs_of_folders(tmp_path, logs) == {"": tmp_path / "rig.toml", "large": tmp_path / "large" / "rig.toml"}
+    assert "rig file of the logs in large" in capsys.readouterr().err
+    given = tmp_path / "other.toml"
+    assert rigs_of_folders(tmp_path, logs, given) == {"": given, "large": tmp_path / "large" / "rig.toml"}
+    assert "logs in no folder" not in capsys.readouterr().err

@@ -1,0 +1,97 @@
+"""Which logs of a batch study come first: how far each is towards a limit, in one sentence and in two columns."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from posixpath import basename
+from typing import Any
+
+import pandas as pd
+import pyarrow as pa
+
+from experiments.fleet.page import worst_in
+from experiments.fleet.rows import LogRow, log_rows
+
+READ = ("file", "verb", "outcome", "found_condition", "reason", "quantities", "against")
+"""Columns of a store that say how bad a log is."""
+
+SICK = ("over", "likely")
+"""States of a log whose actuator needs work."""
+
+OTHERS: Mapping[str, str] = {
+    "likely": "{} probably past one",
+    "open": "{} may be past one",
+    "unknown": "{} without a verdict",
+    "within": "{} within limits",
+    "failed": "{} could not be read",
+}
+"""How many logs are in which other state."""
+
+MOST_NAMED = 5
+"""Logs that are named [count]."""
+
+
+def standing_of(rows: pa.Table) -> list[LogRow]:
+    """Return the logs that were diagnosed, the worst first; a log that was diagnosed twice counts as its worse row.
+
+    Parameters
+    ----------
+    rows : pyarrow.Table
+        Of a batch store.
+    """
+    found = sorted(log_rows(rows.select(list(READ)).to_pylist(), {}, {}), key=lambda one: one.order)
+    first: dict[str, LogRow] = {}
+    for one in found:
+        first.setdefault(one.file, one)
+    return list(first.values())
+
+
+def standing_in_words(logs: Sequence[LogRow]) -> str:
+    """Return how many logs are past a limit, and with which to begin; empty where no log was diagnosed.
+
+    Parameters
+    ----------
+    logs : sequence of LogRow
+        Of `standing_of`.
+    """
+    if not logs:
+        return ""
+    counts = Counter(one.state for one in logs)
+    others = [words.format(counts[name]) for name, words in OTHERS.items() if counts[name]]
+    said = f"{counts['over'] or 'None'} of {len(logs)} logs {'is' if counts['over'] < 2 else 'are'} past a limit"
+    told = f"{said}; {', '.join(others)}." if others else f"{said}."
+    sick = [basename(one.file) for one in logs if one.state in SICK][:MOST_NAMED]
+    return f"{told} Start with {', '.join(sick)}." if sick else told
+
+
+def with_standing(table: pd.DataFrame, logs: Sequence[LogRow]) -> pd.DataFrame:
+    """Return the table of logs, the worst first, with the state of each and its worst severity.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        With ``file``.
+    logs : sequence of LogRow
+        Of `standing_of`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        With ``state`` and ``worst`` too; logs that were not diagnosed stand below, in the order they had.
+    """
+    known: Mapping[str, LogRow] = {one.file: one for one in logs}
+    places = {one.file: place for place, one in enumerate(logs)}
+    order = sorted(range(len(table)), key=lambda row: places.get(table["file"].iloc[row], len(logs)))
+    sorted_table = table.iloc[order].reset_index(drop=True)
+    files: list[Any] = sorted_table["file"].tolist()
+    states: list[Any] = [known[file].state if file in known else None for file in files]
+    return sorted_table.assign(
+        state=states,
+        worst=[_worst(known.get(file)) for file in files],
+    )
+
+
+def _worst(log: LogRow | None) -> str:
+    """Return the severity that is nearest to its limit or farthest beyond, and how far towards it that is."""
+    if log is None or log.worst is None or not log.told:
+        return ""
+    return f"{worst_in(log)}, {100.0 * log.worst.share:.0f} % of the limit"
