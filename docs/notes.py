@@ -23,7 +23,8 @@ HEAD = """# Notes
 
 Every result has a list of notes beside its numbers: `notes` in the JSON, `found.all_notes` in Python. Each note has a
 `code`, `data` (in SI unless the sentence says otherwise), and `text`, the sentence made from them. Programs should
-decide by code and data: any version may change a sentence. `python docs/notes.py` writes this page.
+decide by code and data: any version may change a sentence. A field such as `{drop_pa:.2g|bar}` is shown in bar; its
+data are in SI. `python docs/notes.py` writes this page.
 """
 
 

@@ -10,12 +10,14 @@ class SensorCode(Code):
         "{channel} stays at {value:.6g} for {length_s:.3g} s, from {begin_s:.3g} s on, while other channels move: the "
         "sensor froze"
     )
-    SENSOR_CONSTANT = "{channel} is {value:g} Pa throughout: the sensor is dead or not connected"
-    SENSOR_NOISE_ONLY = "{channel} shows nothing but noise ({noise:.3g} Pa) while the motor turns: the sensor is dead"
+    SENSOR_CONSTANT = "{channel} is {value:.4g|bar} bar throughout: the sensor is dead or not connected"
+    SENSOR_NOISE_ONLY = (
+        "{channel} shows nothing but noise ({noise:.3g|bar} bar) while the motor turns: the sensor is dead"
+    )
     SENSOR_CLIPPED = (
         "{channel} is at the end of its range ({levels} {unit}) in {percent:.2g} % of its samples; they were left out"
     )
-    HUM = "{channel} contains a hum of {amplitude_pa:.3g} Pa at {frequency_hz:.4g} Hz; it was removed"
+    HUM = "{channel} contains a hum of {amplitude_pa:.3g|bar} bar at {frequency_hz:.4g} Hz; it was removed"
     HELD = (
         "{channel} has a new sample only every {milliseconds:.3g} ms and repeats it for {rows} rows; the repeated "
         "values were left out"
@@ -45,27 +47,25 @@ class SensorCode(Code):
         "there, although its times go on; only {begin_s:.4g} to {end_s:.4g} s of the log was used"
     )
     POSITION_REZEROED = (
-        "{channel} steps by {step:.4g} m at {at_s:.4g} s while everything else goes on as before: its zero was set "
-        "anew, or rows were lost in steady motion; the step was subtracted"
+        "{channel} steps by {step:.4g|mm} mm at {at_s:.4g} s while everything else goes on as before: its zero was "
+        "reset, or rows were lost in steady motion; it was subtracted"
     )
     PRESSURE_REZEROED = (
-        "{channel} steps at {where} s (by {step:.3g} Pa), which no flow explains, while position goes on as before: "
-        "its zero was set anew; only {begin_s:.4g} to {end_s:.4g} s of the log was used"
+        "{channel} steps at {where} s (by {step:.3g|bar} bar), which no flow explains, while position goes on as "
+        "before: its zero was reset; only {begin_s:.4g} to {end_s:.4g} s of the log was used"
     )
     FILTERED = (
         "{channel} was filtered or averaged before it was logged: its noise is correlated over {rows} rows, so one "
         "sample in {rows} was used"
     )
     OUTLIERS_LEFT_OUT = "{channel} has gross outliers in {count} of {total} samples; they were left out"
-    SENSORS_DISAGREE = (
-        "velocity_m_s and the slope of position_m differ by {difference_m_s:.2g} m/s: one of the two sensors is wrong"
-    )
+    SENSORS_DISAGREE = "velocity_m_s and the slope of position_m differ by {difference_m_s:.2g|mm/s} mm/s: one is wrong"
     VELOCITY_LATE = (
         "{channel} comes {late_ms:.2g} ms later than the slope of position_m: it was filtered, or derived from "
         "position with a delay; it was not used"
     )
     VELOCITY_OFFSET = (
-        "{channel} reads {offset_m_s:.2g} m/s too much, compared with position_m; the offset was subtracted"
+        "{channel} reads {offset_m_s:.2g|mm/s} mm/s too much, compared with position_m; the offset was subtracted"
     )
 
 
@@ -124,8 +124,8 @@ class EstimateCode(Code):
         "observable"
     )
     KNOWN_AS_THE_RIG = (
-        "{entry} in the rig file causes {percent:.0f} % of the variance of {quantity!w} with rig error: a better value "
-        "of it narrows that interval"
+        "{entry} in the rig file causes {percent:.0f} % of the variance of {quantity} with rig error: measure {entry} "
+        "to narrow that interval"
     )
     STIFFER_THAN_RIG = (
         "bulk modulus is {ratio:.2g} times that in the rig file: if the oil is stiffer, enter its bulk_modulus there, "
@@ -135,7 +135,7 @@ class EstimateCode(Code):
         "bulk modulus is {ratio:.2g} times that in the rig file: there is air in the oil or a soft hose, or "
         "chamber_volume is {volume:.3g} m^3 and not {written:.3g} m^3"
     )
-    DIVERGED = "the estimate stopped being finite; check units, rig parameters and the form of the model"
+    DIVERGED = "the estimate became infinite or no number: check units, the rig file and --form"
     PRESSURE_RESIDUALS_LARGE = (
         "the pressure residuals are {ratio:.1f} times the sensor's noise: the log contains something that the flow "
         "balance leaves out"
@@ -165,12 +165,12 @@ class EstimateCode(Code):
         "neither friction model explains how the piston starts and stops, and bulk modulus may be far off"
     )
     FRICTION_LAWS_DISAGREE = (
-        "two friction models explain the log equally well, but put bulk modulus at {least_pa:.3g} and at {most_pa:.3g} "
-        "Pa"
+        "two friction models explain the log equally well, but put bulk modulus at {least_pa:.3g|MPa} and at "
+        "{most_pa:.3g|MPa} MPa"
     )
     FORCES_ON_ANY_SCALE = (
-        "position alone does not fix the scale of the forces: any bulk modulus from {least_pa:.3g} to {most_pa:.3g} Pa "
-        "explains the log, with friction in proportion"
+        "position alone does not fix the scale of the forces: any bulk modulus from {least_pa:.3g|MPa} to "
+        "{most_pa:.3g|MPa} MPa explains the log, with friction in proportion; log differential pressure"
     )
     WEAKLY_HELD = (
         "position alone determines bulk modulus only weakly: noise gives it a standard deviation of "
@@ -222,11 +222,12 @@ class RigCode(Code):
         "measurement, or a delay of both sensors); this was corrected"
     )
     PRESSURE_OFFSET = (
-        "differential_pressure_pa reads {offset_pa:.4g} ± {half_width_pa:.2g} Pa too much; the offset was subtracted"
+        "differential_pressure_pa reads {offset_pa:.4g|bar} ± {half_width_pa:.2g|bar} bar too much; the offset was "
+        "subtracted"
     )
     PRESSURE_DRIFTS = (
-        "the offset of differential_pressure_pa drifts by {drift_pa:.4g} ± {half_width_pa:.2g} Pa over the log; the "
-        "drift was subtracted"
+        "the offset of differential_pressure_pa drifts by {drift_pa:.4g|bar} ± {half_width_pa:.2g|bar} bar over the "
+        "log; the drift was subtracted"
     )
     ENCODER_ZERO = "position_m reads {zero_mm:.1f} ± {half_width_mm:.1f} mm at mid-stroke; it was shifted to zero there"
     POSITION_PLAY = (
@@ -249,19 +250,19 @@ class RigCode(Code):
         "includes this"
     )
     MAKEUP_BENDS = (
-        "the make-up valves restrict the flow as orifices do: at a pressure drop of {drop_pa:.2g} Pa they pass half as "
-        "much flow per pascal as at a small drop; the fit includes this"
+        "the make-up valves act as orifices: at a pressure drop of {drop_pa:.2g|bar} bar they pass half as much flow "
+        "per bar as at a small drop; the fit includes this"
     )
     MAKEUP_UNSEEN = (
         "the make-up valve of chamber {side} never opened, so this log does not show whether it is stuck shut; a "
         "drive that draws oil into chamber {side} would"
     )
     SPEED_OFFSET = (
-        "motor_speed_rad_s reads {offset_rad_s:.3g} ± {half_width:.2g} rad/s too much; the offset was subtracted"
+        "motor_speed_rad_s reads {offset_rad_s:.3g|rpm} ± {half_width:.2g|rpm} rpm too much; the offset was subtracted"
     )
     WEAR_NOT_EXCLUDED = (
-        "pump wear is not excluded: a pump that delivers up to {percent:.0f} % less would look like leakage at the "
-        "speeds of this log, and this bulk modulus would be too low by as much"
+        "pump wear is not excluded: at these speeds a pump that delivers up to {percent:.0f} % less would look like "
+        "leakage, and this bulk modulus would be as much too low"
     )
     SINGLE_ROD = (
         "side B of the piston has {percent:.1f} ± {half_width:.2g} % of the area of side A (rig file: "
@@ -271,38 +272,39 @@ class RigCode(Code):
     )
     VOLUME_DIFFERS = "the chamber volume is {percent:.0f} ± {half_width:.0f} % of that in the rig file"
     STARTS_UNDER_LOAD = (
-        "the log begins at a differential pressure of {pressure_pa:.3g} Pa: the piston already moves, or a load of "
-        "{force_n:.3g} N acts on it"
+        "the log begins at a differential pressure of {pressure_pa:.3g|bar} bar: the piston moves, or a load of "
+        "{force_n:.3g} N acts"
     )
     AIR_ENTRAINED = (
         "the oil contains {percent:.2g} ± {half_width:.2g} % of air at atmospheric pressure; bulk modulus is given at "
-        "{stated_pa:.3g} Pa absolute, and would be {liquid_pa:.3g} Pa without the air"
+        "{stated_pa:.3g|bar} bar absolute, and would be {liquid_pa:.3g|MPa} MPa without the air"
     )
     AIR_ENTERS = (
         "air enters the oil after {percent_of_log:.0f} % of the log: {percent:.2g} ± {half_width:.2g} % at "
         "atmospheric pressure"
     )
     RELIEF_LOW = (
-        "the relief valve opens at {setting_pa:.3g} ± {half_width_pa:.2g} Pa instead of the {rig_pa:.3g} Pa in the "
-        "rig file: it is set too low, or leaks"
+        "the relief valve opens at {setting_pa:.3g|bar} ± {half_width_pa:.2g|bar} bar instead of the {rig_pa:.3g|bar} "
+        "bar in the rig file: it is set too low, or leaks"
     )
     LEAKAGE_GROWS = "leakage grows by a factor of {factor:.3g} over the log: more than warming oil explains"
     LEAKAGE_STEPS = (
-        "leakage changes from {first:.3g} to {last:.3g} m^3/(s Pa) after {percent_of_log:.3g} % of the log; the "
-        "change takes {within_percent:.2g} % of it"
+        "leakage changes from {first:.3g|L/(min bar)} to {last:.3g|L/(min bar)} L/(min bar) after {percent_of_log:.3g} "
+        "% of the log; the change takes {within_percent:.2g} % of it"
     )
     LEAKAGE_DRIFTS = (
-        "leakage changes by a factor of {factor:.2f} over the log, from {first:.3g} to {last:.3g} m^3/(s Pa), as when "
-        "the oil warms or cools; severities are those at the end; the condition was "
-        "judged for rig files that describe the oil at the beginning, halfway and at the end"
+        "leakage changes by a factor of {factor:.2f} over the log, from {first:.3g|L/(min bar)} to {last:.3g|L/(min "
+        "bar)} L/(min bar), as when the oil warms or cools; severities are those at the end; the condition was judged "
+        "with the oil of the beginning, the middle and the end"
     )
     MAKEUP_BLOCKED = "the make-up valve of chamber {side} lets almost no oil in: it is stuck shut"
     PORT_DRAINS = (
-        "chamber {side} loses {drain:.3g} m^3/(s Pa) to the inner circuit: its make-up valve leaks or is stuck open"
+        "chamber {side} loses {drain:.3g|L/(min bar)} L/(min bar) to the inner circuit: its make-up valve leaks or is "
+        "stuck open"
     )
     PORTS_DRAIN_APART = (
-        "chamber A loses {drain_a:.2g} and chamber B {drain_b:.2g} m^3/(s Pa) to the inner circuit: the case of a "
-        "sound pump drains up to {sound:.2g}, so this is no fault"
+        "chamber A loses {drain_a:.2g|L/(min bar)} and chamber B {drain_b:.2g|L/(min bar)} L/(min bar) to the inner "
+        "circuit: the case of a sound pump drains up to {sound:.2g|L/(min bar)} L/(min bar), so this is no fault"
     )
     OIL_STIFFER = (
         "bulk modulus is {ratio:.3g} times that in the rig file; the conditions were compared at the measured value"
@@ -312,9 +314,8 @@ class RigCode(Code):
         "compared at the measured value"
     )
     LEAKAGE_TURBULENT = (
-        "{percent:.0f} ± {half_width:.0f} % of the leakage at {at_pa:.3g} Pa is turbulent (it grows with the square "
-        "root of pressure), as through a worn edge or a scratch; the fit includes this, and leakage is given at that "
-        "pressure"
+        "{percent:.0f} ± {half_width:.0f} % of the leakage at {at_pa:.3g|bar} bar is turbulent (it grows with the "
+        "square root of pressure), as at a worn edge or scratch; leakage is given at that pressure"
     )
     PUMP_COMPRESSES = (
         "the pump is filled at the pressure of its inlet and then compresses its oil, so it delivers less: by "
@@ -329,21 +330,20 @@ class RigCode(Code):
         "be worn or chipped; the fit includes this"
     )
     PUMP_STARVES = (
-        "above a motor speed of {from_rad_s:.3g} rad/s the pump delivers less than its displacement, at "
-        "{fastest_rad_s:.3g} rad/s {percent:.1f} ± {half_width:.1g} % less: it fills badly (low inlet pressure, "
+        "above a motor speed of {from_rad_s:.3g|rpm} rpm the pump delivers less than its displacement, at "
+        "{fastest_rad_s:.3g|rpm} rpm {percent:.1f} ± {half_width:.1g} % less: it fills badly (low inlet pressure, "
         "blocked suction line, cold oil); the fit includes this"
     )
     LEAKAGE_LIFTS = (
-        "above a differential pressure of {from_pa:.3g} Pa, leakage grows by more than pressure does, at "
-        "{highest_pa:.3g} Pa to {factor:.2g} times its usual value: a seal lifts, or a valve opens there; the fit "
-        "includes this"
+        "above a differential pressure of {from_pa:.3g|bar} bar, leakage grows faster than pressure, at "
+        "{highest_pa:.3g|bar} bar to {factor:.2g} times the usual: a seal lifts or a valve opens; the fit includes this"
     )
     LEAKS_ONE_WAY = (
         "leakage is {factor:.2g} times as large while chamber {side} is loaded: a relief or check valve of that side "
         "may leak; the fit includes this"
     )
     CHECKS_CRACK = (
-        "on average the make-up valves open {crack_pa:.3g} ± {half_width_pa:.2g} Pa below the accumulator pressure in "
-        "the rig file; that of chamber {side} opens {later_pa:.3g} ± {later_half_width_pa:.2g} Pa lower than the other"
+        "on average the make-up valves open {crack_pa:.3g|bar} ± {half_width_pa:.2g|bar} bar below the accumulator "
+        "pressure in the rig file; that of chamber {side} {later_pa:.3g|bar} ± {later_half_width_pa:.2g|bar} bar lower"
     )
     EXPLAINED_OTHERWISE = "other explanations that fit the log about as well: {count}; the interval includes them"

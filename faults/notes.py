@@ -27,16 +27,16 @@ class AgainstCode(Code):
         "a relief valve that opens early, so that the pump's flow escapes under load, explains the log better than any "
         "of the nine conditions"
     )
-    SPEED_BIAS = "motor speed reads wrong by {bias_rad_s:+.3g} rad/s"
+    SPEED_BIAS = "motor speed reads wrong by {bias_rad_s:+.3g|rpm} rpm"
     LOAD_UNTOLD = (
         "{load} on the rod that the rig file does not have would explain the log: if there is one, enter {entry} "
         "(about {value:.2g} {unit})"
     )
     LOAD_OR_OFFSET = (
-        "motor speed reads wrong by {bias_rad_s:+.3g} rad/s, or there is {load} on the rod that the rig file does not "
-        "have ({entry} of about {value:.2g} {unit}): without differential_pressure_pa the log does not tell which"
+        "motor speed reads wrong by {bias_rad_s:+.3g|rpm} rpm, or there is {load} on the rod that the rig file does not"
+        " have ({entry} of about {value:.2g} {unit}): without differential_pressure_pa the log does not tell which"
     )
-    PRESSURE_BIAS = "differential pressure reads wrong by {bias_pa:+.3g} Pa"
+    PRESSURE_BIAS = "differential pressure reads wrong by {bias_pa:+.3g|bar} bar"
     OIL_SOFT = "the oil's bulk modulus is {share:.2f} times that in the rig file: air in the oil, or a soft hose"
     OIL_STIFF = "the oil's bulk modulus is {share:.2f} times that in the rig file: another oil, or a wrong rig file"
     OIL_SOFTENS = (
@@ -45,8 +45,8 @@ class AgainstCode(Code):
     )
     OUTSIDE_CONDITIONS = "the actuator that fits best is in none of the nine conditions, nor between them"
     BETWEEN_CONDITIONS = (
-        "between the nine conditions: to the nearest quarter, leakage {leakage:.3g} and friction {friction:.3g}, "
-        "where 1 is minor and 2 is major; a fault of another size, or a sensor with a wrong gain"
+        "the fault lies between the nine conditions: to the nearest quarter, leakage {leakage:.3g} and friction "
+        "{friction:.3g}, where 0 is none, 1 is minor and 2 is major; a sensor with a wrong gain would look the same"
     )
 
 
@@ -87,14 +87,13 @@ class ClassCode(Code):
     NO_CIRCUIT = "no circuit can be fitted with this rig file, so there are scores but no probabilities: {reason}"
     NO_PROBABILITIES = "no probabilities: {reason}"
     LOAD_ON_ROD = (
-        "a constant load of {force_n:.0f} N ({low:.0f} to {high:.0f}) holds the rod back, or differential_pressure_pa "
-        "reads {pressure_pa:.3g} Pa too much: the force balance cannot separate the two"
+        "a constant load of {force_n:.0f} N ({low:.0f} to {high:.0f} N) holds the rod back, or differential_pressure_pa"
+        " reads {pressure_pa:.3g|bar} bar too much: the force balance cannot separate the two"
     )
-    SPRING_ON_ROD = "a spring of {value:.0f} N/m ({low:.0f} to {high:.0f}) on the rod; the rig file says {rig:.0f} N/m"
-    MASS_ON_ROD = (
-        "the moving mass is {value:.3g} kg ({low:.3g} to {high:.3g}), an inertia on the rod; the rig file says "
-        "{rig:.3g} kg"
+    SPRING_ON_ROD = (
+        "a spring of {value:.0f} N/m ({low:.0f} to {high:.0f} N/m) acts on the rod; the rig file says {rig:.0f} N/m"
     )
+    MASS_ON_ROD = "the moving mass is {value:.3g} kg ({low:.3g} to {high:.3g} kg); the rig file says {rig:.3g} kg"
     END_STOP = "the piston ran into a stop {reach_mm:.0f} mm from where the log begins; the fit includes the stop"
     HEALTHY_OF_THE_PAPER = (
         "the rig file has the pump or piston of your actuator, but still the leakage and friction of the paper's: "

@@ -4,11 +4,22 @@ A code is a member of an enum that stands beside the method that raises it, and 
 Programs decide by code and data alone; no sentence is read back.
 """
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from string import Formatter
 from typing import Any
+
+WORKSHOP: Mapping[str, float] = {
+    "bar": 1e-5,
+    "MPa": 1e-6,
+    "mm": 1e3,
+    "mm/s": 1e3,
+    "rpm": 30.0 / math.pi,
+    "L/(min bar)": 6e9,
+}
+"""Units that a sentence may give a number in, and the factor from SI."""
 
 WRITTEN_OUT = 1e7
 """Size below which a reader is spared a power of ten."""
@@ -36,9 +47,11 @@ def written_out(value: float, spec: str) -> str:
 
 
 class _Sentence(Formatter):
-    """Fills a template; a number in significant digits is written out."""
+    """Fills a template; a number in significant digits is written out, in bar where a field says ``{a_pa:.3g|bar}``."""
 
     def format_field(self, value: Any, format_spec: str) -> Any:
+        format_spec, _, unit = format_spec.partition("|")
+        value = WORKSHOP[unit] * value if unit else value
         if format_spec.endswith("g") and isinstance(value, int | float):
             return written_out(value, format_spec)
         return super().format_field(value, format_spec)
@@ -54,7 +67,8 @@ _SENTENCE = _Sentence()
 class Code(Enum):
     """A kind of note; each layer and each actuator has an enum of its own, without members in common.
 
-    A member is written ``NAME = "sentence with {fields}"``; a note's data fill the fields. Its name in small letters is
+    A member is written ``NAME = "sentence with {fields}"``; a note's data fill the fields. A field such as
+    ``{drop_pa:.3g|bar}`` converts its number from SI to one of the units in `WORKSHOP`. Its name in small letters is
     the code, and equals that text.
 
     Examples
@@ -63,6 +77,10 @@ class Code(Enum):
     ...     FADED = "the colour is {share:.0f} % of what it was"
     >>> str(Colour.FADED), str(Colour.FADED.note(share=40.0))
     ('faded', 'the colour is 40 % of what it was')
+    >>> class Pressure(Code):
+    ...     DROPS = "pressure drops by {drop_pa:.3g|bar} bar"
+    >>> str(Pressure.DROPS.note(drop_pa=250000.0))
+    'pressure drops by 2.5 bar'
     """
 
     template: str

@@ -1,6 +1,7 @@
 """Codes: no two alike, each raised somewhere with all that its sentence needs, each on the page docs/notes.md."""
 
 import importlib.util
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -104,3 +105,32 @@ def test_the_scan_sees_codes_by_name_and_choice_and_fields_by_dictionary() -> No
 def test_a_dictionary_that_is_made_elsewhere_is_refused() -> None:
     with pytest.raises(ValueError, match=r"line 1: what \*\* gives"):
         list(notes.sites_in("a.py", "Weather.RAIN.note(**elsewhere.known())", {"Weather": Weather}))
+
+
+def test_a_number_that_is_converted_for_a_reader_has_its_unit_behind_it(enums: Mapping[str, type[Code]]) -> None:
+    """The unit follows the field, or the field with which it is a range, and no pressure is told in pascal."""
+    for member in (member for enum in enums.values() for member in enum):
+        for said in re.split(r"[:,;] ", member.template.replace(":.", "=").replace(":+.", "=")):
+            units = re.findall(r"\{[a-z_]+=[0-9]g\|([^}]+)\}", said)
+            behind = re.split(r"\{[a-z_]+=[0-9]g\|[^}]+\}", said)[1:]
+            joined = [text for text in behind if text not in (" ± ", " to ", " and at ", " and chamber B ")]
+            assert all(text.lstrip().startswith(tuple(units)) for text in joined), member
+        assert not re.search(r"\} (Pa|rad/s|m/s|m\^3/\(s Pa\))(?![a-z])", member.template), member
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [
+        (".3g|bar", 250000.0, "2.5"),
+        ("+.3g|rpm", 10.0, "+95.5"),
+        (".2g|L/(min bar)", 2.5e-11, "0.15"),
+        (".3g|MPa", 2.07e8, "207"),
+        (".2g|mm/s", 0.012, "12"),
+    ],
+)
+def test_a_sentence_gives_numbers_in_the_units_of_a_workshop(field: str, value: float, said: str) -> None:
+    class Told(Code):
+        NUMBER = f"it is {{number:{field}}}"
+
+    note = Told.NUMBER.note(number=value)
+    assert (str(note), note.data) == (f"it is {said}", {"number": value})

@@ -34,7 +34,8 @@ class MotorCode(Code):
         "the maps of flow and pressure do not hold: run diagnose first"
     )
     FASTER_THAN_MAPS = (
-        "the rod moves faster than the pump's maps allow (leakage {leakage:.2g} m^3/(s Pa)): ports may be clogged"
+        "the rod moves faster than the pump's maps allow (leakage {leakage:.2g|L/(min bar)} L/(min bar)): ports may be "
+        "clogged"
     )
     TOO_UNCERTAIN = (
         "too uncertain for a value: {names}; apply a load of 10 N or more, or give a healthy run (--healthy)"

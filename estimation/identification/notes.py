@@ -85,7 +85,7 @@ class IdentificationCode(Code):
         "of the error of the linear model on held-back data; use --structure wiener, or log the sign"
     )
     UNRELATED = (
-        "the inputs explain {output!r} no better than the same inputs in other orders would: it follows a course of "
-        "its own, such as drift, which a slow model imitates; do not rely on the model"
+        "the inputs explain {output!r} no better than the same inputs in a shuffled order: the output drifts by itself,"
+        " and a slow model imitates the drift; do not rely on the model"
     )
     NO_FIT = "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): do not rely on it"

@@ -241,9 +241,13 @@ def what_to_do(result: Mapping[str, Any]) -> list[str]:
     Returns
     -------
     list[str]
-        Work on the actuator first, then how to read this log, then how to log next.
+        Work on the actuator first, then how to read this log, then how to log next; where a sensor with a wrong gain
+        would look alike, work on the actuator last.
     """
-    return [*work_on(result), *left_unread(result), *(sentence(one) for one in result["advice"])]
+    advice = [sentence(one) for one in result["advice"]]
+    if of_another_size(result):  # a wrong sensor or rig file would look alike, and is looked for first
+        return [*left_unread(result), *advice, *work_on(result)]
+    return [*work_on(result), *left_unread(result), *advice]
 
 
 def work_on(result: Mapping[str, Any]) -> list[str]:
@@ -262,7 +266,7 @@ def work_on(result: Mapping[str, Any]) -> list[str]:
     if of_another_size(result):
         works = {"leakage": WORK_ON_LEAKAGE, "friction": WORK_ON_FRICTION}
         work = [works[name]["minor" if size < MAJOR else "major"] for name, size in _raised(result).items()]
-        return ["Check the gains of the sensors against the rig file. If they are right:", *work]
+        return [f"If rig file and sensors are right: {one[:1].lower()}{one[1:]}" for one in work]
     if result["unknown"]:
         return []
     levels = _levels(result)

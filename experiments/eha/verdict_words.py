@@ -214,10 +214,11 @@ def believed(result: Mapping[str, Any]) -> str:
 
 
 def next_step(result: Mapping[str, Any]) -> str:
-    """Return what to do next, sentences: work on the actuator first, then what to measure."""
-    from experiments.eha.plain_verdict import work_on
+    """Return what to do next, as sentences, the most important first."""
+    from experiments.eha.plain_verdict import of_another_size, work_on
 
-    return " ".join([*work_on(result), *map(sentence, result["advice"])])
+    work, advice = work_on(result), [sentence(one) for one in result["advice"]]
+    return " ".join([*advice, *work] if of_another_size(result) else [*work, *advice])
 
 
 def library_sentence(result: Mapping[str, Any]) -> str:

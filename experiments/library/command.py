@@ -28,10 +28,10 @@ def library(
 ) -> None:
     """Show the library of nine transfer functions next to Table 6, or build a new one with its report.
 
-    From motor speed [rad/s] to velocity [m/s] at 1 ms, one a condition, identified on the circuit plant. With `--out`
-    the folder gets `library.json`, and a report that compares ARX, ARMAX, output error and Box-Jenkins on all nine,
-    orders and break frequencies beside the paper's, and clocks of the test; its path is the last line of standard
-    output. That takes half a minute; the seed changes nothing else.
+    Each is from motor speed [rad/s] to velocity [m/s] at 1 ms, one per condition, identified on the circuit plant.
+    With `--out` the folder gets `library.json` and a report. The report compares ARX, ARMAX, output error and
+    Box-Jenkins on all nine conditions, shows orders and break frequencies beside the paper's, and says how fast the
+    test signal should switch. This takes half a minute; the last line of standard output is the path of the report.
     """
     if out is None:
         _show(file, seed, as_json)

@@ -25,9 +25,10 @@ def make(
     count: Annotated[int, option("N", "Logs of each kind.")] = 10,
     as_json: Json = False,
 ) -> None:
-    """Write logs with truth.csv, and a rig file where the actuator is not the paper's; same options, same bits.
+    """Write logs with truth.csv, and a rig file where the actuator is not the paper's.
 
-    The simulator shares no model of physics, sensors or loggers with the methods that estimate and diagnose here.
+    The same options write the same files. The simulator shares no model of physics, sensors or loggers with the methods
+    that estimate and diagnose here.
     """
     from experiments.open_benchmark.folders import write_set
     from experiments.open_benchmark.kinds import KINDS, VERSION

@@ -20,9 +20,9 @@ STATES: Mapping[str, str] = {"start": "learning", "ready": "watching", "end": "e
 
 
 BALANCES: Mapping[str, str] = {
-    "flow": "the piston gets another share of the pump's flow",
-    "force": "moving the piston takes another pressure",
-    "motion": "the piston follows the pump in another way",
+    "flow": "the piston gets a different share of the pump's flow than before",
+    "force": "moving the piston takes a different pressure than before",
+    "motion": "the piston follows the pump differently than before",
 }
 """What a balance compares, as what it means that it changed."""
 
@@ -168,8 +168,8 @@ def _changed(event: "Alarm") -> str:
     from faults.watch.events import SLOW
 
     if event.balance == SLOW:
-        return f"lost flow has grown more than warm oil explains, since about {event.since:.0f} s"
-    return f"the {event.balance} balance changed at {event.since:.2f} s: {BALANCES[event.balance]}"
+        return f"leakage has grown by more than warm oil explains, since about {event.since:.0f} s of the stream"
+    return f"the {event.balance} balance changed at {event.since:.2f} s of the stream: {BALANCES[event.balance]}"
 
 
 def _reading(event: "Change") -> str:

@@ -45,7 +45,7 @@ def size_cylinder(
     """Size a double-acting cylinder and its circuit: bore, rod, flows of the ports, pump, relief valve, valves, pipes.
 
     Section 5.1 of the diaphragm-motor paper as a small calculator, with steady balances. With --bore and --rod it says
-    what that cylinder gives; a cylinder too weak for its duty is an error.
+    what that cylinder gives; a cylinder that is too weak for its load is an error.
     """
     from plant.eha.cylinder_sizing import Duty, cylinder_circuit
     from plant.eha.cylinder_sizing import size_cylinder as smallest_standard

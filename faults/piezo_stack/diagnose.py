@@ -69,7 +69,7 @@ class StackFaultCode(Code):
     )
     LEAKAGE_AND_FRICTION = "these sensors cannot separate leakage from friction: log the stack's displacement"
     AIR_IN_OIL = "air in the oil: {percent:.2f} %, {ratio:.3g} times the healthy share"
-    CHAMBER_LEAKS = "the pump chamber leaks: {leakage:.2g} m^3/(s Pa)"
+    CHAMBER_LEAKS = "the pump chamber leaks: {leakage:.2g|L/(min bar)} L/(min bar)"
     STACK_DEPOLARISED = "the stack is depolarised: {percent:.0f} % of its stroke is lost"
     REED_SOFT = "{reed} reed soft: {ratio:.3g} times the healthy stiffness"
     REED_STIFF = "{reed} reed stiff or jammed: {ratio:.3g} times the healthy stiffness"

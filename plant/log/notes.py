@@ -31,7 +31,7 @@ class LogCode(Code):
         "{channel} is {value:.6g} in {count} of {total} samples, far from all others, as a logger writes it for a lost "
         "sample; those samples are not used"
     )
-    CHANNEL_SLOWER = "{channel} has one value in {rows} rows"
+    CHANNEL_SLOWER = "{channel} was logged more slowly than the others, with one value in {rows} rows"
     CHANNEL_LEFT_OUT = "{channel} is missing in {count} of {total} samples ({percent:.2g} %); the channel is not used"
     CHANNEL_LOGGED_IN_PART = (
         "{channel} is logged only from {begin_s:.4g} s to {end_s:.4g} s; only this part of the log is used"
@@ -61,8 +61,13 @@ class LogCode(Code):
     SAMPLE_TIME_LONG = (
         "the sample time is {sample_time_s:.3g} s, which is unusually long: check the unit (ms read as s?)"
     )
-    SPEED_CONSTANT = "motor_speed_rad_s is constant, as if nothing moved: the log can show little"
-    NOTHING_MOVES = "{channels} stay constant: nothing moves, so the log can show little"
+    SPEED_CONSTANT = (
+        "motor_speed_rad_s is constant, so the log can show little: check its column, or log again while the speed "
+        "changes"
+    )
+    NOTHING_MOVES = (
+        "{channels} stay constant, so the log can show little: check their columns, or log again while the piston moves"
+    )
     CHANNEL_LARGE = (
         "{channel} {verb} {size:.3g} {unit}, but at most {limit:g} {unit} is usual: check the unit ({slip}?)"
     )
@@ -76,4 +81,6 @@ class LogCode(Code):
         "the piston travels {travel_m:.2g} m per radian of the pump, but {least:g} to {most:g} m is usual: check the "
         "units of {channel} and of motor speed"
     )
-    CLOCK_ASSUMED = "the log has no time column: a sample time of {sample_time_s:g} s was assumed"
+    CLOCK_ASSUMED = (
+        "the log has no time column: a sample time of {sample_time_s:g} s was assumed; --sample-time gives another"
+    )

@@ -23,8 +23,11 @@ def alarm(balance: str) -> Alarm:
 
 def test_a_sudden_change_has_its_time_and_a_slow_one_is_told_as_growth() -> None:
     (sudden,), (slow,) = told(alarm("flow")), told(alarm(SLOW))
-    assert sudden["message"] == "the flow balance changed at 11.25 s: the piston gets another share of the pump's flow"
-    assert "lost flow has grown more than warm oil explains" in slow["message"]
+    assert sudden["message"] == (
+        "the flow balance changed at 11.25 s of the stream: "
+        "the piston gets a different share of the pump's flow than before"
+    )
+    assert "leakage has grown by more than warm oil explains" in slow["message"]
     assert (sudden["since_s"], sudden["since_ci95_s"]) == (11.25, [11.0, 11.5])
 
 
