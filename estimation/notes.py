@@ -124,7 +124,7 @@ class EstimateCode(Code):
         "observable"
     )
     KNOWN_AS_THE_RIG = (
-        "{entry} in the rig file causes {percent:.0f} % of the variance of {quantity} with rig error: measure {entry} "
+        "{entry} in the rig file causes {percent:.0f} % of the variance of {quantity!w} with rig error: measure {entry} "
         "to narrow that interval"
     )
     STIFFER_THAN_RIG = (

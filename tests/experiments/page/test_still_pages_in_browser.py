@@ -3,10 +3,12 @@
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
 from experiments.cli import app
+from experiments.page.tables import folded_tables
 
 pytestmark = pytest.mark.slow
 
@@ -70,4 +72,22 @@ def test_a_still_page_is_quiet_dark_and_as_wide_as_a_phone(browser: Any, pages: 
     found = axe.Axe().run(page).response["violations"]
     assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
     assert complaints == []
+    page.close()
+
+
+def test_rows_that_a_click_opens_are_closed_on_a_screen_and_open_on_paper(browser: Any, tmp_path: Path) -> None:
+    style = (Path(__file__).parents[3] / "experiments/page/templates/report.css").read_text(encoding="utf-8")
+    frame = pd.DataFrame({"where": ["Table 1"] * 40, "claim": ["a claim"] * 40, "verdict": ["reproduced"] * 40})
+    table = folded_tables(frame, ("where", "claim", "verdict"), "where", "verdict")
+    (tmp_path / "page.html").write_text(f"<style>{style}</style><main>{table}</main>", encoding="utf-8")
+    page = browser.new_page(viewport={"width": 390, "height": 800})
+    page.goto((tmp_path / "page.html").as_uri())
+    cell, height = page.locator("td").first, "document.documentElement.scrollHeight"
+    assert (cell.is_visible(), page.evaluate(height) <= 800) == (False, True)
+    page.locator("summary").click()
+    assert cell.is_visible()
+    page.locator("summary").click()
+    page.emulate_media(media="print")
+    assert page.locator("td").last.bounding_box()["height"] > 0.0
+    assert page.locator("table").bounding_box()["height"] > 400.0
     page.close()
