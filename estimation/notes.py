@@ -124,8 +124,8 @@ class EstimateCode(Code):
         "observable"
     )
     KNOWN_AS_THE_RIG = (
-        "{entry} in the rig file causes {percent:.0f} % of the variance of {quantity!w} with rig error: measure {entry} "
-        "to narrow that interval"
+        "{entry} in the rig file causes {percent:.0f} % of the variance of {quantity!w} with rig error: measure "
+        "{entry} to narrow that interval"
     )
     STIFFER_THAN_RIG = (
         "bulk modulus is {ratio:.2g} times that in the rig file: if the oil is stiffer, enter its bulk_modulus there, "
