@@ -39,11 +39,11 @@ def open_tdms(path: Path) -> tuple[Table, ...]:
                     raise LogError(f"it ends before the {len(channel)} samples that {channel.name!r} has", str(path))
                 said = channel.properties
                 alike = (group.name, len(channel), _number(said.get(STEP)))
-                start = (_stamp(said.get(BEGAN)), _offset(said.get(OFFSET)))
-                if start[0] is None and OFFSET not in said:
-                    start = starts.get(alike, start)  # only the first of a group may say it
-                starts.setdefault(alike, start)
-                key = (*alike, *start)
+                began = _stamp(said.get(BEGAN))
+                if began is None:
+                    began = starts.get(alike)  # only the first of a group may say it
+                starts.setdefault(alike, began)
+                key = (*alike, began, _offset(said.get(OFFSET)))
                 groups[key][channel.name] = channel[:]
                 units[key][channel.name] = next((str(said[name]) for name in UNITS if said.get(name)), None)
     if not groups:

@@ -51,6 +51,21 @@ def test_channels_that_begin_at_other_times_are_laid_beside_each_other_by_them(t
     np.testing.assert_allclose(log.channels["position_m"], 1e-3 * values[:30])
 
 
+def test_an_offset_is_of_the_channel_that_says_it_and_a_date_of_its_whole_group(tmp_path: Path) -> None:
+    values, step = np.arange(40.0), {"wf_increment": 0.01}
+    path = written(
+        tmp_path / "log.tdms",
+        ("Bench", "position_m", 1e-3 * values, step | {"wf_start_time": START, "wf_start_offset": 0.1}),
+        ("Bench", "motor_speed_rad_s", values, step),
+        ("Bench", "velocity_m_s", 1e-3 * values, step | {"wf_start_offset": 0.05}),
+    )
+    with pytest.warns(LogWarning, match="merged"):
+        log = read_record(path)
+    np.testing.assert_allclose(log.channels["position_m"], 1e-3 * values[:30])
+    np.testing.assert_array_equal(log.channels["motor_speed_rad_s"], values[10:])
+    np.testing.assert_allclose(log.channels["velocity_m_s"], 1e-3 * values[5:35])
+
+
 def test_a_beginning_without_a_date_is_the_first_time(tmp_path: Path) -> None:
     offset = {"wf_increment": 0.01, "wf_start_offset": 0.25}
     values = np.arange(20.0)
