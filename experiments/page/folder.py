@@ -26,6 +26,9 @@ UNWRITABLE = "result folder {} must be in a place that can be written, got"
 _TRIES = 10
 """Times that a result is moved to its name while other studies take it [count]."""
 
+_HERE, _EXCHANGE = -100, 2
+"""AT_FDCWD, by which a path is taken from the current folder, and RENAME_EXCHANGE, of Linux."""
+
 DESKTOP_FILES = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 """Files that file managers leave behind, which are nobody's work."""
 
@@ -172,6 +175,9 @@ def _strangers(folder: Path) -> set[str]:
 
 
 def _swap(temporary: Path, target: Path) -> None:
+    if target.exists() and _exchanged(temporary, target):
+        shutil.rmtree(temporary, ignore_errors=True)
+        return
     old = target.with_name(f".{target.name}.{token_hex(4)}.old")
     try:
         for _ in range(_TRIES):
@@ -190,6 +196,27 @@ def _swap(temporary: Path, target: Path) -> None:
         if old.exists() and not target.exists():
             old.rename(target)
         shutil.rmtree(old, ignore_errors=True)
+
+
+def _exchanged(first: Path, second: Path) -> bool:
+    """Exchange the names of two folders in one step, so that each name always has a whole one.
+
+    Returns
+    -------
+    bool
+        False where the system or the file system cannot do it; then nothing has changed.
+
+    References
+    ----------
+    renameat2(2) of Linux, ``RENAME_EXCHANGE``.
+    """
+    import ctypes
+
+    try:
+        rename = ctypes.CDLL(None).renameat2
+    except (OSError, TypeError, AttributeError):  # pragma: no cover -- Windows, macOS, an old C library
+        return False
+    return rename(_HERE, os.fsencode(first), _HERE, os.fsencode(second), _EXCHANGE) == 0
 
 
 def _tidy(target: Path) -> None:

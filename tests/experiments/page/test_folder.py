@@ -2,7 +2,9 @@
 
 import json
 import os
+import shutil
 import signal
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ from experiments.command.study_verb import finish_study
 from experiments.nine_conditions.figures import FIGURES
 from experiments.nine_conditions.study import NINE_CONDITIONS
 from experiments.nine_conditions.transfer_functions import identification_study
+from experiments.page import folder
 from experiments.page.figure_files import figure_files
 from experiments.page.folder import check_target, held
 from experiments.running import study as runner
@@ -128,6 +131,7 @@ def test_a_swap_that_fails_brings_the_earlier_result_back(
             raise PermissionError(13, "Permission denied")
         return rename(path, new)
 
+    monkeypatch.setattr(folder, "_exchanged", lambda *_: False)  # as on a system that cannot
     monkeypatch.setattr(Path, "rename", second_fails)
     with pytest.raises(HydrostateError, match="can be written, got: Permission denied"):
         write_study(short, target)
@@ -215,6 +219,39 @@ def test_what_a_killed_run_left_is_tidied_and_an_earlier_result_gets_its_name_ba
 
 
 @pytest.mark.usefixtures("undrawn")
+@pytest.mark.skipif(sys.platform != "linux", reason="the system has no call that exchanges two names")
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_a_study_that_is_ended_as_it_replaces_another_leaves_a_whole_result(
+    short: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    write_study(short, target := tmp_path / "out")
+    ended, remove = iter([number]), shutil.rmtree
+
+    def end_first(place: Path, **how: Any) -> None:
+        for one in ended:
+            os.kill(os.getpid(), one)
+        remove(place, **how)
+
+    def never(*_: object) -> None:
+        raise AssertionError("for a moment nothing has the name")
+
+    if not (child := os.fork()):
+        monkeypatch.setattr(Path, "rename", never)
+        monkeypatch.setattr(shutil, "rmtree", end_first)
+        try:
+            write_study(Found({"of the second": short.tables["bulk modulus"]}, {}, short.files), target)
+        except KeyboardInterrupt:
+            os._exit(130)
+        os._exit(1)
+    wanted = -9 if number == signal.SIGKILL else 130
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == wanted
+    assert json.loads((target / "manifest.json").read_text(encoding="utf-8"))["files"] == _listing(target)
+    assert (target / "tables/of_the_second.csv").is_file()
+    check_target(target)
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_a_study_that_takes_the_name_meanwhile_is_replaced(
     short: Found, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -228,6 +265,7 @@ def test_a_study_that_takes_the_name_meanwhile_is_replaced(
             (target / "report.html").write_bytes(content)
         return moved
 
+    monkeypatch.setattr(folder, "_exchanged", lambda *_: False)
     monkeypatch.setattr(Path, "rename", beaten)
     assert write_study(short, target).read_text() == "report"
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
