@@ -5,7 +5,7 @@ import json
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache, cached_property, partial
-from glob import glob, has_magic
+from glob import has_magic
 from importlib.metadata import version
 from itertools import product
 from math import prod
@@ -14,6 +14,7 @@ from typing import Any, TypeAlias
 
 from estimation.engine.kernels import LANES
 from experiments.actuators import DEFAULT, actuator
+from experiments.batch.log_files import matching
 from experiments.batch.other_actuators import simulated_of
 from experiments.batch.series import Group, Log, Series, Simulated, Work, content_of
 from experiments.batch.study_file import Logs, Method, Runs, Study, StudyError
@@ -262,7 +263,7 @@ def nearest_folder(file: str, folders: Collection[str]) -> str:
 
 def _logs(logs: Logs, place: int, folder: Path, rigs: Mapping[str, Rig[Any]]) -> Iterator[Log]:
     pattern = str(folder / logs.glob)
-    found = sorted(path for path in glob(pattern, recursive=True) if Path(path).is_file())  # noqa: PTH207 -- absolute too
+    found = matching(pattern)
     if not found:
         said = "no file matches" if has_magic(pattern) else "there is no such file as"
         raise StudyError(f"logs[{place}].glob must match at least one file, got {logs.glob!r}: {said} {pattern}")
