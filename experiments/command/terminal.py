@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 
 from experiments.command.plain_help import hide_bool, read_plainly
 from experiments.command.plain_values import take_plainly
+from experiments.command.visible_text import visible, visible_name
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -27,25 +28,7 @@ PIPE_WIDTH = 200
 USAGE, SOME_FAILED, INTERRUPTED = 2, 1, 130
 """Exit codes beside 0."""
 
-
-_CONTROLS = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160))}
 _BLOCKS, _DIGITS = "\u2581\u2582\u2583\u2584\u2585\u2586\u2587\u2588", "_.-=+*%#"
-
-
-def visible(text: str) -> str:
-    """Return a text of a file's with its control characters spelt out, so that none reaches a terminal.
-
-    Parameters
-    ----------
-    text : str
-        Any text; lines stay lines.
-
-    Examples
-    --------
-    >>> len(visible("run" + chr(27) + "[2J.csv"))
-    14
-    """
-    return "\n".join(line.translate(_CONTROLS) for line in text.split("\n"))
 
 
 def sparkline(values: "Sequence[float]", width: int) -> str:
@@ -142,11 +125,13 @@ def table(*headings: str, title: str | None = None) -> "Table":
     from rich.text import Text
 
     unicode = "utf" in (getattr(sys.stdout, "encoding", None) or "").lower()
-    head = None if title is None else Text(title)
+    head = None if title is None else Text(visible(title))
     made = Table(box=box.SIMPLE_HEAD if unicode else box.ASCII, title=head, title_justify="left")
     for heading in headings:
         numeric = heading.endswith("]")
-        made.add_column(Text(heading), justify="right" if numeric else "left", overflow="fold", no_wrap=numeric)
+        made.add_column(
+            Text(visible(heading)), justify="right" if numeric else "left", overflow="fold", no_wrap=numeric
+        )
     return made
 
 
@@ -158,7 +143,7 @@ def short_names(results: Sequence[Mapping[str, Any]]) -> list[str]:
     results : sequence of Mapping
         One object a log, with its ``file``.
     """
-    files = [visible(str(result["file"])) for result in results]
+    files = [visible_name(result["file"]) for result in results]
     names = [file.replace(os.sep, "/").rsplit("/", 1)[-1] for file in files]
     return names if len(set(names)) == len(set(files)) else files
 
@@ -212,7 +197,8 @@ def rendered(*parts: "RenderableType") -> str:
     console = Console(file=io.StringIO(), force_terminal=terminal, width=width, **as_is)
     with console.capture() as captured:
         for part in parts:
-            told = folded(part, console.width) if terminal and isinstance(part, str) else part
+            told = visible(part) if isinstance(part, str) else part
+            told = folded(told, console.width) if terminal and isinstance(told, str) else told
             console.print(told, soft_wrap=isinstance(part, str))
     return "\n".join(line.rstrip() for line in captured.get().strip("\n").splitlines())
 

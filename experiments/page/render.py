@@ -8,6 +8,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from experiments.command.visible_text import visible_page
 from experiments.page.errata import linked, linked_errata
 from experiments.page.figure_files import image_of
 from experiments.page.numbers import exact, number
@@ -62,7 +63,7 @@ def render_page(
     made = {"table": table, "folded": folded, "figure": figure, "chart": chart}
     made |= {"headings_of": _headings_of, "errata_of": linked_errata}
     page = _templates().get_template(template).render({**facts, **made})
-    return with_scripts(_BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", page))
+    return with_scripts(_BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", visible_page(page)))
 
 
 @cache

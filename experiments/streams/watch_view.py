@@ -7,7 +7,7 @@ from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from experiments.command.terminal import visible
+from experiments.command.visible_text import visible
 from experiments.streams.watched import Watched
 
 if TYPE_CHECKING:

@@ -11,7 +11,8 @@ from experiments.command.json_output import Result, prepare_output, write_whole
 from experiments.command.logs import finish, run_logs
 from experiments.command.options import Beside, Json, Out, Plant, SampleTime, argument, option
 from experiments.command.output_paths import own_paths, page_place, pages_sentence, require_place
-from experiments.command.terminal import note, table, visible
+from experiments.command.terminal import note, table
+from experiments.command.visible_text import visible, visible_name
 from experiments.log_pages.inspected import BLANK, block_of, looked_into
 from plant.errors import HydrostateError
 
@@ -95,7 +96,7 @@ def _write_rig(path: Path, columns: Mapping[str, str], kind: "ActuatorKind") -> 
 
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     for result in results:
-        yield visible(str(result["file"]))
+        yield visible_name(result["file"])
         for one in result["tables"]:
             yield _shown(one)
             yield _clock_sentence(one)

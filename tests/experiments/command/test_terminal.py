@@ -78,3 +78,12 @@ def test_a_terminal_folds_lines_between_words_and_a_pipe_keeps_them_whole(monkey
     assert max(map(len, (first, *others))) <= 60
     assert all(other.startswith(" " * 12) and other[12] != " " for other in others)
     assert " ".join(one.strip() for one in (first, *others)) == line.strip()
+
+
+def test_no_name_of_a_file_reaches_a_terminal_as_more_than_text() -> None:
+    name = "a\x1b[31m\x9b\u202evsc.\u2066\n.csv"
+    shown = terminal.table(name, title=name)
+    shown.add_row(*terminal.short_names([{"file": name}]))
+    said = rendered(f"{name}: healthy", shown)
+    assert not {"\x1b", "\x9b", "\u202e", "\u2066"} & set(said)
+    assert "a\\x1b[31m\\x9b\\u202evsc.\\u2066\\x0a.csv" in said
