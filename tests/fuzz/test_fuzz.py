@@ -1,11 +1,12 @@
 """A reduced run of the fuzzers, which are run at length as ``python -m tests.fuzz.files`` and ``tests.fuzz.texts``."""
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.fuzz import bench_layouts, columns_held, files, spellings, texts, verbs
+from tests.fuzz import bench_layouts, columns_held, files, legal_files, spellings, texts, verbs
 from tests.fuzz.guard import limited
 from tests.fuzz.mutations import CELLS, mutated
 from tests.fuzz.seeds import KINDS
@@ -34,6 +35,18 @@ def test_a_few_spellings_of_one_log_are_that_log_or_refused() -> None:
 
 def test_a_few_files_of_columns_that_are_no_plain_numbers_end_in_a_record_or_a_sentence() -> None:
     assert columns_held.run(4, first=1_000_000) == []
+
+
+def test_a_few_legal_files_with_odd_content_are_read_as_what_was_written(tmp_path: Path) -> None:
+    assert [legal_files.check(legal_files.tdms, seed, tmp_path) for seed in legal_files.KEPT] == [""] * 3
+    assert legal_files.run(5, first=1_000_000) == []  # one of each writer
+
+
+@pytest.mark.slow
+def test_many_legal_files_with_odd_content_are_read_as_what_was_written() -> None:
+    ends: Counter[str] = Counter()
+    assert legal_files.run(600, ends=ends) == []
+    assert sum(count for end, count in ends.items() if end.endswith("read")) > 500  # a refusal proves little
 
 
 def test_logs_as_programs_of_benches_write_them_are_read(tmp_path: Path) -> None:
