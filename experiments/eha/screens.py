@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from experiments.command.json_output import Result
 from experiments.command.options import PRESSURE
 from experiments.command.terminal import short_names, table
+from experiments.command.visible_text import visible_name
 from experiments.eha.entries import costs
 from experiments.eha.verdict_words import equally_likely, margin_word, verdict_lines
 from experiments.page.condition_names import in_words
@@ -39,7 +40,7 @@ def estimates_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
     yield shown
     doubtful = [result for result in results if not result["gate"]["passed"]]
     if len(results) <= MOST_MESSAGES:
-        yield from (f"{result['file']}: {result['message']}" for result in doubtful)
+        yield from (f"{visible_name(result['file'])}: {result['message']}" for result in doubtful)
     elif doubtful:
         yield f"{len(doubtful)} of {len(results)} logs gave no reliable value; --json and --out give the reasons"
     yield from costs(results)
@@ -85,7 +86,7 @@ def diagnoses_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
         if detailed and judged and result["outcome"] == "ok" and result["expected"] is not None:
             yield f"  {_agreement(result)}"
         elif not judged or result["outcome"] != "ok" or result["expected"] is not None:
-            yield f"{result['file']}: {result['message']}"
+            yield f"{visible_name(result['file'])}: {result['message']}"
     notes = list(costs(results))
     yield from ["", *notes] if notes and detailed else notes
 
@@ -114,7 +115,7 @@ def _scores_table(result: Result) -> "RenderableType":
     unit = "1" if PRESSURE in result["channels"] else "m/s"
     others = result["transfer_function_scores"]
     headings = ["condition", f"model error [{unit}]", *([] if others is None else ["transfer function [m/s]"]), ""]
-    shown = table(*headings, title=result["file"])
+    shown = table(*headings, title=visible_name(result["file"]))
     winners = {
         "<- best": "condition",
         "runner-up": "runner_up",

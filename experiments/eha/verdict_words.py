@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from experiments.command.visible_text import visible_name
 from experiments.page.condition_names import in_words
 from experiments.page.numbers import decimals_of, percent_text, shop_unit
 from experiments.page.sentences import sentence
@@ -48,7 +49,7 @@ def verdict_lines(result: Mapping[str, Any]) -> list[str]:
 
     library = library_sentence(result)
     return [
-        f"{result['file']}: {headline(result)}",
+        f"{visible_name(result['file'])}: {headline(result)}",
         f"  verdict   {verdict(result)}",
         f"  leakage   {amounts(result, ('leakage_flow', 'velocity_lost'))}",
         f"  friction  {amounts(result, ('added_friction', 'pressure_rise'))}",

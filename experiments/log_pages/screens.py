@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.command.json_output import Result
 from experiments.command.terminal import table
+from experiments.command.visible_text import visible_name
 from experiments.page.names_shown import quantity_name
 from experiments.page.numbers import percent_text, reader_unit
 from experiments.page.sentences import sentence
@@ -52,7 +53,7 @@ def messages_shown(results: Sequence[Result]) -> "Iterable[RenderableType]":
         One a log, with ``message`` and ``advice``.
     """
     for result in results:
-        yield f"{result['file']}: {result['message']}"
+        yield f"{visible_name(result['file'])}: {result['message']}"
         yield from (f"  next  {sentence(one)}" for one in result["advice"])
 
 
