@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from experiments.log_pages.screens import quantities_shown
+from experiments.log_pages.screens import messages_shown, quantities_shown
 
 
 def shown(said: dict[str, Any] | None = None, **entry: Any) -> str:
@@ -69,3 +69,8 @@ def test_a_share_is_told_in_percent_and_a_pressure_as_gauges_show_it() -> None:
     air, oil = (next(line.split() for line in lines if name in line) for name in ("air", "bulk"))
     assert air == ["air", "fraction", "4.9", "4.89", "to", "4.91", "%"]
     assert oil == ["bulk", "modulus", "207", "206", "to", "208", "MPa"]
+
+
+def test_a_name_with_an_end_of_line_stays_on_one_line() -> None:
+    (line,) = messages_shown([{"file": "a\nb: no fault.csv", "message": "said", "advice": []}])
+    assert line == "a\\x0ab: no fault.csv: said"
