@@ -15,7 +15,8 @@ from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
 from estimation.fits.explaining.delivery import delivered
 from estimation.fits.explaining.form_fit import FormFit
-from estimation.fits.flow.fit import FLOW_CHANNELS, REPORTED, LogTraits, fit_flow, require_flow_channels
+from estimation.fits.flow.fit import FLOW_CHANNELS, REPORTED, fit_flow, require_flow_channels
+from estimation.fits.flow.traits import LogTraits
 from estimation.fits.motion.fit import MOTION_CHANNELS, fit_motion
 from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED
 from estimation.log_checks.channel_physics import FARTHEST, RPM, TURNS

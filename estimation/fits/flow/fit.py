@@ -1,7 +1,7 @@
 """`fit_flow(record, parameters, ...) -> FormFit`: bulk modulus, leakage and flow bias of a log, by the flow form."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -20,6 +20,7 @@ from estimation.fits.flow.log import homed_at_stop, without_strays
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, stiffer
 from estimation.fits.flow.search import MAKEUP_TRIED
+from estimation.fits.flow.traits import AT_REST, LogTraits
 from estimation.fits.flow.valley import lower_valley
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
@@ -75,33 +76,6 @@ pressure, but simulators and textbooks balance volumes."""
 LITTLE = 0.01
 """Share of what the plain form leaves beside noise that the best hypothesis must take up before pairs are tried
 [fraction]."""
-
-
-@dataclass(frozen=True)
-class LogTraits:
-    """How a log begins, and how its channels were logged, as far as a fit has to know it.
-
-    Parameters
-    ----------
-    loaded : bool
-        Whether the log begins under load, and not at rest.
-    moving : bool
-        Whether the motor turns when it begins: both chambers may then stand at any pressure.
-    filtered : bool
-        Whether the pressure was filtered: it is then late, and by how much is fitted whatever that gains.
-    speed_held : bool
-        Whether motor speed came slower than the rest: of a log that the plain form does not explain the motor's course
-        is then what is not known, and nothing is asked.
-    """
-
-    loaded: bool = False
-    moving: bool = False
-    filtered: bool = False
-    speed_held: bool = False
-
-
-AT_REST = LogTraits()
-"""A log that begins at rest, each channel sampled in every row and as it is."""
 
 
 def require_flow_channels(record: Record) -> None:

@@ -17,8 +17,9 @@ from estimation.fits.explaining.left_open import OPEN_DELIVERY
 from estimation.fits.explaining.tried import Explanation, Tried
 from estimation.fits.flow import asked
 from estimation.fits.flow.asked import near_starts
-from estimation.fits.flow.fit import LogTraits, _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
+from estimation.fits.flow.fit import _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
 from estimation.fits.flow.search import MAKEUP_TRIED, flow_starts
+from estimation.fits.flow.traits import LogTraits
 from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import HYPOTHESES, LATEST
 from estimation.log_checks.clean import clean_log

@@ -16,8 +16,9 @@ from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_star
 from estimation.fits.flow import asked as asking
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import plain as plain_flow
-from estimation.fits.flow.fit import LogTraits, _wanted, fit_flow
+from estimation.fits.flow.fit import _wanted, fit_flow
 from estimation.fits.flow.log import homed_at_stop
+from estimation.fits.flow.traits import LogTraits
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.play import ShownPlay

@@ -12,9 +12,10 @@ import pytest
 
 from estimation.fits.explaining.explain import explain
 from estimation.fits.explaining.wide_problem import flow_bounds
-from estimation.fits.flow.fit import LogTraits, fit_flow
+from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import without_strays
 from estimation.fits.flow.search import balanced, flow_starts
+from estimation.fits.flow.traits import LogTraits
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.fit import Search, explained, roughly
 from estimation.fits.greybox.freed_problem import FreedProblem

@@ -5,6 +5,7 @@ import pytest
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.fits.flow import fit as flow_fit
+from estimation.fits.flow.traits import LogTraits
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.held import without_held
 from estimation.notes import SensorCode
@@ -84,7 +85,7 @@ def test_a_log_that_its_slow_speed_leaves_unexplained_is_asked_nothing(monkeypat
     clean = clean_log(strange, P)
     assert clean.speed_held
     monkeypatch.setattr(flow_fit, "explain", never)
-    fit = flow_fit.fit_flow(clean.record, P, P.bulk_modulus, {}, clean.variances, flow_fit.LogTraits(speed_held=True))
+    fit = flow_fit.fit_flow(clean.record, P, P.bulk_modulus, {}, clean.variances, LogTraits(speed_held=True))
     assert fit.reasons
     with pytest.raises(AssertionError):
         flow_fit.fit_flow(clean.record, P, P.bulk_modulus, {}, clean.variances)
