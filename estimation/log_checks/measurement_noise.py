@@ -94,11 +94,11 @@ off, the mean square 2 %."""
 
 def _squared(bends: Array, step: float, gain: int) -> float:
     """Return the variance of white noise whose differences, which have ``gain`` times as much, are given."""
-    deviation = NORMAL_MAD * _grouped_median(np.abs(bends), step)
-    if step * gain**0.5 > COARSE * deviation > 0.0:
-        near = bends[np.abs(bends) <= NEAR * deviation]
+    deviation = NORMAL_MAD * _grouped_median(np.abs(bends), step) / gain**0.5
+    if step > COARSE * deviation > 0.0:
+        near = bends[np.abs(bends) <= NEAR * gain**0.5 * deviation]
         return float(np.mean(near * near)) / gain
-    return deviation**2 / gain
+    return deviation**2
 
 
 def _grouped_median(sizes: Array, step: float) -> float:

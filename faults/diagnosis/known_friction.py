@@ -13,6 +13,8 @@ import numpy as np
 
 from estimation.arrays import IntArray
 from estimation.log_checks.channel_names import PRESSURE
+from estimation.log_checks.measurement_noise import NORMAL_MAD
+from estimation.log_checks.order import median
 from faults.diagnosis.circuits.friction_shape import BEND, FADES
 from faults.diagnosis.circuits.model_doubt import SELDOM_KNOWN
 from faults.diagnosis.severity import KnownFriction
@@ -126,7 +128,7 @@ def _noise(values: Array, order: int) -> float:
     """Return the deviation of a channel's white noise, which its differences of some order show."""
     apart = np.abs(np.diff(values, order))
     apart = apart[np.isfinite(apart)]
-    return 1.4826 * float(np.median(apart)) / math.sqrt(math.comb(2 * order, order)) if len(apart) else math.inf
+    return NORMAL_MAD * median(apart) / math.sqrt(math.comb(2 * order, order)) if len(apart) else math.inf
 
 
 def _told(columns: Array, forces: Array, least: float, bends: Array) -> KnownFriction | None:

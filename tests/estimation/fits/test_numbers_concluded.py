@@ -24,8 +24,9 @@ from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.play import ShownPlay
 from estimation.fits.hypotheses import BEGUN, HYPOTHESES, MAY_HIDE
 from estimation.fits.motion import fit as motion_fit
-from estimation.fits.motion.fit import _starts, _steps, motion_log, unseen
+from estimation.fits.motion.fit import _starts, _steps, motion_log
 from estimation.fits.motion.search import MOST_WORK, Begun, MotionSearch, explained, rough
+from estimation.fits.motion.weakly_held import unseen
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
 from estimation.models.motion import MOTION_FORMS
 from plant.log.record import Record
@@ -205,9 +206,7 @@ def steps_of_the_form_of_motion() -> dict[str, Any]:
         0.0,
         99.0,
     )
-    told["unseen"] = [
-        unseen(plain(1.0, chi=chi), samples) for chi in (0.9, 1.0, 1.05, 1.1, 1.3) for samples in (100, 20_000)
-    ]
+    told["unseen"] = [unseen(chi, samples) for chi in (0.9, 1.0, 1.05, 1.1, 1.3) for samples in (100, 20_000)]
     theta = usual(found)
     fit = replace(plain(1.0), slopes=found.slopes(theta))
     gapped = replace(found.log, gaps=np.array([[1.0, 2.0, 3.0]]))
@@ -271,7 +270,7 @@ def conclusions_of_the_form_of_motion() -> dict[str, Any]:
         asked: list[Any] = []
         with patch.multiple(
             motion_fit,
-            _fitted=lambda _: (fits, others),
+            _fitted=lambda _, **__: (fits, others, False),
             likeliest=lambda searches: searches,
             MotionSearch=SimpleNamespace(of=lambda _, log, starts: asked.append((log, starts))),
         ):

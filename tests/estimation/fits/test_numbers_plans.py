@@ -116,7 +116,7 @@ def plan_of_the_form_of_motion() -> dict[str, Any]:
             told[name] = {"descents": grouped(plan), "explains": [one.explains for one in ended]}
             plan.clear()
             with patch.object(motion_fit, "concluded", lambda _, point: point):
-                found, others = _fitted(ended)
+                found, others, _ = _fitted(ended)
             told[name] |= {
                 "descents of the fit": grouped(plan),
                 "costs": [float(one.cost) for one in found],

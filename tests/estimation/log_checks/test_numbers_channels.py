@@ -173,7 +173,7 @@ def reversed_by(share: float, slow: float | None = None, **of: Any) -> list[Any]
     piston = together(share, given.get("size", 1.0)) if slow is None else mixed(slow)
     long = blocks(slope=piston, pumped=WAVE, pressure=given.get("pressure"))
     balance = replace_balance(**of) if of else None
-    return codes(channel_physics._reversed(record, long, balance))  # pyright: ignore[reportPrivateUsage]
+    return codes(channel_physics._reversed(record, long, long, balance))  # pyright: ignore[reportPrivateUsage]
 
 
 def replace_balance(**of: float) -> FlowBalance:
@@ -208,10 +208,10 @@ def what_counts_the_other_way() -> dict[str, Any]:
         "swept the other way surely from": edge(lambda one: reversed_by(-0.2, swept=-0.8, swept_std=one), 0.01, 0.9),
         "swept the other way, together": edge(lambda one: reversed_by(one, swept=-0.8), -0.25, 0.25),
         "data": [
-            told(channel_physics._reversed(made_log(60), blocks(slope=piston, pumped=WAVE, pressure=-WAVE), balance))  # pyright: ignore[reportPrivateUsage]
-            for piston, balance in (
-                (together(-0.9, 1.0), None),
-                (together(0.9, 1.0), BALANCE._replace(compressed=-1.0)),
+            told(channel_physics._reversed(made_log(60), shaped, shaped, balance))  # pyright: ignore[reportPrivateUsage]
+            for shaped, balance in (
+                (blocks(slope=together(-0.9, 1.0), pumped=WAVE, pressure=-WAVE), None),
+                (blocks(slope=together(0.9, 1.0), pumped=WAVE, pressure=-WAVE), BALANCE._replace(compressed=-1.0)),
             )
         ],
     }

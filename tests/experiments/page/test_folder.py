@@ -287,6 +287,7 @@ def test_a_study_that_is_asked_to_end_is_interrupted(
 ) -> None:
     monkeypatch.setattr(runner, "run_study", lambda *_: os.kill(os.getpid(), number))
     before = {one: signal.getsignal(one) for one in (signal.SIGTERM, signal.SIGHUP)}
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
     try:
         with pytest.raises(KeyboardInterrupt):
             finish_study(NINE_CONDITIONS, SMALL, tmp_path / "out", as_json=False)

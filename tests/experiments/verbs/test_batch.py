@@ -133,7 +133,7 @@ def test_a_long_study_speaks_now_and_then_where_nobody_sees_its_bar(
         (("batch", "nothing.toml"), "nothing.toml: cannot be read: No such file"),
         (("report", "nowhere"), "store nowhere: there is no batch study there"),
         (("compare", "nowhere", "nothing"), "store nowhere: there is no batch study there"),
-        (("compare", __file__, "b.csv"), "compare takes two logs, or two stores"),
+        (("compare", __file__, "b.csv"), "b.csv: there is no such file"),
         (("batch", "eha-paper", "--logs", "*.csv"), "--logs replaces the logs of a study, and eha-paper has none"),
     ],
 )

@@ -39,7 +39,7 @@ COURSES = {
 
 @pytest.mark.parametrize("course", COURSES)
 def test_a_course_of_its_own_is_no_answer_to_an_input(course: str) -> None:
-    with pytest.warns(LogWarning, match="course of its own"):
+    with pytest.warns(LogWarning, match="the output drifts by itself"):
         found = identify_channels(_data(COURSES[course]), order=2, delay=1)
     assert found.quality.fit_percent > 40.0
     assert _said(found)
