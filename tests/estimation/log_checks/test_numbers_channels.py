@@ -188,8 +188,8 @@ def what_counts_the_other_way() -> dict[str, Any]:
         "opposed": reversed_by(-0.95),
         "opposed from": edge(lambda one: reversed_by(one), -0.9, 0.1),
         "opposed from block to block, from": edge(lambda one: reversed_by(0.0, one), -0.9, 0.1),
-        "with pressure that goes with the pump": reversed_by(-0.95, compressed=1.0),
-        "with pressure that opposes it": reversed_by(-0.95, **weak),
+        "with pressure that goes with the pump": reversed_by(-0.95, swept=-1.0, compressed=1.0),
+        "with pressure that opposes it": reversed_by(-0.95, swept=-1.0, **weak),
         "pressure alone": reversed_by(0.95, **weak),
         "pressure, and a piston that hardly follows": reversed_by(0.3, swept=0.1, **weak),
         "pressure, follows from": edge(lambda one: reversed_by(one, swept=0.1, **weak), 0.2, 0.9),
@@ -199,7 +199,7 @@ def what_counts_the_other_way() -> dict[str, Any]:
             lambda one: reversed_by(0.95, pressure=-WAVE, compressed=-one, compressed_std=0.1), 0.01, 2.0
         ),
         "with pressure, compressed from": edge(
-            lambda one: reversed_by(-0.95, compressed=one, compressed_std=0.1), 0.01, 2.0
+            lambda one: reversed_by(-0.95, swept=-1.0, compressed=one, compressed_std=0.1), 0.01, 2.0
         ),
         "power that opposes, by the share of": edge(
             lambda one: reversed_by(0.95, compressed=-1.0, pressure=mixed(one)), -0.9, 0.9
