@@ -73,7 +73,7 @@ class ChannelCode(Code):
     """Notes on channels whose sign, unit or name is wrong: correct the columns, then read the log again."""
 
     CHANNEL_REVERSED = (
-        "{channel} has the wrong sign: compared with {against}, its correlation is {correlation:.2f}; give the column "
+        "the sign of {channel} is wrong: its correlation with {against} is {correlation:.2f}; give the column "
         "with a minus before its unit (NAME:-UNIT under [columns] in the rig file, or --columns CHANNEL=NAME:-UNIT)"
     )
     CHANNELS_SWAPPED = (
