@@ -22,16 +22,19 @@ def reflections(coefficients: Array) -> Array:
     Returns
     -------
     ndarray, shape (n,)
-        Each between -1 and 1 [dimensionless].
+        Each between -1 and 1 [dimensionless]; NaN below one that rounding has put at 1 or beyond.
 
     Examples
     --------
-    >>> reflections(np.array([-1.5, 0.56])).round(6).tolist()
-    [-0.961538, 0.56]
+    >>> reflections(np.array([-1.5, 0.56])).round(6).tolist(), reflections(np.array([-2.0, 1.0])).tolist()
+    ([-0.961538, 0.56], [nan, 1.0])
     """
     row, found = np.asarray(coefficients, dtype=np.float64), np.zeros(coefficients.size)
     for size in range(row.size, 0, -1):
         last = found[size - 1] = float(row[-1])
+        if abs(last) >= 1.0:
+            found[: size - 1] = np.nan
+            break
         row = (row[:-1] - last * row[-2::-1]) / (1.0 - last * last) if size > 1 else row[:0]
     return found
 

@@ -45,7 +45,7 @@ def test_a_condition_is_named() -> None:
     ("fault", "said", "code"),
     [
         ("air_doubled", "2 times the healthy share", StackAdviceCode.BLEED_OIL),
-        ("chamber_leakage_minor", "the pump chamber leaks: 5e-12", StackAdviceCode.LOOK_AT_CHAMBER),
+        ("chamber_leakage_minor", "the pump chamber leaks: 0.03 L/(min bar)", StackAdviceCode.LOOK_AT_CHAMBER),
         ("depolarised_10_percent", "10 % of its stroke is lost", StackAdviceCode.POLARISE),
         ("inlet_reed_soft", "inlet reed soft: 0.5", StackAdviceCode.REPLACE_REED),
         ("inlet_reed_gap", "inlet reed does not shut: a gap of 30 um", StackAdviceCode.CLEAN_SEAT),
