@@ -18,6 +18,7 @@ from estimation.fits.flow.log import DRAIN_START, OPENING_START, carried, outrun
 from estimation.fits.flow.swept import swept_evenly
 from estimation.fits.flow.valley import FINISHING, Found, completed_form, from_valley
 from estimation.fits.greybox.descent import Point, descend
+from estimation.fits.greybox.driven import driven_samples
 from estimation.fits.greybox.fit import NEAR_ENOUGH, GreyBoxFit, Search, concluded, explained, roughly
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
@@ -48,7 +49,7 @@ GUESSED_WITHIN = 0.3
 """First radius of a search from the likeliest guess [dimensionless]: half the distance between guesses of leakage."""
 
 SCREENED_SECONDS = 4.0
-"""Starts are compared on the beginning of the log: it tells a wrong valley from a right one [s]."""
+"""Starts are compared on the beginning of the log, at least so long: it tells a wrong valley from a right one [s]."""
 
 ROUGH_ENOUGH = 0.05
 """Half the sum of squares that a further step must promise while model steps are long [dimensionless]: their errors put
@@ -287,7 +288,9 @@ def _guesses_about(around: Mapping[str, float], model: GreyBoxModel, p: EhaParam
 def _search(log: GreyBoxLog) -> Search:
     # where the noise moves with bulk modulus, steps promise less than they give
     near_enough = NEAR_ENOUGH if log.passes_on else ROUGH_ENOUGH
-    return Search(screened=ceil(SCREENED_SECONDS / log.sample_time), near_enough=near_enough)
+    speed = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
+    screened = driven_samples(speed, ceil(SCREENED_SECONDS / log.sample_time))
+    return Search(screened=screened, near_enough=near_enough)
 
 
 def _searched(

@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from estimation.fits.greybox.descent import Point, descend, descend_together
+from estimation.fits.greybox.driven import driven_samples
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import search_bounds
@@ -154,7 +155,9 @@ class MotionSearch:
         whole = FreedProblem(form, log, UNKNOWNS, LINEAR)
         guesses = [whole.model.theta(start) for start in starts]
         bounds = search_bounds(whole.model, guesses, {"speed_lead": (0.0, 0.5 * log.sample_time)})
-        part, short = (whole.on(log.beginning(samples)) for samples in (SEARCHED, SCREENED))
+        speed = log.drives[:, form.drives.index("motor_speed_rad_s")]
+        lengths = (driven_samples(speed, samples) for samples in (SEARCHED, SCREENED))
+        part, short = (whole.on(log.beginning(samples)) for samples in lengths)
         return cls(whole, part, short, guesses, bounds)
 
     def brought_near(self, rank: int, begun: Begun) -> Iterator[Array]:

@@ -105,6 +105,17 @@ def test_a_guess_that_leads_into_a_wrong_valley_is_not_followed_over_the_whole_l
         assert one.values == pytest.approx(other.values)
 
 
+def test_a_log_that_rests_for_long_before_it_moves_is_explained_by_the_plain_form() -> None:
+    """On a beginning at rest any guess leaves noise alone, so one was followed to oil without stiffness."""
+    rng, p = np.random.default_rng(0), parameters_for(CONDITIONS["minor_leakage"])
+    strokes = [np.repeat([share, 0.0], 1000) for share in (0.5, -0.5, 0.9, -0.9)]
+    drive = p.rated_speed * np.concatenate([np.zeros(6000), *strokes])
+    fits = balanced(seen(simulate(CIRCUIT, drive, 1e-3, p, sensors=BENCH, rng=rng)), HEALTHY, STARTS)
+    likeliest = min(fits, key=lambda fit: fit.cost)
+    assert likeliest.chi_square[0] < 1.1
+    assert likeliest.values["bulk_modulus"] == pytest.approx(p.bulk_modulus, rel=0.01)
+
+
 def by_mass(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:
     (one,) = (fit for fit in fits if fit.model.rates is MASS_FLOW_FORM.rates)
     return one
