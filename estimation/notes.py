@@ -262,7 +262,7 @@ class RigCode(Code):
     )
     WEAR_NOT_EXCLUDED = (
         "pump wear is not excluded: at these speeds a pump that delivers up to {percent:.0f} % less would look like "
-        "leakage, and this bulk modulus would be as much too low"
+        "leakage, and bulk modulus would come out too low by the same share"
     )
     SINGLE_ROD = (
         "side B of the piston has {percent:.1f} ± {half_width:.2g} % of the area of side A (rig file: "
