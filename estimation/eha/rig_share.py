@@ -76,7 +76,7 @@ def scaled_responses(
     """
     p = replace(parameters, **{name: value for name, value in found.items() if hasattr(parameters, name)})
     velocity, settled = steady_state(p.rated_speed, p)
-    pumped, swept = p.pump_displacement * p.rated_speed, p.piston_area * velocity
+    pumped, swept = p.rated_flow, p.piston_area * velocity
     leaked, biased = (max(flow, 1e-3 * pumped) for flow in (p.leakage_coefficient * settled, p.flow_bias))
     scale: Responses = {"piston_area": 1.0, PRESSURE_GAIN: -1.0} if pressure else {"moving_mass": 1.0}
     held: Responses = {PRESSURE_GAIN: 1.0} if pressure else {"moving_mass": -1.0}

@@ -95,7 +95,7 @@ def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance
     noises = [p.piston_area**2 * spread * noise_x, compliance**2 * window.of_slope * noise_p]
     noises += [window.of_mean * noise_p, 0.0]
     sign = window.mean(np.sign(speed))  # a block in which the pump turns round has both
-    return _whatever_the_bias(flow, sign, parts, np.array(noises), MOST_LOST * p.pump_displacement * p.rated_speed)
+    return _whatever_the_bias(flow, sign, parts, np.array(noises), MOST_LOST * p.rated_flow)
 
 
 def _noise(values: Array) -> float:

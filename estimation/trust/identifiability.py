@@ -180,7 +180,7 @@ def _sizes(p: EhaParameters) -> Array:
 
 
 def _linear_size(p: EhaParameters) -> float:
-    rated = p.pump_displacement * p.rated_speed / p.piston_area
+    rated = p.rated_flow / p.piston_area
     return max(abs(p.friction_linear), 0.1 * p.friction_coulomb / rated)
 
 

@@ -71,7 +71,7 @@ def _rig() -> Mapping[str, Ours]:
 def _compression_factor() -> float:
     """Return the plant's flow of compression over V_0/beta times the rate of differential pressure."""
     rate = float(pressure_rate(0.0, 0.0, RIG.rated_speed, RIG))
-    pumped = RIG.pump_displacement * RIG.rated_speed - RIG.flow_bias
+    pumped = RIG.rated_flow - RIG.flow_bias
     return pumped * RIG.bulk_modulus / (RIG.chamber_volume * rate)
 
 

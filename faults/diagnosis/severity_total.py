@@ -80,7 +80,7 @@ def _laws(lost: float, actuator: Actuator, *, pressure: bool) -> Mapping[str, Re
     """Return how severities respond to errors of the rig file, each as a share of its whole (`_whole`) or of itself."""
     healthy = actuator.circuit
     swept = healthy.piston_area * actuator.rated * (1.0 - lost / 100.0)
-    pumped = healthy.pump_displacement * healthy.rated_speed
+    pumped = healthy.rated_flow
     ratio = pumped / max(pumped - swept, LEAST_LEAKAGE * pumped)
     flows: Responses = {"pump_displacement": ratio, "piston_area": 1.0 - ratio}
     gauge: Responses = {"pump_displacement": 1.0, "piston_area": 1.0, PRESSURE_GAIN: -1.0}

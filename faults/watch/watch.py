@@ -133,7 +133,7 @@ class Watch:
         self.block = samples * INTERVALS
         """Samples a block."""
         duration = self.block * sample_time
-        rated_velocity = parameters.pump_displacement * parameters.rated_speed / parameters.piston_area
+        rated_velocity = parameters.rated_flow / parameters.piston_area
         scales = parameters.rated_speed, rated_velocity * sample_time, parameters.relief_pressure
         fade = exp(-samples * sample_time / MEMORY)
         allowed = false_alarms * duration / 3600.0

@@ -91,6 +91,11 @@ class EhaParameters:
         """Motor speed at the paper's 4 V [rad/s]."""
         return 4.0 * self.motor_speed_per_volt
 
+    @property
+    def rated_flow(self) -> float:
+        """What the pump displaces at that speed [m^3/s]."""
+        return self.pump_displacement * self.rated_speed
+
 
 PAIRS: Mapping[str, str] = {"piston_area": "area_difference", "chamber_volume": "volume_difference"}
 """Entries that a rig file may give as two numbers, of sides A and B: mean, and their difference over their sum."""

@@ -36,7 +36,7 @@ def leakage_scales(p: EhaParameters) -> Mapping[str, float]:
     >>> leakage_scales(EhaParameters())
     {'leakage_coefficient': 1.0, 'flow_bias': 1.0}
     """
-    flow = _rated_flow(p) / _rated_flow(PAPER_RIG)
+    flow = p.rated_flow / PAPER_RIG.rated_flow
     return {"leakage_coefficient": flow / _pressure_ratio(p), "flow_bias": flow}
 
 
@@ -62,7 +62,7 @@ def friction_scales(p: EhaParameters) -> Mapping[str, float]:
     1.0
     """
     area = p.piston_area / PAPER_RIG.piston_area
-    velocity = _rated_flow(p) / _rated_flow(PAPER_RIG) / area
+    velocity = p.rated_flow / PAPER_RIG.rated_flow / area
     force = area * _pressure_ratio(p)
     return {
         "friction_quadratic": force / velocity**2,
@@ -93,10 +93,6 @@ def natural_frequency(p: EhaParameters) -> float:
     """
     stiffness = p.bulk_modulus * p.piston_area**2 / p.chamber_volume
     return (stiffness / p.moving_mass) ** 0.5 / (2.0 * math.pi)
-
-
-def _rated_flow(p: EhaParameters) -> float:
-    return p.pump_displacement * p.rated_speed
 
 
 @lru_cache(maxsize=256)

@@ -23,7 +23,7 @@ def usual_leakage(p: EhaParameters) -> float:
     float
         The healthy actuator's, or a little where it has none.
     """
-    return max(p.leakage_coefficient, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed / p.relief_pressure)
+    return max(p.leakage_coefficient, LEAST_LEAKAGE * p.rated_flow / p.relief_pressure)
 
 
 def usual_bias(p: EhaParameters) -> float:
@@ -39,7 +39,7 @@ def usual_bias(p: EhaParameters) -> float:
     float
         The healthy actuator's, or a little where it has none.
     """
-    return max(p.flow_bias, LEAST_LEAKAGE * p.pump_displacement * p.rated_speed)
+    return max(p.flow_bias, LEAST_LEAKAGE * p.rated_flow)
 
 
 def worse(p: EhaParameters, name: str, healthy: float, factor: float) -> float:

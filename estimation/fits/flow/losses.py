@@ -90,7 +90,7 @@ def with_lumped(
     if not {LEAKAGE, DRAIN, BIAS} <= set(found):
         return {**found}, 0.0
     values, covariance = losses(fits, weights)
-    covariance[0, 0] += (DISCRETISED * p.pump_displacement * p.rated_speed / p.relief_pressure) ** 2
+    covariance[0, 0] += (DISCRETISED * p.rated_flow / p.relief_pressure) ** 2
     deviations = np.sqrt(np.diag(covariance))
     if not np.all(np.isfinite(deviations)) or not np.all(deviations > 0.0):
         return {**found, LEAKAGE: (found[LEAKAGE][0] + OF_DRAIN * found[DRAIN][0], found[LEAKAGE][1])}, 0.0

@@ -69,7 +69,7 @@ def coordinates_of(p: EhaParameters, rated: float) -> Array:
     """
     parts, force = friction_parts(p, rated)
     forces = (max(one, force) for one in parts)
-    least = LEAST_FLOW * p.pump_displacement * p.rated_speed
+    least = LEAST_FLOW * p.rated_flow
     leakage, bias = max(p.leakage_coefficient, least / p.relief_pressure), max(p.flow_bias, least)
     return np.log([leakage, bias, *forces, p.bulk_modulus, 1.0])
 
