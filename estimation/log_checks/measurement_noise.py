@@ -121,6 +121,32 @@ def _step(values: Array) -> float:
     return float(np.min(steps[steps > ROUNDING * np.max(np.abs(values), initial=0.0)], initial=np.inf))
 
 
+def is_coarse(values: Array, variance: float) -> bool:
+    """Return whether the steps of a channel's converter are so coarse that its noise does not average them out.
+
+    What a signal that rests between two steps reads is then off by the same share of a step in each sample.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        The channel, in any unit; NaN where missing.
+    variance : float
+        Of its noise, rounding included [unit of the channel squared].
+
+    Returns
+    -------
+    bool
+        Whether they are; see `COARSE`.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(1).normal(0.3, 0.3, 20_000)
+    >>> is_coarse(np.round(noise), 0.3**2 + 1.0 / 12.0), is_coarse(np.round(3.0 * noise), 0.9**2 + 1.0 / 12.0)
+    (True, False)
+    """
+    return _step(values[np.isfinite(values)]) > COARSE * variance**0.5
+
+
 def _quantum(values: Array) -> float:
     """Return the smallest step of a channel that mostly does not move; 0 for any other."""
     steps = np.abs(np.diff(values))

@@ -3,7 +3,7 @@
 A fitted circuit tells friction with the whole motion, and what its seals do at reversals is judged. While a piston
 slides one way, what pressure pushes it with beyond its inertia is its friction, whatever pump and seals do. The three
 parts of the law are regressed on the velocities at which it slid; a steady force, as of a load or a sensor's zero, has
-another sign than friction by direction and is fitted beside them.
+another sign than friction by direction and is fitted beside them. See decision 319.
 """
 
 import math
@@ -12,9 +12,8 @@ from itertools import pairwise
 import numpy as np
 
 from estimation.arrays import IntArray
-from estimation.log_checks.channel_names import PRESSURE
-from estimation.log_checks.measurement_noise import NORMAL_MAD
-from estimation.log_checks.order import median
+from estimation.log_checks.channel_names import POSITION, PRESSURE
+from estimation.log_checks.measurement_noise import is_coarse, measurement_variances, position_variance
 from faults.diagnosis.circuits.friction_shape import BEND, FADES
 from faults.diagnosis.circuits.model_doubt import SELDOM_KNOWN
 from faults.diagnosis.severity import KnownFriction
@@ -22,8 +21,6 @@ from plant.arrays import Array
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.model import EhaParameters, load_on_rod
 from plant.log.record import Record
-
-POSITION = "position_m"
 
 WINDOW = 0.02
 """Time over which forces are averaged [s]: sensors' noise averages, and velocity is nearly the same."""
@@ -75,7 +72,8 @@ def friction_by_forces(record: Record, p: EhaParameters, rated: float) -> KnownF
     -------
     KnownFriction or None
         None where one of the channels is not logged, or too slowly, where areas differ, so that differential pressure
-        is no force, where the piston hardly slides, and where more than the sensors' noise is left.
+        is no force, where pressure has too coarse a converter, where the piston hardly slides, and where more than the
+        sensors' noise is left.
     """
     if not {POSITION, PRESSURE} <= set(record.channels) or p.area_difference or rated <= 0.0:
         return None
@@ -84,7 +82,9 @@ def friction_by_forces(record: Record, p: EhaParameters, rated: float) -> KnownF
     half, length = max(1, round(HALF_STEP / step)), round(WINDOW / step)
     if length < RESOLVED or len(position) < 4 * half + length:
         return None
-    noise = _noise(position, 3), _noise(pressure, 2)
+    noise_x, noise_p = position_variance(position), measurement_variances(record, (PRESSURE,))[PRESSURE]
+    if is_coarse(pressure, noise_p):
+        return None
     position, known = np.nan_to_num(position), np.isfinite(position + pressure)
     velocity = np.zeros(len(position))
     velocity[half:-half] = (position[2 * half :] - position[: -2 * half]) / (2 * half * step)
@@ -102,7 +102,7 @@ def friction_by_forces(record: Record, p: EhaParameters, rated: float) -> KnownF
     speed = np.abs(position[last] - position[first]) / time / rated
     square = _mean(velocity**2, first, length) / rated**2
     columns = np.stack([1.0 - speed, square - speed, speed, direction, direction * inertia], axis=1)
-    least = (p.piston_area * noise[1]) ** 2 / length + (p.moving_mass * noise[0] / (half * step * time)) ** 2
+    least = p.piston_area**2 * noise_p / length + (p.moving_mass / (half * step * time)) ** 2 * noise_x
     bends = BEND * np.exp(-speed[:, None] / np.array(FADES))
     return _told(columns, direction * (pushed - inertia), least, bends)
 
@@ -122,13 +122,6 @@ def _mean(values: Array, first: IntArray, length: int) -> Array:
     """Return means over windows by trapezoids."""
     sums = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))])
     return np.asarray((sums[first + length] - sums[first]) / length, dtype=np.float64)
-
-
-def _noise(values: Array, order: int) -> float:
-    """Return the deviation of a channel's white noise, which its differences of some order show."""
-    apart = np.abs(np.diff(values, order))
-    apart = apart[np.isfinite(apart)]
-    return NORMAL_MAD * median(apart) / math.sqrt(math.comb(2 * order, order)) if len(apart) else math.inf
 
 
 def _told(columns: Array, forces: Array, least: float, bends: Array) -> KnownFriction | None:

@@ -72,6 +72,14 @@ def test_no_friction_is_told_where_the_law_does_not_hold_or_a_log_does_not_show_
     assert friction_by_forces(one, replace(RIG, area_difference=0.1), RATED) is None
 
 
+@pytest.mark.parametrize(("step", "told"), [(2e3, True), (2e4, False)])
+def test_no_friction_is_told_by_a_converter_that_is_coarse_beside_the_pressure_s_noise(step: float, told: bool) -> None:
+    one = record()
+    rounded = np.round(one["differential_pressure_pa"] / step) * step
+    found = friction_by_forces(Record(STEP, {**one.channels, "differential_pressure_pa": rounded}), RIG, RATED)
+    assert (found is not None) is told
+
+
 def test_samples_that_are_missing_are_left_out() -> None:
     one, whole = record(), friction_by_forces(record(), RIG, RATED)
     holed = np.where(np.arange(len(one)) % 500 < 100, np.nan, one["differential_pressure_pa"])
