@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from estimation.arrays import Array, IntArray
-from estimation.fits.greybox.side_by_side_loops import SideBySideKernel, absorb, drive
+from estimation.fits.greybox.side_by_side_loops import SideBySideKernel, close, drive
 from plant.solvers.fixed_step_loops import Operation, lay, share
 
 
@@ -129,14 +129,7 @@ def residuals_across_gaps(
                 for lane in range(lanes):
                     excess[i, lane] += work[shown + i * lanes + lane]
         if (k + 1) % block == 0 or k == n - 1:
-            for i in range(kernel.OUTPUTS):
-                if present[i] > 0.0:
-                    total = spread[i] + variance[i] / present[i] + open_at[i, min(k // block, open_at.shape[1] - 1)]
-                    gain = spread[i] / total
-                    absorb(kernel, excess[i], level[i], present[i], gain, math.sqrt(total), errors[i, k // block])
-                    spread[i] -= gain * spread[i]
-                    present[i] = 0.0
-                spread[i] += walk[i, min(k // block, walk.shape[1] - 1)]
+            close(kernel, k // block, excess, level, present, spread, variance, walk, open_at, errors)
 
 
 def carry_each(kernel: GapKernel, work: Array, covariance: Array, reach: Array) -> None:

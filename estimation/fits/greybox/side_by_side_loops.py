@@ -102,14 +102,7 @@ def residuals_side_by_side(
                 for lane in range(lanes):
                     excess[i, lane] += work[shown + i * lanes + lane] - measured[k, i]
         if (k + 1) % block == 0 or k == n - 1:
-            for i in range(kernel.OUTPUTS):
-                if present[i] > 0.0:
-                    total = spread[i] + variance[i] / present[i] + open_at[i, min(k // block, open_at.shape[1] - 1)]
-                    gain = spread[i] / total
-                    absorb(kernel, excess[i], level[i], present[i], gain, math.sqrt(total), errors[i, k // block])
-                    spread[i] -= gain * spread[i]
-                    present[i] = 0.0
-                spread[i] += walk[i, min(k // block, walk.shape[1] - 1)]
+            close(kernel, k // block, excess, level, present, spread, variance, walk, open_at, errors)
 
 
 def drive(kernel: SideBySideKernel, work: Array, drives: Array, k: int, steps: int) -> None:
@@ -138,6 +131,43 @@ def drive(kernel: SideBySideKernel, work: Array, drives: Array, k: int, steps: i
             for lane in range(lanes):
                 work[bases + i * lanes + lane] = drives[k - 1, i, 0]
                 work[rises + i * lanes + lane] = rise
+
+
+def close(
+    kernel: SideBySideKernel,
+    place: int,
+    excess: Array,
+    level: Array,
+    present: Array,
+    spread: Array,
+    variance: Array,
+    walk: Array,
+    open_at: Array,
+    errors: Array,
+) -> None:
+    """Fill in the residuals of a block, and take the random walks over to the next one.
+
+    Parameters
+    ----------
+    place : int
+        The block's number.
+    excess, level : ndarray, shape (outputs, lanes)
+        Sums over the block, predicted less measured, which become zero, and the random walks' levels [SI].
+    present, spread : ndarray, shape (outputs,)
+        Samples of the block, which become none, and what the levels are not known by [SI squared].
+    variance, walk, open_at : ndarray, shapes (outputs,), (outputs, walks), (outputs, places)
+        As of `residuals_side_by_side` [SI squared].
+    errors : ndarray, shape (outputs, blocks, lanes)
+        Room for the residuals; those of missing blocks are left as they are.
+    """
+    for i in range(kernel.OUTPUTS):
+        if present[i] > 0.0:
+            total = spread[i] + variance[i] / present[i] + open_at[i, min(place, open_at.shape[1] - 1)]
+            gain = spread[i] / total
+            absorb(kernel, excess[i], level[i], present[i], gain, math.sqrt(total), errors[i, place])
+            spread[i] -= gain * spread[i]
+            present[i] = 0.0
+        spread[i] += walk[i, min(place, walk.shape[1] - 1)]
 
 
 def absorb(
