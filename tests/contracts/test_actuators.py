@@ -36,13 +36,17 @@ SHORT: Mapping[str, Mapping[str, Any]] = {
 }
 """What makes a run short, where the kind's own is long."""
 
+LOADED: Mapping[str, Mapping[str, Any]] = {"diaphragm-motor": {"load": 10.0}}
+"""The load under which other tests lay logs beside the curves of a motor's faults, which take seconds to simulate."""
+
 FOREIGN = {"eha": ("--load", "3")}
 """An option that a kind does not understand."""
 
 
 def run_of(kind: ActuatorKind, seed: int = 3) -> Run:
     assert kind.simulate is not None
-    options = {**kind.simulate.options, **SHORT.get(kind.name, {}), "seed": seed, "plant": kind.name}
+    own = {**SHORT.get(kind.name, {}), **LOADED.get(kind.name, {})}
+    options = {**kind.simulate.options, **own, "seed": seed, "plant": kind.name}
     return kind.simulate.run(kind.rig, options)
 
 
@@ -65,7 +69,9 @@ def looked(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     findings: dict[str, Finding] = {}
     for name, verb in (("estimate", kind.estimate), ("diagnose", kind.diagnose)):
         if verb is not None:
-            findings[name] = verb.run(record, *verb.prepare(kind.rig, {**verb.options, "seed": 0}))
+            findings[name] = verb.run(
+                record, *verb.prepare(kind.rig, {**verb.options, **LOADED.get(kind.name, {}), "seed": 0})
+            )
     return Looked(kind, log, record, findings)
 
 
@@ -155,7 +161,8 @@ def test_the_page_says_what_was_found(looked: Looked) -> None:
 
 
 def test_the_command_says_the_same(looked: Looked) -> None:
-    done = CliRunner().invoke(app, ["diagnose", "--plant", looked.kind.name, "--json", str(looked.log)])
+    load = [f"--{name}={value}" for name, value in LOADED.get(looked.kind.name, {}).items()]
+    done = CliRunner().invoke(app, ["diagnose", "--plant", looked.kind.name, *load, "--json", str(looked.log)])
     assert done.exit_code == 0, done.output
     (entries,) = json.loads(done.stdout)
     assert entries["condition"] == looked.kind.conditions[0]

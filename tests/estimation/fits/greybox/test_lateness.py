@@ -37,9 +37,9 @@ def test_half_a_millisecond_of_a_position_is_taken_up_where_it_shows() -> None:
     record = log(duration=3.0)
     rows = np.arange(len(record))
     given = record.replace(position_m=np.interp(rows - 0.5, rows, record["position_m"]))
-    found = explained(given)
-    assert found.names == ("position_late",)
-    assert notes_of(found, HEALTHY)[0].data["late_ms"] == pytest.approx(0.5, abs=0.25)
     fit = fit_flow(given, HEALTHY, HEALTHY.bulk_modulus)
+    assert fit.explanation is not None
+    assert fit.explanation.names == ("position_late",)
+    assert notes_of(fit.explanation, HEALTHY)[0].data["late_ms"] == pytest.approx(0.5, abs=0.25)
     value, std = fit.parameters["bulk_modulus"]
     assert abs(value - HEALTHY.bulk_modulus) < 2.0 * std
