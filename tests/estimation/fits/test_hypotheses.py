@@ -142,9 +142,9 @@ def test_a_pressure_that_reads_a_bar_too_much_is_an_offset_that_is_taken_off_and
     assert first_load(off) != 0.0
     (offset,) = [note.data["offset_pa"] for note in found.notes if note.code is RigCode.PRESSURE_OFFSET]
     assert offset == pytest.approx(1e5, rel=0.02)
-    assert found.explanation is not None
-    assert found.explanation.names == ("pressure_offset",)
-    mended = set_right(clean_log(off, HEALTHY), found.explanation).record[PRESSURE]
+    explanation = found.evidence.explanation
+    assert explanation.names == ("pressure_offset",)
+    mended = set_right(clean_log(off, HEALTHY), explanation).record[PRESSURE]
     assert np.mean(mended - record[PRESSURE]) == pytest.approx(0.0, abs=2e3)
     assert found.gate.passed
     assert found.quantities["bulk_modulus"].value == pytest.approx(HEALTHY.bulk_modulus, rel=0.01)
