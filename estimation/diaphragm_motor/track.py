@@ -251,9 +251,22 @@ def _tilts(block: Block, state: Floats, p: DiaphragmMotorParameters, maps: Healt
 
 
 _LEAST_SPEED = 1e-4
+"""Velocity of the rod above which a point of operation counts for the maps [m/s]; judged."""
+
 _LEAST_PRESSURE = 1e3
+"""Pressure by which a lost flow is divided at least, for a leakage [Pa]; judged."""
+
 _DEGREE = 5
+"""Of the polynomials by which flow and pressure go with the electrodes' amplitude; judged."""
+
 _FIRST_LEAKAGE, _FIRST_LOAD = 2e-11, 50.0
+"""Standard deviations of leakage [m^3/(s Pa)] and load [N] before a log is seen, and of a load after a jump; judged."""
+
 _LEAKAGE_WALK, _LOAD_WALK = 5e-14, 0.05
+"""What both may change by within a block without a jump, one standard deviation [m^3/(s Pa), N]; judged."""
+
 _STILL, _SURE = 300.0, 6.0
+"""Change of pressure from block to block that is no jump [Pa], and deviations of its noise that are none; judged."""
+
 _WAIT = 3
+"""Blocks for which leakage is held after a jump [count]; judged."""

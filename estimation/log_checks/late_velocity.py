@@ -2,6 +2,7 @@
 
 A velocity that comes late by T is behind what position gained: over any stretch, position gains ``int v dt + T dv``,
 to first order, whether a filter or a delay makes it late. Play of the encoder and a late position have the other sign.
+See decision 288.
 """
 
 import numpy as np

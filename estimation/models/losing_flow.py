@@ -1,7 +1,7 @@
 """The flow form with one more loss, whose course is known from what is measured and whose size is not.
 
 A leak that goes with position, with the shaft's angle or with pressure, and a pump that fills badly, take oil from the
-loaded chamber as leakage does: each is one column beside the drives.
+loaded chamber as leakage does: each is one column beside the drives. See decision 288.
 """
 
 from dataclasses import dataclass, replace

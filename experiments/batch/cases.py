@@ -34,6 +34,7 @@ MOST_SERIES = 1_000_000
 """Series of one `[[runs]]`, all of which are listed before the first is run [count]."""
 
 MOST_CASES = 2048
+"""Cases of a task at most, however short they are [count]; judged."""
 
 COSTS: Mapping[str, tuple[float, float]] = {"filter": (0.0, 2.5e-8), "estimate": (0.3, 2e-5), "diagnose": (0.05, 1e-6)}
 """About what a case costs on one core, by verb: by itself, and for each tenth of a millisecond of its series [s]."""

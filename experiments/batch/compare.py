@@ -13,6 +13,7 @@ SERIES = ["plant", "file", "drive", "sensors", "condition", "seed", "duration_s"
 DOING = ["form", "method", "pressure", "told", "start_pa", "start_std_pa"]
 
 RESAMPLES = 2000
+"""Bootstrap draws of series for an interval [count]: fifty of them lie beyond each end of a 95 % interval."""
 
 BLOCK = 200
 """Draws that are held in memory at a time [count]."""

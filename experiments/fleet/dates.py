@@ -1,4 +1,7 @@
-"""Dates of logs: the day-first form, dates that a wrong clock wrote, and how a date to come is told."""
+"""Dates of logs: the day-first form, dates that a wrong clock wrote, and how a date to come is told.
+
+See decision 309.
+"""
 
 import re
 from collections.abc import Iterable, Mapping

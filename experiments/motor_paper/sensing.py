@@ -50,6 +50,7 @@ FAULTS = {
 """Faults of one part: parameter, place, value."""
 
 HARMONICS = 9
+"""Highest multiple of the drive's frequency that is told [dimensionless]."""
 
 
 @tabled

@@ -3,7 +3,7 @@
 A fitted circuit tells leakage with the whole motion: where its seals yield otherwise than real ones do, it makes up for
 that by leakage. The balance of flows knows pump, piston and pressure, and nothing of friction. Where it explains a log,
 leakage is known some twenty times as well by it, and what hangs on leakage in the steady state is better known too.
-Friction is told by `known_friction` then, which knows nothing of the pump.
+Friction is told by `known_friction` then, which knows nothing of the pump. See decision 304.
 """
 
 from collections.abc import Mapping

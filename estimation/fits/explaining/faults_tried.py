@@ -1,4 +1,7 @@
-"""`worse(parameters, name, factor)`: leakage, flow bias and friction of an actuator as faults make them."""
+"""`worse(parameters, name, factor)`: leakage, flow bias and friction of an actuator as faults make them.
+
+See decision 311.
+"""
 
 from plant.eha.model import EhaParameters
 from plant.eha.scales import PAPER_RIG, friction_scales, leakage_scales

@@ -2,6 +2,7 @@
 
 A scored bore leaks where the piston passes the score, a worn tooth once a turn, a pump that fills badly loses flow
 above some speed, a lip that lifts leaks above some pressure, and a leaking relief valve leaks one way.
+See decision 288.
 """
 
 from collections.abc import Mapping

@@ -2,7 +2,7 @@
 
 Its course follows from the log, up to where it lies and how wide it is (`loss_courses`); its size is one more unknown
 of the flow form. What residuals promise of some seventy courses is read off side by side; the best of each kind is
-followed, its course moved by Gauss-Newton steps between steps of all that is fitted.
+followed, its course moved by Gauss-Newton steps between steps of all that is fitted. See decision 288.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -2,7 +2,7 @@
 
 The form knows two leaks: from chamber to chamber, and a drain of each port to the inner circuit. Equation 5.8 knows
 one, and Table 3 gives it: what flows across, and half of a port's drain (errata E17). A log often tells it far better
-than its parts.
+than its parts. See decision 304.
 """
 
 import math

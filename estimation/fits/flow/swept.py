@@ -1,4 +1,7 @@
-"""`swept_evenly(log, ...)`: positions whose straight lines between samples leak as the piston's own course does."""
+"""`swept_evenly(log, ...)`: positions whose straight lines between samples leak as the piston's own course does.
+
+See decision 313.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace

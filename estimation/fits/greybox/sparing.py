@@ -2,7 +2,7 @@
 
 Between samples pressures are all but straight lines, so that one step is as exact as four. A few samples differ: a
 valve opens or shuts there. Which they are is read off two runs at one point, so that a search has one misfit
-throughout.
+throughout. See decision 294.
 """
 
 from dataclasses import replace

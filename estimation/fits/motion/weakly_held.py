@@ -1,4 +1,7 @@
-"""Whether position holds bulk modulus so weakly that it will not be believed, at the end of a fit or on the way."""
+"""Whether position holds bulk modulus so weakly that it will not be believed, at the end of a fit or on the way.
+
+See decision 314.
+"""
 
 import numpy as np
 

@@ -3,6 +3,7 @@
 A pulse counter gives the speed of a shaft and not its direction. With the sign known, the model behind it is linear, so
 searches begin at signs: the square of the output is a quadratic form of filtered inputs, whose least-squares estimate
 has the linear model as its largest eigenvector (the lifting of phase retrieval: Candes, Strohmer and Voroninski 2013).
+See decision 307.
 """
 
 from collections.abc import Sequence

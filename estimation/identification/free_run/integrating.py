@@ -2,7 +2,7 @@
 
 A pole that is estimated near 1 decays over a few records, so that a run over new data drifts off; and its descent goes
 along a curved valley, where offset, initial state and pole give one ramp together. With the pole given, the inputs are
-summed, the ramp is a column, and the other poles are as easy to fit as those of a plant that settles.
+summed, the ramp is a column, and the other poles are as easy to fit as those of a plant that settles. See decision 295.
 """
 
 from collections.abc import Sequence

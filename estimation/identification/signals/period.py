@@ -1,4 +1,7 @@
-"""After how many samples inputs repeat themselves."""
+"""After how many samples inputs repeat themselves.
+
+See decision 295.
+"""
 
 import numpy as np
 from numpy.typing import ArrayLike

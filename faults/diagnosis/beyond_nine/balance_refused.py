@@ -3,7 +3,7 @@
 The balance predicts each sample, and what it leaves is measured by the sensors' noise: a motor that turns between two
 samples, a search that ends in a wrong valley, spikes, or a valve that chatters refuse bulk modulus, though they hardly
 change the means over 10 ms by which a circuit is compared. What the balance would have told of a worn pump and of
-valves is then asked of circuits with these faults, as without pressure (`other_faults`).
+valves is then asked of circuits with these faults, as without pressure (`other_faults`). See decision 303.
 """
 
 import numpy as np

@@ -8,7 +8,7 @@ open in classes and intervals.
 
 Source: law and size of the fall, Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, European Journal of Control 4
 (1998), sections 2 and 3; an error of a model as an unknown with a prior, Kennedy and O'Hagan, Journal of the Royal
-Statistical Society B 63 (2001).
+Statistical Society B 63 (2001). See decision 296.
 """
 
 import numpy as np

@@ -7,7 +7,7 @@ so does what it says of them, because the fit did not go that way (consider cova
 Statistical Orbit Determination, 2004, chapter 6). The file may also be right about all of them: both count, as likely
 as they make the log. What is left of a log that no sensor makes is a wrong model's error, which a longer log does not
 average away; that is counted here, once, and where it is. Where noise alone is left, that of a position does not last.
-An encoder's steps are no wrong model either: what they add to one block they take from the next.
+An encoder's steps are no wrong model either: what they add to one block they take from the next. See decision 251.
 """
 
 from collections.abc import Mapping

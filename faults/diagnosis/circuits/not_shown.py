@@ -1,4 +1,7 @@
-"""Which parts of a circuit a log says nothing of: their values are those of the belief before it."""
+"""Which parts of a circuit a log says nothing of: their values are those of the belief before it.
+
+See decision 302.
+"""
 
 import numpy as np
 

@@ -15,6 +15,7 @@ from plant.log.notes import LogCode
 from plant.notes import Note
 
 FEWEST_SAMPLES = 10
+"""Samples that a log has at least [count]; judged."""
 
 MOST_MISSING, MOST_MISSING_TO_RELATE = 0.05, 0.5
 """Share of a channel's samples, or of the clock's, that may be missing [fraction]: where an actuator is estimated, and
@@ -27,6 +28,7 @@ WHOLE = 0.01
 """A step so near a whole number of sample times is one [fraction]."""
 
 ROUNDING = 1e-6
+"""Share of the sample time by which stamps may be off beside what they are rounded to [fraction]; judged."""
 
 Channels = Mapping[str, Array]
 

@@ -27,6 +27,7 @@ NEWER = (b"\x00\x02IM", b"\x02\x00MI")
 """Version and byte order of a MAT 7.3."""
 
 DEEPEST = 20
+"""Structs within structs that are read [count]; judged."""
 
 
 class DamagedMatError(ValueError):
