@@ -40,10 +40,10 @@ def record(seed: int = 0, *, mass: float = RIG.moving_mass, load: float = 0.0, b
 
 @pytest.mark.parametrize("load", [0.0, 200.0])
 def test_friction_at_rated_velocity_is_told_as_well_as_is_said(load: float) -> None:
-    found = [friction_by_forces(record(seed, load=load), RIG, RATED) for seed in range(12)]
+    found = [friction_by_forces(record(seed, load=load), RIG, RATED) for seed in range(40)]
     z = [(one.forces[2] - WHOLE) / one.covariance[2, 2] ** 0.5 for one in found if one is not None]
     assert len(z) == len(found)
-    assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.5
+    assert 0.7 < np.sqrt(np.mean(np.square(z))) < 1.25
     assert all(one is not None and one.covariance[2, 2] ** 0.5 < 5.0 for one in found)
 
 
