@@ -125,7 +125,7 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
     record, blocks, fits = part.record, part.blocks, part.fits
     found = {
         "models": models_scores(fits),
-        "innovations": innovation_scores(record, actuator.circuit) / blocks.block,
+        "innovations": innovation_scores(record, actuator.circuit) / blocks.rows,
         "parameters": fits.scores,
     }
     if library is not None:

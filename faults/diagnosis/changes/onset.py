@@ -19,6 +19,7 @@ from faults.diagnosis.changes.fault_throughout import fault_throughout
 from faults.diagnosis.changes.split import GAIN, in_one_condition, likeliest_split
 from faults.diagnosis.changes.warming import Drift, drift_of
 from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.between_samples import with_lead
 from faults.diagnosis.circuits.blocks import LONGEST, Blocks, blocks_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted
 from faults.diagnosis.circuits.class_fit import least_scales, nominal_runs
@@ -139,7 +140,7 @@ def last_part(record: Record, actuator: Actuator) -> LastPart:
 
 
 def _last_of(window: Record, actuator: Actuator) -> LastPart:
-    blocks = blocks_of(window)
+    blocks = with_lead(blocks_of(window), actuator)
     blocks, fits = stopped(blocks, fit_classes(blocks, actuator), actuator)
     two, drift = parted(blocks, fits, actuator), drift_of(blocks, fits, actuator)
     if drift is not None and (two is None or drift.gain > two.gain):

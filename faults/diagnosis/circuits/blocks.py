@@ -90,6 +90,11 @@ class Blocks:
         Whether each sample of motor speed is the mean of several logged ones.
     differenced : bool
         Whether velocity is how far a logged position went: what its error adds to a block, it takes from the next.
+    lead : float
+        By how much the motor is ahead of straight lines between logged samples [s], see
+        `faults.diagnosis.circuits.between_samples`.
+    between : int
+        Samples of the motor speed from one logged sample to the next.
     """
 
     speed: Array
@@ -107,6 +112,13 @@ class Blocks:
     settling: float = SETTLING
     averaged: bool = False
     differenced: bool = False
+    lead: float = 0.0
+    between: int = 1
+
+    @property
+    def rows(self) -> int:
+        """Logged samples in a block."""
+        return self.block // self.between
 
     @cached_property
     def outputs(self) -> Array:

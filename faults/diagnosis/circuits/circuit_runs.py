@@ -18,7 +18,7 @@ from plant.eha.circuit_start import at_rest, under_pressure
 from plant.eha.model import EhaParameters
 from plant.eha.one_sided import as_wide, circuit_groups, circuit_plant
 from plant.eha.simulate import CIRCUIT
-from plant.solvers.adaptive import MEANS, SAMPLES
+from plant.solvers.adaptive import MEANS, SAMPLES, STRAIGHT
 from plant.solvers.block_means import block_means
 from plant.solvers.steps import parameter_row
 
@@ -193,6 +193,8 @@ def _run(blocks: Blocks, starts: Array, rows: Array, since: int = 0) -> Array:
 
 def _allowed(blocks: Blocks) -> dict[str, float]:
     """Return the errors allowed in runs, and what the motor's speed does between its samples: it has inertia."""
+    if blocks.between > 1:  # its lines have a curve's means
+        return {**ALLOWED, "bulge": STRAIGHT}
     return {**ALLOWED, "bulge": MEANS if blocks.averaged else SAMPLES}
 
 
@@ -279,5 +281,7 @@ def _outputs(blocks: Blocks, states: Array, rows: Array) -> Array:
     if blocks.pressure is None:
         return np.ascontiguousarray(velocity.T)[..., None]
     whose = circuit_plant(rows.shape[-1]).parameter_class
-    pressure = block_means(CIRCUIT.observe, PRESSURE, states[:-1], rows, blocks.block, whose)
+    logged, rows = states[: -1 : blocks.between], rows if len(rows) == 1 else rows[:: blocks.between]
+    logged, rows = np.ascontiguousarray(logged), np.ascontiguousarray(rows)
+    pressure = block_means(CIRCUIT.observe, PRESSURE, logged, rows, blocks.rows, whose)
     return np.stack([velocity.T, pressure.T], axis=-1)

@@ -12,6 +12,7 @@ import numpy as np
 
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.between_samples import open_beside
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import (
@@ -29,7 +30,7 @@ from faults.diagnosis.circuits.class_fit import (
     scales_of,
 )
 from faults.diagnosis.circuits.friction_shape import bent_by, doubt_of_bends, told_of_bent
-from faults.diagnosis.circuits.model_doubt import distrust, doubt_of, lasting_power, seldom_known_slopes, spreads_of
+from faults.diagnosis.circuits.model_doubt import distrust, doubt_of, lasting_power
 from faults.diagnosis.circuits.region_scores import (
     apart_in_forces,
     region_scores,
@@ -198,8 +199,9 @@ def fit_classes(
     if blocks.pressure is None:
         spread = spread_of(best, known[least], blocks, centre)
     else:
-        seen, seldom = _NO_FRICTION if stuck else np.ones(len(COORDINATES)), seldom_known_slopes(best, blocks, actuator)
-        spread = doubt_of(best, seldom, blocks, actuator.conditions, unbent, seen, spreads_of(actuator))
+        seen = _NO_FRICTION if stuck else np.ones(len(COORDINATES))
+        seldom, spreads = open_beside(best, blocks, actuator)
+        spread = doubt_of(best, seldom, blocks, actuator.conditions, unbent, seen, spreads)
         spread = spread + between_fits(fits, best, worse)
     errors = np.array([scales_of(blocks, run) for run in runs])
     return ClassFits(best, known[least], nominal, errors, held, spread, lasting, moved[least], unbent)

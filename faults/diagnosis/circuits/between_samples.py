@@ -1,0 +1,154 @@
+"""`with_lead(blocks, actuator)`: a slow log with what its motor does between samples, as a circuit tells it.
+
+A slow log says how fast its motor turns at the samples. Where commands come at samples, as in a controller whose clock
+the logger shares, a motor that nears its new speed within a sample or two is ahead of the straight line at every turn.
+The oil that this pumps moves the piston at once; a circuit that is driven by straight lines makes up for it by friction
+and leakage. The flow form has a lead for that (`estimation.models.flow.delivered_flow`); here circuits have it too.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.fits.flow.log import MOST_LEAD
+from estimation.fits.greybox.course import SLOW
+from estimation.fits.greybox.speed_course import steady_bend
+from faults.conditions import CONDITIONS
+from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.circuit_runs import parameter_rows, predicted
+from faults.diagnosis.circuits.class_fit import WEAK, PointFit, fit_freely, misfit, nominal_runs
+from faults.diagnosis.circuits.model_doubt import left_of, seldom_known_slopes, spreads_of
+from plant.arrays import Array
+
+ROUNDS = 3
+"""Linear steps to a lead at most [count]."""
+
+ROUGHLY = 10.0
+"""Gain in log-likelihood below which the search before each ends [dimensionless]."""
+
+SETTLED = 0.005
+"""Step over the sample time at which a lead is near enough [dimensionless]: it moves severities by some hundredths of
+their deviations."""
+
+NUDGE = 0.02
+"""Step of the finite difference by a lead, over the sample time [dimensionless]."""
+
+
+def with_lead(blocks: Blocks, actuator: Actuator) -> Blocks:
+    """Return a slow log with the lead of its motor that a circuit tells; any other as it is.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    Blocks
+        The log, with a speed half-way between each two samples. One without pressure is left as it is.
+    """
+    if blocks.pressure is None or blocks.averaged or blocks.sample_time < SLOW:
+        return blocks
+    found, start = led(blocks, 0.0), None
+    nearest = list(CONDITIONS)[int(np.argmin([misfit(found, run) for run in nominal_runs(found, actuator)]))]
+    for _ in range(ROUNDS):
+        fit = fit_freely(found, actuator, nearest, start, ROUGHLY)
+        step = _step(found, fit, actuator)
+        if not np.isfinite(step):
+            return blocks
+        start, found = fit.coordinates, led(found, found.lead + step)
+        if abs(step) < SETTLED * blocks.sample_time:
+            break
+    return found
+
+
+def led(blocks: Blocks, lead: float) -> Blocks:
+    """Return a log whose motor is ahead of the straight lines between its samples.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log, with or without speeds between its samples.
+    lead : float
+        By so much of each rise of the speed more is turned until it is over [s].
+
+    Returns
+    -------
+    Blocks
+        The log, with speeds half-way, between which it is linear: on average that is a curve's mean where speed bends
+        steadily, and the straight line's with the lead elsewhere.
+
+    Examples
+    --------
+    >>> steps = Blocks(np.array([0.0, 0.0, 100.0, 100.0]), 0.01, 2, np.zeros(1), np.zeros(1), np.ones(2))
+    >>> led(steps, 1e-3).speed.tolist()
+    [0.0, 0.0, 0.0, 70.0, 100.0, 100.0, 100.0]
+    """
+    logged, sample_time = blocks.speed[:: blocks.between], blocks.sample_time * blocks.between
+    bend = steady_bend(logged)
+    half_way = 0.5 * (logged[1:] + logged[:-1]) - (bend[1:] + bend[:-1]) / 12.0
+    speed = np.empty(2 * len(logged) - 1)
+    speed[::2], speed[1::2] = logged, half_way + 2.0 * lead / sample_time * np.diff(logged)
+    if blocks.between > 1:
+        return replace(blocks, speed=speed, lead=lead)
+    course = blocks.course
+    if course is not None:
+        course = np.interp(np.arange(len(speed)) / 2.0, np.arange(len(course)), course)
+    return replace(
+        blocks,
+        speed=speed,
+        sample_time=0.5 * sample_time,
+        block=2 * blocks.block,
+        course=course,
+        lead=lead,
+        between=2,
+    )
+
+
+def open_beside(fit: PointFit, blocks: Blocks, actuator: Actuator) -> tuple[Array, Array]:
+    """Return what is unknown beside the coordinates of a circuit: what is seldom known, and a slow log's lead.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    blocks : Blocks
+        Its log.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    tuple of ndarray, shapes (m, n, outputs) and (m,)
+        How the outputs answer each, and how far off it may be, see `seldom_known_slopes` and `spreads_of`.
+    """
+    slopes, spreads = seldom_known_slopes(fit, blocks, actuator), spreads_of(actuator)
+    if blocks.between == 1:
+        return slopes, spreads
+    return np.concatenate([slopes, _slope(blocks, fit, actuator)[None]]), np.append(spreads, MOST_LEAD)
+
+
+def _step(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float:
+    """Return by how much the lead should grow, all coordinates being free beside it [s]."""
+    slopes = np.concatenate([fit.slopes, _slope(blocks, fit, actuator)[None]])[:, blocks.first :]
+    weighted = np.where(blocks.seen, slopes / fit.scales, 0.0).reshape(len(slopes), -1)
+    left = np.where(blocks.seen, left_of(fit, blocks) / fit.scales, 0.0).ravel()
+    prior = np.zeros((len(slopes), len(slopes)))
+    prior[:-1, :-1], prior[-1, -1] = np.linalg.inv(WEAK), MOST_LEAD**-2
+    sample_time = blocks.sample_time * blocks.between
+    pull = weighted @ left
+    pull[-1] -= prior[-1, -1] * blocks.lead / sample_time
+    try:
+        return sample_time * float(np.linalg.solve(weighted @ weighted.T + prior, pull)[-1])
+    except np.linalg.LinAlgError:  # a circuit of no numbers
+        return float("nan")
+
+
+def _slope(blocks: Blocks, fit: PointFit, actuator: Actuator) -> Array:
+    """Return how the outputs answer the lead over the sample time, shape (n, outputs)."""
+    rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
+    ahead = led(blocks, blocks.lead + NUDGE * blocks.sample_time * blocks.between)
+    return np.asarray((predicted(ahead, rows)[0] - predicted(blocks, rows)[0]) / NUDGE, dtype=np.float64)
