@@ -278,7 +278,7 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     """Return what a log says that is believed to have nothing strange about it."""
     best = plain.best
     beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in plain.fits]
-    weights = weights_of(plain.fits, SURER, beforehand)
+    weights = weights_of(plain.fits, SURER * _passes(plain), beforehand)
     found, correlation = with_lumped(averaged(plain.fits, weights), plain.fits, weights, plain.start.parameters)
     found = with_small_teeth(found, best.small_teeth)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
@@ -297,6 +297,14 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
         turning=plain.turning,
         correlation=correlation,
     )
+
+
+def _passes(plain: PlainFits) -> int:
+    """Return how often a slow log's motor turns, 1 at the least and of any other log.
+
+    It passes each turn alike. So what a balance gains on another at one turn, it gains at all, which says no more.
+    """
+    return 1 if plain.log.course is None else max(1, plain.log.course.passes)
 
 
 def _hopeless(swinging: GreyBoxFit, asked: Sequence[Hypothesis]) -> float:

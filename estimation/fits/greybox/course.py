@@ -35,6 +35,13 @@ TRIED = np.array([0.0, *np.geomspace(0.005, 0.28, 7)])
 LONGEST = 5000
 """Blocks of a log's beginning that are asked what is open [count]."""
 
+AT_ONCE = 64
+"""Blocks whose products are summed at a time [count]."""
+
+ALIKE = 1e-9
+"""Power of a combination of columns of length one below which it tells nothing [dimensionless]: rounding is some 1e-15
+of it."""
+
 MAY_VANISH = ("leakage_coefficient", "flow_bias")
 """Unknowns that a slow log may put to nothing, and so far from what they are that bulk modulus follows."""
 
@@ -68,6 +75,11 @@ class Course:
     turns: Array
     staying: float = 1.0
     passing: float = 1.0
+
+    @property
+    def passes(self) -> int:
+        """How often the motor turns [count]: each turn is felt in the time before it and in that after it."""
+        return int(np.count_nonzero(self.turns)) // 2
 
     def walk(self, samples: int, block: int) -> Array:
         """Return the variance that pressure gains after each block but the last.
@@ -157,33 +169,81 @@ def likeliest(problem: Problem, theta: Array, course: Course) -> tuple[float, fl
     (noise,) = log.noise
     still = problem.on(replace(log, course=None, noise=(replace(noise, walk=0.0),)))
     samples, block = len(log.measured), max(1, round(log.block / log.sample_time))
-    left = _without_offset(still, theta)[:LONGEST] * (noise.variance / block) ** 0.5
+    left, freed = _without_offset(still, theta, LONGEST)
+    level = noise.variance / block
     walk, beside = np.append(0.0, unit.walk(samples, block)), unit.beside(samples, block)
+    return restricted(left * level**0.5, freed, level, walk, beside)
+
+
+def restricted(left: Array, freed: Array, level: float, walk: Array, beside: Array) -> tuple[float, float]:
+    """Return the likeliest noise of residuals from which a fit has taken what its unknowns could.
+
+    A log under steps has some twenty turns, of which ten unknowns take up half. To the likelihood of what is left those
+    were quiet; the restricted one counts what was taken (Patterson and Thompson 1971, Biometrika 58).
+
+    Parameters
+    ----------
+    left : ndarray, shape (blocks,)
+        Residuals, 0 where missing [Pa].
+    freed : ndarray, shape (blocks, columns)
+        What was taken out of them: columns of length one at right angles [dimensionless].
+    level : float
+        Variance of the pressure's noise in a block [Pa squared].
+    walk, beside : ndarray, shape (blocks,)
+        Variance that is gained up to each block, and that comes back, where each is open in full [Pa squared].
+
+    Returns
+    -------
+    tuple of float
+        What stays and what comes back, see `Course` [fraction].
+    """
     share, staying, passing = (one.ravel() for one in np.meshgrid(SHARES, TRIED, TRIED, indexing="ij"))
-    white, walks, passes = share * noise.variance / block, staying**2, passing**2
-    level, spread, cost = np.zeros_like(white), np.zeros_like(white), np.zeros_like(white)
-    for value, gained, there in zip(left.tolist(), walk.tolist(), beside.tolist(), strict=False):
+    white, walks, passes = share * level, staying**2, passing**2
+    values = np.column_stack([left, freed])
+    mean, spread, cost = np.zeros((len(white), values.shape[1])), np.zeros_like(white), np.zeros_like(white)
+    whitened, together = list[Array](), np.zeros((len(white), values.shape[1], values.shape[1]))
+    for value, gained, there in zip(values, walk.tolist(), beside.tolist(), strict=False):
         spread += walks * gained
-        if value == 0.0:  # missing
+        if value[0] == 0.0:  # missing
             continue
         total = spread + white + passes * there
-        innovation = value - level
-        cost += np.minimum(innovation**2 / total, 9.0) + np.log(total)
-        gain = spread / total
-        level += gain * innovation
-        spread -= gain * spread
+        innovation = (value - mean) / np.sqrt(total)[:, None]
+        cost += np.minimum(innovation[:, 0] ** 2, 9.0) + np.log(total)
+        whitened.append(innovation)
+        if len(whitened) == AT_ONCE:
+            together += _squares(whitened)
+        mean += (spread / np.sqrt(total))[:, None] * innovation
+        spread -= spread / total * spread
+    if whitened:
+        together += _squares(whitened)
+    known, pulled = together[:, 1:, 1:], together[:, 1:, 0]
+    cost += np.linalg.slogdet(known)[1] - np.sum(pulled * np.linalg.solve(known, pulled[..., None])[..., 0], axis=1)
     at = int(np.argmin(cost))
     return float(staying[at]), float(passing[at])
 
 
-def _without_offset(problem: Problem, theta: Array) -> Array:
-    """Return residuals less what an offset of motor speed and the unknowns make of them, shape (blocks,).
+def _squares(whitened: list[Array]) -> Array:
+    """Return sums of products of what was whitened, shape (noises, columns, columns), and forget it."""
+    parts = np.stack(whitened, axis=1)
+    whitened.clear()
+    return np.asarray(parts.transpose(0, 2, 1) @ parts, dtype=np.float64)
 
-    An offset leaves pressure off for long. A walk of the pressure would take it up, and none would be found.
+
+def _without_offset(problem: Problem, theta: Array, most: int) -> tuple[Array, Array]:
+    """Return residuals of the first blocks less what an offset of motor speed and the unknowns make of them.
+
+    An offset leaves pressure off for long. A walk of the pressure would take it up, and none would be found. With them,
+    as columns of length one that are at right angles, is what was taken out.
     """
     errors, slopes = problem.linearised(theta)
     columns = np.column_stack([_answers(problem, theta, [np.ones(len(problem.log.drives))]), slopes])
-    return errors.ravel() - columns @ np.linalg.lstsq(columns, errors.ravel(), rcond=None)[0]
+    errors, columns = errors.ravel()[:most], columns[:most]
+    sizes = np.linalg.norm(columns, axis=0)
+    columns = columns[:, sizes > 0.0] / sizes[sizes > 0.0]
+    squares, ways_out = np.linalg.eigh(columns.T @ columns)
+    told = squares > ALIKE
+    basis = columns @ (ways_out[:, told] / np.sqrt(squares[told]))  # exactly none where a block is missing
+    return errors - basis @ (basis.T @ errors), basis
 
 
 def _answers(problem: Problem, theta: Array, speeds: Iterable[Array]) -> Array:

@@ -1,14 +1,17 @@
 """What the motor's course between the samples of a slow log leaves open."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimation.fits.explaining.between_samples import with_course
+from estimation.fits.flow import fit
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log
-from estimation.fits.greybox.course import Course, likeliest, turns
+from estimation.fits.greybox.course import Course, likeliest, restricted, turns
+from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
 from estimation.models.flow import FLOW_FORM
@@ -54,6 +57,25 @@ def test_what_stays_is_told_from_what_comes_back(staying: float, passing: float)
     assert likeliest(problem, np.empty(0), course) == pytest.approx((staying, passing), rel=0.6, abs=0.01)
 
 
+def test_what_unknowns_take_up_of_few_turns_is_counted_all_the_same() -> None:
+    rng, samples, times = np.random.default_rng(5), 1000, np.linspace(-1.0, 1.0, 1000)
+    walk = np.where(np.arange(samples) % 62 == 31, (4e5) ** 2, 0.0)
+    columns, _ = np.linalg.qr(np.vander(times, 9))
+    without, found = list[float](), list[float]()
+    for _ in range(12):
+        made = np.cumsum(0.1 * np.sqrt(walk) * rng.standard_normal(samples)) + 5e3 * rng.standard_normal(samples)
+        left = made - columns @ (columns.T @ made)
+        found.append(restricted(left, columns, 25e6, walk, np.zeros(samples))[0])
+        without.append(restricted(left, columns[:, :0], 25e6, walk, np.zeros(samples))[0])
+    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(0.1, rel=0.3)
+    assert np.sqrt(np.mean(np.square(without))) < 0.75 * np.sqrt(np.mean(np.square(found)))
+
+
+@pytest.mark.parametrize(("turned", "passes"), [([0.0, 5.0, 5.0, 0.0, 0.0, 3.0, 3.0], 2), ([0.0, 0.0], 0)])
+def test_a_turn_is_felt_on_either_side_and_counts_once(turned: list[float], passes: int) -> None:
+    assert Course(np.array(turned)).passes == passes
+
+
 def test_blocks_of_several_samples_hold_what_each_gains() -> None:
     course = Course(np.array([0.0, 0.0, 3.0, 4.0, 1.0]))
     assert course.walk(5, 2).tolist() == [25.0, 1.0]
@@ -71,6 +93,21 @@ def test_bulk_modulus_of_a_log_of_200_hz_is_within_its_interval(seed: int) -> No
     value, std = fit_flow(logged(200, seed), HEALTHY, HEALTHY.bulk_modulus).parameters["bulk_modulus"]
     assert abs(value - HEALTHY.bulk_modulus) < 2.5 * std
     assert std < 0.005 * value
+
+
+def test_balances_of_a_slow_log_are_weighed_by_what_they_gain_at_one_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    tempers, original = list[float](), fit.weights_of
+
+    def heard(fits: Sequence[GreyBoxFit], temper: float, beforehand: Sequence[float]) -> np.ndarray:
+        tempers.append(temper)
+        return original(fits, temper, beforehand)
+
+    monkeypatch.setattr(fit, "weights_of", heard)
+    for rate in (200, 1000):
+        fit_flow(logged(rate, 0), HEALTHY, HEALTHY.bulk_modulus)
+    slow, fast = tempers
+    assert fast == fit.SURER
+    assert slow > 5.0 * fit.SURER
 
 
 def test_a_steady_bend_leaves_nothing_open() -> None:
