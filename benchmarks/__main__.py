@@ -37,6 +37,7 @@ NAMES = (
     "plants.diaphragm_faults",
     "diagnosis.diagnosis",
     "diagnosis.noisy_sensors",
+    "diagnosis.random_rigs",
     "diagnosis.open_benchmark",
     "many_logs.batch_scale",
     "many_logs.archive",

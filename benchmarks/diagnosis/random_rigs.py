@@ -1,0 +1,136 @@
+"""Both verbs on actuators that they have never met: a line a log of a random realistic rig, and what is right of all.
+
+The rig file is right, or with ``--wrong`` its displacement, area, volume, mass and bulk modulus are off by the usual
+errors, all at once. Intervals given the rig are judged where the file is right alone.
+"""
+
+import argparse
+import time
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.diagnosis.rig_draws import draw_bench, wrong_file
+from benchmarks.diagnosis.scores import share_interval
+from benchmarks.targets import Check, printed
+from estimation.finding import NORMAL_95
+from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class
+from experiments.python_user.log import Log
+from plant.eha.rig import Rig
+from plant.errors import HydrostateError, LogWarning
+
+FAILED = {"outcome": "failed"}
+
+USUAL = {"known_as_the_rig", "nothing"}
+"""Codes of notes that say nothing of a log: what limits the total interval, and that no advice is needed."""
+
+
+def main(arguments: list[str]) -> int:
+    """Print a line a log, and every figure beside its target; return how many fall short."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", default="1000:1019", metavar="A:B", help="first and last seed, both drawn")
+    parser.add_argument("--wrong", action="store_true", help="give both verbs a wrong rig file")
+    parser.add_argument("--without-pressure", action="store_true")
+    options = parser.parse_args(arguments)
+    first, _, last = options.seeds.partition(":")
+    warnings.simplefilter("ignore", LogWarning)
+    rows: list[dict[str, Any]] = []
+    for seed in range(int(first), int(last or first) + 1):
+        rows.append(scored(seed, wrong=options.wrong, pressure=not options.without_pressure))
+        print(line_of(rows[-1]), flush=True)
+    checks = printed(summarised(rows, wrong=options.wrong))
+    return sum(not check.met for check in checks)
+
+
+def scored(seed: int, *, wrong: bool, pressure: bool) -> dict[str, Any]:
+    """Return what both verbs say of one rig, against its truth.
+
+    Parameters
+    ----------
+    seed : int
+        Of the rig.
+    wrong : bool
+        Whether the rig file is.
+    pressure : bool
+        Whether it may be used.
+
+    Returns
+    -------
+    dict[str, Any]
+        Entries of `judge_bulk_modulus` and `judge_class`; ``z``, the error over its deviation; ``notes``, their codes;
+        ``seconds`` of processor time.
+    """
+    bench = draw_bench(seed)
+    rig = Rig("drawn", wrong_file(bench.healthy, seed) if wrong else bench.healthy)
+    log, began = Log(bench.record, rig), time.process_time()
+    estimate, diagnosis = (_asked(log, verb, pressure) for verb in ("estimate", "diagnose"))
+    seconds = time.process_time() - began
+    truth = {"beta_lo": bench.true.bulk_modulus, "beta_hi": bench.true.bulk_modulus, "accept": bench.condition}
+    row: dict[str, Any] = {"seed": seed, "about": bench.about, "z": None, "seconds": seconds}
+    row |= judge_bulk_modulus(estimate, truth) | judge_class(diagnosis, truth)
+    said = estimate.get("bulk_modulus_pa") or {}
+    if said.get("value") is not None:
+        low, high = said["ci95"]
+        row["z"] = 2.0 * NORMAL_95 * (said["value"] - bench.true.bulk_modulus) / (high - low)
+    condition = diagnosis.get("condition")
+    row["said"] = condition, (diagnosis.get("probabilities") or {}).get(condition, 0.0)
+    told = (*estimate.get("notes", ()), *diagnosis.get("notes", ()))
+    row["notes"] = sorted({note["code"] for note in told} - USUAL)
+    row["reasons"] = [*(estimate.get("gate") or {}).get("reasons", ()), *diagnosis.get("reasons", ())]
+    return row | {"failed": [one["message"] for one in (estimate, diagnosis) if one["outcome"] == "failed"]}
+
+
+def _asked(log: Log, verb: str, pressure: bool) -> dict[str, Any]:
+    try:
+        return dict(getattr(log, verb)(no_pressure=not pressure).to_dict())
+    except HydrostateError as error:
+        return {**FAILED, "message": str(error)}
+
+
+def line_of(row: dict[str, Any]) -> str:
+    """Return a row as a line of text."""
+    error = "no number" if row["error"] is None else f"error {100.0 * row['error']:.2f} %, z {row['z']:.1f}"
+    covers = "".join("+" if row[name] else "-" for name in ("covered", "covered_total") if row["error"] is not None)
+    name, probability = row["said"]
+    verdict = row["verdict"] + (f" ({name} {100.0 * probability:.0f} %)" if row["verdict"] == "wrong" else "")
+    flag = f"{row['outcome']}{', flagged' if row['flagged'] else ''}"
+    words = "; ".join([*row["notes"], *row["failed"], *(str(reason) for reason in row["reasons"])])
+    return f"{row['seed']} {verdict} | {flag} {error} {covers} | {row['seconds']:.1f} s | {row['about']} | {words}"
+
+
+def summarised(rows: Sequence[dict[str, Any]], *, wrong: bool) -> list[Check]:
+    """Return the figures of a population, and print each share with its bounds."""
+    count = len(rows)
+    verdicts = [row["verdict"] for row in rows]
+    believed = [row for row in rows if row["error"] is not None and not row["flagged"] and row["outcome"] == "ok"]
+    shares = {
+        "unknown": (sum(verdict == "unknown" for verdict in verdicts), count),
+        "of another class": (sum(verdict in ("wrong", "failed") for verdict in verdicts), count),
+        "without a believed bulk modulus": (count - len(believed), count),
+        "of these not determined by the log": (sum(row["outcome"] == "not_observable" for row in rows), count),
+        "total intervals that hold it": (sum(row["covered_total"] for row in believed), len(believed)),
+    }
+    if not wrong:
+        shares["intervals given the rig that hold it"] = sum(row["covered"] for row in believed), len(believed)
+    print(f"{count} logs; {np.mean([row['seconds'] for row in rows]):.1f} s CPU a log")
+    if believed:
+        errors, z = np.array([[100.0 * abs(row["error"]), row["z"]] for row in believed]).T
+        size = f"off by {np.median(errors):.2f} % median, {np.max(errors):.2f} % at most"
+        print(f"bulk modulus {size}; z {np.sqrt(np.mean(z**2)):.2f} rms, {np.median(np.abs(z)):.2f} median in size")
+    for what, (hits, of) in shares.items():
+        if of:
+            low, high = share_interval(hits, of)
+            print(f"{what}: {hits} of {of} ({100.0 * low:.0f} to {100.0 * high:.0f} %)")
+    percent = {what: 100.0 * hits / of for what, (hits, of) in shares.items() if of}
+    checks = [
+        Check("sure of a wrong class", sum(row["silent_class"] for row in rows), most=0),
+        Check("bulk modulus wrong without a word", sum(row["narrow"] for row in rows), most=0),
+        Check("unknown, %", percent["unknown"], most=10.0),
+        Check("total intervals that cover, %", percent.get("total intervals that hold it", 100.0), least=90.0),
+    ]
+    if not wrong:
+        covered = percent.get("intervals given the rig that hold it", 100.0)
+        checks.append(Check("intervals given the rig that cover, %", covered, least=90.0))
+    return checks

@@ -1,0 +1,283 @@
+"""Random realistic rigs: actuators of other sizes, oils, motors, sensors and loads, and what their benches log.
+
+Sizes are drawn over the range that such actuators are built in, and what hangs together is drawn together: the pump
+goes with piston and velocity, the oil with the stroke, leakage with the pump's flow, friction with pressure, sensors
+with the ranges they see. A rig that nobody would build or run is drawn again (see `_drive` and `_sound`).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import pi
+from types import MappingProxyType
+
+import numpy as np
+
+from benchmarks.diagnosis.population import draw_parameters
+from experiments.running.random_streams import stream
+from faults.conditions import CONDITIONS
+from plant.arrays import Array
+from plant.eha.circuit_parameters import CircuitParameters, oil_demand
+from plant.eha.doubts import DOUBTS
+from plant.eha.drives import STEPS, chirp, multisine, nine_steps, prbs, sine
+from plant.eha.model import PARAMETER_NAMES, EhaParameters, load_on_rod
+from plant.eha.scales import natural_frequency
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.errors import HydrostateError
+from plant.log.record import Record
+from plant.sensors.sensors import Sensors
+
+DRIVES = ("steps", "sine", "chirp", "prbs", "multisine")
+
+SAMPLE_TIMES = (2e-4, 5e-4, 1e-3, 2e-3)
+"""Times between samples that loggers offer [s]; the slowest that still sees a period of the ring six times or more is
+the upper limit of a draw."""
+
+MOST_SAMPLES = 30_000
+"""Samples of a log at most: a bench that logs fast logs for a shorter time."""
+
+SPREAD = 0.1
+"""Half width of leakage, friction and presliding about their condition, of bulk modulus twice that [fraction]."""
+
+BULK_MODULUS_DOUBT = 0.3
+"""How far a file's bulk modulus is off, as a standard deviation of its logarithm: air and hoses are seldom counted."""
+
+WRONG = ("pump_displacement", "piston_area", "chamber_volume", "moving_mass")
+"""Entries of a wrong rig file that are off as far as `plant.eha.doubts` doubts them, all at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A log of a rig that was drawn, and what is true.
+
+    Parameters
+    ----------
+    condition : str
+        Its true condition.
+    true : CircuitParameters
+        The actuator that was logged.
+    healthy : EhaParameters
+        The same when nothing is wrong with it: what the right rig file says.
+    drive : str
+        Name of the drive.
+    record : Record
+        What the sensors logged.
+    """
+
+    condition: str
+    true: CircuitParameters
+    healthy: EhaParameters
+    drive: str
+    record: Record
+
+    @property
+    def about(self) -> str:
+        """The rig in a line."""
+        p = self.true
+        sides = "single rod" if p.area_difference else "through rod"
+        loaded = " load" * bool(p.load_force) + " spring" * bool(p.load_stiffness)
+        return (
+            f"{self.condition}; {self.drive}, {1e3 * self.record.sample_time:g} ms, {self.record.duration:.1f} s; "
+            f"{1e4 * p.piston_area:.3g} cm2, {sides}{loaded}, {1e-5 * p.relief_pressure:.3g} bar, "
+            f"{1e-6 * p.bulk_modulus:.4g} MPa, {natural_frequency(p):.3g} Hz"
+        )
+
+
+def draw_bench(seed: int) -> Bench:
+    """Return the log of one random rig.
+
+    Parameters
+    ----------
+    seed : int
+        Of every draw.
+
+    Returns
+    -------
+    Bench
+        The log and its truth.
+    """
+    rng = stream(seed, "random rigs")
+    while True:
+        healthy = draw_rig(rng)
+        condition = str(rng.choice(list(CONDITIONS)))
+        true = draw_parameters(condition, rng, SPREAD, healthy)
+        assert isinstance(true, CircuitParameters)  # noqa: S101 -- conditions change values, not the kind
+        name, speed, sample_time = _drive(healthy, rng)
+        if len(speed) == 0 or not _sound(true):
+            continue
+        sensors = _sensors(healthy, sample_time, rng)
+        try:
+            record = simulate(CIRCUIT, speed, sample_time, true, sensors=sensors, rng=rng)
+        except HydrostateError:  # the run left what the circuit describes: an empty accumulator
+            continue
+        if moves(record, sensors):
+            kept = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_pressure_pa")
+            record = Record(sample_time, {channel: record[channel] for channel in kept})
+            return Bench(condition, true, file_of(healthy), name, record)
+
+
+def draw_rig(rng: np.random.Generator) -> CircuitParameters:
+    """Return a healthy actuator of a random size.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Source of the draw.
+
+    Returns
+    -------
+    CircuitParameters
+        The actuator with its circuit.
+
+    Examples
+    --------
+    >>> rig = draw_rig(np.random.default_rng(0))
+    >>> 3e-4 <= rig.piston_area <= 8e-3
+    True
+    """
+    area = _between(3e-4, 8e-3, rng)  # pistons of 20 to 100 mm
+    velocity = _between(0.03, 0.4, rng)  # at rated speed [m/s]; seals are rated to about 0.5
+    stroke = _between(0.05, 0.5, rng)
+    rated = _between(120.0, 420.0, rng)  # 1,150 to 4,000 rpm
+    relief = _between(35e5, 250e5, rng)
+    oil = _between(2e8, 1.4e9, rng)  # effective: hoses and air below 1 GPa, steel lines above
+    volume = 0.25 * area * stroke * (1.0 + _between(0.15, 1.0, rng))  # swept, and ports and lines beside it
+    stiffness = oil * area**2 / volume
+    mass = stiffness / (2.0 * pi * _between(15.0, 350.0, rng)) ** 2
+    flow = area * velocity
+    leak = flow * _between(0.005, 0.05, rng) / relief  # volumetric efficiency of 95 to 99.5 % at the relief pressure
+    healthy_pressure = min(_between(1e5, 8e5, rng), 0.13 * relief)  # seals and lines at rated velocity
+    shares = rng.dirichlet((6.0, 3.0, 2.0))  # Coulomb, linear, quadratic
+    push = area * healthy_pressure * shares
+    single = bool(rng.random() < 0.3)
+    uneven = float(rng.uniform(0.1, 0.3)) if single else 0.0  # rods of 0.43 to 0.68 of the bore
+    needed = (1.0 + uneven) * area * stroke / (3.79 * volume) - 1.0  # else the larger side has no room for the stroke
+    loaded, sprung = rng.random() < 0.3, rng.random() < 0.15
+    most = area * relief
+    made = CircuitParameters(
+        pump_displacement=flow / rated,
+        piston_area=area,
+        chamber_volume=volume,
+        moving_mass=mass,
+        bulk_modulus=oil,
+        leakage_coefficient=leak,
+        flow_bias=flow * _between(0.002, 0.04, rng),
+        friction_coulomb=float(push[0]),
+        friction_linear=float(push[1]) / velocity,
+        friction_quadratic=float(push[2]) / velocity**2,
+        relief_pressure=relief,
+        relief_conductance=flow / (_between(0.005, 0.05, rng) * relief),
+        accumulator_pressure=_between(2e5, 15e5, rng),
+        makeup_conductance=flow / _between(0.3e5, 2e5, rng),
+        makeup_opening=_between(3e3, 3e4, rng),
+        motor_speed_per_volt=0.25 * rated,
+        motor_speed_limit=2.0 * rated,
+        stroke=stroke,
+        area_difference=uneven,
+        volume_difference=max(uneven * float(rng.uniform(0.5, 1.0)), uneven and needed),
+        pilot_share=float(rng.uniform(0.5, 2.0)) if single and rng.random() < 0.5 else 0.0,
+        load_force=float(rng.choice((-1.0, 1.0))) * _between(0.03, 0.2, rng) * most if loaded else 0.0,
+        load_stiffness=_between(0.05, 0.15, rng) * most / (0.5 * stroke) if sprung else 0.0,
+        pump_crossport_leakage=float(rng.uniform(0.2, 0.6)) * leak,
+        pump_case_leakage=float(rng.uniform(0.0, 0.1)) * leak,
+        motor_lag=_between(3e-3, 2e-2, rng),  # servo drives of 8 to 50 Hz
+        presliding_displacement=_between(5e-6, 5e-5, rng),
+        presliding_damping=_between(0.1, 0.4, rng),
+        throttle_rated_flow=20.0 * flow,
+        end_stop_stiffness=10.0 * stiffness,
+        accumulator_gas=1.0,
+        accumulator_oil=1.0,
+    )
+    taken = 2.0 * oil_demand(made) + 4.0 * area * uneven * stroke  # compression, and the rod's own volume
+    return replace(made, accumulator_gas=taken, accumulator_oil=taken)
+
+
+def file_of(rig: EhaParameters) -> EhaParameters:
+    """Return what a rig file says of an actuator: nothing of its circuit."""
+    return EhaParameters(**{name: getattr(rig, name) for name in PARAMETER_NAMES})
+
+
+def wrong_file(right: EhaParameters, seed: int) -> EhaParameters:
+    """Return a rig file whose entries are off by the usual errors, all at once.
+
+    Parameters
+    ----------
+    right : EhaParameters
+        What it should say.
+    seed : int
+        Of the errors.
+
+    Returns
+    -------
+    EhaParameters
+        What it says.
+    """
+    rng = stream(seed, "random rigs", "file")
+    spreads: Mapping[str, float] = MappingProxyType({name: DOUBTS[name].usual.down for name in WRONG})
+    off = {**spreads, "bulk_modulus": BULK_MODULUS_DOUBT}
+    return replace(right, **{name: getattr(right, name) * float(np.exp(s * rng.normal())) for name, s in off.items()})
+
+
+def _between(least: float, most: float, rng: np.random.Generator) -> float:
+    """Return a number whose logarithm is uniform: sizes of machines come in ratios."""
+    return float(least * (most / least) ** rng.random())
+
+
+def _sound(p: CircuitParameters) -> bool:
+    """Return whether the actuator bears its own moves: its mass, stopped at once, takes half its pressure, no more."""
+    velocity = p.pump_displacement * p.rated_speed / p.piston_area
+    ringing = velocity * p.moving_mass * 2.0 * pi * natural_frequency(p)
+    held = abs(load_on_rod(0.5 * (p.stroke or 0.0), p))
+    return ringing < 0.5 * p.piston_area * p.relief_pressure and held < 0.4 * p.piston_area * p.relief_pressure
+
+
+def _drive(p: CircuitParameters, rng: np.random.Generator) -> tuple[str, Array, float]:
+    """Return a drive's name, motor speed [rad/s] and sample time [s]; no samples if the stroke is too short.
+
+    The way that the pump would move the piston stays within 90 % of the stroke.
+    """
+    frequency, velocity, stroke = natural_frequency(p), p.pump_displacement * p.rated_speed / p.piston_area, p.stroke
+    assert stroke is not None  # noqa: S101 -- every rig that is drawn has one
+    slowest = 1.0 / (6.0 * frequency)
+    sample_time = float(rng.choice([some for some in SAMPLE_TIMES if some <= max(slowest, SAMPLE_TIMES[0])]))
+    duration = min(float(rng.uniform(4.0, 12.0)), MOST_SAMPLES * sample_time)
+    name = str(rng.choice(DRIVES))
+    amplitude = float(rng.uniform(0.5, 1.0)) * p.rated_speed
+    highest = min(30.0, 0.5 * frequency)
+    if name == "steps":
+        held = min(duration / STEPS, 0.45 * stroke / velocity)
+        speed = nine_steps(STEPS * held, sample_time, p, rng) if held > 0.12 else np.empty(0)
+        return name, speed, sample_time
+    if name == "sine":
+        least = velocity / (pi * 0.45 * stroke)
+        often = _between(least, max(least, min(10.0, 0.5 * frequency)), rng)
+        speed = sine(duration, sample_time, amplitude, often)
+    elif name == "chirp":
+        speed = chirp(duration, sample_time, amplitude, 0.5, highest)
+    elif name == "prbs":
+        speed = prbs(duration, sample_time, amplitude, _between(0.02, 0.2, rng), rng)
+    else:
+        speed = multisine(duration, sample_time, amplitude, rng, 0.5, highest)
+    way = np.cumsum(speed) * sample_time * p.pump_displacement / p.piston_area
+    room = 0.45 * stroke / float(np.max(np.abs(way)))
+    return name, (min(1.0, room) * speed if room > 0.3 else np.empty(0)), sample_time
+
+
+def _sensors(p: CircuitParameters, sample_time: float, rng: np.random.Generator) -> Sensors:
+    """Return sensors of the ranges that the rig needs."""
+    velocity = p.pump_displacement * p.rated_speed / p.piston_area
+    quantum = _between(5e-7, 5e-6, rng)  # linear encoders of 0.5 to 5 um
+    return Sensors(
+        speed_noise=_between(2e-4, 1e-3, rng) * p.rated_speed,
+        velocity_noise=_between(2e-3, 2e-2, rng) * velocity,
+        pressure_noise=_between(3e-4, 2e-3, rng) * p.relief_pressure,  # of transmitters of that range
+        pressure_quantum=2.0**-14 * p.relief_pressure,
+        position_noise=float(rng.uniform(0.0, 1.0)) * quantum,
+        position_quantum=quantum,
+        velocity_window=max(5e-3, 2.0 * sample_time),
+        velocity_from_position=bool(rng.random() < 0.5),
+    )
+
+
+def moves(record: Record, sensors: Sensors) -> bool:
+    """Return whether the piston goes a way that its encoder sees: 100 of its steps."""
+    return float(np.ptp(record["position_m"])) > 100.0 * sensors.position_quantum
