@@ -231,8 +231,7 @@ def _fit(
     loaded = not chosen and first_load(record, log.variances) != 0.0
     traits = LogTraits(loaded, begins_in_motion(record), log.filtered, log.speed_held)
     fit = fit_flow(record, parameters, guess, doubted, log.variances, traits)
-    unexplained = fit.explanation is None or fit.bound > LARGEST_BOUND
-    return None if loaded and unexplained else fit  # a filter needs no state at rest
+    return None if loaded and fit.explanation is None else fit  # a filter needs no state at rest
 
 
 def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusEstimate:

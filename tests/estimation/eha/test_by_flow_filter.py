@@ -8,9 +8,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from benchmarks.diagnosis.rig_draws import draw_bench
 from benchmarks.filters.chamber_filter import on_circuit
+from estimation.eha import bulk_modulus as subject
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.eha.by_flow_filter import BIASES, LEAKAGES, MODULI, drive_noise, filter_flow
+from estimation.finding import Outcome
+from estimation.fits.explaining.form_fit import FormFit
+from estimation.fits.flow.traits import LogTraits
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.chambers import FLOOR_NOISE
 from estimation.models.eha_forms import BULK_MODULUS
@@ -27,6 +32,8 @@ from tests.thinned import thinned
 
 HEALTHY = EhaParameters()
 TRUTH = HEALTHY.bulk_modulus
+
+LOADED = LogTraits(loaded=True, moving=False, filtered=False, speed_held=False)
 
 chamber_ekf = partial(estimate_bulk_modulus, parameters=HEALTHY, method="chamber-ekf")
 
@@ -151,3 +158,31 @@ def test_first_guesses_lie_side_by_side_from_a_healthy_actuator_to_beyond_the_wo
     steps = np.divide(MODULI[1:], MODULI[:-1])
     assert np.all((steps > 1.0) & (steps <= 2.0))
     assert 1.0 in MODULI
+
+
+def test_a_fit_that_explains_a_load_but_not_bulk_modulus_is_not_overruled_by_a_filter(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    whole = run("minor_leakage")[0]
+    first = 2000 + int(np.argmax(np.abs(whole["differential_pressure_pa"][2000:]) > 4e5))
+    loaded = whole.slice(first, first + 4000)
+    told = subject.fit_flow(loaded, HEALTHY, TRUTH, {}, None, LOADED)
+    assert told.explanation is not None
+    untold = replace(told, bound=0.36)
+
+    def vague(*_: object) -> FormFit:
+        return untold
+
+    monkeypatch.setattr(subject, "fit_flow", vague)
+    answer = estimate_bulk_modulus(loaded, HEALTHY)
+    assert answer.outcome is Outcome.NOT_OBSERVABLE
+    assert answer.value is None
+    assert answer.bound == 0.36
+
+
+@pytest.mark.slow
+def test_no_number_is_told_of_chambers_that_leak_empty_within_a_sample_under_load() -> None:
+    bench = draw_bench(1020)  # the filter gave 210 +- 7 MPa, the truth is 302
+    answer = estimate_bulk_modulus(bench.record, bench.healthy)
+    assert answer.outcome is Outcome.NOT_OBSERVABLE
+    assert answer.value is None
