@@ -13,9 +13,18 @@ from estimation.log_checks.channel_names import POSITION
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS
 from estimation.models.inner_circuit import BEND
-from estimation.models.wide_flow import COURSES, CROSSED, WIDE_FLOW_FORM, WideFlowParameters
+from estimation.models.wide_flow import COURSES, CROSSED, LINEAR, WIDE_FLOW_FORM, WideFlowParameters
 from plant.eha.model import EhaParameters
 from plant.solvers.steps import parameter_names, parameter_row
+
+START_LEVEL = "start_level"
+
+LEVEL_OPEN = 3.0**-0.5
+"""Root mean square of the level at which the lower side begins, over the most that it may be, before a log is seen: it
+is anywhere between none and that [fraction]."""
+
+LEAST_PEAK = 1.0
+"""Highest differential pressure taken of a log whose sensor is dead: the logarithm of none is no start [Pa]."""
 
 
 def widened(
@@ -57,8 +66,25 @@ def widened(
             **log.presumed,
             **{name: (known[name], std) for name, std in PRESUMED.items()},
             **dict.fromkeys(CROSSED, (0.0, 1.0)),
+            START_LEVEL: (0.0, LEVEL_OPEN * shut_in(log) / LINEAR[START_LEVEL]),
         },
     )
+
+
+def shut_in(log: GreyBoxLog) -> float:
+    """Return the most that a loaded chamber passes to the other one while no make-up flows: half of what loaded it.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log.
+
+    Returns
+    -------
+    float
+        Level over the inner circuit's pressure [Pa].
+    """
+    return max(0.5 * float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)
 
 
 def usual_pressure(log: GreyBoxLog, parameters: EhaParameters) -> float:

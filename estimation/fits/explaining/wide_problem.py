@@ -8,7 +8,7 @@ import numpy as np
 from estimation.fits.explaining.air_entry import likeliest_entry
 from estimation.fits.explaining.form_fit import LONGEST_STEP
 from estimation.fits.explaining.leakage_step import likeliest_step
-from estimation.fits.explaining.wide_log import usual_values
+from estimation.fits.explaining.wide_log import LEAST_PEAK, START_LEVEL, shut_in, usual_values
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import search_bounds
@@ -57,10 +57,7 @@ POSITION_ZERO = "position_zero"
 
 AIR_ONSET, AIR_WIDTH = "air_onset", "air_width"
 
-START_PRESSURE, START_LEVEL = "start_pressure", "start_level"
-
-LEAST_PEAK = 1.0
-"""Highest differential pressure taken of a log whose sensor is dead: the logarithm of none is no start [Pa]."""
+START_PRESSURE = "start_pressure"
 
 LEVELS_TRIED = (0.0, 0.3)
 """Levels over the accumulator's pressure with which both sides may begin, as shares of the most [fraction]."""
@@ -164,7 +161,7 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
         begun = float(seen[0]) if len(seen) else 0.0
         if START_PRESSURE not in one.free:
             return [{one.free[0]: begun}]
-        return [{START_PRESSURE: begun, START_LEVEL: share * _shut_in(log)} for share in LEVELS_TRIED]
+        return [{START_PRESSURE: begun, START_LEVEL: share * shut_in(log)} for share in LEVELS_TRIED]
     if one.from_change:
         return [likeliest_step(log).first or one.starts[0]]
     if one.from_entry:
@@ -201,7 +198,7 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     stiffest = ADIABATIC * rig["accumulator_pressure"] / (LEAST_GAS * rig["chamber_volume"])
     latest = 0.0 if log.course is None else -log.sample_time
     limits = {"speed_lead": (latest, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
-    limits[START_LEVEL] = (-rig["accumulator_pressure"], _shut_in(log))
+    limits[START_LEVEL] = (-rig["accumulator_pressure"], shut_in(log))
     place = model.unknowns.index("bulk_modulus")  # fitted as a logarithm
     softest, stiffest_guess = (float(np.exp(end(guess[place] for guess in guesses))) for end in (min, max))
     stiff = max(rig["bulk_modulus"], stiffest_guess)
@@ -211,8 +208,3 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     if log.passes_on:
         limits["bulk_modulus"] = (softest / MOST_BIASED, MOST_BIASED * stiffest_guess)
     return search_bounds(model, guesses, {**LIMITS, **limits})
-
-
-def _shut_in(log: GreyBoxLog) -> float:
-    """Return the most that a loaded chamber passes to the other one while no make-up flows: half of what loaded it."""
-    return max(0.5 * float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)

@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.fits.explaining.wide_log import usual_values, widened
+from benchmarks.diagnosis.rig_draws import draw_bench
+from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from estimation.fits.explaining.wide_log import START_LEVEL, usual_values, widened
 from estimation.fits.explaining.wide_problem import (
     MOST_WORN,
     POSITION_ZERO,
@@ -16,6 +18,7 @@ from estimation.fits.explaining.wide_problem import (
     worn_start,
 )
 from estimation.fits.greybox import freed_problem
+from estimation.fits.greybox.deviations import believed
 from estimation.fits.greybox.log import greybox_log
 from estimation.fits.hypotheses import BEGUN, ENCODER_ZERO, HYPOTHESES, LIMITS, OFFSET_AT_REST, Hypothesis
 from estimation.models.flow import FLOW_FORM
@@ -107,3 +110,23 @@ def test_an_offset_at_rest_is_first_taken_to_be_none_where_no_pressure_was_read(
     log = wide()
     blind = replace(log, measured=np.full_like(log.measured, np.nan))
     assert list(own_starts(blind, OFFSET_AT_REST)) == [{"pressure_offset": 0.0}]
+
+
+def test_the_level_at_which_chambers_begin_is_presumed_anywhere_up_to_half_of_what_loads_them() -> None:
+    log = wide()
+    problem, most = freed(log, (BEGUN,)), 0.5 * float(np.max(np.abs(log.measured)))
+    place = problem.model.unknowns.index(START_LEVEL)
+    known = dict.fromkeys(problem.model.unknowns, 1.0)
+    unit = problem.model.values(problem.model.theta(known) + 1.0)[START_LEVEL] - 1.0
+    levels = np.linspace(0.0, most, 1001)
+    assert unit * believed(problem)[place] ** -0.5 == pytest.approx(np.sqrt(np.mean(levels**2)), rel=1e-3)
+
+
+@pytest.mark.slow
+def test_a_level_that_a_loaded_log_hardly_tells_is_in_the_deviation_of_bulk_modulus() -> None:
+    bench = draw_bench(1004)  # the level took on half of the load's pressure: 0.45 % high, at 4.9 deviations
+    found = estimate_bulk_modulus(bench.record, bench.healthy)
+    assert found.gate.passed
+    assert found.value is not None
+    assert found.std is not None
+    assert abs(found.value - bench.true.bulk_modulus) < 2.0 * found.std < 0.01 * bench.true.bulk_modulus
