@@ -5,7 +5,6 @@ import json
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache, cached_property, partial
-from glob import has_magic
 from importlib.metadata import version
 from itertools import product
 from math import prod
@@ -14,10 +13,10 @@ from typing import Any, TypeAlias
 
 from estimation.engine.kernels import LANES
 from experiments.actuators import DEFAULT, actuator
-from experiments.batch.log_files import matching
+from experiments.batch.logs_listed import listed_logs
 from experiments.batch.other_actuators import simulated_of
-from experiments.batch.series import Group, Log, Series, Simulated, Work, content_of
-from experiments.batch.study_file import Logs, Method, Runs, Study, StudyError
+from experiments.batch.series import Group, Log, Series, Simulated, Work
+from experiments.batch.study_file import Method, Runs, Study, StudyError
 from faults.conditions import CONDITIONS, LEVELS
 from plant.eha.rig import Rig
 
@@ -72,12 +71,15 @@ class Plan:
         Series, and what is done with each of them, a block at a time.
     rigs : Mapping[str, Rig]
         Of the folders that have one of their own.
+    links : Mapping[str, str]
+        Names that lead to a log which counts under another name, and that name.
     """
 
     study: Study
     rig: Rig[Any]
     blocks: tuple[tuple[tuple[Series, ...], tuple[Work, ...]], ...]
     rigs: Mapping[str, Rig[Any]] = field(default_factory=dict[str, Rig[Any]])
+    links: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def __len__(self) -> int:
         return sum(len(series) * len(works) for series, works in self.blocks)
@@ -192,9 +194,11 @@ def plan_study(study: Study, folder: Path) -> Plan:
     rig = kind.read_rig(folder / study.rig if study.rig else None)
     rigs = {name: kind.read_rig(folder / file) for name, file in study.rigs.items()}
     listed = _simulated if kind.name == DEFAULT else partial(simulated_of, kind)
-    series = [*map(listed, study.runs), *(_logs(one, place, folder, rigs) for place, one in enumerate(study.logs))]
+    logs = [listed_logs(one, place, folder, rigs) for place, one in enumerate(study.logs)]
+    series = [*map(listed, study.runs), *(one.logs for one in logs)]
     works = [_works(one.methods, one.starts_pa) for one in (*study.runs, *study.logs)]
-    return Plan(study, rig, tuple(zip(map(tuple, series), works, strict=True)), rigs)
+    links = {name: counted for one in logs for name, counted in one.links.items()}
+    return Plan(study, rig, tuple(zip(map(tuple, series), works, strict=True)), rigs, links)
 
 
 def _count(runs: Runs) -> int:
@@ -244,39 +248,6 @@ def _works(methods: tuple[Method, ...], starts: tuple[float, ...]) -> tuple[Work
         for one in methods
         for start in ((None,) if one.verb == "diagnose" or not starts else starts)
     )
-
-
-def nearest_folder(file: str, folders: Collection[str]) -> str:
-    """Return which of several folders is the nearest above a file; empty where none is.
-
-    Parameters
-    ----------
-    file : str
-        Path with slashes, as those of the folders.
-
-    Examples
-    --------
-    >>> nearest_folder("a/b/c/run.csv", ["a", "a/b"]), nearest_folder("ab/run.csv", ["a"])
-    ('a/b', '')
-    """
-    return max((one for one in folders if file.startswith(f"{one.rstrip('/')}/")), key=len, default="")
-
-
-def _logs(logs: Logs, place: int, folder: Path, rigs: Mapping[str, Rig[Any]]) -> Iterator[Log]:
-    pattern = str(folder / logs.glob)
-    found = matching(pattern)
-    if not found:
-        said = "no file matches" if has_magic(pattern) else "there is no such file as"
-        raise StudyError(f"logs[{place}].glob must match at least one file, got {logs.glob!r}: {said} {pattern}")
-    if strange := [name for name in found if any("\ud800" <= one <= "\udfff" for one in name)]:
-        raise StudyError(f"names of logs must be UTF-8, rename {strange[0]!r} and others like it")
-    for name in found:
-        path = Path(name)
-        relative = path.relative_to(folder) if path.is_relative_to(folder) else path
-        columns = tuple(sorted(logs.columns.items()))
-        file = relative.as_posix()
-        own = nearest_folder(file, rigs)
-        yield Log(file, str(path.resolve()), content_of(path), path.stat().st_size, columns, own)
 
 
 def _content(series: Series) -> list[Any]:

@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from glob import escape, glob
 from pathlib import Path
 
+from experiments.batch.part_store import CASES, PARTS
+
 
 def matching(pattern: str) -> list[str]:
     """Return the files that a pattern matches, in order of their names.
@@ -17,7 +19,8 @@ def matching(pattern: str) -> list[str]:
     -------
     list of str
         Paths of regular files, and of links to them. ``**`` enters each folder once: links in a circle have an end,
-        and a link to a folder that holds the search is not followed.
+        and a link to a folder that holds the search is not followed. The store of a study holds results and no logs,
+        so it is not entered.
 
     Examples
     --------
@@ -49,6 +52,8 @@ def _folders(top: str) -> Iterator[str]:
         try:
             itself = folder.resolve()
             if itself in seen or (folder.is_symlink() and top_itself.is_relative_to(itself) and folder != Path(top)):
+                continue
+            if (folder / CASES).is_file() and (folder / PARTS).is_dir():
                 continue
             entries = [one for one in folder.iterdir() if not one.name.startswith(".") and one.is_dir()]
         except (OSError, RuntimeError):  # a folder that nobody may read, a link to itself

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 import pyarrow as pa
 
 from experiments.batch.series import Group, Log, Series, Simulated, Work
+from experiments.command.visible_text import spelt
 from plant.errors import HydrostateError
 
 TEXT, NUMBER = pa.string(), pa.float64()
@@ -109,7 +110,7 @@ class Rows:
 
     def fail(self, places: Sequence[int], reason: str | Exception) -> None:
         """Note that cases could not be run."""
-        told = " ".join(_said(reason).split())
+        told = spelt(" ".join(_said(reason).split()))
         self.put(places, {"outcome": ["failed"] * len(places), "reason": [told] * len(places)})
 
     def failures(self) -> tuple[Failure, ...]:

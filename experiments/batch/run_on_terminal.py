@@ -76,6 +76,11 @@ def run_plan(plan: "Plan", store: "PartStore", source: str, settings: RunSetting
         _say_differences(store.manifest(), manifest)
     else:
         store.clear()
+    if plan.links:
+        link, log = next(iter(plan.links.items()))
+        several = len(plan.links) > 1
+        counted = f"{len(plan.links)} links lead to logs that count" if several else "1 link leads to a log that counts"
+        note(f"{counted} under another name, {'such as ' if several else ''}{link} ({log})")
     done, broken = store.done(again=settings.retry_failed)
     for name in broken:
         note(f"part {name} of {store.name} cannot be read: it is set aside, and its cases are run again")

@@ -37,6 +37,7 @@ from experiments.batch.other_actuators import found_of, simulated_run
 from experiments.batch.rows import NIS, TRUTH, Failure, Row, Rows, error_percent
 from experiments.batch.series import Log, Series, Simulated, Work, content_of
 from experiments.command.logs import caught, read_log
+from experiments.command.visible_text import spelt
 from experiments.running.random_streams import stream
 from faults.conditions import severity
 from plant.eha.drives import make_drive
@@ -306,7 +307,7 @@ def _first_problem(record: Record, parameters: EhaParameters, work: Work, sensor
 
 def _sentences(said: Iterable[object]) -> str | None:
     """Return what was said of a log in one text, each sentence once."""
-    return "; ".join(dict.fromkeys(map(str, said))) or None
+    return spelt("; ".join(dict.fromkeys(map(str, said)))) or None
 
 
 @cache

@@ -10,6 +10,7 @@ import typer
 from experiments.command.json_output import write_whole
 from experiments.command.options import Columns, Plant, RigFile, argument, load_actuator, load_columns, option
 from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, emit, note
+from experiments.command.visible_text import spelt
 from plant.errors import HydrostateError, require_known
 
 if TYPE_CHECKING:
@@ -77,10 +78,10 @@ def fleet(
     if Path(place).is_file():
         raise HydrostateError(f"{place}: must be a folder with logs or a store, got a file")
     store = open_store(place)
-    from_logs, rigs = store.manifest() is None, dict[str, Path]()
+    from_logs, rigs, logs = store.manifest() is None, dict[str, Path](), list[Path]()
     if from_logs:
-        logs = _logs_in(Path(place), out)
-        _names([one.relative_to(place).as_posix() for one in logs], pattern, names)
+        logs = _logs_in(Path(place))
+        _names([spelt(one.relative_to(place).as_posix()) for one in logs], pattern, names)
         rigs = rigs_of_folders(Path(place), logs, rig)
         rig = rigs.pop("", None)
         store = _diagnosed(Path(place), logs, out, plant, rig, rigs, load_columns(columns), workers)
@@ -93,7 +94,8 @@ def fleet(
     if not rows:
         raise HydrostateError(f"{place}: must contain logs that were diagnosed (verb diagnose), but there are none")
     base = Path(place) if from_logs else Path()
-    links = write_pages(rows, out, pages, _page_writer(base, plant, rig, rigs, columns))
+    paths = {spelt(one.relative_to(base).as_posix()): one for one in logs}
+    links = write_pages(rows, out, pages, _page_writer(base, paths, plant, rig, rigs, columns))
     write_whole(out / PAGE, fleet_page(rows, links, Path(place).name), "--out", parents=True)
     _warn(rows, repairs, unnamed)
     failed = sum(one.state == "failed" for row in rows for one in row.logs)
@@ -191,11 +193,15 @@ def _say_split(named: "Mapping[str, Named]") -> None:
     )
 
 
-def _logs_in(folder: Path, out: Path) -> list[Path]:
+def _logs_in(folder: Path) -> list[Path]:
+    from glob import escape
+
+    from experiments.batch.log_files import matching
+
     if not folder.is_dir():
         raise HydrostateError(f"{folder}: must be a folder with logs or a store, but there is no such folder")
     known = (*SUFFIXES, *OTHERS)
-    found = sorted(one for one in folder.rglob("*") if one.suffix.lower() in known and out not in one.parents)
+    found = [one for one in map(Path, matching(f"{escape(str(folder))}/**/*")) if one.suffix.lower() in known]
     if not found:
         raise HydrostateError(f"{folder}: must hold logs, files that end in {', '.join(known)}, but there are none")
     return found
@@ -258,7 +264,7 @@ def rigs_of_folders(folder: Path, logs: Sequence[Path], given: Path | None = Non
     """
     above = {one for log in logs for one in log.parents if one == folder or folder in one.parents}
     found = {
-        "" if one == folder else one.relative_to(folder).as_posix(): one / RIG
+        "" if one == folder else spelt(one.relative_to(folder).as_posix()): one / RIG
         for one in sorted(above)
         if (one / RIG).is_file()
     }
@@ -269,25 +275,31 @@ def rigs_of_folders(folder: Path, logs: Sequence[Path], given: Path | None = Non
 
 
 def _page_writer(
-    base: Path, plant: str | None, rig: Path | None, rigs: Mapping[str, Path], columns: Any
+    base: Path,
+    paths: Mapping[str, Path],
+    plant: str | None,
+    rig: Path | None,
+    rigs: Mapping[str, Path],
+    columns: Any,
 ) -> Callable[[str, Path], bool]:
     """Return what writes the page of a log, and says whether the log is still there."""
     from experiments.actuators import offered
-    from experiments.batch.cases import nearest_folder
+    from experiments.batch.logs_listed import nearest_folder
 
     kind, common = load_actuator(plant, rig)
     own = {name: kind.read_rig(file) for name, file in rigs.items()}
     chosen, mapping = offered(kind, "diagnose"), load_columns(columns)
 
     def write(file: str, path: Path) -> bool:
-        if not (base / file).exists():
+        log = paths.get(file, base / file)
+        if not log.exists():
             return False
         from experiments.command.log_verb import page_of  # which pages of a store alone need not load
         from experiments.command.logs import caught, read_log
 
         bench = own.get(nearest_folder(file, own), common)
         with caught():
-            record = read_log(base / file, bench.columns, mapping, kind.required)
+            record = read_log(log, bench.columns, mapping, kind.required)
             found = chosen.run(record, *chosen.prepare(bench, {**chosen.options, "seed": 0}))
         result = {**chosen.blank, "file": file, "rig": bench.name, **chosen.entries(found)}
         write_whole(path, page_of(chosen, result, found, record), "--out", parents=True)

@@ -1,4 +1,3 @@
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -72,13 +71,6 @@ def test_a_glob_without_a_file_is_an_error(tmp_path: Path) -> None:
     study = parse_study({"name": "logs", "logs": [{"glob": "*.csv", "methods": [DIAGNOSE]}]}, "logs.toml")
     with pytest.raises(StudyError, match=r"logs\[0\]\.glob must match at least one file"):
         plan_study(study, tmp_path)
-
-
-def test_a_log_whose_name_is_no_text_is_refused_by_its_name(tmp_path: Path) -> None:
-    Path(os.fsdecode(os.fsencode(tmp_path) + b"/l\xf6g.csv")).write_text("t,u\n0,1\n")
-    content = {"name": "s", "logs": [{"glob": "*.csv", "methods": [{"verb": "diagnose"}]}]}
-    with pytest.raises(StudyError, match=r"must be UTF-8, rename '.*l\\udcf6g.csv'"):
-        plan_study(parse_study(content, "s"), tmp_path)
 
 
 def test_more_series_than_can_be_listed_are_refused_before_they_are() -> None:

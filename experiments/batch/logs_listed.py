@@ -1,0 +1,104 @@
+"""The logs that a study names, each once whatever names lead to it."""
+
+import os
+from collections.abc import Collection, Mapping
+from glob import escape, has_magic
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from experiments.batch.log_files import matching
+from experiments.batch.series import Log, content_of
+from experiments.batch.study_file import Logs, StudyError
+from experiments.command.visible_text import spelt
+from plant.eha.rig import Rig
+
+
+class Listed(NamedTuple):
+    """Logs of one `[[logs]]` of a study.
+
+    Parameters
+    ----------
+    links : Mapping[str, str]
+        Names that lead to a log which counts under another name, and that name.
+    """
+
+    logs: tuple[Log, ...]
+    links: Mapping[str, str]
+
+
+def listed_logs(logs: Logs, place: int, folder: Path, rigs: Mapping[str, Rig[Any]]) -> Listed:
+    """List the logs that a pattern finds; they are hashed.
+
+    Parameters
+    ----------
+    place : int
+        Of the `[[logs]]` in the study, for the error.
+    folder : Path
+        From which the pattern begins.
+    rigs : Mapping[str, Rig]
+        Of folders that have one of their own.
+
+    Returns
+    -------
+    Listed
+        The logs. Of several names of one file, the file's own counts, else the first; where their folders have other
+        rig files, each counts.
+
+    Raises
+    ------
+    StudyError
+        If no file is found.
+    """
+    pattern = os.path.join(escape(str(folder)), logs.glob)  # noqa: PTH118 -- which keeps a pattern that is absolute
+    found = matching(pattern)
+    if not found:
+        said = "no file matches" if has_magic(logs.glob) else "there is no such file as"
+        raise StudyError(
+            f"logs[{place}].glob must match at least one file, got {logs.glob!r}: {said} {folder / logs.glob}"
+        )
+    columns = tuple(sorted(logs.columns.items()))
+    there = [_log(Path(name), folder, columns, rigs) for name in found]
+    itself = folder.resolve()
+    there.sort(key=lambda one: one.path != str(itself / one.file))  # the file's own name before any link to it
+    counted: dict[tuple[object, ...], Log] = {}
+    links: dict[str, str] = {}
+    for one in there:
+        first = counted.setdefault((_identity(one.path), one.content, one.folder), one)
+        if first is not one:
+            links[one.file] = first.file
+    return Listed(tuple(sorted(counted.values(), key=lambda one: one.file)), links)
+
+
+def _log(path: Path, folder: Path, columns: tuple[tuple[str, str], ...], rigs: Mapping[str, Rig[Any]]) -> Log:
+    relative = path.relative_to(folder) if path.is_relative_to(folder) else path
+    file, itself = spelt(relative.as_posix()), path.resolve()
+    try:
+        size = itself.stat().st_size
+    except OSError:  # it has just gone, which becomes a failed case
+        size = 0
+    return Log(file, str(itself), content_of(itself), size, columns, nearest_folder(file, rigs))
+
+
+def _identity(path: str) -> object:
+    """Return what two names of one file share."""
+    try:
+        found = Path(path).stat()
+    except OSError:
+        return path
+    return (found.st_dev, found.st_ino) if found.st_ino else path
+
+
+def nearest_folder(file: str, folders: Collection[str]) -> str:
+    """Return which of several folders is the nearest above a file; empty where none is.
+
+    Parameters
+    ----------
+    file : str
+        Path with slashes, as those of the folders.
+
+    Examples
+    --------
+    >>> nearest_folder("a/b/c/run.csv", ["a", "a/b"]), nearest_folder("ab/run.csv", ["a"])
+    ('a/b', '')
+    """
+    return max((one for one in folders if file.startswith(f"{one.rstrip('/')}/")), key=len, default="")
