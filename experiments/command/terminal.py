@@ -170,7 +170,7 @@ def folded(text: str, width: int) -> str:
     lines: list[str] = []
     for line in text.split("\n"):
         named = re.match(r" +\S+ {2,}", line)
-        hang = " " * (len(named.group()) if named else 4)
+        hang = " " * (len(named.group()) if named and len(named.group()) < width // 2 else 4)
         folder = textwrap.TextWrapper(width, subsequent_indent=hang, break_long_words=False, break_on_hyphens=False)
         lines += folder.wrap(line) or [""]
     return "\n".join(lines)
@@ -190,6 +190,9 @@ def rendered(*parts: "RenderableType") -> str:
         The text, without its last line's end.
     """
     from rich.console import Console
+    from rich.table import Table
+
+    from experiments.command.narrow import as_lines, narrowed
 
     terminal = sys.stdout.isatty()
     width = None if terminal else PIPE_WIDTH
@@ -197,9 +200,10 @@ def rendered(*parts: "RenderableType") -> str:
     console = Console(file=io.StringIO(), force_terminal=terminal, width=width, **as_is)
     with console.capture() as captured:
         for part in parts:
-            told = visible(part) if isinstance(part, str) else part
+            shown = narrowed(part, console.width) or f"\n{as_lines(part)}\n" if isinstance(part, Table) else part
+            told = visible(shown) if isinstance(shown, str) else shown
             told = folded(told, console.width) if terminal and isinstance(told, str) else told
-            console.print(told, soft_wrap=isinstance(part, str))
+            console.print(told, soft_wrap=isinstance(told, str))
     return "\n".join(line.rstrip() for line in captured.get().strip("\n").splitlines())
 
 

@@ -1,0 +1,43 @@
+"""Whatever the width of a terminal, no number and no verdict of a table is cut off."""
+
+import re
+
+import pytest
+from rich.table import Table
+
+from experiments.command import terminal
+from experiments.command.narrow import as_lines, narrowed
+from experiments.command.terminal import rendered, table
+
+
+def shown() -> Table:
+    made = table("log", "bulk modulus [MPa]", "95 % interval [MPa]", "bound [%]", "verdict")
+    made.add_row("run.csv", "206.0", "204.8 to 207.2", "0.3", "not observable")
+    made.add_row("a-log-with-a-name-that-no-terminal-shows-whole.csv", "1207.1", "-", "", "ok")
+    return made
+
+
+@pytest.mark.parametrize("width", [20, 30, 44, 60, 80, 120])
+def test_every_number_and_verdict_is_there_at_any_width(monkeypatch: pytest.MonkeyPatch, width: int) -> None:
+    monkeypatch.setattr(terminal.sys.stdout, "isatty", lambda: True, raising=False)
+    monkeypatch.setenv("COLUMNS", str(width))
+    text = re.sub("\x1b\\[[0-9;]*m", "", rendered(shown()))
+    assert max(map(len, text.splitlines())) <= max(width, 54)  # a name without a blank stays whole among lines
+    for whole in ("206.0", "1207.1", "0.3", "observable", "ok"):
+        assert re.search(rf"(?<!\S){re.escape(whole)}(?!\S)", text), (whole, text)
+    assert re.search(r"204\.8\s+to\s+207\.2", text)
+
+
+def test_headings_stand_in_lines_before_a_table_is_given_up() -> None:
+    wide, narrow = narrowed(shown(), 100), narrowed(shown(), 78)
+    assert wide is not None
+    assert str(wide.columns[1].header) == "bulk modulus [MPa]"
+    assert narrow is not None
+    assert str(narrow.columns[1].header) == "bulk\nmodulus\n[MPa]"
+    assert narrowed(shown(), 60) is None
+
+
+def test_a_row_as_lines_leaves_out_empty_cells_and_sets_further_lines_below_the_first() -> None:
+    made = table("log", "gain", "coefficients", title="two")
+    made.add_row("a.csv", "", "b 1\nf 2")
+    assert as_lines(made) == "two\n\na.csv\n  coefficients   b 1\n                 f 2"
