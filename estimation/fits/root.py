@@ -61,9 +61,13 @@ def root_between(function: Callable[[float], float], low: float, high: float, to
 
 
 def _interpolated(old: tuple[float, float], here: tuple[float, float], across: tuple[float, float]) -> float:
-    """Return the step from here to the root of the line through two points, of the inverse parabola through three."""
+    """Return the step from here to the root of the line through two points, of the inverse parabola through three.
+
+    It is infinite, and so not taken, where values are so small that their products underflow to zero.
+    """
     (x, y), (x_old, y_old), (x_across, y_across) = here, old, across
     if x_old == x_across:
         return -y * (x - x_old) / (y - y_old)
     slope, other = (y_old - y) / (x_old - x), (y_across - y) / (x_across - x)
-    return -y * (y_across * other - y_old * slope) / (other * slope * (y_across - y_old))
+    divisor = other * slope * (y_across - y_old)
+    return -y * (y_across * other - y_old * slope) / divisor if divisor else inf

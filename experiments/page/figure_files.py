@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from experiments.page.frames import Tables
 from experiments.page.style import styled
+from experiments.running.refusal import refused
 from plant.atomic import replacing
 
 if TYPE_CHECKING:
@@ -72,6 +73,12 @@ def image_of(figure: "Figure | bytes", words: str) -> Markup:
 
 
 def write_png(draw: "Callable[[], Figure]", path: Path) -> None:
-    """Write the figure of one log as a PNG, whole or not at all."""
-    with styled(), replacing(path) as file:
+    """Write the figure of one log as a PNG, whole or not at all.
+
+    Raises
+    ------
+    HydrostateError
+        If it cannot be written.
+    """
+    with refused(f"--figure {path}: cannot be written"), styled(), replacing(path) as file:
         draw().savefig(file, format="png", dpi=LOG_DOTS_PER_INCH)

@@ -17,6 +17,7 @@ from estimation.fits.root import root_between
         (lambda x: tanh(50.0 * (x - 0.3)), -1.0, 9.0),
         (lambda x: x, 0.0, 1.0),
         (lambda x: x, -1.0, 0.0),
+        (lambda x: 1e-200 * (x**3 - x - 1.0), -5.0, 9.0),
     ],
 )
 def test_the_root_is_that_of_scipy(
