@@ -2,7 +2,8 @@
 
 import re
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import date, datetime, time, timedelta
 from itertools import islice
 from pathlib import Path
@@ -16,6 +17,7 @@ from plant.log.formats.csv_cells import read_cells
 from plant.log.formats.csv_layout import LINES, layout_of_lines
 from plant.log.formats.extras import library
 from plant.log.formats.packed import most_unpacked, too_large
+from plant.log.headings import Heading, unit_or_none
 from plant.log.table import Table
 
 LONGEST_ROW = 8 << 20
@@ -25,6 +27,9 @@ MOST_CELLS = 40_000_000
 """Cells of the largest workbook that is read; a sheet has 1,048,576 rows."""
 
 _BLOCK = 1 << 18
+_UNIT = re.compile(r"\W*(?:units?|einheit(?:en)?|unités?|unidad(?:es)?|unità|eenheid|dimension)\W*", re.IGNORECASE)
+"""What a list of channels calls its column of units."""
+
 _UNCOMPUTED = re.compile(rb"</f>\s*(?:<v>\s*</v>|<v\s*/>|</c>)")
 Cells = Sequence[Sequence[Any]]
 
@@ -47,6 +52,7 @@ def open_xlsx(path: Path) -> tuple[Table, ...]:
     import warnings
 
     made: list[Table] = []
+    units: dict[str, str] = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         reader = openpyxl.reader.excel.ExcelReader(path, read_only=True, data_only=True, keep_links=False)
@@ -56,13 +62,44 @@ def open_xlsx(path: Path) -> tuple[Table, ...]:
         try:
             for sheet in book.worksheets:
                 sheet.reset_dimensions()
-                if (table := _table(path, sheet.title, _cells(sheet, str(path)), uncomputed)) is not None:
+                cells = _cells(sheet, str(path))
+                units |= _listed_units(cells)
+                if (table := _table(path, sheet.title, cells, uncomputed)) is not None:
                     made.append(table)
         finally:
             book.close()
     if not made:
         raise LogError("no sheet has rows of numbers", str(path))
-    return tuple(made)
+    return tuple(replace(one, headings=tuple(_with_unit(heading, units) for heading in one.headings)) for one in made)
+
+
+def _listed_units(rows: Cells) -> dict[str, str]:
+    """Return the units that a sheet lists, by each text that stands in their rows: one is the name of a channel.
+
+    A text that stands beside several units, such as the kind of a sensor, is none.
+    """
+    found = (
+        (below, place)
+        for below, row in enumerate(islice(rows, LINES), start=1)
+        for place, cell in enumerate(row)
+        if isinstance(cell, str) and _UNIT.fullmatch(cell)
+    )
+    first, column = next(found, (len(rows), 0))
+    told: dict[str, set[str]] = {}
+    for row in islice(rows, first, first + LINES):
+        unit = row[column] if column < len(row) else None
+        if isinstance(unit, str):
+            for place, name in enumerate(row):
+                if isinstance(name, str) and place != column:
+                    told.setdefault(_said(name), set()).add(unit.strip())
+    return {name: units.pop() for name, units in told.items() if len(units) == 1}
+
+
+def _with_unit(heading: Heading, units: Mapping[str, str]) -> Heading:
+    """Return a heading with the unit that another sheet lists for it, where it has none itself."""
+    if heading.unit is not None or heading.stamped or heading.name not in units:
+        return heading
+    return replace(heading, said=unit_or_none(units[heading.name]))
 
 
 def _no_charts(*_: object) -> None:

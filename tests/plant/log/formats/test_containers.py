@@ -60,6 +60,23 @@ def test_an_empty_sheet_of_charts_is_passed_over(tmp_path: Path) -> None:
     assert len(open_xlsx(tmp_path / "log.xlsx")) == 1
 
 
+def test_units_that_another_sheet_lists_are_those_of_its_columns(tmp_path: Path) -> None:
+    rows = [["T", "Pos [m]", "DP", "A"], *([0.001 * k, 1.0 * k, 2.0 * k, 3.0 * k] for k in range(30))]
+    listed = [["channels"], [None], ["No", "Channel", "Einheit", "Sensor"], [1, "T", "s", "clock"]]
+    listed += [[2, "Pos [m]", "mm", "LVDT"], [3, "DP", "bar", "A"], [4, "A", "V", "none"], [5, "unused"]]
+    for place, sheets in enumerate(((rows, listed), (listed, rows))):
+        tables = open_xlsx(workbook(tmp_path / f"{place}.xlsx", *sheets))
+        (found,) = [one.headings for one in tables if "DP" in names(one)]
+        assert [one.unit for one in found] == [
+            "s",
+            "m",
+            "bar",
+            None,
+        ]  # A is a sensor in bar and a channel in V: neither
+    (alone,) = open_xlsx(workbook(tmp_path / "alone.xlsx", rows))
+    assert [one.unit for one in alone.headings] == [None, "m", None, None]
+
+
 def test_too_many_cells_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xlsx, "MOST_CELLS", 5)
     with pytest.raises(LogError, match="more than 5 cells"):
