@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.command.terminal import HydrostateGroup, emit
+from experiments.command.terminal import INTERRUPTED, HydrostateGroup, emit
 from plant.compiled.native.recipes import trust_sources
 
 LEFT_TO_END = 10.0
@@ -174,6 +174,9 @@ def main() -> None:
         keep_freed_memory()
     try:
         app_for(sys.argv[1:])()
+    except KeyboardInterrupt:  # while a command is loaded, which guards itself as soon as it is
+        emit("hydrostate: interrupted", err=True)
+        os._exit(INTERRUPTED)
     except SystemExit as ended:
         if not isinstance(ended.code, int):
             raise

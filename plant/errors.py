@@ -151,7 +151,11 @@ def require_known(
     """
     names = list(known)
     if name not in names:
-        raise error(f"{what} must be one of {', '.join(names)}, got {name!r}")
+        from difflib import get_close_matches  # which no right name needs
+
+        near = get_close_matches(str(name), names, n=1)
+        hint = f", did you mean {near[0]!r}?" if near else ""
+        raise error(f"{what} must be one of {', '.join(names)}, got {name!r}{hint}")
 
 
 def require_each_known(what: str, names: Sequence[str], known: Sequence[str]) -> None:

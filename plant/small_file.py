@@ -55,7 +55,7 @@ def small_toml(path: Path) -> dict[str, Any]:
         text = small_file(path).decode("utf-8-sig")
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        commas = re.search(r"^\s*(\w+)\s*=\s*([-+]?\d+,\d+)\s*(?:#|$)", text, re.MULTILINE)
+        commas = re.search(r"^\s*(\w+)\s*=\s*([-+]?\d+,\d+(?:[eE][-+]?\d+)?)\s*(?:#|$)", text, re.MULTILINE)
         hint = f"; {commas[1]} = {commas[2]} has a decimal comma, write a point" if commas else ""
         raise ValueError(f"{error}{hint}") from error
 

@@ -11,7 +11,7 @@ import typer
 from experiments.actuators import kind_meant
 from experiments.command.json_output import Result, prepare_output, write_whole
 from experiments.command.logs import finish, overheard, read_log, run_logs, with_remarks
-from experiments.command.options import load_actuator, load_columns, understood
+from experiments.command.options import load_actuator, load_columns, require_positive, understood
 from experiments.command.output_paths import own_paths, page_place, pages_sentence, require_place
 from experiments.command.terminal import clauses, note
 from plant.errors import HydrostateError, NoChannelError, require_known
@@ -81,6 +81,7 @@ class _Question:
         if expected is not None:
             require_known("--condition", expected, kind.conditions)
         columns, sample_time = load_columns(asked["columns"]), asked.get("sample_time")
+        require_positive("--sample-time", sample_time, "s")
         read = partial(
             read_log, rig_columns=bench.columns, columns=columns, required=kind.required, sample_time=sample_time
         )

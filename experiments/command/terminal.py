@@ -301,6 +301,11 @@ def _usage_sentence(error: Exception) -> str | None:
     said = str(message())
     if command == "hydrostate" and said.startswith("No such option"):
         said += " (a command's options stand after its name)"
+    if said.startswith("Missing"):
+        said += f" `{command} --help` shows an example."
+    if said.startswith("No such command") and said.endswith("'."):
+        group: Any = getattr(error, "ctx", None)
+        said += f" Commands: {', '.join(group.command.list_commands(group))}."
     return f"{command}: {said}" if said else ""
 
 

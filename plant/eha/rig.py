@@ -169,6 +169,8 @@ def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> 
     from plant.eha.rig_entries import RigEntries, numbers_of
     from plant.eha.rig_units import require_si
 
+    if misplaced := [name for name in content if name in _names(parameter_class)]:
+        raise RigError(f"{misplaced[0]} must stand below a line [parameters]")
     _known(content, RigEntries.model_fields, "")
     file = RigEntries.model_validate(content)
     if file.plant not in (None, plant):

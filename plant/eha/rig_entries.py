@@ -75,4 +75,5 @@ def wrong_kinds() -> Generator[None]:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         wanted = first["msg"].removeprefix("Input should be ")
+        wanted += " (a fraction: 0.15 is 15 %)" if first["loc"][0] == "uncertainty" and len(first["loc"]) > 1 else ""
         raise RigError(f"{where} must be {wanted}, got {shown(first['input'])}") from error

@@ -79,5 +79,5 @@ def require_si(p: EhaParameters) -> None:
         raise RigError(
             f"parameters.chamber_volume must be {LENGTHS[0]:g} to {LENGTHS[1]:g} m of the piston's area, got "
             f"{p.chamber_volume:g} m^3, which is {length:.3g} m of {p.piston_area:g} m^2: L times 1e-3 and cm^3 times "
-            "1e-6 are m^3"
+            "1e-6 are m^3, and for piston_area cm^2 times 1e-4 and mm^2 times 1e-6 are m^2"
         )

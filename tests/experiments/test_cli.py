@@ -118,8 +118,10 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["bogus"], "hydrostate: No such command 'bogus'."),
-        (["estimate"], "hydrostate estimate: Missing argument 'LOG'."),
+        (["bogus"], "hydrostate: No such command 'bogus'. Commands: inspect, diagnose, "),
+        (["export", "filter"], "hydrostate export: No such command 'filter'. Commands: c, fmu, model."),
+        (["estimate"], "hydrostate estimate: Missing argument 'LOG'. `hydrostate estimate --help` shows an example."),
+        (["estimate", "a.csv", "--sample-time", "0"], "--sample-time must be positive and finite, got 0 s"),
         (
             ["estimate", "a.csv", "--sart", "1"],
             "hydrostate estimate: No such option: --sart (Possible options: --plant, --start",
@@ -157,6 +159,7 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
             "--plant must be one of eha, reduced, lumped, circuit, piezo-stack, diaphragm-motor, got 'toy'",
         ),
         (["simulate", "-o", "a.csv", "--drive", "walk"], "--drive must be one of sine"),
+        (["simulate", "-o", "a.csv", "--drive", "stepz"], "got 'stepz', did you mean 'steps'?"),
         (["simulate", "-o", "a.csv", "--duration", "inf"], "--duration must be positive and finite, got inf s"),
         (["simulate", "-o", "a.csv", "--leakage-severity", "9"], "leakage severity must be between 0 and 5, got 9.0"),
         (

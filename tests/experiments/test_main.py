@@ -65,6 +65,19 @@ def test_an_end_without_a_code_is_left_to_python(order: list[str], monkeypatch: 
     assert order == ["sources trusted"]
 
 
+def test_an_interruption_while_a_command_is_loaded_is_a_sentence(
+    order: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def loaded(_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "app_for", loaded)
+    with pytest.raises(Ended):
+        cli.main()
+    assert order == ["sources trusted", "end 130"]
+    assert capsys.readouterr().err == "hydrostate: interrupted\n"
+
+
 def test_the_users_own_count_of_threads_stands_and_one_is_the_default(
     order: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

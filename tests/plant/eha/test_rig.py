@@ -94,6 +94,13 @@ def test_every_parameter_refuses_text(tmp_path: Path, field: str) -> None:
             "[parameters]\npiston_aera = 1.0",
             r"parameters\.piston_aera is unknown, did you mean 'piston_area'",
         ),
+        ("piston_area = 1e-3", r"piston_area must stand below a line \[parameters\]"),
+        ("[parameters]\npiston_area = 1,5e-3", r"; piston_area = 1,5e-3 has a decimal comma, write a point"),
+        ('[uncertainty]\nchamber_volume = "15 %"', r"must be a valid number \(a fraction: 0\.15 is 15 %\), got '15 %'"),
+        (
+            "[parameters]\npiston_area = 2.0",
+            r"parameters\.chamber_volume .* m of 2 m\^2: .* for piston_area .*mm\^2 times 1e-6",
+        ),
         ("[parametres]\npiston_area = 1.0", r"parametres is unknown, did you mean 'parameters'\?"),
         (
             "[uncertainty]\nbulk_modulos = 0.3",
