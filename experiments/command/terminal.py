@@ -331,6 +331,14 @@ class HydrostateGroup(TyperGroup):
             read_plainly(command)
         return command
 
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; an interruption is told here, since Typer ends with its code and without a word."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            note("hydrostate: interrupted")
+            raise typer.Exit(INTERRUPTED) from None
+
     def main(self, *args: Any, **kwargs: Any) -> NoReturn:
         """Run the command line and exit."""
         kwargs["standalone_mode"] = False

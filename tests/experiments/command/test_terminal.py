@@ -3,6 +3,7 @@
 import logging
 
 import pytest
+import typer
 
 from experiments.command import terminal
 from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, guarded, rendered
@@ -56,6 +57,19 @@ def test_a_model_that_cannot_be_compiled_is_its_authors_slip_and_no_internal_err
 @pytest.mark.parametrize("values", [[], [1.0], [2.0, 2.0, 2.0]])
 def test_what_does_not_vary_has_no_curve(values: list[float]) -> None:
     assert terminal.sparkline(values, 8) == ""
+
+
+def test_an_interrupted_command_says_so_and_ends_with_its_code(capsys: pytest.CaptureFixture[str]) -> None:
+    app = typer.Typer(cls=terminal.HydrostateGroup, callback=lambda: None)
+
+    @app.command()
+    def wait() -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(SystemExit) as ended:
+        app(["wait"])
+    assert ended.value.code == INTERRUPTED
+    assert capsys.readouterr().err == "hydrostate: interrupted\n"
 
 
 def test_compiling_is_said_once_and_every_warning(monkeypatch: pytest.MonkeyPatch) -> None:
