@@ -183,7 +183,7 @@ def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None, los
     Parameters
     ----------
     out : Path or None
-        Where results are written too.
+        Where results are written too, if there are any.
     lost : bool
         Whether something else that was asked for could not be written: then not all is done.
 
@@ -197,7 +197,7 @@ def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None, los
     elif batch.done:
         emit(rendered(*screen(batch.done)))
     code = batch.exit_code or (SOME_FAILED if lost else 0)
-    if out is not None:
+    if out is not None and batch.results:  # an interruption before the first leaves earlier results as they are
         try:
             note(f"written: {', '.join(str(path) for path in write_results(batch.results, out))}")
         except HydrostateError as error:

@@ -114,6 +114,19 @@ def test_an_interruption_keeps_what_is_done(good: Path, tmp_path: Path, monkeypa
     assert len(json.loads((tmp_path / "results.json").read_text())) == 1
 
 
+def test_an_interruption_before_the_first_log_leaves_earlier_results_as_they_are(
+    good: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object, **__: object) -> Record:
+        raise KeyboardInterrupt
+
+    (tmp_path / "found.json").write_text("earlier")
+    monkeypatch.setattr(plant.log.files, "read_record", interrupted)
+    done = CliRunner().invoke(app, ["estimate", str(good), "--out", str(tmp_path / "found.json")])
+    assert (done.exit_code, "written" in done.stderr) == (130, False)
+    assert (tmp_path / "found.json").read_text() == "earlier"
+
+
 def test_a_warning_is_printed_with_the_log_and_kept_in_the_result(good: Path, tmp_path: Path) -> None:
     record = read_record(good)
     gappy = record["velocity_m_s"].copy()
