@@ -49,12 +49,13 @@ def number(value: float | None, digits: int = 4) -> str:
         return MISSING
     if value == 0.0:
         return "0"
-    rounded = float(f"{value:.{digits - 1}e}")
-    magnitude = math.floor(math.log10(abs(rounded)))
+    leading, _, power = f"{value:.{digits - 1}e}".partition("e")
+    rounded, magnitude = float(f"{leading}e{power}"), int(power)
     if PLAIN_FROM <= abs(rounded) < PLAIN_TO:
         return f"{rounded:.{max(0, digits - 1 - magnitude)}f}".replace("-", MINUS)
     exponent = 3 * (magnitude // 3)
-    mantissa = f"{rounded / 10.0**exponent:.{max(0, digits - 1 - (magnitude - exponent))}f}".replace("-", MINUS)
+    shift = magnitude - exponent
+    mantissa = f"{float(leading) * 10.0**shift:.{max(0, digits - 1 - shift)}f}".replace("-", MINUS)
     return f"{mantissa}{TIMES}10{str(exponent).translate(SUPERSCRIPTS)}"
 
 
