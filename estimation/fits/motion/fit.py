@@ -15,6 +15,7 @@ from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
+from estimation.fits.motion.chatter import without_chatter
 from estimation.fits.motion.force_scale import Way, bulk_modulus, disagree, rescaled
 from estimation.fits.motion.search import (
     ENOUGH,
@@ -32,6 +33,7 @@ from estimation.fits.motion.search import (
     likeliest,
     rough,
 )
+from estimation.fits.motion.settled import RETURNING
 from estimation.fits.motion.weakly_held import MOST_MOVED, far_too_weak, unseen
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
@@ -87,6 +89,10 @@ SPARED_NIS, SPARED_SHARE = 0.5 * MISMATCH_NIS, 0.03
 
 BEGINNING = 0.2
 """Share of these that counts on a beginning of the log [fraction]: the rest may be followed less well."""
+
+NEARLY = 1.1
+"""Misfit of a beginning, over what would explain it, up to which other scales of forces are looked for all the same
+[dimensionless]: the pit of a log that is explained by another one, some percent away in bulk modulus."""
 
 ALIKE = 5.0
 """Difference of log-likelihood up to which two structures are said to explain a log alike [dimensionless]."""
@@ -265,8 +271,11 @@ def _fitted(ended: list[Ended], *, sparing: bool = False) -> tuple[list[GreyBoxF
         best = descend(part.at, best.theta, FINISHING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
     asked = best.cost < explained(part)
     spared = sparing and asked and far_too_weak(part, best, whole)
-    if asked:
-        best, others = (best, [bulk_modulus(part, best)]) if spared else _rescaled(part, best, search)
+    if spared:
+        others = [bulk_modulus(part, best)]
+    elif best.cost < NEARLY * explained(part):
+        best, others = _rescaled(part, best, search)
+        asked = best.cost < explained(part)
     hopeful = asked and not disagree([bulk_modulus(part, best), *others])
     if hopeful:
         best = descend(whole.at, best.theta, FINISHING, bounds)
@@ -278,7 +287,10 @@ def _fitted(ended: list[Ended], *, sparing: bool = False) -> tuple[list[GreyBoxF
     told = best.cost < explained(whole) and not disagree([bulk_modulus(whole, best), *others])
     if told and not hopeful:
         best = descend(whole.at, best.theta, FINISHING, bounds)
-    return [concluded(whole, best), *_rival(second, best, told=told)], others, spared
+    if told and (finer := without_chatter(whole, best.theta)) is not whole:
+        whole, best = finer, descend(finer.at, best.theta, RETURNING, bounds)
+        told = best.cost < explained(whole) and not disagree([bulk_modulus(whole, best), *others])
+    return [concluded(whole, best), *_rival(second, whole, best, told=told)], others, spared
 
 
 def _wanted(problem: FreedProblem, begun: Point, share: float = 1.0) -> float:
@@ -293,9 +305,11 @@ def _wanted(problem: FreedProblem, begun: Point, share: float = 1.0) -> float:
     return explained(problem) if spared and samples > SCREENED else np.inf
 
 
-def _rival(second: Ended, best: Point, *, told: bool) -> list[GreyBoxFit]:
+def _rival(second: Ended, whole: FreedProblem, best: Point, *, told: bool) -> list[GreyBoxFit]:
     """Return the fit of the other structure of friction to the whole log; none where it cannot matter."""
-    whole, bounds, thetas = second.search.whole, second.search.bounds, [best.theta, second.point.theta]
+    own = second.search.whole
+    whole = own if whole.log is own.log else own.on(whole.log)  # the same steps, so that misfits compare
+    bounds, thetas = second.search.bounds, [best.theta, second.point.theta]
     costs, wanted = whole.costs(thetas), explained(whole)
     begun = thetas[int(np.argmin(costs))]
     if told:

@@ -16,10 +16,13 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import search_bounds
 from estimation.fits.greybox.side_by_side import LANES
+from estimation.fits.motion.chatter import followed
 from estimation.fits.motion.force_scale import bulk_modulus
+from estimation.fits.motion.settled import RETURNING, settled
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.motion import LINEAR, UNKNOWNS
 from plant.arrays import Array
+from plant.solvers.steps import parameter_names
 
 SCREENED = 4_000
 """Samples on which starts are compared."""
@@ -126,6 +129,8 @@ class MotionSearch:
         Where it begins [dimensionless].
     bounds : tuple of ndarray, shape (unknowns,)
         How far it may go [dimensionless].
+    near : tuple of ndarray, shape (unknowns,)
+        How far while a start is brought near: as far as model steps follow the bristle [dimensionless].
     """
 
     whole: FreedProblem
@@ -133,6 +138,7 @@ class MotionSearch:
     short: FreedProblem
     guesses: list[Array]
     bounds: tuple[Array, Array]
+    near: tuple[Array, Array]
 
     @classmethod
     def of(cls, form: GreyBoxModel, log: GreyBoxLog, starts: Sequence[dict[str, float]]) -> "MotionSearch":
@@ -154,11 +160,13 @@ class MotionSearch:
         """
         whole = FreedProblem(form, log, UNKNOWNS, LINEAR)
         guesses = [whole.model.theta(start) for start in starts]
-        bounds = search_bounds(whole.model, guesses, {"speed_lead": (0.0, 0.5 * log.sample_time)})
+        lead = {"speed_lead": (0.0, 0.5 * log.sample_time)}
+        soft = followed(log, parameter_names(form.parameters))
+        bounds, near = (search_bounds(whole.model, guesses, limits) for limits in (lead, lead | soft))
         speed = log.drives[:, form.drives.index("motor_speed_rad_s")]
         lengths = (driven_samples(speed, samples) for samples in (SEARCHED, SCREENED))
         part, short = (whole.on(log.beginning(samples)) for samples in lengths)
-        return cls(whole, part, short, guesses, bounds)
+        return cls(whole, part, short, guesses, bounds, near)
 
     def brought_near(self, rank: int, begun: Begun) -> Iterator[Array]:
         """Yield where the starts of a rank lead on the short beginning under larger noise.
@@ -182,13 +190,13 @@ class MotionSearch:
         for way, (first, second) in enumerate(WAYS):
             if way not in begun.screened:
                 screen = begun.at_each(rough(self.short, first))
-                points = descend_together(screen, self.guesses, SCREENING, self.bounds, NEAR_ENOUGH)
+                points = descend_together(screen, self.guesses, SCREENING, self.near, NEAR_ENOUGH)
                 begun.screened[way] = sorted(points, key=cost_of)
             start = begun.screened[way][rank].theta
             if second == UNCHANGED:
                 yield start
                 continue
-            near = descend(begun.at(rough(self.short, second)), start, NEARING, self.bounds, NEAR_ENOUGH)
+            near = descend(begun.at(rough(self.short, second)), start, NEARING, self.near, NEAR_ENOUGH)
             if near.cost < explained(self.short) and not any(self.same_pit(near, other) for other in reached):
                 yield near.theta
             reached.append(near)
@@ -243,7 +251,9 @@ def likeliest(searches: Sequence[MotionSearch]) -> list[Ended]:
         if begun.work > MOST_WORK or all(one.best.cost > HOPELESS * explained(one.search.short) for one in tries):
             break
     likelier = min(tries, key=lambda one: one.best.cost)
-    return [Ended(one.search, one.ended() if one is likelier else one.best, explains=False) for one in tries]
+    last, explains = likelier.ended()
+    ends = [(last, explains) if one is likelier else (one.best, False) for one in tries]
+    return [Ended(one.search, *end) for one, end in zip(tries, ends, strict=True)]
 
 
 class _Tries:
@@ -268,7 +278,9 @@ class _Tries:
         What explains the shorter beginning is followed once a pit, and once in all after `MOST_WORK`.
         """
         search, wanted = self.search, explained(self.search.short)
-        point = descend(self._begun.at(search.short), near, FINISHING, search.bounds, ENOUGH, wanted=wanted)
+        point, at = Point(near, np.inf, np.zeros(0), np.zeros((0, 0))), self._begun.at(search.short)
+        for bounds in (search.near, search.bounds):
+            point = descend(at, point.theta, FINISHING, bounds, ENOUGH, wanted=wanted)
         self.best = min(self.best, point, key=cost_of)
         known = any(search.same_pit(point, other) for other, _ in self._followed)
         if point.cost >= wanted or known or (self._followed and self._begun.work > MOST_WORK):
@@ -278,16 +290,22 @@ class _Tries:
         self._followed.append((point, more))
         return more if more.cost < wanted else None
 
-    def ended(self) -> Point:
-        """Return where the search ends on the shorter beginning if nothing explains the log."""
-        search = self.search
+    def ended(self) -> tuple[Point, bool]:
+        """Return where the search ends on the shorter beginning if no start explains the log; or what explains more.
+
+        What nearly explains the beginning is settled: in which pit a descent ends hangs on rounding.
+        """
+        search, at = self.search, self._begun.at
+        short, bounds, wanted = search.short, search.bounds, explained(search.short)
         if self._followed:
             _, more = min(self._followed, key=lambda pair: pair[1].cost)
-            return search.short.at(more.theta)
-        if self._begun.work > MOST_WORK:
-            return self.best
-        promising = SLIGHT * explained(search.short)
-        return descend(search.short.at, self.best.theta, FINISHING, search.bounds, promising)
+            return short.at(more.theta), False
+        promising, share = SLIGHT * wanted, SLIGHT_SHARE if self._begun.work > MOST_WORK else 0.0
+        point = descend(at(short), self.best.theta, RETURNING, bounds, promising, least_share=share)
+        if point.cost < HOPELESS * wanted:
+            point = settled(short, point, bounds, promising, SAME_COST * wanted, at)
+        found = self.carried_on(point.theta) if point.cost < wanted else None
+        return (point, False) if found is None else (found, True)
 
 
 def rough(problem: FreedProblem, factors: tuple[float, float]) -> FreedProblem:

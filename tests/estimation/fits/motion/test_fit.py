@@ -49,6 +49,13 @@ def searches_of(log: GreyBoxLog) -> list[MotionSearch]:
     return [MotionSearch.of(form, log, starts) for form in MOTION_FORMS]
 
 
+def fine_searches(monkeypatch: pytest.MonkeyPatch) -> list[MotionSearch]:
+    """Return the searches of two seconds with steps that follow a stiff bristle, and no shorter ones at their end."""
+    monkeypatch.setattr(motion_fit, "without_chatter", lambda problem, _: problem)
+    log = heard(short_log(2.0))
+    return searches_of(replace(log, steps=np.where(log.steps == np.max(log.steps), 4 * log.steps, log.steps)))
+
+
 @pytest.fixture(scope="module")
 def healthy() -> FormFit:
     """What two seconds of a healthy actuator say, from a first guess of twice the value."""
@@ -65,7 +72,8 @@ def test_two_seconds_without_pressure_give_the_bulk_modulus(healthy: FormFit) ->
 
 def test_the_deviation_holds_noise_and_what_the_friction_law_may_be_wrong_by(healthy: FormFit) -> None:
     value, std = healthy.parameters["bulk_modulus"]
-    assert std / value == pytest.approx(np.hypot(healthy.bound, motion_fit.STRUCTURE), rel=0.05)
+    least = np.hypot(healthy.bound, motion_fit.STRUCTURE)
+    assert least <= std / value <= np.hypot(least, motion_fit.MOST_MOVED)
 
 
 def test_what_a_doubtful_piston_area_does_to_bulk_modulus_is_told(healthy: FormFit) -> None:
@@ -100,6 +108,7 @@ def test_a_long_log_is_searched_on_its_beginning_and_ends_on_the_whole(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     log = heard(short_log(2.0))
+    monkeypatch.setattr(motion_fit, "without_chatter", lambda problem, _: problem)
     monkeypatch.setattr(motion_search, "SCREENED", 500)
     monkeypatch.setattr(motion_search, "SEARCHED", 1000)
     searches = searches_of(log)
@@ -241,7 +250,7 @@ def test_another_optimum_far_from_the_best_is_objected_to() -> None:
 def test_the_other_law_goes_on_on_the_whole_log_from_where_it_stands_better(
     near: bool, healthy: FormFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first, second = searches_of(heard(short_log(2.0)))
+    first, second = fine_searches(monkeypatch)
     there = first.whole.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
     worst = max(second.guesses, key=lambda theta: second.whole.at(theta).cost)
     own = descend(second.whole.at, there, 40, second.bounds).theta if near else worst
@@ -260,7 +269,9 @@ def test_the_other_law_goes_on_on_the_whole_log_from_where_it_stands_better(
     fits, _, _ = motion_fit._fitted(ended)
     assert [fit.model for fit in fits] == [first.whole.model, second.whole.model]
     (start,) = begun
-    assert np.array_equal(start, own if near else fits[0].theta)
+    stands = own, fits[0].theta
+    assert np.array_equal(start, min(stands, key=lambda theta: second.whole.at(theta).cost))
+    assert near or np.array_equal(start, fits[0].theta)
     assert fits[1].cost == second.whole.at(fits[1].theta).cost <= second.whole.at(start).cost
 
 
@@ -268,7 +279,7 @@ def test_the_other_law_goes_on_on_the_whole_log_from_where_it_stands_better(
 def test_what_the_searches_leave_unexplained_is_fitted_on_and_tried_on_other_scales_if_that_explains_it(
     late: bool, healthy: FormFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first, second = searches_of(heard(short_log(2.0)))
+    first, second = fine_searches(monkeypatch)
     there = first.whole.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
     there[UNKNOWNS.index("bulk_modulus")] += 0.01
     ended = [
@@ -287,7 +298,7 @@ def test_what_the_searches_leave_unexplained_is_fitted_on_and_tried_on_other_sca
 def test_what_only_the_whole_log_explains_is_tried_on_other_scales_too(
     healthy: FormFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first, second = searches_of(heard(short_log(2.0)))
+    first, second = fine_searches(monkeypatch)
     there = first.whole.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
     ended = [Ended(one, one.part.at(there), explains=False) for one in (first, second)]
     asked: list[object] = []
@@ -308,7 +319,7 @@ def test_what_only_the_whole_log_explains_is_tried_on_other_scales_too(
 def test_the_other_law_is_not_fitted_where_no_number_is_told(
     disagreeing: bool, healthy: FormFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first, second = searches_of(heard(short_log(2.0)))
+    first, second = fine_searches(monkeypatch)
     there = first.whole.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
     ended = [Ended(one, one.part.at(there), explains=one is first) for one in (first, second)]
     monkeypatch.setattr(motion_fit, "rescaled", lambda _, best, __: (best, [9e7] if disagreeing else []))
@@ -321,7 +332,7 @@ def test_the_other_law_is_not_fitted_where_no_number_is_told(
 def test_what_nothing_explains_is_fitted_by_one_law_and_not_to_the_last_digit(
     healthy: FormFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first, second = searches_of(heard(short_log(2.0)))
+    first, second = fine_searches(monkeypatch)
     there = first.whole.model.theta({name: 1.01 * healthy.parameters[name][0] for name in UNKNOWNS})
     ended = [Ended(one, one.part.at(there), explains=False) for one in (first, second)]
     shares: list[float] = []

@@ -14,6 +14,7 @@ from estimation.fits.motion.search import (
     FINALISTS,
     HOPELESS,
     MOST_WORK,
+    SLIGHT_SHARE,
     WAYS,
     Begun,
     MotionSearch,
@@ -31,6 +32,7 @@ class Search:
     def __init__(self, misfit: Misfit, name: str, asked: list[str], steps: int = 1) -> None:
         self._steps = steps
         self.guesses, self.bounds = [np.zeros(1)], (np.full(1, -9.0), np.full(1, 99.0))
+        self.near = self.bounds
         self.short, self.part = (self._problem(misfit, samples) for samples in (SHORT, PART))
         self._name, self._asked = name, asked
 
@@ -38,7 +40,8 @@ class Search:
         def at(theta: np.ndarray) -> Point:
             return Point(theta, 0.5 * samples * misfit(float(theta[0])), np.zeros(1), np.eye(1))
 
-        return SimpleNamespace(at=at, log=SimpleNamespace(measured=np.zeros((samples, 1)), steps=[self._steps]))
+        log = SimpleNamespace(measured=np.zeros((samples, 1)), steps=[self._steps], softened=lambda *_: None)
+        return SimpleNamespace(at=at, log=log, on=lambda _: SimpleNamespace(at=at, log=log))
 
     def same_pit(self, one: Point, other: Point) -> bool:
         return bool(one.theta[0] == other.theta[0])
@@ -91,23 +94,29 @@ def test_no_other_start_is_tried_once_the_work_is_done() -> None:
         assert not any(one.explains for one in found)
 
 
-def test_where_the_work_is_done_nothing_is_carried_to_the_end_that_explains_nothing(
+def test_where_the_work_is_done_the_end_is_searched_on_while_that_gains_a_share(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    finished: list[float] = []
+    shares: list[float] = []
     descended = motion_search.descend
 
-    def noted(at: Callable[..., Point], start: np.ndarray, evaluations: int, bounds: Any, *others: Any) -> Point:
-        finished.append(float(start[0]))
-        return descended(at, start, evaluations, bounds, *others)
+    def noted(*given: Any, least_share: float = 0.0, **named: Any) -> Point:
+        shares.append(least_share)
+        return descended(*given, least_share=least_share, **named)
 
-    monkeypatch.setattr(
-        motion_search, "descend", lambda *a, wanted=None, **k: descended(*a, **k) if wanted else noted(*a)
-    )
-    for steps, ends in ((1, 1), (MOST_WORK, 0)):  # the likelier structure alone is carried on
-        finished.clear()
+    monkeypatch.setattr(motion_search, "descend", noted)
+    for steps, share in ((1, 0.0), (MOST_WORK, SLIGHT_SHARE)):
+        shares.clear()
         ended(lambda _: 1.2, lambda _: 1.3, steps=steps)
-        assert len(finished) == ends
+        assert shares.count(share) == (len(shares) if share == 0.0 else 1)
+
+
+def test_an_end_that_explains_the_beginning_is_carried_on_as_a_start_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motion_search, "settled", lambda problem, *_: problem.at(np.array([7.5])))
+    (first, second), _ = ended(lambda at: 1.0 if at == 7.5 else 2.0, lambda _: 2.5)
+    assert (first.explains, second.explains) == (True, False)
+    assert first.point.theta[0] == 7.5
+    assert first.point.cost == 0.5 * PART
 
 
 def test_what_explains_the_first_seconds_alone_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -86,6 +86,7 @@ def test_what_bulk_modulus_was_on_the_way_stands_for_the_scales_that_are_spared(
     monkeypatch.setattr(motion_fit, "concluded", lambda *_: "concluded")
     monkeypatch.setattr(motion_fit, "_rival", lambda *_, **__: [])
     monkeypatch.setattr(motion_fit, "disagree", noted)
+    monkeypatch.setattr(motion_fit, "without_chatter", lambda problem, _: problem)
     search: Any = SimpleNamespace(part=problem_of(10), whole=problem_of(10), bounds=None)
     ended = [Ended(search, at(0.5), explains=True)] * 2
     others = [2e8] if sparing else [3e8]

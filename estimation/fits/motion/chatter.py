@@ -1,0 +1,70 @@
+"""Bristles that are too stiff for the steps of the motion form: no search begins there, and no fit ends there in them.
+
+Piston and bristle then chatter, each step on the other side of rest. That is no motion of the model: the misfit has
+pits a few thousandths apart, and in which of them a descent ends hangs on the last digit of the noise.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import ceil, sqrt
+
+import numpy as np
+
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.log import GreyBoxLog
+from plant.arrays import Array
+from plant.solvers.steps import parameter_names
+
+STIFFEST = 4_000.0
+"""Frequency of the mass on its bristle that the model's steps follow [rad/s]: a quarter over the shortest of them."""
+
+QUICKEST = 2_000.0
+"""Rate at which the bristle's damping may stop the mass [1/s]: a half over the longest of them."""
+
+MOST_SHORTENED = 4
+"""By how many times steps are shortened at most, where the piston turns [dimensionless]."""
+
+
+def followed(log: GreyBoxLog, names: tuple[str, ...]) -> dict[str, tuple[float, float]]:
+    """Return the least and largest stiffness [N/m] and damping [N s/m] of a bristle that the model's steps follow.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log; its parameters hold the mass.
+    names : tuple of str
+        Their names, in order.
+
+    Returns
+    -------
+    dict of str to tuple of float
+        By unknown.
+    """
+    mass = float(log.parameters[names.index("moving_mass")])
+    return {"bristle_stiffness": (0.0, mass * STIFFEST**2), "bristle_damping": (0.0, mass * QUICKEST)}
+
+
+def without_chatter(problem: FreedProblem, theta: Array) -> FreedProblem:
+    """Return a problem whose steps follow the bristle at a point where the piston turns.
+
+    Parameters
+    ----------
+    problem : FreedProblem
+        The problem.
+    theta : ndarray, shape (unknowns,)
+        The point [dimensionless].
+
+    Returns
+    -------
+    FreedProblem
+        The same one where its steps do.
+    """
+    log, values = problem.log, problem.model.values(theta)
+    times = min(ceil(_over(log, values, parameter_names(problem.model.parameters))), MOST_SHORTENED)
+    steps = np.where(log.steps == np.max(log.steps), times * log.steps, log.steps)
+    return problem if times <= 1 else problem.on(replace(log, steps=steps))
+
+
+def _over(log: GreyBoxLog, values: Mapping[str, float], names: tuple[str, ...]) -> float:
+    """Return by how many times a bristle is quicker than what the steps follow."""
+    return sqrt(values["bristle_stiffness"] / followed(log, names)["bristle_stiffness"][1])
