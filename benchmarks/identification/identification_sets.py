@@ -6,11 +6,12 @@ of the mean (0 is perfect, 1 as good as the mean), initial states estimated for 
 model with offset, ``scipy`` output error of orders 1 to 4 from ARX, by BIC, both by `scipy.optimize.least_squares`.
 Peers run in environments of their own (`make peers`), each size chosen on the last third of the training data; they are
 skipped where there are none. ``--simulated 0 3`` takes our own sets of seeds 0 to 2 instead, each with a nonlinearity,
-and ``--machines 0 3`` simulated machines and circuits. How often the default loses to the better baseline is said at
-the end. ``--begun 0.2`` estimates initial states from the first fifth of the test alone: a model with an unstable pole,
-whose state is fitted to the whole test, follows the output without its inputs; a peer's that grows a hundredfold over
-the test is shown and not compared. Where a peer is ahead by more than the
-targets allow, the ratio of errors comes with its 95 % interval over blocks of the test drawn anew.
+``--machines 0 3`` simulated machines and circuits, ``--stand-ins 0 3`` those that stand in for sets that are kept back.
+How often the default loses to the better baseline is said at the end. ``--begun 0.2`` estimates initial states from the
+first fifth of the test alone: a model with an unstable pole, whose state is fitted to the whole test, follows the
+output without its inputs; a peer's that grows a hundredfold over the test is shown and not compared. Where a peer is
+ahead by more than the targets allow, the ratio of errors comes with its 95 % interval over blocks of the test drawn
+anew.
 """
 
 import argparse
@@ -31,6 +32,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks.identification.identification_machines import machine_sets
 from benchmarks.identification.identification_sets_data import DATA, Part, PublicSet, public_sets
 from benchmarks.identification.identification_simulated import simulated_sets
+from benchmarks.identification.identification_stand_ins import stand_in_sets
 from benchmarks.identification.paired_blocks import error_ratio
 from estimation.arrays import Array
 from estimation.identification.free_run.data import channels_from
@@ -78,6 +80,7 @@ def main(arguments: list[str]) -> int:
     seeds = ("FIRST", "END")
     parser.add_argument("--simulated", type=int, nargs=2, default=(0, 0), metavar=seeds, help="our own sets")
     parser.add_argument("--machines", type=int, nargs=2, default=(0, 0), metavar=seeds, help="simulated machines")
+    parser.add_argument("--stand-ins", type=int, nargs=2, default=(0, 0), metavar=seeds, help="of sets kept back")
     parser.add_argument("--ours", nargs="*", default=list(OURS), choices=list(OURS), help="columns of ours")
     parser.add_argument("--peers", nargs="*", default=list(PEERS), choices=list(PEERS))
     parser.add_argument("--begun", type=float, default=1.0, metavar="SHARE", help="of the test that states come from")
@@ -85,6 +88,7 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     made = [one for seed in range(*options.simulated) for one in simulated_sets(seed)]
     made += [one for seed in range(*options.machines) for one in machine_sets(seed)]
+    made += [one for seed in range(*options.stand_ins) for one in stand_in_sets(seed)]
     chosen = made or public_sets(options.sets)
     if not chosen:
         parser.error(_no_set(options.sets))

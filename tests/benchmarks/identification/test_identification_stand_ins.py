@@ -1,0 +1,49 @@
+"""Stand-ins of sets that are kept back, on which the defaults of identification are judged."""
+
+import numpy as np
+import pytest
+
+from benchmarks.identification import identification_stand_ins as module
+from benchmarks.identification.identification_sets_data import PublicSet
+from benchmarks.identification.identification_stand_ins import MACHINES, stand_in_sets
+
+
+@pytest.fixture(scope="module")
+def sets() -> dict[str, PublicSet]:
+    return {one.name: one for one in stand_in_sets(1)}
+
+
+def test_every_machine_is_measured_and_moves(sets: dict[str, PublicSet]) -> None:
+    assert {name.split(" ")[0] for name in sets} == {name.split(" ")[0] for name in (*MACHINES, "Duffing")}
+    for one in sets.values():
+        for u, y in (one.train, *one.tests.values()):
+            assert np.isfinite(u).all()
+            assert np.isfinite(y).all()
+            assert y.std() > 0.0
+            assert u.shape == (y.size, 1)
+
+
+def test_machines_keep_their_physics(sets: dict[str, PublicSet]) -> None:
+    position = np.concatenate(
+        [sets["pneumatic position"].train[1], *(y for _, y in sets["pneumatic position"].tests.values())]
+    )
+    assert np.abs(position).max() < 0.17, "end stops at 0.15 m"
+    speed, moved = (sets[f"motor {name}"].train[1] for name in ("speed", "position"))
+    assert np.corrcoef(np.gradient(moved, 0.01), speed)[0, 1] > 0.9
+    drives = sets["coupled drives"].train[1]
+    assert drives.min() > -0.1 * drives.std(), "the sign is not measured"
+    warm = sets["heat exchanger"].train[1]
+    assert warm.min() > 0.0
+    assert warm.max() < 1.0, "between its two inlets"
+
+
+def test_the_arrow_leaves_the_range_of_the_training(sets: dict[str, PublicSet]) -> None:
+    reached = [np.abs(one[1]).max() for one in (sets["Duffing"].train, *sets["Duffing"].tests.values())]
+    assert reached[1] < 1.1 * reached[0] < reached[2]
+
+
+def test_a_seed_tells_a_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MACHINES", {"damper": MACHINES["damper"]})
+    first, again, other = (stand_in_sets(seed)[0].train[1] for seed in (1, 1, 2))
+    assert np.array_equal(first, again)
+    assert first.size != other.size or not np.array_equal(first, other)
