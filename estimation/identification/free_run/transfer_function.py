@@ -5,7 +5,7 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.fit.covariances import covariances
 from estimation.identification.fit.fitted import COLOURED
-from estimation.identification.fit.residual_tests import ljung_box
+from estimation.identification.fit.residual_tests import DEFAULT_LAGS, ljung_box
 from estimation.identification.fit.validate import estimate_initial_state
 from estimation.identification.free_run.data import Channels, Scaling
 from estimation.identification.free_run.linear_problem import LinearFit, Problem
@@ -33,7 +33,8 @@ def linear_model(fit: LinearFit, data: Channels, by: Scaling) -> LinearModel:
     unscale = np.concatenate([np.full(form.n_b, gain), np.ones(form.order)])
     *spreads, _ = covariances(jacobian, residual, experiments)
     white, robust = (spread[:n_main, :n_main] * np.outer(unscale, unscale) for spread in spreads)
-    coloured = ljung_box(np.where(used, residual, np.nan)).p_value < COLOURED
+    lags = DEFAULT_LAGS if data.n_samples > DEFAULT_LAGS else data.n_samples // 2
+    coloured = ljung_box(np.where(used, residual, np.nan), n_lags=lags).p_value < COLOURED
     b = fit.theta[: form.n_b] * gain
     level = by.y_mean + by.y_std * float(fit.theta[n_main])
     rss, n_used = float(residual @ residual) * by.y_std**2, data.n_samples

@@ -220,6 +220,18 @@ def test_what_cannot_be_fitted_is_refused_with_a_sentence(u: Array, y: Array, sa
         channels_from([u], [y], 1.0, ["u"], "y")
 
 
+@pytest.mark.parametrize("samples", [20, 25, 26])
+@pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
+def test_a_log_of_hardly_more_samples_than_are_needed_has_a_model(samples: int) -> None:
+    """The residual is asked whether it is white at as many lags as the log has room for."""
+    u = steps(samples, 8, hold=3)
+    y = filtered([0.0, 0.5], [1.0, -0.5], u) + 0.01 * np.random.default_rng(8).normal(size=samples)
+    found = identify_channels(channels_from([u[:, None]], [y], 1.0, ["u"], "y"))
+    assert found.quality.fit_percent > 90.0
+    assert found.model.linear is not None
+    assert np.isfinite(found.model.linear.covariance).all()
+
+
 @pytest.mark.parametrize("structure", ["arx", "box-jenkins", "instrumental", "subspace", "continuous"])
 def test_other_structures_run_free_with_an_offset(structure: str) -> None:
     data = one_log()
