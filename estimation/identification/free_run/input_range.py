@@ -77,8 +77,9 @@ def linear_instead(
     if not isinstance(dynamics, PolynomialDynamics) or dynamics.fallback is None:
         return []
     if judged is None:
-        one, errors = in_scale(data, model.scaling), dynamics.fallback.errors
-        judged = [errors(u, y, dynamics.own_run(u, y)) for u, y in zip(one.u, one.y, strict=True)]
+        one = in_scale(data, model.scaling)
+        told = (dynamics.judged_run(u, y)[1] for u, y in zip(one.u, one.y, strict=True))
+        judged = [errors for errors in told if errors is not None]
     undetermined, linear = max([(0.0, 1.0), *judged], key=lambda pair: pair[0] / pair[1])
     if undetermined < linear:
         return []

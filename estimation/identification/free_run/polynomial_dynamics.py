@@ -1,7 +1,7 @@
 """A polynomial model in the data's scale: its free run, its prediction one step ahead and its JSON form."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,10 +12,14 @@ from estimation.identification.free_run.fallback import Fallback
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs
-from estimation.identification.free_run.polynomial_variables import Variables, products
+from estimation.identification.free_run.polynomial_variables import Variables, lagged_signals, products
 
 START_STEPS = 12
 """Refinements of the first outputs of a polynomial run."""
+
+AGREED = 0.6
+"""Share of what a run is not determined to, where its products are held, that it may be where they go on: of four fits
+each, less is chance in one case of six (Fisher's ratio of variances) [fraction]."""
 
 SMOOTHED = (8, 24)
 """Samples through which a level and a straight line give first outputs without their noise."""
@@ -82,7 +86,20 @@ class PolynomialDynamics:
             Output, scaled, and what `Fallback.errors` returns; None where no linear model may stand in.
         """
         own = self.own_run(u, y)
-        return (own, None) if self.fallback is None else self.fallback.judged(u, y, own)
+        if self.fallback is None:
+            return own, None
+        told = self.fallback.judged(u, y, own)
+        single, held = lagged_signals(self.variables, u, own)
+        if np.array_equal(single, held):
+            return told
+        # beyond what was seen, products go on where fits that left out a block agree on that, and not on their ends
+        parts = (one._released() if isinstance(one, PolynomialDynamics) else one for one in self.fallback.parts)
+        freed = replace(self.fallback, parts=tuple(parts)).judged(u, y, self._released().own_run(u, y))
+        return freed if freed[1][0] < AGREED * told[1][0] else told
+
+    def _released(self) -> "PolynomialDynamics":
+        """Return the same products, held farther out."""
+        return replace(self, variables=self.variables.released(), fallback=None)
 
     def own_run(self, u: Array, y: Array) -> Array:
         """Return the free run, its first outputs fitted to those that are there; NaN from where it runs away.

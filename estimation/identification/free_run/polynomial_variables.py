@@ -1,6 +1,6 @@
 """The lagged signals that terms of a polynomial model multiply, and each term's product."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,6 +9,9 @@ from estimation.identification.search.jit import compiled
 
 BEYOND = 0.1
 """Share of its range by which a signal may leave it in a product before it is held [dimensionless]."""
+
+RELEASED = 2.0
+"""How many times as far from its middle a signal may go where it is held no longer than that [dimensionless]."""
 
 FRICTIONS = {"": 0, "position": 2, "velocity": 3}
 """What an output that rubs is, and how many values its friction has: what is taken off below and above, and, of a
@@ -61,6 +64,11 @@ class Variables:
         """
         low, high = self.ends
         return np.array([low, high]) + share * (high - low) * np.array([-1.0, 1.0])
+
+    def released(self) -> "Variables":
+        """Return the same signals, held where they are `RELEASED` times as far from the middle of their range."""
+        middle = self.limits.mean(axis=1, keepdims=True)
+        return replace(self, limits=middle + RELEASED * (self.limits - middle))
 
     @property
     def n_start(self) -> int:

@@ -15,6 +15,7 @@ from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
+from estimation.identification.free_run.polynomial_variables import Variables
 
 N = 400
 
@@ -72,6 +73,42 @@ def test_a_run_that_has_no_end_is_replaced() -> None:
     assert np.array_equal(one.judged(u, y, np.full(9, 2.0))[0], np.ones(9))
     sound = Fallback(gain(1.0), (gain(1.0),) * 4, (gain(2.0),) * 4, 0.1)
     assert np.array_equal(sound.judged(u, y, np.full(9, np.nan))[0], np.ones(9))
+
+
+def squared(coefficient: float, end: float) -> PolynomialDynamics:
+    """Return ``y = coefficient u[t - 1]^2``, its input held in the square at so much on both sides."""
+    limits = np.array([[-9.0, 9.0], [-end, end]])
+    variables = Variables(np.array([0, 1]), np.array([1, 1]), limits)
+    return PolynomialDynamics(variables, np.array([[1, 1, -1]]), np.array([coefficient]))
+
+
+@pytest.mark.parametrize(
+    ("parts", "u", "wanted"),
+    [
+        # fits agree on the square, and not on its end: a block that is left out holds the largest input
+        ([(0.5, 1.0), (0.5, 0.8), (0.5, 1.0), (0.5, 0.8)], 1.5, 0.5 * 1.5**2),
+        # farther out they agree on it no longer
+        ([(0.5, 1.0), (0.5, 0.8), (0.5, 1.0), (0.5, 0.8)], 3.0, 0.5),
+        # nor where they disagree on the square itself
+        ([(0.4, 1.0), (0.6, 1.0), (0.4, 1.0), (0.6, 1.0)], 1.5, 0.5),
+        # within the range nothing is held
+        ([(0.5, 1.0), (0.5, 0.8), (0.5, 1.0), (0.5, 0.8)], 0.7, 0.5 * 0.7**2),
+    ],
+)
+def test_products_go_on_beyond_what_was_seen_where_fits_agree_on_that(
+    parts: list[tuple[float, float]], u: float, wanted: float
+) -> None:
+    linear = gain(0.2)
+    fallback = Fallback(linear, (linear,) * 4, tuple(squared(*one) for one in parts), 1.0)
+    whole = replace(squared(0.5, 1.0), fallback=fallback)
+    run, errors = whole.judged_run(np.full((9, 1), u), np.full(9, wanted))
+    assert run[1:] == pytest.approx(np.full(8, wanted))
+    assert errors is not None
+    assert errors[0] < errors[1]
+    assert whole.variables.released().limits[1] == pytest.approx([-2.0, 2.0])
+    # a model that was asked for has nothing to tell it by
+    asked = replace(whole, fallback=None).run(np.full((9, 1), u), np.full(9, wanted))
+    assert asked[1:] == pytest.approx(np.full(8, 0.5 * min(u, 1.0) ** 2))
 
 
 def answered(u: Array) -> Array:
