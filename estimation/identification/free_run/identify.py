@@ -222,6 +222,8 @@ def _identified(
     transfer = None
     if isinstance(dynamics, LinearDynamics):
         fit = refitted_linear(best.fit, whole)
+        # fitted on, a model with a pole at 1 may come where it cannot be written: what was judged stays
+        fit = best.fit if part is whole and not fit.cost <= best.fit.cost else fit
         dynamics = LinearDynamics.of(fit)
         transfer = linear_model(fit, whole, by) if len(data.inputs) == 1 else None
     model = FreeRunModel(data.inputs, data.output, data.sample_time, named, by, dynamics, transfer)

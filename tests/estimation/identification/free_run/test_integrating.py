@@ -1,14 +1,18 @@
 """A plant that integrates is fitted with a pole at 1, and runs on without drifting off."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from estimation.arrays import Array
+from estimation.identification.free_run import identify
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.integrating import RECORDS, fit_integrating, refitted_linear
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.model.recursion import filtered
+from plant.errors import LogWarning
 
 N, F = 400, np.convolve([1.0, -0.8], [1.0, -1.0])
 NOISE = 0.05 * np.random.default_rng(7).normal(size=(2, N))
@@ -56,3 +60,16 @@ def test_a_fit_to_other_data_keeps_its_kind(data: Channels) -> None:
     assert other.integrates
     assert other.cost < fit.cost
     assert other.f == pytest.approx(fit.f, abs=1e-12), "one pole alone, and it is given"
+
+
+def test_a_model_that_cannot_be_written_once_it_is_fitted_on_stays_as_it_was_judged(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    u = levels(3)
+    data = channels_from([u[:, None]], [driven(u, 1.0) + NOISE[0]], 1.0, ["u"], "y")
+    lost = lambda fit, _: replace(fit, theta=np.zeros(fit.theta.size), cost=float("inf"))  # noqa: E731 -- used once
+    monkeypatch.setattr(identify, "refitted_linear", lost)
+    with pytest.warns(LogWarning, match="integrates its input"):
+        found = identify.identify_channels(data)
+    assert found.sound
+    assert found.quality.fit_percent > 90.0
