@@ -9,7 +9,9 @@ from estimation.fits.explaining.settled import NEAR, SLIGHT, at_end, coarse
 from estimation.fits.explaining.tried import Tried
 from estimation.fits.explaining.wide_log import usual_values
 from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_starts, worn_start
-from estimation.fits.greybox.descent import descend
+from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.descents_in_turn import Way, descend_in_turn
+from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, Hypothesis
 
@@ -52,16 +54,23 @@ def screened(
     found = at_end(together[:-1])
     problems = [(delays, freed(coarse(log, delays, together, every), together, *found)) for delays in asked]
     begun = own_starts(log, together[-1])
-    for start in starts:
-        tried: list[Tried] = []
+    ways: list[Way] = []
+    of_way: list[tuple[int, Mapping[str, float], FreedProblem]] = []
+    for place, start in enumerate(starts):
         worn = worn_start(log, {**absent, **start}) if together[-1] == DELIVERY else ()
         for (delays, problem), own in product(problems, (*begun, *worn)):
             guess = problem.model.theta({**absent, **start, **own})
-            bounds = flow_bounds(problem.model, [guess], log)
-            point = descend(problem.at, guess, SCREENING, bounds, radius=NEAR, wanted=wanted, least_share=SLIGHT)
-            tried.append(Tried(together, point, problem.model.values(point.theta), delays, absent))
-            wanted = min(wanted, NEARLY * tried[-1].cost)
-        yield min(tried, key=lambda one: one.cost)
+            ways.append(Way(problem.at_each, guess, flow_bounds(problem.model, [guess], log)))
+            of_way.append((place, delays, problem))
+    tried: list[list[Tried]] = [[] for _ in starts]
+
+    def after(way: int, point: Point) -> float:
+        place, delays, problem = of_way[way]
+        tried[place].append(Tried(together, point, problem.model.values(point.theta), delays, absent))
+        return NEARLY * tried[place][-1].cost
+
+    descend_in_turn(ways, SCREENING, wanted, after, radius=NEAR, least_share=SLIGHT)
+    yield from (min(each, key=lambda one: one.cost) for each in tried)
 
 
 def hopeful(

@@ -153,7 +153,11 @@ def descend_together(
     list of Point
         The best point from each start.
     """
-    searches = [_search(start, evaluations, bounds, least_gain, radius, wanted, least_share) for start in starts]
+
+    def worth(_: Point, hoped: float) -> bool:
+        return not hoped > wanted
+
+    searches = [search(start, evaluations, bounds, least_gain, radius, worth, least_share) for start in starts]
     asked = {i: next(search) for i, search in enumerate(searches)}
     ended: dict[int, Point] = {}
     while asked:
@@ -167,22 +171,42 @@ def descend_together(
     return [ended[i] for i in range(len(searches))]
 
 
-def _search(
+def search(
     start: Array,
     evaluations: int,
     bounds: tuple[Array, Array],
     least_gain: float,
     radius: float,
-    wanted: float,
+    worth: Callable[[Point, float], bool],
     least_share: float,
 ) -> Generator[Array, Point, Point]:
-    """Yield where the cost is to be evaluated, and return the best point."""
+    """Yield where the cost is to be evaluated, and return the best point; see `descend`.
+
+    Parameters
+    ----------
+    start, evaluations, bounds, least_gain, radius, least_share
+        As of `descend`.
+    worth : callable
+        ``worth(best, hoped)``: whether to go on, from the cost that all steps that are left may bring the best down to.
+
+    Yields
+    ------
+    ndarray, shape (unknowns,)
+        The next coordinates [dimensionless]; the cost there is to be sent.
+
+    Returns
+    -------
+    Point
+        The best.
+    """
     best = yield np.clip(start, *bounds)
     gained = np.inf  # by the last step; unknown before the first, and after one that broke its promise
     for left in range(evaluations - 1, 0, -1):
         curvature = best.gram + np.diag(np.abs(best.gradient) / REACH)
         step, promised, radius = _downhill(best, curvature, radius, bounds)
-        if promised < max(least_gain, least_share * best.cost) or best.cost - left * max(promised, gained) > wanted:
+        if promised < max(least_gain, least_share * best.cost):
+            break
+        if not worth(best, best.cost - left * max(promised, gained)):
             break
         tried = yield best.theta + step
         gain, length = (best.cost - tried.cost) / promised, _length(step)

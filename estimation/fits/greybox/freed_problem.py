@@ -117,6 +117,8 @@ class FreedProblem(Problem):
         """
         if self.log.passes_on:  # each has a variance of its own
             return [self.at(theta) for theta in thetas]
+        if len(thetas) == 1:
+            return [self.at(thetas[0])]
         rows = np.vstack([self._rows(self._nudged(theta), self.log.parameters) for theta in thetas])
         found = self._residuals(rows, None, self._variances(thetas[0]))[..., : len(rows)]
         parts = np.split(found, len(thetas), axis=-1)

@@ -11,6 +11,7 @@ import numpy as np
 
 from estimation.arrays import IntArray
 from estimation.fits.greybox.problem import Problem
+from estimation.fits.greybox.side_by_side import LANES
 from plant.arrays import Array
 
 FELT_ERRORS = (1e-4, 3e-4, 1e-3, 3e-3)
@@ -99,6 +100,6 @@ def _long_step_errors(problem: Problem, theta: Array) -> Array:
     log = problem.log
     white = tuple(one.scaled(1.0, 0.0) for one in log.noise)
     bare = replace(log, measured=np.zeros(log.measured.shape), block=log.sample_time, noise=white, course=None)
-    rows = [log.parameters] * (1 + len(theta))  # as many as a search has side by side: no kernel for these two runs
+    rows = [log.parameters] * min(1 + len(theta), LANES)  # side by side, as a search has them: no kernel for these two
     fine, rough = (problem.on(one).residuals_of(theta, rows)[0] for one in (bare, bare.coarsened()))
     return np.max(np.abs(np.diff(rough - fine, axis=1, prepend=0.0)), axis=0)

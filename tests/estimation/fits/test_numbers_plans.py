@@ -21,6 +21,7 @@ from estimation.fits.flow import search as flow_search
 from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox import fit as greybox_fit
 from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.descents_in_turn import Way
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.sparing import LAST
 from estimation.fits.hypotheses import HYPOTHESES
@@ -74,9 +75,20 @@ def planned(cost: Cost, *modules: Any) -> Iterator[list[list[float]]]:
     def together(at: Any, starts: Sequence[Array], evaluations: int, *others: Any, **named: Any) -> list[Point]:
         return [descended(at, start, evaluations, *others, **named) for start in starts]
 
+    def in_turn(
+        ways: Sequence[Way], evaluations: int, wanted: float, after: Callable[[int, Point], float], **named: float
+    ) -> list[Point]:
+        found: list[Point] = []
+        for i, way in enumerate(ways):
+            rest = {"radius": named["radius"], "wanted": wanted, "least_share": named["least_share"]}
+            found.append(descended(way.at_each, way.start, evaluations, way.bounds, **rest))
+            wanted = min(wanted, after(i, found[-1]))
+        return found
+
+    fakes = {"descend": descended, "descend_together": together, "descend_in_turn": in_turn}
     with ExitStack() as stack:
         for module in modules:
-            for name, fake in (("descend", descended), ("descend_together", together)):
+            for name, fake in fakes.items():
                 if hasattr(module, name):
                     stack.enter_context(patch.object(module, name, fake))
         stack.enter_context(patch.object(FreedProblem, "at", lambda _, theta: still(theta, 1e9)))

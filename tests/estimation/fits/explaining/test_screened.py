@@ -24,20 +24,21 @@ def test_a_worn_pump_at_one_speed_is_found_sooner_from_where_the_flow_bias_is_he
 
 
 def test_a_screening_ends_where_a_step_promises_less_than_long_steps_err(monkeypatch: pytest.MonkeyPatch) -> None:
-    log, descend = widened(seen(at_one_speed()), PAPER), screening.descend
+    log, descend_in_turn = widened(seen(at_one_speed()), PAPER), screening.descend_in_turn
     counted: list[int] = []
 
-    def counting(at: Any, *given: Any, **options: Any) -> Any:
+    def counting(ways: Any, *given: Any, **options: Any) -> Any:
+        (way,) = ways
         counted.append(0)
 
-        def once_more(theta: Any) -> Any:
-            counted[-1] += 1
-            return at(theta)
+        def once_more(thetas: Any) -> Any:
+            counted[-1] += len(thetas)
+            return way.at_each(thetas)
 
         assert options["least_share"] == SLIGHT
-        return descend(once_more, *given, **options)
+        return descend_in_turn([way._replace(at_each=once_more)], *given, **options)
 
-    monkeypatch.setattr(screening, "descend", counting)
+    monkeypatch.setattr(screening, "descend_in_turn", counting)
     (near,) = screened(log, (VOLUME,), [lost_in_bias()])
     (again,) = screened(log, (VOLUME,), [near.values])
     assert counted[-1] < counted[0] <= screening.SCREENING
