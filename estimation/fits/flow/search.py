@@ -4,7 +4,7 @@ The likeliest of many coarse guesses is followed first, for a run without slopes
 that explains the log, nothing else is searched; else searches begin at leakages and flow biases of all conditions.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import ceil, prod
@@ -17,7 +17,7 @@ from estimation.fits.explaining.wide_problem import flow_bounds
 from estimation.fits.flow.log import DRAIN_START, OPENING_START, carried, outruns_pump
 from estimation.fits.flow.swept import swept_evenly
 from estimation.fits.flow.valley import FINISHING, Found, completed_form, from_valley
-from estimation.fits.greybox.descent import Point, descend
+from estimation.fits.greybox.descent import Point, descend, remembered
 from estimation.fits.greybox.driven import driven_samples
 from estimation.fits.greybox.fit import NEAR_ENOUGH, GreyBoxFit, Search, concluded, explained, roughly
 from estimation.fits.greybox.freed_problem import FreedProblem
@@ -228,15 +228,16 @@ def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[
     forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
     afar = log.taken_at(parameters.bulk_modulus)
     guess, near = _guess(forms[0], afar, parameters, starts)
+    screen = remembered(FreedProblem.of(forms[0], _begun(afar)).at)
     if not near:  # in a wrong valley the whole log takes all steps that there are
-        first = _searched(forms[0], log, afar, starts, hopeful=True)
+        first = _searched(forms[0], log, afar, starts, hopeful=True, screen=screen)
         if _explains(first):
             return [first, *_others(forms[1:], log, afar, first)]
     first = _searched(forms[0], log, afar, [guess], alone=True)
     others = _others(forms[1:], log, afar, first, alone=True)
     if _explains(first) or _explains(others[0]):
         return [first, *others]
-    first = _searched(forms[0], log, afar, [*starts, first.values])
+    first = _searched(forms[0], log, afar, [*starts, first.values], screen=screen)
     return [first, *_others(forms[1:], log, afar, first)]
 
 
@@ -260,13 +261,18 @@ def _guess(
     Of the log its beginning is looked at.
     """
     search = _search(log)
-    problem = FreedProblem.of(form, log.beginning(search.screened).coarsened())
+    problem = FreedProblem.of(form, _begun(log))
     around = {STIFFNESS: 0.0, **starts[0]}
     guesses = _guesses_about(around, problem.model, parameters)
     likeliest = guesses[int(np.argmin(problem.costs(guesses, LANES)))]
     bounds = flow_bounds(form, guesses, log)
     found = descend(problem.at, likeliest, search.evaluations, bounds, search.near_enough, GUESSED_WITHIN)
     return problem.model.values(found.theta), explained(problem, found)
+
+
+def _begun(log: GreyBoxLog) -> GreyBoxLog:
+    """Return the beginning of a log on which starts are compared, with long model steps."""
+    return log.beginning(_search(log).screened).coarsened()
 
 
 def _guesses_about(around: Mapping[str, float], model: GreyBoxModel, p: EhaParameters) -> list[Array]:
@@ -302,6 +308,7 @@ def _searched(
     alone: bool = False,
     wanted: float = np.inf,
     hopeful: bool = False,
+    screen: Callable[[Array], Point] | None = None,
 ) -> _Rough:
     """Return the best that is found from starts, at first with noise of position as it is at the rig's bulk modulus."""
     search = _search(log)
@@ -309,9 +316,9 @@ def _searched(
     guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in starts]
     bounds = flow_bounds(form, guesses, afar)
     if not log.passes_on:
-        point = roughly(problem, guesses, search, bounds, wanted, hopeful=hopeful)
+        point = roughly(problem, guesses, search, bounds, wanted, hopeful=hopeful, screen=screen)
         return _Rough(problem, point, bounds)
-    point = roughly(problem, guesses, search, bounds, hopeful=hopeful)
+    point = roughly(problem, guesses, search, bounds, hopeful=hopeful, screen=screen)
     if np.isinf(point.cost):
         return _Rough(problem, point, bounds)
     problem, modulus = problem.on(log), form.values(point.theta)["bulk_modulus"]

@@ -4,7 +4,7 @@ The variance of an estimate has three parts, told apart: noise of the outputs, n
 well the rig's own parameters are known. The last two are read off the fit's linear response to them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -173,6 +173,7 @@ def roughly(
     wanted: float = np.inf,
     *,
     hopeful: bool = False,
+    screen: Callable[[Array], Point] | None = None,
 ) -> Point:
     """Return the least cost that is found from several starts, with one model step a sample.
 
@@ -190,6 +191,8 @@ def roughly(
         Cost above which the result is of no use [dimensionless], see `estimation.fits.greybox.descent.descend`.
     hopeful : bool
         Whether several starts are followed only if one explains the beginning; else the cost is infinite.
+    screen : callable, optional
+        The misfit on the beginning of a log that is longer, if another search has asked for some of it.
 
     Returns
     -------
@@ -201,7 +204,8 @@ def roughly(
 
     def descended(guess: Array, samples: int, evaluations: int) -> Point:
         if samples < len(log.measured):
-            return descend(problem.on(log.beginning(samples)).at, guess, evaluations, bounds, search.near_enough)
+            at = screen if screen and samples == search.screened else problem.on(log.beginning(samples)).at
+            return descend(at, guess, evaluations, bounds, search.near_enough)
         return descend(whole.at, guess, evaluations, bounds, search.near_enough, wanted=wanted)
 
     if len(guesses) > 1:
@@ -332,18 +336,15 @@ def _late_and_play(
     problem: Problem, known_of: Information, moved: Sequence[Array], told: NDArray[np.bool_]
 ) -> tuple[dict[str, tuple[float, float]], ShownPlay]:
     """Return which drives seem to come late, and what the residuals say of a play of the encoder."""
-    timed, left_over = problem.log.timed, known_of.left_over
+    timed, left_over, at_play = problem.log.timed, known_of.left_over, moved[len(problem.log.timed) :]
     left = left_by(known_of.fitted_slopes, known_of.fitted_bread, told)
     names = [problem.model.unknowns[place] for place in known_of.felt]
     late = dict(lateness(timed, moved, left_over, left))
-    at_play = moved[len(timed) :]
     return late, shown_play(at_play, left_over, left, lambda one: zip(names, known_of.response(one), strict=False))
 
 
 def _statistics(errors: Array) -> tuple[tuple[float, ...], tuple[float, ...], float]:
     """Return mean square and autocorrelation of each output's residuals, and how many of the first one count."""
-    squares = np.einsum("ij,ij->i", errors, errors)
-    neighbours = np.einsum("ij,ij->i", errors[:, 1:], errors[:, :-1])
-    seen = np.maximum(np.count_nonzero(errors, axis=1), 1)
-    autocorrelation = neighbours / np.maximum(squares, np.finfo(float).tiny)
+    squares, seen = np.einsum("ij,ij->i", errors, errors), np.maximum(np.count_nonzero(errors, axis=1), 1)
+    autocorrelation = np.einsum("ij,ij->i", errors[:, 1:], errors[:, :-1]) / np.maximum(squares, np.finfo(float).tiny)
     return tuple(map(float, squares / seen)), tuple(map(float, autocorrelation)), float(seen[0])
