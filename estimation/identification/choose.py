@@ -161,6 +161,28 @@ def compare_structures(
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("structure")
 
 
+def held_back_percent(model: LinearModel, u: Array, y: Array) -> float | None:
+    """Return how a model of the same structure and size, fitted to two thirds of a log, follows the last third.
+
+    Parameters
+    ----------
+    u, y : ndarray, shape (n,)
+        Input, no gaps, and output, NaN where missing.
+
+    Returns
+    -------
+    float or None
+        Fit of the free run [%], negative infinity if it is unstable; None of a log shorter than `LEAST` samples.
+    """
+    if u.size < LEAST:
+        return None
+    late = model.delay if not model.continuous else round(model.dead_time / model.sample_time) + bool(model.dead_time)
+    form = {"n_numerator": model.free_numerator.size, "n_denominator": model.denominator.size - 1, "delay": late}
+    form |= {"covariance": "white", "input_name": model.input_name, "output_name": model.output_name}
+    table = compare_structures(u, y, model.sample_time, form, (model.structure,))
+    return float(table.at[model.structure, "fit_percent"])
+
+
 def split_record(u: Signals, y: Signals) -> tuple[tuple[list[Array], list[Array]], tuple[list[Array], list[Array]]]:
     """Return what is fitted and what is held back: the last third of the experiments, or of each of two or one.
 

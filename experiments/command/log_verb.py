@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 from experiments.actuators import kind_meant
-from experiments.command.json_output import Result, prepare_output, write_whole
+from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, overheard, read_log, run_logs, with_remarks
 from experiments.command.options import load_actuator, load_columns, require_positive, understood
-from experiments.command.output_paths import own_paths, page_place, pages_sentence, require_place
+from experiments.command.output_paths import own_paths, page_place, require_place
+from experiments.command.pages import Pages
 from experiments.command.terminal import clauses, note
 from plant.errors import HydrostateError, NoChannelError, require_known
 
@@ -26,27 +27,6 @@ if TYPE_CHECKING:
 
 COMMON = frozenset({"logs", "plant", "rig", "columns", "report", "out", "seed", "as_json", "sample_time", "beside"})
 """Options of every kind of actuator."""
-
-
-class _Pages:
-    """Pages of logs: where each goes, which are written, and why others are not."""
-
-    def __init__(self, places: Mapping[Path, Path]) -> None:
-        self.places = places
-        self.written: list[Path] = []
-        self.unwritten: list[str] = []
-
-    def write(self, log: Path, page: str) -> None:
-        """Write a log's page; what cannot be written is told in the end, for the answer is shown all the same."""
-        try:
-            write_whole(self.places[log], page, "--report")
-            self.written.append(self.places[log])
-        except HydrostateError as error:
-            self.unwritten.append(str(error))
-
-    def told(self) -> list[str]:
-        """Return what to tell of them: where they are, then each that is missing."""
-        return [*([pages_sentence(self.written)] if self.written else []), *self.unwritten]
 
 
 @dataclass(frozen=True)
@@ -115,7 +95,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
         raise HydrostateError("--with goes with one log, got several")
     report = page_place(asked.get("report"))
     prepare_output(asked["out"], logs)
-    figures, pages = own_paths(question.options.get("figure"), logs), _Pages(own_paths(report, logs))
+    figures, pages = own_paths(question.options.get("figure"), logs), Pages(own_paths(report, logs))
     questions = {question.about["plant"]: question}
 
     def read(log: Path) -> "tuple[_Question, Record]":
@@ -149,8 +129,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     for one, results in of_each_kind(batch.results):
         for remark in one.chosen.remarks(results):
             note(remark)
-    for sentence in pages.told():
-        note(sentence)
+    pages.tell()
 
     def screen(results: Sequence[Result]) -> "Iterator[RenderableType]":
         for one, own in of_each_kind(results):

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from estimation.identification.structure_names import STRUCTURE_NAMES
 from experiments.command.json_output import Result, prepare_output
-from experiments.command.logs import finish, read_log, run_logs
+from experiments.command.logs import finish, overheard, read_log, run_logs, with_remarks
 from experiments.command.options import require_positive
-from experiments.command.output_paths import own_paths
+from experiments.command.output_paths import own_paths, page_place
+from experiments.command.pages import Pages
 from experiments.command.terminal import note, short_names, table
 from experiments.identification.entries import FORMAT_VERSION, linear_entries
 from plant.errors import require_known
@@ -72,6 +73,7 @@ class ChannelFit:
     sample_time: float | None = None
     filter_hz: float | None = None
     figure: Path | None = None
+    report: Path | None = None
     seed: int = 0
 
 
@@ -92,7 +94,7 @@ def identify_channels(
     require_positive("--sample-time", fit.sample_time, "s")
     require_positive("--filter-hz", fit.filter_hz, "Hz")
     prepare_output(out, logs)
-    figures = own_paths(fit.figure, logs)
+    figures, pages = own_paths(fit.figure, logs), Pages(own_paths(page_place(fit.report), logs))
     chosen = {"input": fit.input, "output": fit.output, "rig": rig.name, "seed": fit.seed}
 
     def work(log: Path) -> Result:
@@ -103,12 +105,28 @@ def identify_channels(
             raise NoChannelError(f"{error.message}; {hint}", error.source) from error
         taken: dict[str, Any] = {"output": fit.output, "input": fit.input, "filter_cutoff_hz": fit.filter_hz}
         taken["sample_time"] = max(TABLE_6_TIME, record.sample_time) if fit.sample_time is None else fit.sample_time
-        model = identify_record(record, **taken, **form)
+        with overheard() as said:
+            model = identify_record(record, **taken, **form)
         u, y = record_signals(record, **taken)
-        return {**chosen, **linear_entries(model), **_judged(model, u, y, log, figures.get(log))}
+        result = {**chosen, **linear_entries(model), **_judged(model, u, y, log, figures.get(log))}
+        if log in pages.places:
+            pages.write(log, _page(with_remarks({"file": str(log), **result}, said), model, u, y))
+        return result
 
     batch = run_logs(logs, work, {**NOTHING, **chosen}, "identifying")
-    finish(batch, _screen, as_json=as_json, out=out)
+    pages.tell()
+    finish(batch, _screen, as_json=as_json, out=out, lost=bool(pages.unwritten))
+
+
+def _page(result: Result, model: "LinearModel", u: "Array", y: "Array") -> str:
+    """Return the page of a model, with the fit of one of its size on a third of the log that is held back."""
+    from estimation.identification.choose import held_back_percent
+    from experiments.log_pages.identified_page import identified_page
+    from experiments.log_pages.identified_view import view_of_channels
+
+    return identified_page(
+        view_of_channels({**result, "held_back_percent": held_back_percent(model, u, y)}, model, u, y)
+    )
 
 
 def _form(fit: ChannelFit) -> dict[str, Any]:

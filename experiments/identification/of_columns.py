@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from experiments.command.json_output import Result, prepare_output
-from experiments.command.logs import Batch, finish, run_logs
+from experiments.command.logs import Batch, finish, overheard, run_logs, with_remarks
 from experiments.command.options import require_positive
-from experiments.command.output_paths import own_paths
+from experiments.command.output_paths import own_paths, page_place
+from experiments.command.pages import Pages
 from experiments.command.terminal import table
 from experiments.identification.entries import column_entries
 from experiments.identification.simulate_model import quality_of, record_of, write_simulated
@@ -45,6 +46,7 @@ class ColumnFit:
     resampled: float | None = None
     validate: tuple[Path, ...] = ()
     figure: Path | None = None
+    report: Path | None = None
     simulated: Path | None = None
     response: Path | None = None
 
@@ -67,6 +69,7 @@ def identify_columns(logs: Sequence[Path], fit: ColumnFit, *, as_json: bool, out
     HydrostateError
         If an option is not usable.
     """
+    from estimation.identification.free_run.from_records import channels_of
     from estimation.identification.free_run.identify import FREE_STRUCTURES
     from estimation.identification.state_space.identify import STATE_SPACE
 
@@ -90,14 +93,28 @@ def identify_columns(logs: Sequence[Path], fit: ColumnFit, *, as_json: bool, out
         together = fit.structure == STATE_SPACE or (fit.structure == "auto" and len(fit.outputs) > 1)
         if together and not shared:
             shared.update(_together(read[0], fit, fit.outputs))
-        found = shared.get(output) or _together(read[0], fit, (output,))[output]
-        return _answer(found, read, output, fit, logs)
+        with overheard() as said:
+            found = shared.get(output) or _together(read[0], fit, (output,))[output]
+            result = _answer(found, read, output, fit, logs)
+        if output in pages.places:
+            about = with_remarks({"file": ", ".join(map(str, logs)), **result}, said)
+            pages.write(output, _page(about, found, channels_of(read[0], fit.inputs, output, fit.resampled)))
+        return result
 
     columns = {Path(output): output for output in fit.outputs}  # a path drops parts of some names, such as "x/."
+    pages = Pages(own_paths(page_place(fit.report), fit.outputs))
     batch = run_logs(list(columns), work, BLANK, "identifying")
     named = ", ".join(str(log) for log in logs)
     results = tuple({**result, "file": named} for result in batch.results)
-    finish(Batch(results, batch.total), _screen, as_json=as_json, out=out)
+    pages.tell()
+    finish(Batch(results, batch.total), _screen, as_json=as_json, out=out, lost=bool(pages.unwritten))
+
+
+def _page(result: Result, found: "Identified", data: "Channels") -> str:
+    from experiments.log_pages.identified_page import identified_page
+    from experiments.log_pages.identified_view import view_of_columns
+
+    return identified_page(view_of_columns(result, found.model, data))
 
 
 def _together(records: "Sequence[Record]", fit: ColumnFit, outputs: Sequence[str]) -> "dict[str, Identified]":

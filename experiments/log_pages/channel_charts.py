@@ -35,7 +35,7 @@ def channel_charts(record: "Record", found: "Finding", stem: str) -> Charts:
     panels: list[Panel] = []
     for name in names[:MOST_CHANNELS]:
         unit, scale = SHOWN_IN.get(UNITS[name], (UNITS[name], 1.0))
-        panels.append(Panel(_plain(name), unit, (Curve("measured", scale * record[name], "blue"),)))
+        panels.append(Panel(plain_channel(name), unit, (Curve("measured", scale * record[name], "blue"),)))
     return Charts(record.time, "time [s]", panels, f"{stem}-measured")
 
 
@@ -47,15 +47,15 @@ def label_of(name: str) -> str:
     >>> label_of("motor_speed_rad_s"), label_of("Weg [mm]")
     ('motor speed [rad/s]', 'Weg [mm]')
     """
-    return f"{_plain(name)} [{UNITS[name]}]" if name in UNITS else name
+    return f"{plain_channel(name)} [{UNITS[name]}]" if name in UNITS else name
 
 
-def _plain(name: str) -> str:
+def plain_channel(name: str) -> str:
     """Return a channel's name without its unit.
 
     Examples
     --------
-    >>> _plain("differential_pressure_pa"), _plain("pressure_a_pa")
+    >>> plain_channel("differential_pressure_pa"), plain_channel("pressure_a_pa")
     ('differential pressure', 'pressure A')
     """
     *words, last = name.removesuffix(unit_ending(UNITS[name])).split("_")

@@ -13,6 +13,7 @@ from estimation.identification.fit.validate import Validation
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.signals.automatic_window import automatic_response
 from experiments.log_pages.free_run_figure import SHOWN_SAMPLES
+from experiments.log_pages.identified_words import chance
 from experiments.page.figure_files import write_png
 from experiments.page.style import BLUE, GREY, ORANGE, VERMILION, Margins, panels
 from plant.log.record import CHANNELS
@@ -32,16 +33,11 @@ def _draw_identified(model: LinearModel, u: Array, y: Array, found: Validation, 
     _over_time(axes[2], model, {"residual": (VERMILION, residual)})
     axes[2].set_title("measured less simulated", loc="left")
     _correlations(axes[1], residual, residual, np.arange(1, DEFAULT_LAGS + 1))
-    axes[1].set_title(f"residual with itself: white with {_chance(found.whiteness.p_value)}", loc="left")
+    axes[1].set_title(f"residual with itself: white with {chance(found.whiteness.p_value)}", loc="left")
     _correlations(axes[3], residual, u, np.arange(-DEFAULT_LAGS, DEFAULT_LAGS + 1))
-    axes[3].set_title(f"residual with the input: none with {_chance(found.cross_correlation.p_value)}", loc="left")
+    axes[3].set_title(f"residual with the input: none with {chance(found.cross_correlation.p_value)}", loc="left")
     _response(axes[4], axes[5], model, u, y)
     return figure
-
-
-def _chance(probability: float) -> str:
-    """Return a p-value as one writes it: no probability is 0."""
-    return "p < 0.001" if probability < 0.001 else f"p = {probability:.2g}"
 
 
 def _over_time(axis: Axes, model: LinearModel, curves: dict[str, tuple[str, Array]]) -> None:

@@ -34,6 +34,8 @@ class Charts:
         What a download is called, without suffix.
     group : str
         Charts of one group zoom together.
+    log : bool
+        Whether the x axis is logarithmic; all places are then above zero.
     """
 
     x: Array
@@ -41,6 +43,7 @@ class Charts:
     panels: Sequence[Panel]
     file: str
     group: str = "time"
+    log: bool = False
 
     def html(self, name: str, caption: str) -> Markup:
         """Return the figure with its numbers, the still picture of them, and a table of their ranges.
@@ -51,7 +54,7 @@ class Charts:
             Anchor of the figure.
         """
         still = Markup('<div class="still">{}</div>').format(
-            image_of(still_picture(self.x, self.label, self.panels), caption)
+            image_of(still_picture(self.x, self.label, self.panels, log=self.log), caption)
         )
         body = Markup('<script type="application/json" class="numbers">{}</script>').format(self._json())
         said = Markup('<figure class="charts" id="figure-{}">{}<figcaption>{}</figcaption>{}{}</figure>')
@@ -61,7 +64,7 @@ class Charts:
         count = len(self.x)
         length = stretch_length(count, MOST_DRAWN)
         found = {
-            "x": {"label": self.label, **_places(self.x, length)},
+            "x": {"label": self.label, "log": self.log, **_places(np.log10(self.x) if self.log else self.x, length)},
             "file": self.file,
             "group": self.group,
             "panels": [

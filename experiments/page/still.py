@@ -39,6 +39,9 @@ MOST_ACROSS, MOST_UP = 8, 4
 ROUND = (0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 2.5, 5.0, 10.0, 20.0)
 """Distances between ticks, times a power of ten [dimensionless]."""
 
+FEW_DECADES = 2.5
+"""Powers of ten below which a logarithmic axis has ticks between them too [decade]."""
+
 EDGE = 1e-9
 """A tick this close beyond an end of the axis is on it, as a share of a step [fraction]."""
 
@@ -56,7 +59,7 @@ STROKES: Mapping[str, str] = {"dots": 'class="dots"', "edge": 'class="line" stro
 """How a curve is drawn, by its look; any other look is a line."""
 
 
-def still_picture(x: Array, label: str, panels: Sequence[Panel]) -> bytes:
+def still_picture(x: Array, label: str, panels: Sequence[Panel], *, log: bool = False) -> bytes:
     """Return the picture as an SVG file.
 
     Parameters
@@ -67,7 +70,10 @@ def still_picture(x: Array, label: str, panels: Sequence[Panel]) -> bytes:
         Of the x axis, with its unit.
     panels : sequence of Panel
         From the top; two in a row where there are more than `ONE_COLUMN`.
+    log : bool
+        Whether the x axis is logarithmic.
     """
+    places = np.log10(x) if log else x
     columns = 1 if len(panels) <= ONE_COLUMN else 2
     rows = -(-len(panels) // columns)
     high = TALL if rows < LOW_FROM else LOW
@@ -82,12 +88,12 @@ def still_picture(x: Array, label: str, panels: Sequence[Panel]) -> bytes:
         corner = f"{LEFT + column * (wide + ACROSS):g} {TOP + row * (high + DOWN):g}"
         last = place >= len(panels) - columns
         parts.append(f'<g transform="translate({corner})">')
-        parts.extend(_panel(x, panel, (wide, high), f"p{place}", label if last else ""))
+        parts.extend(_panel(places, panel, (wide, high), f"p{place}", label if last else "", log=log))
         parts.append("</g>")
     return "".join([*parts, "</svg>"]).encode()
 
 
-def _panel(x: Array, panel: Panel, size: tuple[float, float], name: str, label: str) -> Iterator[str]:
+def _panel(x: Array, panel: Panel, size: tuple[float, float], name: str, label: str, *, log: bool) -> Iterator[str]:
     wide, high = size
     across, up = _range(x, 0.0), panel.ends or _range(_every(panel), ROOM)
     places = (x - across[0]) * (wide / (across[1] - across[0]))
@@ -97,7 +103,7 @@ def _panel(x: Array, panel: Panel, size: tuple[float, float], name: str, label: 
         return high - (values - up[0]) * scale
 
     yield f'<clipPath id="{name}"><path d="M0 -2H{wide:g}V{high + 2:g}H0z"/></clipPath>'
-    for tick, words in _ticks(*across, MOST_ACROSS):
+    for tick, words in _decades(*across) if log else _ticks(*across, MOST_ACROSS):
         at = (tick - across[0]) * wide / (across[1] - across[0])
         yield f'<path class="grid" d="M{at:.1f} 0V{high:g}"/>'
         yield f'<text x="{at:.1f}" y="{high + 11:g}" text-anchor="middle">{words}</text>'
@@ -116,11 +122,11 @@ def _panel(x: Array, panel: Panel, size: tuple[float, float], name: str, label: 
     for curve in panel.curves:
         yield _curve(curve, places, heights)
     for mark in panel.marks:
-        along = (mark.at - across[0]) * wide / (across[1] - across[0])
+        along = (_place(mark.at, mark.axis, log) - across[0]) * wide / (across[1] - across[0])
         line = f"M{along:.1f} 0V{high:g}" if mark.axis == "x" else f"M0 {high - (mark.at - up[0]) * scale:.1f}H{wide:g}"
         yield f'<path class="mark" d="{line}"/>'
     for mark in panel.marks:
-        along = (mark.at - across[0]) * wide / (across[1] - across[0])
+        along = (_place(mark.at, mark.axis, log) - across[0]) * wide / (across[1] - across[0])
         left, top = (along + 3.0, 7.0) if mark.axis == "x" else (wide - 2.0, high - (mark.at - up[0]) * scale - 3.0)
         anchor = "start" if mark.axis == "x" else "end"
         yield f'<text class="told" x="{left:.1f}" y="{top:.1f}" text-anchor="{anchor}">{escape(mark.words)}</text>'
@@ -132,6 +138,11 @@ def _panel(x: Array, panel: Panel, size: tuple[float, float], name: str, label: 
         yield f'<text x="{wide / 2:g}" y="{high + 25:g}" text-anchor="middle">{escape(label)}</text>'
     if len(panel.curves) >= LEGEND_FROM:
         yield from _legend(panel.curves, wide)
+
+
+def _place(at: float, axis: str, log: bool) -> float:
+    """Return where a mark stands on its axis."""
+    return math.log10(at) if log and axis == "x" else at
 
 
 def _curve(curve: Curve, places: Array, heights: Callable[[Array], Array]) -> str:
@@ -200,6 +211,13 @@ def _ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
     whole = len(f"{largest:.0f}") if largest < PLAIN_TO else 0
     digits = min(max(math.ceil(math.log10(largest / step + 1e-300)) + 2, 3, whole), 12)
     return [(one, f"{one:.{digits}g}".replace("-", "\N{MINUS SIGN}")) for one in within]
+
+
+def _decades(low: float, high: float) -> list[tuple[float, str]]:
+    """Return the powers of ten within a range of logarithms, and their twofold and fivefold where they are few."""
+    steps = (1.0, 2.0, 5.0) if high - low < FEW_DECADES else (1.0,)
+    within = [one * 10.0**power for power in range(math.floor(low), math.ceil(high) + 1) for one in steps]
+    return [(math.log10(one), f"{one:g}") for one in within if low - EDGE <= math.log10(one) <= high + EDGE]
 
 
 def _legend(curves: Sequence[Curve], wide: float) -> Iterator[str]:

@@ -12,6 +12,7 @@ from experiments.command.options import (
     Json,
     Logs,
     Out,
+    Report,
     RigFile,
     Seed,
     listed,
@@ -64,6 +65,7 @@ def identify(
     simulated: Simulated = None,
     figure: Figure = None,
     response: Response = None,
+    report: Report = None,
     rig: RigFile = None,
     columns: Columns = None,
     out: Out = None,
@@ -88,6 +90,7 @@ def identify(
         "numerator": numerator,
         "sample_time": sample_time,
         "figure": figure,
+        "report": report,
     }
     related = any(one is not None for one in (inputs, outputs, references, simulate))
     if (related and rig is None and not columns) or structure in ONLY_BETWEEN_COLUMNS:
@@ -127,7 +130,7 @@ def _relate_columns(
     """Fit a model between any columns, or run a saved one on the logs, and leave."""
     if model is None:
         identify_columns(logs, fit, as_json=as_json, out=out)
-    of_fits: dict[str, object] = {"--validate": fit.validate or None, "--figure": fit.figure}
+    of_fits: dict[str, object] = {"--validate": fit.validate or None, "--figure": fit.figure, "--report": fit.report}
     of_fits |= {"--response": fit.response, "--resample": fit.resampled}
     refuse_given(of_fits, "goes with a fit, not with --simulate")
     simulate_model(logs, model, fit, as_json=as_json, out=out)

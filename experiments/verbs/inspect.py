@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from experiments.actuators import actuator
-from experiments.command.json_output import Result, prepare_output, write_whole
+from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, run_logs
 from experiments.command.options import Beside, Json, Out, Plant, SampleTime, argument, option
-from experiments.command.output_paths import own_paths, page_place, pages_sentence, require_place
+from experiments.command.output_paths import own_paths, page_place, require_place
+from experiments.command.pages import Pages
 from experiments.command.terminal import note, table
 from experiments.command.visible_text import visible, visible_name
 from experiments.log_pages.inspected import BLANK, block_of, looked_into
@@ -60,15 +61,10 @@ def inspect(
 
     def work(log: Path) -> Result:
         found, tables = looked_into(log, plant, sample_time, beside or ())
-        if log in pages:
+        if log in pages.places:
             from experiments.log_pages.inspect_page import inspect_page
 
-            page = inspect_page({"file": str(log), **found}, tables)
-            try:
-                write_whole(pages[log], page, "--report")
-                written.append(pages[log])
-            except HydrostateError as error:  # what was found is shown all the same
-                unwritten.append(str(error))
+            pages.write(log, inspect_page({"file": str(log), **found}, tables))
         if write is not None:
             _write_rig(write, found["columns"], actuator(found["plant"]))
             note(f"{write}: check units and parameters, then run: hydrostate diagnose {log} --rig {write}")
@@ -76,15 +72,12 @@ def inspect(
 
     if (write is not None or beside) and len(logs) > 1:
         raise HydrostateError("--write and --with go with one file, got several")
-    pages = own_paths(page_place(report), logs)
+    pages = Pages(own_paths(page_place(report), logs))
     require_place("--write", write)
     prepare_output(out, logs)
-    unwritten: list[str] = []
-    written: list[Path] = []
     batch = run_logs(logs, work, BLANK, "looking")
-    for said in [*([pages_sentence(written)] if written else []), *unwritten]:
-        note(said)
-    finish(batch, _screen, as_json=as_json, out=out, lost=bool(unwritten))
+    pages.tell()
+    finish(batch, _screen, as_json=as_json, out=out, lost=bool(pages.unwritten))
 
 
 def _write_rig(path: Path, columns: Mapping[str, str], kind: "ActuatorKind") -> None:

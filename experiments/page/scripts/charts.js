@@ -28,8 +28,8 @@
   }
 
   async function abscissa(x) {
-    if (x.data) return unpacked(x);
-    return Array.from({ length: x.count }, (_, i) => x.start + x.step * i);
+    const places = x.data ? await unpacked(x) : Array.from({ length: x.count }, (_, i) => x.start + x.step * i);
+    return x.log ? places.map((one) => 10 ** one) : places;
   }
 
   const digits = (value) => (value === null || value === undefined ? "–" : Number(value.toPrecision(5)).toString());
@@ -82,6 +82,8 @@
     return look;
   }
 
+  const scaleOf = (x) => (x.log ? { time: false, distr: 3, range: (_, low, high) => [low, high] } : { time: false });
+
   // Options of one panel; axes take their colours from the page, so that dark pages have dark figures.
   function optionsOf(panel, figure, width, last) {
     const axis = { stroke: css("soft"), grid: { stroke: css("line"), width: 1 }, ticks: { stroke: css("line"), width: 1 } };
@@ -92,7 +94,7 @@
       legend: { show: false },
       padding: [10, 24, last ? 0 : 8, 0], // room for half of the lowest number where no axis is below it
       cursor: { sync: { key: figure.group }, drag: { x: true, y: false } },
-      scales: { x: { time: false }, y: panel.ends ? { range: () => panel.ends } : {} },
+      scales: { x: scaleOf(figure.x), y: panel.ends ? { range: () => panel.ends } : {} },
       axes: [
         { ...axis, label: last ? figure.x.label : undefined, show: last, size: 34, labelSize: 20 },
         { ...axis, size: 62 },
@@ -156,15 +158,17 @@
 
   function zoom(group, factor, shift = 0) {
     const [first] = groups.get(group);
-    const whole = [first.data[0][0], first.data[0].at(-1)];
-    const { min, max } = first.scales.x;
+    const log = first.scales.x.distr === 3;
+    const [along, back] = log ? [Math.log10, (one) => 10 ** one] : [Number, Number];
+    const whole = [first.data[0][0], first.data[0].at(-1)].map(along);
+    const [min, max] = [first.scales.x.min, first.scales.x.max].map(along);
     const half = (0.5 * (max - min)) / factor;
     const under = first.cursor.idx;
     const middle = shift === 0 && under !== null && under !== undefined && factor > 1
-      ? first.data[0][under]
+      ? along(first.data[0][under])
       : 0.5 * (min + max) + shift * (max - min);
     const low = Math.max(whole[0], Math.min(middle - half, whole[1] - 2 * half));
-    first.setScale("x", { min: low, max: Math.min(whole[1], low + 2 * half) });
+    first.setScale("x", { min: back(low), max: back(Math.min(whole[1], low + 2 * half)) });
   }
 
   const reset = (group) => {
@@ -221,7 +225,8 @@
     const { group } = figure;
     return element("div", { class: "tools" },
       act("+", "Zoom in", () => zoom(group, 2)), act("−", "Zoom out", () => zoom(group, 0.5)),
-      act("←", "Earlier", () => zoom(group, 1, -0.5)), act("→", "Later", () => zoom(group, 1, 0.5)),
+      act("←", figure.x.log ? "Lower" : "Earlier", () => zoom(group, 1, -0.5)),
+      act("→", figure.x.log ? "Higher" : "Later", () => zoom(group, 1, 0.5)),
       button("Show all", () => reset(group)),
       button("Download the numbers (CSV)", () => download(`${figure.file}.csv`, csvOf(x, panels))));
   }

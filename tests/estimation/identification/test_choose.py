@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from estimation.identification.choose import LEAST, STRUCTURES, choose_model, compare_structures, split_record
+from estimation.identification.choose import (
+    LEAST,
+    STRUCTURES,
+    choose_model,
+    compare_structures,
+    held_back_percent,
+    split_record,
+)
+from estimation.identification.fit.output_error import fit_output_error
 from estimation.identification.model.recursion import filtered
 
 
@@ -46,3 +54,17 @@ def test_structures_are_compared_on_the_second_of_two_experiments_too() -> None:
     assert right > 90.0
     other = [y[0], filtered([0.0, -0.5], [1.0, -0.8], u[1])]  # a plant that answers the other way
     assert compare_structures(u, other, 0.01, form, ("output-error",))["fit_percent"].iloc[0] < 50.0
+
+
+def test_what_a_log_holds_back_is_followed_if_its_plant_stays_and_not_if_it_changes() -> None:
+    rng = np.random.default_rng(6)
+    u = np.repeat(rng.choice([-1.0, 1.0], 150), 8)
+    y = filtered([0.0, 0.5], [1.0, -0.9], u) + 0.05 * rng.normal(size=u.size)
+    changed = np.where(np.arange(u.size) < 800, y, -0.5 * y)
+    model = fit_output_error(u, y, 0.01, n_numerator=1, n_denominator=1, delay=1)
+    held = held_back_percent(model, u, y)
+    assert held == pytest.approx(model.fit_percent, abs=2.0)
+    worse = held_back_percent(fit_output_error(u, changed, 0.01, n_numerator=1, n_denominator=1, delay=1), u, changed)
+    assert worse is not None
+    assert worse < 0.0
+    assert held_back_percent(model, u[: LEAST - 1], y[: LEAST - 1]) is None

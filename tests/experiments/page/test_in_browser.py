@@ -1,5 +1,6 @@
 """Pages in a real browser: they draw, zoom, fit the screen and the paper, load nothing and can be read by all."""
 
+import json
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,9 +12,14 @@ import pytest
 
 from estimation.eha.bulk_modulus import EstimateOptions
 from estimation.eha.estimate import estimate_log
+from estimation.identification.from_record import identify_record, record_signals
+from estimation.identification.model.linear_model import LinearModel
 from experiments.eha.diagnosis_page import diagnosis_page
 from experiments.eha.entries import diagnosis_entries, estimate_entries
+from experiments.identification.entries import linear_entries
 from experiments.log_pages.finding_page import finding_page
+from experiments.log_pages.identified_page import identified_page
+from experiments.log_pages.identified_view import view_of_channels
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.diagnose import diagnose_log
 from plant.eha.drives import make_drive
@@ -36,6 +42,10 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     log = simulate(CIRCUIT, drive, 1e-3, parameters_for(CONDITIONS["minor_leakage"]), sensors=BENCH, rng=rng)
     found, rig = diagnose_log(log, Rig()), {"file": "/private/place/run.csv", "rig": "paper"}
     estimate = estimate_log(log, Rig(), EstimateOptions())
+    model, signals = identify_record(log), record_signals(log)
+    fit = {**linear_entries(model), "validation": {"whiteness_p": 0.0, "cross_correlation_p": 0.0}, "notes": []}
+    fit |= {"file": rig["file"], "held_back_percent": 87.0, "input": model.input_name, "output": model.output_name}
+    fit["dc_gain"] = {"value": model.dc_gain, "std": model.dc_gain_std, "ci95": None}
     folder = tmp_path_factory.mktemp("pages")
     texts = {
         "diagnosis": diagnosis_page({**rig, **diagnosis_entries(found)}, found, log),
@@ -45,13 +55,14 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
             log,
         ),
         "estimate": finding_page({**rig, **estimate_entries(estimate)}, estimate, log),
+        "identified": identified_page(view_of_channels(fit, model, *signals)),
     }
     for name, text in texts.items():
         (folder / f"{name}.html").write_text(text, encoding="utf-8")
     return {name: folder / f"{name}.html" for name in texts}
 
 
-PAGES = ("diagnosis", "unknown", "estimate")
+PAGES = ("diagnosis", "unknown", "estimate", "identified")
 
 
 @pytest.fixture
@@ -199,9 +210,30 @@ def test_without_scripts_the_verdict_and_a_still_picture_are_there(opened: Any) 
     assert page.locator(".still img").first.is_visible()
 
 
-def test_a_page_prints_on_two_sheets_and_names_no_folder(opened: Any) -> None:
-    page = opened("diagnosis", scheme="dark")
+@pytest.mark.parametrize("name", ["diagnosis", "identified"])
+def test_a_page_prints_on_two_sheets_and_names_no_folder(opened: Any, name: str) -> None:
+    page = opened(name, scheme="dark")
     edges = dict.fromkeys(("top", "bottom", "left", "right"), "12mm")
     sheets = len(re.findall(rb"/Type\s*/Page\b", page.pdf(format="A4", margin=edges)))
     assert sheets <= 2
     assert "/private/place" not in page.content()
+
+
+def test_a_logarithmic_axis_zooms_by_shares_of_decades_and_its_model_is_downloaded(opened: Any, tmp_path: Path) -> None:
+    page = opened("identified")
+    figure = page.locator("#figure-bode")
+    panel = figure.locator(".panel").first
+    panel.focus()
+    page.keyboard.press("ArrowRight")
+    middle = float(figure.locator(".place").inner_text().split(":")[1])
+    assert 2.0 < middle < 12.0  # from 0.25 to 500 Hz the middle is at 11 Hz, and on a linear axis at 250 Hz
+    before = panel.screenshot()
+    figure.get_by_role("button", name="Zoom in").click()
+    figure.get_by_role("button", name="Higher").click()
+    assert panel.screenshot() != before
+    with page.expect_download() as started:
+        page.get_by_role("link", name="the model as JSON").click()
+    started.value.save_as(tmp_path / "model.json")
+    assert started.value.suggested_filename == "run-model.json"
+    assert LinearModel.from_dict(json.loads((tmp_path / "model.json").read_text("utf-8"))[0]).is_stable
+    assert page.complaints == []

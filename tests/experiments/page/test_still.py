@@ -75,6 +75,18 @@ def test_a_line_across_is_named_and_an_axis_may_be_given() -> None:
     assert {"0", "500", "1000"} <= set(words)
 
 
+def test_a_logarithmic_axis_has_powers_of_ten_at_equal_distances() -> None:
+    def picture(x: np.ndarray) -> ET.Element:
+        panel = Panel("gain", "dB", [Curve("a", np.ones(x.size))])
+        return ET.fromstring(still_picture(x, "frequency [Hz]", [panel], log=True))  # noqa: S314 -- our own picture
+
+    texts = [one for one in picture(np.geomspace(0.5, 2000.0, 50)).iter(f"{SVG}text") if one.get("y") == "111"]
+    found = {one.text: float(one.attrib["x"]) for one in texts}
+    assert list(found) == ["1", "10", "100", "1000"]
+    assert np.diff(list(found.values())) == pytest.approx(644.0 / np.log10(4000.0), abs=0.1)
+    assert {"1", "2", "5", "10", "20"} <= set(words_of(picture(np.array([1.0, 30.0]))))
+
+
 def test_names_are_escaped_and_a_long_log_keeps_its_peak_with_few_points() -> None:
     values = np.zeros(100_000)
     values[77_777] = 1.0

@@ -1,0 +1,227 @@
+"""What a page says of an identified model in sentences: how good it is, what it may be used for, and what not."""
+
+import math
+
+import numpy as np
+
+from estimation.identification.notes import IdentificationCode
+from experiments.identification.of_channels import INPUT, OUTPUT
+from experiments.log_pages.identified_charts import MeasuredCurve
+from experiments.log_pages.identified_view import IdentifiedView, Signal
+from experiments.page.numbers import number
+from experiments.page.sentences import sentence
+
+KINDS = {
+    "output-error": "linear",
+    "ARX": "linear, ARX",
+    "ARMAX": "linear, ARMAX",
+    "Box-Jenkins": "linear, Box-Jenkins",
+    "SRIV": "linear, by instrumental variables",
+    "subspace": "linear, by subspaces",
+    "continuous": "linear, in continuous time",
+    "narx": "polynomial, NARX",
+    "hammerstein": "linear behind a nonlinear input",
+    "wiener": "linear, whose output is measured without its sign",
+    "state-space": "state space",
+}
+"""Structures in words."""
+
+ROUGH = 50.0
+"""Fit on held-back data below which more than half of the output's deviation is left [%]."""
+
+AGREES = 0.3
+"""Median distance from the measured response over its gain, up to which a controller may be designed [fraction],
+judged: margins of 6 dB and 40 degrees leave room for it."""
+
+NO_BREAK = "\N{NO-BREAK SPACE}"
+
+LEVEL = 0.05
+"""Level of the tests of the residual [probability]."""
+
+GAIN_MEANS_NOTHING = frozenset(
+    {
+        IdentificationCode.INTEGRATES,
+        IdentificationCode.TIME_CONSTANT_BEYOND_RECORD,
+        IdentificationCode.SLOWER_THAN_PERIOD,
+    }
+)
+"""Notes by which a steady gain must not be used."""
+
+
+def is_usable(view: IdentifiedView) -> bool:
+    """Return whether the model may be used at all: it runs free, and does better than the mean on held-back data."""
+    held, own = view.result["held_back_percent"], view.result["fit_percent"]
+    better = own is not None and own > 0.0 and (held is None or held > 0.0)
+    return better and view.result["outcome"] == "ok" and bool(np.isfinite(view.simulated).all())
+
+
+def title_of(view: IdentifiedView) -> str:
+    """Return the verdict in one sentence."""
+    held, own = view.result["held_back_percent"], view.result["fit_percent"]
+    if not is_usable(view):
+        return f"Do not use this model of {view.output.name}: {_why_not(view)}."
+    order = view.result.get("order") or (None if view.linear is None else view.linear.denominator.size - 1)
+    kind = KINDS.get(view.result["structure"], view.result["structure"])
+    said = f"Model of {view.output.name} ({kind}{f', order {order}' if order else ''})"
+    if held is None:
+        return f"{said}: fit {own:.1f} % on the data of the fit; the log is too short to hold data back."
+    return f"{said}: fit {held:.1f} % on data held back from the fit."
+
+
+def _why_not(view: IdentifiedView) -> str:
+    if view.linear is not None and not view.linear.is_stable:
+        return "it is unstable"
+    held, own = view.result["held_back_percent"], view.result["fit_percent"]
+    if not np.isfinite(view.simulated).all():
+        return "its free run grows beyond bounds"
+    if held is not None and held <= 0.0:
+        return "on held-back data it is no better than the mean"
+    if own is not None and own <= 0.0:
+        return "it is no better than the mean"
+    return "the log does not show that the output follows the input"
+
+
+def answer_of(view: IdentifiedView) -> str:
+    """Return what the verdict's number means, and how large the error is."""
+    inputs = ", ".join(one.name for one in view.inputs)
+    said = f"The model runs free from {inputs}: it never sees the measured output. "
+    said += "A fit of 100 % is perfect; 0 % is no better than the mean. "
+    error = _held_back_error(view)
+    if error is None:
+        return said.rstrip()
+    return f"{said}The error is about {view.output.amount(number(error, 2))} (rms)."
+
+
+def _held_back_error(view: IdentifiedView) -> float | None:
+    """Return the error of the free run on held-back data, else on all [shown unit]."""
+    held = view.result["held_back_percent"]
+    if held is None or not is_usable(view):
+        own = view.result["rmse"]
+        return None if own is None or not math.isfinite(own) else view.output.scale * own
+    return view.output.scale * (1.0 - held / 100.0) * float(np.nanstd(view.y))
+
+
+def told_band(measured: MeasuredCurve | None) -> tuple[float, float] | None:
+    """Return the longest run of frequencies in which the log tells the response [Hz]; None where it tells none."""
+    if measured is None or not measured.frequency.size:
+        return None
+    first, last = measured.frequency[measured.begins], measured.frequency[np.append(measured.begins[1:], 0) - 1]
+    best: tuple[float, float] | None = None
+    begin: float | None = None
+    for low, high, known in zip(first.tolist(), last.tolist(), measured.known.tolist(), strict=True):
+        begin = (low if begin is None else begin) if known else None
+        if begin is not None and (best is None or high / begin > best[1] / best[0]):
+            best = begin, high
+    return best
+
+
+def distance(view: IdentifiedView, measured: MeasuredCurve, band: tuple[float, float]) -> float:
+    """Return the median distance of the model's response from the measured one, over its gain [fraction].
+
+    Stretches of equal width on a logarithmic scale count alike.
+    """
+    there = (measured.frequency >= band[0]) & (measured.frequency <= band[1])
+    part = MeasuredCurve(measured.frequency[there], measured.response[there], measured.radius[there])
+    apart = np.abs(view.response(0, part.frequency) - part.response) / np.abs(part.response)
+    return float(np.median([np.median(one) for one in np.split(apart, part.begins[1:])]))
+
+
+def uses_of(view: IdentifiedView, measured: MeasuredCurve | None) -> tuple[list[str], list[str]]:
+    """Return what the model may be used for, and what not, as sentences.
+
+    Parameters
+    ----------
+    measured : MeasuredCurve or None
+        The response that the log itself tells.
+    """
+    good: list[str] = []
+    bad: list[str] = []
+    usable = is_usable(view)
+    if usable:
+        ranges = " and ".join(f"{one.name} from {_range(one, view.u[:, k])}" for k, one in enumerate(view.inputs))
+        held, own = view.result["held_back_percent"], view.result["fit_percent"]
+        rough = "Rough simulation" if (own if held is None else held) < ROUGH else "Simulation"
+        good.append(f"{rough} of {view.output.name} by {ranges}.")
+        bad.append("Inputs beyond that range: the log says nothing about them.")
+    band = told_band(measured) if usable and view.is_linear else None
+    if band is not None and measured is not None:
+        apart = distance(view, measured, band)
+        said = f"{number(band[0], 2)} to {number(band[1], 2)} Hz"
+        told = f"there, it differs from the measured response by {100.0 * apart:.0f} % (median)"
+        if apart <= AGREES:
+            good.append(f"Controller design from {said}: {told}.")
+            bad.append(f"Frequencies beyond {said}: the log does not tell the response there.")
+        else:
+            bad.append(
+                f"Controller design: between {said}, it differs from the measured response by "
+                f"{100.0 * apart:.0f} % (median)."
+            )
+    elif usable and view.is_linear and len(view.inputs) == 1:
+        bad.append("Controller design: the log tells the response at no frequency well enough to check the model.")
+    bad += [*_of_gain(view), *_of_residual(view)]
+    if (view.result["input"], view.result["output"]) == (INPUT, OUTPUT):
+        bad.append("Diagnosis: the model does not tell leakage, friction and oil apart. Use hydrostate diagnose.")
+    return good, bad
+
+
+def _range(one: Signal, values: np.ndarray) -> str:
+    low, high = (number(one.scale * end, 3) for end in (float(values.min()), float(values.max())))
+    return f"{low} to {one.amount(high)}"
+
+
+def _of_gain(view: IdentifiedView) -> list[str]:
+    """Return why a steady gain must not be used, if it must not."""
+    codes = {one["code"] for one in view.result.get("notes", ())}
+    gain = view.result.get("dc_gain")
+    if codes & GAIN_MEANS_NOTHING:
+        return ["Steady gain: the log does not determine it."]
+    if not gain or view.linear is None:
+        return []
+    value, ends = gain["value"], gain.get("ci95")
+    if ends is not None and value is not None and ends[0] <= 0.0 <= ends[1]:
+        return ["Steady gain: its 95 % interval contains zero."]
+    return []
+
+
+def _of_residual(view: IdentifiedView) -> list[str]:
+    """Return what the plant's structure must not be concluded from, if an input is left in the residual."""
+    cross = view.cross_correlation_p
+    if cross is None or cross >= LEVEL:
+        return []
+    return [
+        f"Conclusions about order and poles of the plant: the residual still follows the input ({chance(cross)}), so "
+        "the model lacks something, such as friction or a dead time."
+    ]
+
+
+def tests_of(view: IdentifiedView) -> str:
+    """Return what the tests of the residual say, as sentences; empty where none was made."""
+    white, cross = view.whiteness_p, view.cross_correlation_p
+    said: list[str] = []
+    if white is not None and white < LEVEL:
+        linear = view.linear
+        allowed = linear is not None and np.array_equal(linear.covariance, linear.covariance_robust)
+        told = "; the intervals allow for that" if allowed else ""
+        said.append(f"The residual is not white noise ({chance(white)}): an error lasts over several samples{told}.")
+    elif white is not None:
+        said.append(f"The residual may be white noise ({chance(white)}).")
+    if cross is not None:
+        left = "It still follows the input" if cross < LEVEL else "Nothing of the input is left in it"
+        said.append(f"{left} ({chance(cross)}).")
+    return " ".join(said)
+
+
+def chance(probability: float) -> str:
+    """Return a p-value as one writes it, on one line: no probability is 0.
+
+    Examples
+    --------
+    >>> [chance(one).replace(NO_BREAK, " ") for one in (0.0, 0.02)]
+    ['p < 0.001', 'p = 0.02']
+    """
+    return ("p < 0.001" if probability < 0.001 else f"p = {probability:.2g}").replace(" ", NO_BREAK)
+
+
+def notes_of(view: IdentifiedView) -> list[str]:
+    """Return the notes of a model as sentences."""
+    return [sentence(one["text"]) for one in view.result.get("notes", ())]
