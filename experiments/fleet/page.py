@@ -16,7 +16,11 @@ from experiments.page.tables import Cell, Column, right
 from experiments.page.words import in_words
 
 MOST_STILL = 100
-"""Rows of the table that stands where scripts do not run, and on paper [count]."""
+"""Rows of a table where scripts do not run [count]."""
+
+MOST_OPEN, MOST_LISTED = 25, 10
+"""Rows of the actuators that are not sound on paper, unless more are sick, and of the logs that could not be read or
+have no date there [count]: with what the states mean they fill two sheets."""
 
 UNREAD = ("log", "actuator", "why")
 """Columns of the table of logs that could not be read."""
@@ -32,6 +36,9 @@ LEAST_OPEN, SHARE_OPEN = 3, 0.2
 
 SICK = ("over", "likely")
 """States of actuators that need work."""
+
+SOUND = "within"
+"""State of actuators that need none."""
 
 COLUMNS: Sequence[Mapping[str, Any]] = (
     {"label": "actuator", "kind": "name", "width": 7.7},
@@ -87,7 +94,8 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
         "unread": pd.DataFrame(unread[:MOST_STILL], columns=list(UNREAD)),
         "undated_count": len(undated),
         "undated": pd.DataFrame(undated[:MOST_STILL], columns=["log", "why"]),
-        "still": pd.DataFrame(cells[:MOST_STILL], columns=[column["label"] for column in COLUMNS]),
+        "listed": MOST_LISTED,
+        **_still(rows, cells),
     }
     columns = [
         Column("state", words=lambda name: Cell(STATES[name], f"fleet-{name}")),
@@ -97,7 +105,22 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
     ]
     shown = [next((one for one in columns if one.source == each["label"]), each["label"]) for each in COLUMNS]
     named = (Column("log", words=lambda name: Cell(name, "name")), *UNREAD[1:])
-    return render_page("fleet/fleet.html", facts, {"still": shown, "unread": named, "undated": (named[0], "why")}, {})
+    tables = {"still": shown, "others": shown, "unread": named, "undated": (named[0], "why")}
+    return render_page("fleet/fleet.html", facts, tables, {})
+
+
+def _still(rows: Sequence[ActuatorRow], cells: Sequence[Sequence[Any]]) -> dict[str, Any]:
+    """Return the rows that paper shows, those that stand below where scripts do not run, and what paper leaves out."""
+    sick = sum(row.state in (*SICK, "alarm") for row in rows)
+    ailing = [i for i, row in enumerate(rows) if row.state != SOUND][: max(MOST_OPEN, min(sick, MOST_STILL))]
+    others = sorted(set(range(len(rows))).difference(ailing))
+    left = Counter(rows[i].state for i in others)
+    labels = [column["label"] for column in COLUMNS]
+    return {
+        "still": pd.DataFrame([cells[i] for i in ailing], columns=labels),
+        "others": pd.DataFrame([cells[i] for i in others[: MOST_STILL - len(ailing)]], columns=labels),
+        "left_out": [f"{left[name]} {words}" for name, words in STATES.items() if left[name]],
+    }
 
 
 def sickest_of(rows: Sequence[ActuatorRow]) -> list[str]:

@@ -48,6 +48,30 @@ def test_actuators_that_near_a_limit_are_in_the_title_and_named_where_none_is_pa
     assert sickest_of([sick, near]) == ["C"]
 
 
+def test_paper_lists_what_is_not_sound_and_counts_the_rest() -> None:
+    def paper(**counts: int) -> tuple[int, str]:
+        found: list[ActuatorRow] = []
+        for state in STATES:
+            for i in range(counts.get(state, 0)):
+                (log,) = log_rows([store_row(f"{state}{i}.csv", 1.0)], {}, {})
+                row = ActuatorRow(f"{state}{i}", (log,))
+                vars(row)["state"] = state
+                found.append(row)
+        page = fleet_page(found, {}, "hall").split('<div class="still">')[1].split("</section>")[0]
+        shown = re.split("screen-only|<script", page)[0]
+        assert "within0" not in shown
+        (said,) = re.findall(r"<p>(Not listed.*?)</p>", shown) or [""]
+        return len(re.findall(r'<td class="fleet-', shown)), said
+
+    assert paper(over=2, unknown=3, within=95) == (5, "Not listed on paper: 95 within limits.")
+    assert paper(within=3) == (0, "Not listed on paper: 3 within limits.")
+    assert paper(over=2, unknown=40) == (25, "Not listed on paper: 17 no verdict.")
+    assert paper(over=60, likely=20, unknown=40, within=1)[0] == 80
+    assert paper(over=130, within=1) == (100, "Not listed: 30 past a limit, 1 within limits.")
+    assert paper(over=3) == (3, "")
+    assert paper(within=30, failed=2) == (2, "Not listed on paper: 30 within limits.")
+
+
 def test_many_actuators_without_a_verdict_put_the_rig_file_in_doubt() -> None:
     def rows(unknown: int) -> list[ActuatorRow]:
         outcomes = ["mismatch"] * unknown + ["ok"] * (8 - unknown)
