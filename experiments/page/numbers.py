@@ -136,7 +136,9 @@ def alike_in_digits(value: float | None, interval: Sequence[float] | None, unit:
     Examples
     --------
     >>> alike_in_digits(1.1e-13, [-2.01, 1.92], "N"), alike_in_digits(2.5e-11, [2.4e-11, 2.6e-11], "m^3/(s Pa)")
-    (['0.0', '−2.0', '1.9'], ['25.00 × 10⁻¹²', '24.0 × 10⁻¹²', '26.0 × 10⁻¹²'])
+    (['0.0', '−2.0', '1.9'], ['25.0 × 10⁻¹²', '24.0 × 10⁻¹²', '26.0 × 10⁻¹²'])
+    >>> alike_in_digits(-4.121e-5, [-3.21e-4, 2.39e-4], "L/(min bar)")
+    ['−41 × 10⁻⁶', '−321 × 10⁻⁶', '239 × 10⁻⁶']
     >>> alike_in_digits(0.15058, [0.15021, 0.15094], "L/(min bar)")
     ['0.1506', '0.1502', '0.1509']
     """
@@ -146,7 +148,13 @@ def alike_in_digits(value: float | None, interval: Sequence[float] | None, unit:
     if unit == "%" or PLAIN_FROM <= max(abs(low), abs(high)) < PLAIN_TO:
         decimals = decimals_of(low, high, 3 if unit == "%" else MOST_DECIMALS)
         return [fixed(each, decimals) for each in (value, low, high)]
-    return [number(value), number(low, 3), number(high, 3)]
+    if not all(map(math.isfinite, (value, low, high))):
+        return [number(value), number(low, 3), number(high, 3)]
+    exponent = 3 * math.floor(math.log10(max(abs(low), abs(high)) or 1.0) / 3)
+    inside = [each / 10.0**exponent for each in (value, low, high)]
+    decimals = decimals_of(inside[1], inside[2])
+    power = f"{TIMES}10{str(exponent).translate(SUPERSCRIPTS)}" if exponent else ""
+    return [f"{fixed(each, decimals)}{power}" if each else "0" for each in inside]
 
 
 def exact(value: float) -> str:
