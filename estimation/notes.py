@@ -48,7 +48,7 @@ class SensorCode(Code):
     )
     POSITION_REZEROED = (
         "{channel} steps by {step:.4g|mm} mm at {at_s:.4g} s while everything else goes on as before: its zero was "
-        "reset, or rows were lost in steady motion; it was subtracted"
+        "reset, or rows were lost in steady motion; the step was subtracted"
     )
     PRESSURE_REZEROED = (
         "{channel} steps at {where} s (by {step:.3g|bar} bar), which no flow explains, while position goes on as "
@@ -262,7 +262,7 @@ class RigCode(Code):
     )
     WEAR_NOT_EXCLUDED = (
         "pump wear is not excluded: at these speeds a pump that delivers up to {percent:.0f} % less would look like "
-        "leakage, and bulk modulus would come out too low by the same share"
+        "leakage, and bulk modulus would be too low by the same share"
     )
     SINGLE_ROD = (
         "side B of the piston has {percent:.1f} ± {half_width:.2g} % of the area of side A (rig file: "

@@ -29,12 +29,12 @@ class AgainstCode(Code):
     )
     SPEED_BIAS = "motor speed reads wrong by {bias_rad_s:+.3g|rpm} rpm"
     LOAD_UNTOLD = (
-        "{load} on the rod that the rig file does not have would explain the log: if there is one, enter {entry} "
+        "{load} on the rod that is not in the rig file would explain the log: if there is one, enter {entry} "
         "(about {value:.2g} {unit})"
     )
     LOAD_OR_OFFSET = (
-        "motor speed reads wrong by {bias_rad_s:+.3g|rpm} rpm, or there is {load} on the rod that the rig file does not"
-        " have ({entry} of about {value:.2g} {unit}): without differential_pressure_pa the log does not tell which"
+        "motor speed reads wrong by {bias_rad_s:+.3g|rpm} rpm, or there is {load} on the rod that is not in the rig "
+        "file ({entry} of about {value:.2g} {unit}): without differential_pressure_pa the log does not tell which"
     )
     PRESSURE_BIAS = "differential pressure reads wrong by {bias_pa:+.3g|bar} bar"
     OIL_SOFT = "the oil's bulk modulus is {share:.2f} times that in the rig file: air in the oil, or a soft hose"
@@ -82,7 +82,7 @@ class ClassCode(Code):
     )
     MODELS_DIVERGED = "the models of all conditions diverged; check units and rig file"
     MODELS_ALIKE = (
-        "no class: the models of all conditions move alike under this drive; move the actuator, ideally in steps"
+        "no class: the models of all conditions move alike under this drive; drive the actuator in steps"
     )
     NO_CIRCUIT = "no circuit can be fitted with this rig file, so there are scores but no probabilities: {reason}"
     NO_PROBABILITIES = "no probabilities: {reason}"
