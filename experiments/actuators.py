@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Any
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from experiments.actuator_kind import ActuatorKind
+    from plant.eha.rig import Rig
     from plant.errors import NoChannelError
 
 ACTUATORS: Mapping[str, str] = {
@@ -130,6 +133,27 @@ def _loaded(name: str, place: str) -> "ActuatorKind":
         raise HydrostateError(f"{place} must be called {name!r}, as it is registered, got {kind.name!r}")
     know_channels(kind.channels)
     return kind
+
+
+def read_own_rig(path: "Path", common: "ActuatorKind") -> "Rig[Any]":
+    """Return the rig of a file that lies among logs of several kinds of actuator.
+
+    Parameters
+    ----------
+    path : Path
+        The rig file.
+    common : ActuatorKind
+        Kind of a file that names none.
+
+    Raises
+    ------
+    HydrostateError
+        If there is no such kind, or the file is not usable.
+    """
+    from plant.eha.rig import plant_of
+
+    named = plant_of(path)
+    return (common if named is None else actuator(named)).read_rig(path)
 
 
 def offered(kind: "ActuatorKind", verb: str) -> Any:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from estimation.engine.kernels import LANES
-from experiments.actuators import DEFAULT, actuator
+from experiments.actuators import DEFAULT, actuator, read_own_rig
 from experiments.batch.logs_listed import listed_logs
 from experiments.batch.other_actuators import simulated_of
 from experiments.batch.series import Group, Log, Series, Simulated, Work
@@ -192,7 +192,7 @@ def plan_study(study: Study, folder: Path) -> Plan:
             raise StudyError(f"runs[{place}] must be at most {MOST_SERIES:,} series, got up to {count:,}: lower seeds")
     kind = actuator(study.plant)
     rig = kind.read_rig(folder / study.rig if study.rig else None)
-    rigs = {name: kind.read_rig(folder / file) for name, file in study.rigs.items()}
+    rigs = {name: read_own_rig(folder / file, kind) for name, file in study.rigs.items()}
     listed = _simulated if kind.name == DEFAULT else partial(simulated_of, kind)
     logs = [listed_logs(one, place, folder, rigs) for place, one in enumerate(study.logs)]
     series = [*map(listed, study.runs), *(one.logs for one in logs)]

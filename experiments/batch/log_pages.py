@@ -36,8 +36,6 @@ def write_log_pages(plan: Plan, store: PartStore, most: int) -> list[str]:
     list of str
         Why a page could not be written, a sentence a log.
     """
-    kind = actuator(plan.study.plant)
-    chosen = offered(kind, "diagnose")
     logs = {
         one.series.file: (one.series, work)
         for one in plan.groups
@@ -50,6 +48,8 @@ def write_log_pages(plan: Plan, store: PartStore, most: int) -> list[str]:
     for one in worst[:most]:
         series, work = logs[one.file]
         rig = plan.rig_of(series)
+        kind = actuator(rig.plant or plan.study.plant)
+        chosen = offered(kind, "diagnose")
         options = {**chosen.options, "seed": 0} | ({} if work.pressure else {"no_pressure": True})
         try:
             with caught():

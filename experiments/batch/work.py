@@ -176,7 +176,8 @@ class _Prepared:
 
 
 def _prepared(series: Series, task: Task) -> _Prepared:
-    rig, kind = task.rig_of(series), actuator(task.plant)
+    rig = task.rig_of(series)
+    kind = actuator(rig.plant or task.plant)
     other = None if kind.name == DEFAULT else kind
     if isinstance(series, Log):
         with _one_at_a_time, caught() as said:

@@ -63,8 +63,8 @@ def fleet(
     """Write the page of a fleet: which actuators are faulty, how badly, with links to the pages of their logs.
 
     The command diagnoses the logs of a folder into a store beside the page; run it again to continue where it stopped.
-    Logs of actuators of another size go into a folder of their own, with their rig file in it as rig.toml. The last
-    line of standard output is the path of the page.
+    Logs of actuators of another size or kind go into a folder of their own, with their rig file in it as rig.toml. The
+    last line of standard output is the path of the page.
     """
     from experiments.batch.part_store import open_store
     from experiments.fleet.actuators import actuator_rows
@@ -283,12 +283,12 @@ def _page_writer(
     columns: Any,
 ) -> Callable[[str, Path], bool]:
     """Return what writes the page of a log, and says whether the log is still there."""
-    from experiments.actuators import offered
+    from experiments.actuators import actuator, offered, read_own_rig
     from experiments.batch.logs_listed import nearest_folder
 
-    kind, common = load_actuator(plant, rig)
-    own = {name: kind.read_rig(file) for name, file in rigs.items()}
-    chosen, mapping = offered(kind, "diagnose"), load_columns(columns)
+    usual, common = load_actuator(plant, rig)
+    own = {name: read_own_rig(file, usual) for name, file in rigs.items()}
+    mapping = load_columns(columns)
 
     def write(file: str, path: Path) -> bool:
         log = paths.get(file, base / file)
@@ -298,6 +298,8 @@ def _page_writer(
         from experiments.command.logs import caught, read_log
 
         bench = own.get(nearest_folder(file, own), common)
+        kind = actuator(bench.plant or usual.name)
+        chosen = offered(kind, "diagnose")
         with caught():
             record = read_log(log, bench.columns, mapping, kind.required)
             found = chosen.run(record, *chosen.prepare(bench, {**chosen.options, "seed": 0}))

@@ -61,6 +61,8 @@ class Rig(Generic[P]):
         Foreign log columns by channel: ``{"position_m": "POS_MM:mm"}``.
     measured : tuple of str
         Entries that were measured on the bench, so that less is doubted of them.
+    plant : str or None
+        Kind of actuator that its file was read as; None of a rig without a file.
 
     Raises
     ------
@@ -79,6 +81,7 @@ class Rig(Generic[P]):
     uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
     columns: Mapping[str, str] = field(default_factory=dict[str, str])
     measured: tuple[str, ...] = ()
+    plant: str | None = None
 
     def __post_init__(self) -> None:
         doubted = doubts_of(self.parameters)
@@ -93,7 +96,8 @@ class Rig(Generic[P]):
         object.__setattr__(self, "columns", MappingProxyType(check_columns(self.columns)))
 
     def __reduce__(self) -> tuple[object, ...]:
-        return Rig, (self.name, self.parameters, dict(self.uncertainties), dict(self.columns), self.measured)
+        own = (dict(self.uncertainties), dict(self.columns), self.measured, self.plant)
+        return Rig, (self.name, self.parameters, *own)
 
     @property
     def spreads(self) -> Mapping[str, Spread]:
@@ -180,7 +184,7 @@ def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> 
     parameters = parameter_class(**values)
     if isinstance(parameters, EhaParameters):
         require_si(parameters)
-    return Rig(file.name, parameters, file.uncertainty, file.columns, file.measured)
+    return Rig(file.name, parameters, file.uncertainty, file.columns, file.measured, plant)
 
 
 def _pairs_of(parameter_class: type[Any]) -> Mapping[str, str]:

@@ -24,6 +24,22 @@ def test_a_folder_without_logs_is_refused(tmp_path: Path) -> None:
     assert "must hold logs, files that end in .csv, .txt, " in said
 
 
+def test_a_folder_may_hold_logs_of_another_kind_of_actuator(tmp_path: Path) -> None:
+    logs, stack = tmp_path / "logs", tmp_path / "logs" / "stacks"
+    for name in ("A_1", "A_2"):
+        options = ("--duration", 2, "--sample-time", 1e-3, "--condition", "normal")
+        assert invoke("simulate", *options, "--out", logs / f"{name}.csv")[0] == 0
+        assert invoke("simulate", "--plant", "piezo-stack", "--out", stack / f"S{name}.csv")[0] == 0
+    (stack / "rig.toml").write_text('name = "stack 3"\nplant = "piezo-stack"\n', encoding="utf-8")
+    named = ("--pattern", "{actuator}_{date}.csv")
+    code, _, said = invoke("fleet", logs, *named, "--out", tmp_path / "fleet", "--pages", 2, "--workers", 1)
+    assert (code, "None of 2 actuators is past a limit." in said) == (0, True), said
+    (page,) = (tmp_path / "fleet" / "pages").glob("SA_2*")
+    assert "piezo-stack actuator, rig stack 3" in page.read_text("utf-8")
+    (other,) = (tmp_path / "fleet" / "pages").glob("A_2*")
+    assert "The actuator is healthy" in other.read_text("utf-8")
+
+
 @pytest.mark.parametrize(
     ("option", "words"),
     [("leak=2", "--limit must be one of"), ("leakage_flow=much", "--limit leakage_flow must be a number in L/min")],
