@@ -17,7 +17,7 @@ from experiments.page.sentences import rig_in_words
 from experiments.page.tables import Columns, folded_tables, html_table
 
 _HEADING = re.compile(r'<section id="([^"]+)"[^>]*>\s*<h2>([^:<]*)')
-_BEFORE_UNIT = re.compile(r"(?<=\d) (?=%|(?:V|Hz|kHz|mm|ms|psi|MPa|bar|N|s|L/min)\b)")
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=%|(?:V|Hz|kHz|mm|ms|psi|MPa|MB|rpm|bar|N|s|L/min)\b)")
 
 
 def render_page(

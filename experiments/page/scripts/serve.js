@@ -128,7 +128,8 @@
       older.hidden = logs.length >= total;
       comparing.disabled = ticked.size !== 2;
       if (!coming.size) {
-        const counted = total ? `${total} ${total === 1 ? "log" : "logs"}, ${counts.unfinished ?? 0} not finished yet.` : "No log yet.";
+        const left = counts.unfinished ? `${counts.unfinished} still to do` : total === 1 ? "finished" : "all finished";
+        const counted = total ? `${total} ${total === 1 ? "log" : "logs"}, ${left}.` : "No log yet.";
         status.textContent = refused ? `${refused.replace(/\.$/, "")}. ${counted}` : counted;
       }
     } catch (error) {
