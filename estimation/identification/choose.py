@@ -180,7 +180,7 @@ def held_back_percent(model: LinearModel, u: Array, y: Array) -> float | None:
     form = {"n_numerator": model.free_numerator.size, "n_denominator": model.denominator.size - 1, "delay": late}
     form |= {"covariance": "white", "input_name": model.input_name, "output_name": model.output_name}
     table = compare_structures(u, y, model.sample_time, form, (model.structure,))
-    return float(table.at[model.structure, "fit_percent"])
+    return float(table["fit_percent"].iloc[0])
 
 
 def split_record(u: Signals, y: Signals) -> tuple[tuple[list[Array], list[Array]], tuple[list[Array], list[Array]]]:

@@ -113,7 +113,7 @@ def run_charts(view: IdentifiedView, stem: str) -> Charts:
     )
     left = (Curve("measured minus simulated", out.scale * view.residual, "grey"),)
     panels = [*driven, Panel(out.name, out.unit, both), Panel(f"{out.name}, residual", out.unit, left)]
-    time = view.sample_time * np.arange(view.y.size)
+    time = view.sample_time * np.arange(view.y.size, dtype=np.float64)
     return Charts(time, "time [s]", panels, f"{stem}-free-run")
 
 
@@ -148,7 +148,7 @@ def step_charts(view: IdentifiedView, stem: str) -> Charts:
     A step is as high as half the input's range, in round numbers.
     """
     count = _count(view)
-    time = view.sample_time * np.arange(count)
+    time = view.sample_time * np.arange(count, dtype=np.float64)
     curves: list[Curve] = []
     bands: list[tuple[int, int]] = []
     for k, one in enumerate(view.inputs):
@@ -170,7 +170,17 @@ def step_charts(view: IdentifiedView, stem: str) -> Charts:
 
 
 def step_of(values: Array) -> float:
-    """Return half the range of an input in one digit [its unit].
+    """Return half the range of an input in one digit.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        The input [any unit].
+
+    Returns
+    -------
+    float
+        Half its range [the input's unit].
 
     Examples
     --------

@@ -65,11 +65,13 @@ class IdentifiedView:
         Entries of `hydrostate identify`, without folders in names of files.
     inputs, output : tuple of Signal, Signal
         What it relates.
+    sample_time : float
+        Of the model and of the series [s].
     u, y, simulated : ndarray, shapes (n, m), (n,), (n,)
         Inputs, output and free run [in the log's units]; NaN where missing, and in all of a run that is unstable.
     linear : LinearModel or None
         With its covariance, where the model is linear and has one input.
-    transfers : tuple of tuple of ndarray
+    transfers : tuple of tuple of ndarray, shapes (n_b,) and (n_f,)
         Numerator and denominator from each input, in powers of the delay operator; empty of others.
     run : callable
         Output [its unit] from inputs, shape (n, m), that stood at their first values before.
@@ -129,7 +131,7 @@ class IdentifiedView:
             return self.linear.frequency_response(frequency)
         b, f = self.transfers[number]
         shift = np.exp(-2j * np.pi * frequency * self.sample_time)
-        return np.polyval(b[::-1], shift) / np.polyval(f[::-1], shift)
+        return np.asarray(np.polyval(b[::-1], shift) / np.polyval(f[::-1], shift), dtype=np.complex128)
 
 
 def view_of_channels(result: Mapping[str, Any], model: LinearModel, u: Array, y: Array) -> IdentifiedView:

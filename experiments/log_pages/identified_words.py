@@ -119,6 +119,16 @@ def distance(view: IdentifiedView, measured: MeasuredCurve, band: tuple[float, f
     """Return the median distance of the model's response from the measured one, over its gain [fraction].
 
     Stretches of equal width on a logarithmic scale count alike.
+
+    Parameters
+    ----------
+    band : tuple of float
+        Lowest and highest frequency that is asked [Hz].
+
+    Returns
+    -------
+    float
+        The median over stretches of the median in each [fraction].
     """
     there = (measured.frequency >= band[0]) & (measured.frequency <= band[1])
     part = MeasuredCurve(measured.frequency[there], measured.response[there], measured.radius[there])
@@ -213,6 +223,11 @@ def tests_of(view: IdentifiedView) -> str:
 
 def chance(probability: float) -> str:
     """Return a p-value as one writes it, on one line: no probability is 0.
+
+    Parameters
+    ----------
+    probability : float
+        The p-value [probability].
 
     Examples
     --------

@@ -58,7 +58,7 @@ def step_response(model: LinearModel, count: int) -> StepResponse:
     gradient = _differences(plain, step) if model.continuous else _exact(plain, step)
     with np.errstate(invalid="ignore"):
         std = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", gradient, model.covariance, gradient), 0.0))
-    return StepResponse(model.sample_time * np.arange(count), response, std)
+    return StepResponse(model.sample_time * np.arange(count, dtype=np.float64), response, std)
 
 
 def _exact(model: LinearModel, step: Array) -> Array:

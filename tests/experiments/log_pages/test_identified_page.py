@@ -25,7 +25,9 @@ from experiments.log_pages.identified_words import chance, is_usable, title_of, 
 from plant.log.files import write_record
 from plant.log.record import Record
 
-TRUTH = LinearModel([0.0, 2e-5, 1e-5], [1.0, -1.5, 0.6], 1e-3, "motor_speed_rad_s", "velocity_m_s", delay=1)
+TRUTH = LinearModel(
+    np.array([0.0, 2e-5, 1e-5]), np.array([1.0, -1.5, 0.6]), 1e-3, "motor_speed_rad_s", "velocity_m_s", delay=1
+)
 
 
 def seen(model: LinearModel = TRUTH, held: float | None = 95.0, **changes: Any) -> IdentifiedView:
@@ -122,7 +124,7 @@ def test_the_model_is_taken_along_whole_and_without_the_place_of_the_log(monkeyp
 
 
 def test_a_model_in_continuous_time_is_taken_along_as_such_and_its_step_has_a_band() -> None:
-    model = LinearModel([30.0], [1.0, 100.0], 1e-3, "u", "y", continuous=True, dead_time=0.002)
+    model = LinearModel(np.array([30.0]), np.array([1.0, 100.0]), 1e-3, "u", "y", continuous=True, dead_time=0.002)
     view = seen(replace(TRUTH))
     fitted = replace(model, structure="continuous", fit_percent=90.0, rmse=0.1, covariance=np.diag([0.01, 0.1]))
     entries = {**view.result, **linear_entries(fitted), "input": "u", "output": "y"}
@@ -140,8 +142,8 @@ def columns(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a log of two inputs and two outputs, one of them bent."""
     rng = np.random.default_rng(5)
     a, b = (np.repeat(rng.uniform(-1.0, 1.0, 100), 6) for _ in range(2))
-    y = LinearModel([0.0, 0.4], [1.0, -0.7], 1.0, "a", "y", delay=1).simulate(a + 0.5 * b)
-    z = LinearModel([0.0, 0.3], [1.0, -0.5], 1.0, "a", "z", delay=1).simulate(a - b)
+    y = LinearModel(np.array([0.0, 0.4]), np.array([1.0, -0.7]), 1.0, "a", "y", delay=1).simulate(a + 0.5 * b)
+    z = LinearModel(np.array([0.0, 0.3]), np.array([1.0, -0.5]), 1.0, "a", "z", delay=1).simulate(a - b)
     noise = 0.01 * rng.standard_normal((2, a.size))
     path = tmp_path_factory.mktemp("columns") / "run.csv"
     write_record(Record(0.1, {"a": a, "b": b, "y": y + noise[0], "z": z + noise[1], "w": y + y**2 + noise[0]}), path)
