@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from experiments.cli import app
-from experiments.command import log_verb
+from experiments.command import pages
 from plant.errors import HydrostateError
 
 
@@ -62,7 +62,7 @@ def test_a_page_that_cannot_be_written_costs_no_verdict(
     def full(path: Path, *_: object) -> None:
         raise HydrostateError(f"--report {path}: cannot be written: No space left on device")
 
-    monkeypatch.setattr(log_verb, "write_whole", full)
+    monkeypatch.setattr(pages, "write_whole", full)
     done = invoke("diagnose", log, "--report", tmp_path / "page.html")
     assert done.exit_code == 1
     assert "probability" in done.stdout

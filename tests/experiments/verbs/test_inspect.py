@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from experiments.cli import app
-from experiments.verbs import inspect as inspect_verb
+from experiments.command import pages
 from plant.eha.rig import read_rig
 from plant.errors import HydrostateError
 
@@ -55,7 +55,7 @@ def test_a_page_that_cannot_be_written_costs_nothing_that_was_found(
     def full(path: Path, *_: object) -> None:
         raise HydrostateError(f"--report {path}: cannot be written: No space left on device")
 
-    monkeypatch.setattr(inspect_verb, "write_whole", full)
+    monkeypatch.setattr(pages, "write_whole", full)
     done = invoke(strange, "--report", tmp_path / "page.html")
     assert done.exit_code == 1
     assert 'position_m = "Kolbenweg [mm]:mm"' in done.stdout
