@@ -208,10 +208,20 @@ def search(
 
     Parameters
     ----------
-    start, evaluations, bounds, least_gain, radius, least_share
-        As of `descend`.
+    start : ndarray, shape (unknowns,)
+        Where to begin [dimensionless].
+    evaluations : int
+        How often the cost may be evaluated [evaluations].
+    bounds : tuple of ndarray, shape (unknowns,)
+        Lowest and highest coordinates [dimensionless].
+    least_gain : float
+        Cost that a further step must promise [dimensionless].
+    radius : float
+        Length of the longest first step [dimensionless].
     worth : callable
         ``worth(best, hoped)``: whether to go on, from the cost that all steps that are left may bring the best down to.
+    least_share : float
+        Share of the cost that is left which a further step must promise [fraction].
 
     Yields
     ------

@@ -56,8 +56,10 @@ def descend_in_turn(
         See `descend`; of the first way [dimensionless].
     after : callable
         ``after(i, point)``: what is wanted at most of the ways after way ``i``, given its result; called in order.
-    radius, least_share : float
-        See `descend`.
+    radius : float
+        Length of the longest first step [dimensionless].
+    least_share : float
+        Share of the cost that is left which a further step must promise [fraction].
 
     Returns
     -------

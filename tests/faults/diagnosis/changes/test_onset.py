@@ -87,7 +87,7 @@ def test_a_log_is_judged_from_where_its_condition_changed(condition: str, *, pre
     assert found.record.start_time == pytest.approx(found.onset.since)
     assert len(found.record) == pytest.approx(900, abs=10)
     assert found.blocks.earlier is not None
-    assert found.blocks.earlier[0] * 2e-3 == pytest.approx(2.2, abs=0.02)
+    assert found.blocks.earlier[0] * found.blocks.sample_time == pytest.approx(2.2, abs=0.02)
     assert np.flatnonzero(np.isfinite(found.blocks.velocity))[0] == pytest.approx(220, abs=2)
     assert list(CONDITIONS)[int(np.argmax(found.fits.scores))] == condition
 
