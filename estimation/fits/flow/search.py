@@ -223,9 +223,25 @@ def _completed(one: _Rough, log: GreyBoxLog, *, bent: bool) -> tuple[Problem, Ar
 
 
 def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]) -> list[_Rough]:
-    """Return where the balances fit best with long model steps, each searched from where the first one ended."""
+    """Return where the balances fit best with long model steps.
+
+    A single rod may pump up both chambers, beyond what a balance of volumes follows. If none explains its log, that by
+    mass leads, and counts if it comes far lower.
+    """
     relieved = reaches_relief(log.measured, parameters.relief_pressure)
-    forms = [relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM)]
+    volume, mass, held = (relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM))
+    rough = _led([volume, mass, held], log, parameters, starts)
+    if not parameters.area_difference or any(map(_explains, rough)):
+        return rough
+    by_mass, by_volume, of_held = _led([mass, volume, held], log, parameters, starts)
+    least = min(one.point.cost for one in rough)
+    return [by_volume, by_mass, of_held] if by_mass.point.cost < least - RIVAL else rough
+
+
+def _led(
+    forms: Sequence[GreyBoxModel], log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]
+) -> list[_Rough]:
+    """Return where the balances fit best with long model steps, each searched from where the first one ended."""
     afar = log.taken_at(parameters.bulk_modulus)
     guess, near = _guess(forms[0], afar, parameters, starts)
     screen = remembered(FreedProblem.of(forms[0], _begun(afar)).at)

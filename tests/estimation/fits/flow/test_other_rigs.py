@@ -12,10 +12,11 @@ from estimation.fits.flow.log import flow_log, without_strays
 from estimation.fits.flow.plain import FitStart, Logged, plain_fits
 from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.models.completed_flow import balances_mass
 from faults.conditions import severity
-from plant.eha.circuit_parameters import circuit_of
+from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.drives import prbs
-from plant.eha.model import EhaParameters
+from plant.eha.model import PARAMETER_NAMES, EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
@@ -40,6 +41,35 @@ STIFF = EhaParameters(
     motor_speed_limit=194.0,
 )
 """A cylinder of 20 mm whose pump fills a chamber in 0.8 s, with stiff oil that hardly leaks."""
+
+PUMPED_UP = CircuitParameters(
+    pump_displacement=7.18e-7,
+    piston_area=9.36e-4,
+    chamber_volume=6.21e-5,
+    moving_mass=1.89,
+    bulk_modulus=2.93e8,
+    leakage_coefficient=1.04e-13,
+    flow_bias=1.38e-6,
+    friction_quadratic=1750.0,
+    friction_linear=561.0,
+    friction_coulomb=174.0,
+    relief_pressure=1.52e7,
+    relief_conductance=2.32e-9,
+    accumulator_pressure=2.72e5,
+    makeup_conductance=4.92e-9,
+    makeup_opening=4.17e3,
+    area_difference=0.154,
+    volume_difference=0.132,
+    stroke=0.227,
+    pump_crossport_leakage=4.9e-14,
+    pump_case_leakage=1.1e-14,
+    accumulator_gas=1.56e-4,
+    accumulator_oil=1.56e-4,
+    motor_lag=4e-3,
+    motor_speed_per_volt=79.9,
+    motor_speed_limit=639.0,
+)
+"""A single rod with plain check valves, which keep the oil that its rod displaces."""
 
 SUBSTEPS, LAG = 5, 2e-3
 
@@ -90,3 +120,14 @@ def test_noise_that_was_taken_for_too_large_speaks_against_no_fit() -> None:
     assert objections(replace(fit, chi_square=(0.5,), autocorrelation=(-0.4,)), noisy=False) == ()
     assert len(objections(replace(fit, chi_square=(0.5,), autocorrelation=(0.4,)), noisy=False)) == 1
     assert len(objections(replace(fit, chi_square=(1.2,), autocorrelation=(-0.4,)), noisy=False)) == 1
+
+
+def test_a_single_rod_that_pumps_up_its_mean_pressure_is_balanced_by_mass() -> None:
+    rng = np.random.default_rng(26)
+    drive = prbs(5.0, 5e-4, 250.0, 0.05, rng)
+    record = simulate(CIRCUIT, drive, 5e-4, PUMPED_UP, sensors=BENCH, rng=rng)
+    healthy = EhaParameters(**{name: getattr(PUMPED_UP, name) for name in PARAMETER_NAMES})
+    best = plain_fits(Logged(*without_strays(record)), FitStart(healthy, healthy.bulk_modulus)).best
+    assert balances_mass(best.model)
+    assert best.chi_square[0] < 1.2
+    assert best.values["bulk_modulus"] == pytest.approx(PUMPED_UP.bulk_modulus, rel=0.005)
