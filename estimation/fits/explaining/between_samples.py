@@ -1,9 +1,12 @@
 """`with_course(log, fitted, ...)`: a slow log with what its motor's course between samples leaves open."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from estimation.fits.greybox.course import SLOW, Course, likeliest, turns
+import numpy as np
+
+from estimation.fits.greybox.course import SLOW, Course, turns
+from estimation.fits.greybox.course_noise import likeliest
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
@@ -44,16 +47,23 @@ def with_course(
     """
     if log.sample_time < SLOW or log.gaps.size:
         return log
-    turned, staying, passing, modulus = turns(log), FIRST, FIRST, parameters.bulk_modulus
+    turned, staying, passing, kept, modulus = turns(log), FIRST, FIRST, 1.0, parameters.bulk_modulus
 
     def held() -> GreyBoxLog:
         rise = log.sample_time * parameters.pump_displacement * modulus / parameters.chamber_volume
-        return replace(log, course=Course(rise * turned, staying, ALIKE * passing))
+        return replace(log, course=Course(rise * turned, staying, ALIKE * passing, kept))
 
     for _ in range(ROUNDS):
         now = held()
         best = min(fitted(now), key=lambda fit: fit.cost)
         modulus = best.values["bulk_modulus"]
-        found = likeliest(FreedProblem.of(best.model, now), best.theta, now.course or Course(turned))
-        staying, passing = (max(one, LEAST) for one in found)
+        leaking = replace(now.course or Course(turned), kept=_kept(log, best.values, parameters))
+        staying, passing, kept = likeliest(FreedProblem.of(best.model, now), best.theta, leaking)
+        staying, passing = max(staying, LEAST), max(passing, LEAST)
     return held()
+
+
+def _kept(log: GreyBoxLog, values: Mapping[str, float], parameters: EhaParameters) -> float:
+    """Return what leakage leaves by the next sample of oil that a chamber has too much, make-up holding the other."""
+    leaked = values["bulk_modulus"] * (values["leakage_coefficient"] + values["case_leakage"])
+    return float(np.exp(-log.sample_time * leaked / (2.0 * parameters.chamber_volume)))

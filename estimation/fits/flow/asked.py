@@ -108,13 +108,14 @@ def asked_of(
     shows_zero = best is swinging or homed_at_stop(log)
     if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
         zero = max(zero, promised(log, parameters, best.values, ENCODER_ZERO))
-    worn = delivery.gain > WORTH and abs(delivery.size) > LEAST_DELIVERY
+    worth = WORTH * log.passes
+    worn = delivery.gain > worth and abs(delivery.size) > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and abs(zero.size) > LEAST_ZERO
     plays = play_shows(swinging.play, sensed)
     behind = swinging.values.get("speed_lead", 0.0) > FARTHEST_LEAD * log.sample_time
     tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays), (SPEED_LATE, behind)
     asked = tuple(one for one, worthwhile in tried if worthwhile)
-    asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > WORTH)
+    asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > worth)
     remarks = wear_open(delivery, share_lost(log, swinging.values, parameters.pump_displacement))
     if not moving:
         return HYPOTHESES if not log.passes_on and doubted(swinging) else asked, remarks

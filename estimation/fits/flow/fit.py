@@ -187,7 +187,7 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
     )
     if strange is None:
         return None
-    wanted = _wanted(strange.names, plain.best, plain.swinging, homed=homed_at_stop(plain.log), late=traits.filtered)
+    wanted = _wanted(strange.names, plain, late=traits.filtered)
     believed = _known(strange.names, strange.fit) and explains(strange.fit) and strange.fit.cost < wanted
     return strange if believed else None
 
@@ -278,7 +278,7 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     """Return what a log says that is believed to have nothing strange about it."""
     best = plain.best
     beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in plain.fits]
-    weights = weights_of(plain.fits, SURER * _passes(plain), beforehand)
+    weights = weights_of(plain.fits, SURER * plain.log.passes, beforehand)
     found, correlation = with_lumped(averaged(plain.fits, weights), plain.fits, weights, plain.start.parameters)
     found = with_small_teeth(found, best.small_teeth)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
@@ -299,14 +299,6 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     )
 
 
-def _passes(plain: PlainFits) -> int:
-    """Return how often a slow log's motor turns, 1 at the least and of any other log.
-
-    It passes each turn alike. So what a balance gains on another at one turn, it gains at all, which says no more.
-    """
-    return 1 if plain.log.course is None else max(1, plain.log.course.passes)
-
-
 def _hopeless(swinging: GreyBoxFit, asked: Sequence[Hypothesis]) -> float:
     """Return the cost from which the best of all hypotheses takes up so little that no two of them explain a log.
 
@@ -319,20 +311,23 @@ def _hopeless(swinging: GreyBoxFit, asked: Sequence[Hypothesis]) -> float:
     return swinging.cost - max(WORTH, LITTLE * left)
 
 
-def _wanted(names: Sequence[str], best: GreyBoxFit, swinging: GreyBoxFit, *, homed: bool, late: bool) -> float:
+def _wanted(names: Sequence[str], plain: PlainFits, *, late: bool) -> float:
     """Return the cost below which what is strange is believed rather than the plain form.
 
-    No actuator holds its chambers' volumes. So the zero of an encoder that may have been homed at a stop (``homed``)
-    need explain a log no better than held volumes do, and the lag of a filter (``late``) no better than none. How a
-    play is crossed is not known: with a second hypothesis it may explain a log that has neither.
+    No actuator holds its chambers' volumes. So the zero of an encoder that may have been homed at a stop need explain a
+    log no better than held volumes do, and the lag of a filter (``late``) no better than none. How a play is crossed is
+    not known: with a second hypothesis it may explain a log that has neither. In a slow log that the plain
+    form explains, `WORTH` must be gained at each turn, which the motor passes alike.
     """
+    best = plain.best
+    worth = WORTH * plain.log.passes if plain.explains(best) else WORTH
     if PLAY.name in names and len(names) > 1:
         return -np.inf
     if tuple(names) == (PRESSURE_LATE.name,) and late:
         return best.cost + WORTH
-    if tuple(names) == (ENCODER_ZERO.name,) and homed:
-        return min(best.cost + WORTH, swinging.cost - WORTH)
-    return best.cost - WORTH
+    if tuple(names) == (ENCODER_ZERO.name,) and homed_at_stop(plain.log):
+        return min(best.cost + WORTH, plain.swinging.cost - worth)
+    return best.cost - worth
 
 
 def _known(names: Sequence[str], fit: GreyBoxFit) -> bool:

@@ -1,13 +1,14 @@
 """What the motor's course between the samples of a slow log leaves open, as noise of the pressure.
 
 A slow log says how fast the motor turns at its samples, not in between. Where speed turns suddenly the oil that is
-pumped by straight lines is off in two ways. A command that came at an unknown time leaves a volume open, which stays
-until it leaks off: pressure walks. And a motor that nears its new speed over a sample or two is off by the same course
-each time, which comes back by itself: the samples beside a turn are off, those after it are not.
+pumped by straight lines is off in two ways. A command that came at an unknown time leaves a volume open, which leaks
+off: pressure walks, and comes back as slowly as leakage lets it. And a motor that nears its new speed over a sample or
+two is off by the same course each time, which comes back by itself: the samples beside a turn are off, those after it
+are not.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,24 +24,6 @@ SLOW = 1.5e-3
 
 OWN_NOISE = 4.0
 """Deviations of speed's noise beyond which a second difference is a turn of the motor [dimensionless]."""
-
-SHARES = np.array([0.5, 0.7, 1.0, 1.4])
-"""Variances of the pressure's noise that are tried, over what was read off the log [fraction]: in a slow log the latter
-holds some of what the actuator does."""
-
-TRIED = np.array([0.0, *np.geomspace(0.005, 0.28, 7)])
-"""What is tried of what is open of the oil pumped in a sample, over what a turn of the speed could make of it
-[fraction]: a speed that jumps at an unknown time leaves ``12^-1/2`` open."""
-
-LONGEST = 5000
-"""Blocks of a log's beginning that are asked what is open [count]."""
-
-AT_ONCE = 64
-"""Blocks whose products are summed at a time [count]."""
-
-ALIKE = 1e-9
-"""Power of a combination of columns of length one below which it tells nothing [dimensionless]: rounding is some 1e-15
-of it."""
 
 MAY_VANISH = ("leakage_coefficient", "flow_bias")
 """Unknowns that a slow log may put to nothing, and so far from what they are that bulk modulus follows."""
@@ -70,16 +53,32 @@ class Course:
         [Pa].
     staying, passing : float
         Standard deviation of what stays, and of what comes back, over that [fraction].
+    kept : float
+        What leakage leaves of it by the next sample [fraction].
     """
 
     turns: Array
     staying: float = 1.0
     passing: float = 1.0
+    kept: float = 1.0
 
-    @property
-    def passes(self) -> int:
-        """How often the motor turns [count]: each turn is felt in the time before it and in that after it."""
-        return int(np.count_nonzero(self.turns)) // 2
+    def passes(self, variance: float) -> float:
+        """Return how often the motor turns by what noise does not hide.
+
+        Each turn is felt in the time before it and in that after it.
+
+        Parameters
+        ----------
+        variance : float
+            Of the pressure's noise, a sample [Pa squared].
+
+        Returns
+        -------
+        float
+            At least 1 [count].
+        """
+        left = (self.staying**2 + self.passing**2) * self.turns**2
+        return max(1.0, 0.5 * float(np.sum(left / (left + variance))))
 
     def walk(self, samples: int, block: int) -> Array:
         """Return the variance that pressure gains after each block but the last.
@@ -148,106 +147,23 @@ def turns(log: GreyBoxLog) -> Array:
     return np.maximum(np.maximum(turn, np.append(0.0, turn[:-1])) - OWN_NOISE * log.drive_std[0], 0.0)
 
 
-def likeliest(problem: Problem, theta: Array, course: Course) -> tuple[float, float]:
-    """Return the likeliest of what stays and of what comes back, under any of `SHARES` of the pressure's noise.
+def answered(problem: Problem, theta: Array, speeds: Iterable[Array]) -> Array:
+    """Return how residuals answer to what is added to motor speed.
 
     Parameters
     ----------
     problem : Problem
-        The problem.
+        The problem, motor speed its first drive.
     theta : ndarray, shape (unknowns,)
-        Its solution [dimensionless].
-    course : Course
-        Its turns count alone.
+        Where it is asked [dimensionless].
+    speeds : iterable of ndarray, each of shape (n,)
+        What is added [rad/s].
 
     Returns
     -------
-    tuple of float
-        See `Course` [fraction].
+    ndarray, shape (outputs * blocks, several)
+        Residuals, over what is added [dimensionless].
     """
-    log, unit = problem.log, replace(course, staying=1.0, passing=1.0)
-    (noise,) = log.noise
-    still = problem.on(replace(log, course=None, noise=(replace(noise, walk=0.0),)))
-    samples, block = len(log.measured), max(1, round(log.block / log.sample_time))
-    left, freed = _without_offset(still, theta, LONGEST)
-    level = noise.variance / block
-    walk, beside = np.append(0.0, unit.walk(samples, block)), unit.beside(samples, block)
-    return restricted(left * level**0.5, freed, level, walk, beside)
-
-
-def restricted(left: Array, freed: Array, level: float, walk: Array, beside: Array) -> tuple[float, float]:
-    """Return the likeliest noise of residuals from which a fit has taken what its unknowns could.
-
-    A log under steps has some twenty turns, of which ten unknowns take up half. To the likelihood of what is left those
-    were quiet; the restricted one counts what was taken (Patterson and Thompson 1971, Biometrika 58).
-
-    Parameters
-    ----------
-    left : ndarray, shape (blocks,)
-        Residuals, 0 where missing [Pa].
-    freed : ndarray, shape (blocks, columns)
-        What was taken out of them: columns of length one at right angles [dimensionless].
-    level : float
-        Variance of the pressure's noise in a block [Pa squared].
-    walk, beside : ndarray, shape (blocks,)
-        Variance that is gained up to each block, and that comes back, where each is open in full [Pa squared].
-
-    Returns
-    -------
-    tuple of float
-        What stays and what comes back, see `Course` [fraction].
-    """
-    share, staying, passing = (one.ravel() for one in np.meshgrid(SHARES, TRIED, TRIED, indexing="ij"))
-    white, walks, passes = share * level, staying**2, passing**2
-    values = np.column_stack([left, freed])
-    mean, spread, cost = np.zeros((len(white), values.shape[1])), np.zeros_like(white), np.zeros_like(white)
-    whitened, together = list[Array](), np.zeros((len(white), values.shape[1], values.shape[1]))
-    for value, gained, there in zip(values, walk.tolist(), beside.tolist(), strict=False):
-        spread += walks * gained
-        if value[0] == 0.0:  # missing
-            continue
-        total = spread + white + passes * there
-        innovation = (value - mean) / np.sqrt(total)[:, None]
-        cost += np.minimum(innovation[:, 0] ** 2, 9.0) + np.log(total)
-        whitened.append(innovation)
-        if len(whitened) == AT_ONCE:
-            together += _squares(whitened)
-        mean += (spread / np.sqrt(total))[:, None] * innovation
-        spread -= spread / total * spread
-    if whitened:
-        together += _squares(whitened)
-    known, pulled = together[:, 1:, 1:], together[:, 1:, 0]
-    cost += np.linalg.slogdet(known)[1] - np.sum(pulled * np.linalg.solve(known, pulled[..., None])[..., 0], axis=1)
-    at = int(np.argmin(cost))
-    return float(staying[at]), float(passing[at])
-
-
-def _squares(whitened: list[Array]) -> Array:
-    """Return sums of products of what was whitened, shape (noises, columns, columns), and forget it."""
-    parts = np.stack(whitened, axis=1)
-    whitened.clear()
-    return np.asarray(parts.transpose(0, 2, 1) @ parts, dtype=np.float64)
-
-
-def _without_offset(problem: Problem, theta: Array, most: int) -> tuple[Array, Array]:
-    """Return residuals of the first blocks less what an offset of motor speed and the unknowns make of them.
-
-    An offset leaves pressure off for long. A walk of the pressure would take it up, and none would be found. With them,
-    as columns of length one that are at right angles, is what was taken out.
-    """
-    errors, slopes = problem.linearised(theta)
-    columns = np.column_stack([_answers(problem, theta, [np.ones(len(problem.log.drives))]), slopes])
-    errors, columns = errors.ravel()[:most], columns[:most]
-    sizes = np.linalg.norm(columns, axis=0)
-    columns = columns[:, sizes > 0.0] / sizes[sizes > 0.0]
-    squares, ways_out = np.linalg.eigh(columns.T @ columns)
-    told = squares > ALIKE
-    basis = columns @ (ways_out[:, told] / np.sqrt(squares[told]))  # exactly none where a block is missing
-    return errors - basis @ (basis.T @ errors), basis
-
-
-def _answers(problem: Problem, theta: Array, speeds: Iterable[Array]) -> Array:
-    """Return how residuals answer to what is added to motor speed, shape (outputs * blocks, several)."""
     drives = problem.log.drives
     others = [np.column_stack([NUDGE * one, np.zeros_like(drives[:, 1:])]) for one in speeds]
     known, *moved = problem.disturbed(theta, [drives, *(drives + other for other in others)])
@@ -300,7 +216,7 @@ def opened(problem: Problem, theta: Array, errors: Array, bread: Array, slopes: 
     ndarray, shape (felt, felt)
         [dimensionless]
     """
-    columns = _answers(problem.coarse, theta, ways(problem.log.drives[:, 0]))
+    columns = answered(problem.coarse, theta, ways(problem.log.drives[:, 0]))
     answers = bread @ (slopes.T @ columns)
     free = columns - slopes @ answers
     spread = np.linalg.inv(free.T @ free + IN_VOLUME.T @ IN_VOLUME / USUAL**2)

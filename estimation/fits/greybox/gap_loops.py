@@ -50,6 +50,7 @@ def residuals_across_gaps(
     variance: Array,
     walk: Array,
     open_at: Array,
+    kept: float,
     gaps: Array,
     errors: Array,
 ) -> None:
@@ -71,6 +72,8 @@ def residuals_across_gaps(
         Samples a block.
     variance, walk, open_at : ndarray, shapes (outputs,), (outputs, walks), (outputs, places)
         As of `side_by_side_loops.residuals_side_by_side` [SI squared].
+    kept : float
+        What is left of a random walk's level after a block [fraction].
     gaps : ndarray, shape (gaps, 3)
         First and last sample that a gap in the drives acts on, and the variance of `GreyBoxModel.jump` over each.
     errors : ndarray, shape (outputs, blocks, lanes)
@@ -129,7 +132,7 @@ def residuals_across_gaps(
                 for lane in range(lanes):
                     excess[i, lane] += work[shown + i * lanes + lane]
         if (k + 1) % block == 0 or k == n - 1:
-            close(kernel, k // block, excess, level, present, spread, variance, walk, open_at, errors)
+            close(kernel, k // block, excess, level, present, spread, variance, walk, open_at, kept, errors)
 
 
 def carry_each(kernel: GapKernel, work: Array, covariance: Array, reach: Array) -> None:

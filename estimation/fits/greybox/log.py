@@ -213,8 +213,16 @@ class GreyBoxLog:
         """Whether noise of a driving channel counts with an unknown."""
         return any(noise.passed_on > 0.0 for noise in self.noise)
 
-    def walks(self, block: int) -> tuple[Array, Array]:
-        """Return what the random walk of each output gains after each block, and what else is open of its mean.
+    @property
+    def passes(self) -> float:
+        """How often a slow log's motor turns, 1 at the least and of any other log [count].
+
+        It passes each turn alike. So what one form gains on another at one turn, it gains at all, which says no more.
+        """
+        return 1.0 if self.course is None else self.course.passes(self.noise[0].variance)
+
+    def walks(self, block: int) -> tuple[Array, Array, float]:
+        """Return what the random walk of each output gains after each block, what else is open, and what is kept.
 
         Parameters
         ----------
@@ -223,15 +231,19 @@ class GreyBoxLog:
 
         Returns
         -------
-        tuple of ndarray, shapes (outputs, walks) and (outputs, places)
-            The last number counts for all blocks that follow [SI squared].
+        ndarray, shape (outputs, walks)
+            What it gains; the last number counts for all blocks that follow [SI squared].
+        ndarray, shape (outputs, places)
+            What else is open of each block's mean; likewise [SI squared].
+        float
+            What is left of its level after a block [fraction].
         """
         walk = np.array([[noise.walk * block * self.sample_time] for noise in self.noise])
         beside = np.zeros_like(walk)
         if self.course is None:
-            return walk, beside
-        samples = len(self.measured)
-        return walk + self.course.walk(samples, block), beside + self.course.beside(samples, block)
+            return walk, beside, 1.0
+        samples, course = len(self.measured), self.course
+        return walk + course.walk(samples, block), beside + course.beside(samples, block), course.kept**block
 
     def taken_at(self, value: float) -> "GreyBoxLog":
         """Return the log with the noise that driving channels pass on as it is where the unknown has a value.

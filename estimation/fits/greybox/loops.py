@@ -69,6 +69,7 @@ def run(
     variance: Array,
     walk: Array,
     open_at: Array,
+    kept: float,
     gaps: Array,
     outlier: float,
     errors: Array,
@@ -95,6 +96,8 @@ def run(
     variance, walk, open_at : ndarray, shapes (outputs,), (outputs, walks), (outputs, places)
         White noise of each output, what its random walk gains after each block, and what else is open of each block's
         mean; the last number counts for all blocks that follow [SI squared].
+    kept : float
+        What is left of a random walk's level after a block [fraction].
     gaps : ndarray, shape (gaps, 3)
         First and last sample that a gap in the drives acts on, and the variance of `GreyBoxModel.jump` over each.
     outlier : float
@@ -169,7 +172,8 @@ def run(
                         slopes[i, k // block] = rows[i, 1:]
                     rows[i] = 0.0
                     present[i] = 0.0
-                spread[i] += walk[i, min(k // block, walk.shape[1] - 1)]
+                levels[i] *= kept
+                spread[i] = kept * kept * spread[i] + walk[i, min(k // block, walk.shape[1] - 1)]
     return cost, gradient, gram
 
 

@@ -85,7 +85,7 @@ class Problem:
         self._block = max(1, round(log.block / log.sample_time))
         self._passes_on = log.passes_on
         self._white = np.array([noise.variance for noise in log.noise])
-        self._walk, self._open = log.walks(self._block)
+        self._walks = log.walks(self._block)
         sizes = dict(model.linear)
         presumed = [log.presumed.get(name, (sizes.get(name, 1.0), np.inf)) for name in model.unknowns]
         self.presumed = model.theta({name: value for name, (value, _) in zip(model.unknowns, presumed, strict=True)})
@@ -318,9 +318,9 @@ class Problem:
             out[place] += share * float(errors[i] @ errors[i])
         return out
 
-    def _course(self, variance: Array) -> tuple[float, IntArray, int, Array, Array, Array]:
+    def _course(self, variance: Array) -> tuple[float, IntArray, int, Array, Array, Array, float]:
         """Return sample time, model steps up to each sample, samples a block, and the noises of each output."""
-        return self.log.sample_time, self.log.steps, self._block, variance, self._walk, self._open
+        return self.log.sample_time, self.log.steps, self._block, variance, *self._walks
 
 
 def weighed(errors: Array, slopes: Array) -> tuple[float, Array, Array]:

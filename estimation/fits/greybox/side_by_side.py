@@ -33,8 +33,8 @@ MANY = 2 * LANES
 to 1.6 times as long as one."""
 
 ResidualsRun: TypeAlias = Callable[..., None]
-"""``run(parameters, drives, measured, sample_time, substeps, block, variance, walk, open_at, errors)`` fills errors; of
-a model that bears gaps, these come before the errors."""
+"""``run(parameters, drives, measured, sample_time, substeps, block, variance, walk, open_at, kept, errors)`` fills
+errors; of a model that bears gaps, these come before the errors."""
 
 
 @cache

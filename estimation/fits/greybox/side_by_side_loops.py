@@ -48,6 +48,7 @@ def residuals_side_by_side(
     variance: Array,
     walk: Array,
     open_at: Array,
+    kept: float,
     errors: Array,
 ) -> None:
     """Fill in the normalised residuals of a model under several parameter sets.
@@ -69,6 +70,8 @@ def residuals_side_by_side(
     variance, walk, open_at : ndarray, shapes (outputs,), (outputs, walks), (outputs, places)
         White noise of each output, what its random walk gains after each block, and what else is open of each block's
         mean; the last number counts for all blocks that follow [SI squared].
+    kept : float
+        What is left of a random walk's level after a block [fraction].
     errors : ndarray, shape (outputs, blocks, lanes)
         Room for the residuals; those of missing blocks are left as they are.
     """
@@ -102,7 +105,7 @@ def residuals_side_by_side(
                 for lane in range(lanes):
                     excess[i, lane] += work[shown + i * lanes + lane] - measured[k, i]
         if (k + 1) % block == 0 or k == n - 1:
-            close(kernel, k // block, excess, level, present, spread, variance, walk, open_at, errors)
+            close(kernel, k // block, excess, level, present, spread, variance, walk, open_at, kept, errors)
 
 
 def drive(kernel: SideBySideKernel, work: Array, drives: Array, k: int, steps: int) -> None:
@@ -143,6 +146,7 @@ def close(
     variance: Array,
     walk: Array,
     open_at: Array,
+    kept: float,
     errors: Array,
 ) -> None:
     """Fill in the residuals of a block, and take the random walks over to the next one.
@@ -157,6 +161,8 @@ def close(
         Samples of the block, which become none, and what the levels are not known by [SI squared].
     variance, walk, open_at : ndarray, shapes (outputs,), (outputs, walks), (outputs, places)
         As of `residuals_side_by_side` [SI squared].
+    kept : float
+        What is left of a random walk's level after a block [fraction].
     errors : ndarray, shape (outputs, blocks, lanes)
         Room for the residuals; those of missing blocks are left as they are.
     """
@@ -167,7 +173,9 @@ def close(
             absorb(kernel, excess[i], level[i], present[i], gain, math.sqrt(total), errors[i, place])
             spread[i] -= gain * spread[i]
             present[i] = 0.0
-        spread[i] += walk[i, min(place, walk.shape[1] - 1)]
+        for lane in range(kernel.LANES):
+            level[i, lane] *= kept
+        spread[i] = kept * kept * spread[i] + walk[i, min(place, walk.shape[1] - 1)]
 
 
 def absorb(

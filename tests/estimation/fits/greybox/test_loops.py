@@ -49,7 +49,7 @@ def test_the_same_bits_as_python(model: GreyBoxModel, asked: bool, monkeypatch: 
         rng.integers(1, 3, samples),
         block,
     )
-    given = (*given, np.array([2.5e7]), np.array([[1e3, 0.0, 2e3]]), np.array([[0.0, 5e7]]), gaps, 3.0)
+    given = (*given, np.array([2.5e7]), np.array([[1e3, 0.0, 2e3]]), np.array([[0.0, 5e7]]), 0.9, gaps, 3.0)
     blocks = -(-samples // block)
     shapes = ((1, blocks), (1, blocks, theta.size)) if asked else ((0, 0), (0, 0, theta.size))
     found, wanted = (tuple(np.zeros(shape) for shape in shapes) for _ in range(2))

@@ -104,6 +104,7 @@ def test_a_run_that_escapes_keeps_a_finite_residual_and_leaves_its_neighbours_al
         np.array([noise.variance]),
         np.zeros((1, 1)),
         np.zeros((1, 1)),
+        1.0,
         errors,
     )
     assert np.max(np.abs(errors[..., 3])) == RUNAWAY
