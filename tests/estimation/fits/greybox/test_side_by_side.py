@@ -183,7 +183,7 @@ def test_the_loop_run_as_python_gives_what_its_kernel_gives(
     measured = problem.log.measured[200 : 200 + n].copy()
     measured[4:6] = np.nan
     given = measured, 1e-3, np.array([0, *[2] * (n - 3), 3, 3]), 2, np.array([1e7])
-    given = *given, np.array([[1e6, 0.0, 2e6]]), np.array([[0.0, 3e7]])
+    given = *given, np.array([[1e6, 0.0, 2e6]]), np.array([[0.0, 3e7]]), 0.9
     form = replace(FLOW_FORM, jump=())
     text = text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(form, LANES))
     file = functions_of(text)
@@ -239,7 +239,7 @@ def test_the_loop_across_gaps_run_as_python_gives_what_its_kernel_gives(
     measured = problem.log.measured[200 : 200 + n].copy()
     measured[4:6] = np.nan
     given = problem.log.drives[200 : 200 + n, :2, None], measured, 1e-3, np.array([0, *[2] * (n - 3), 3, 3]), 2
-    given = *given, np.array([1e7]), np.array([[1e6, 0.0, 2e6]]), np.array([[0.0, 3e7]])
+    given = *given, np.array([1e7]), np.array([[1e6, 0.0, 2e6]]), np.array([[0.0, 3e7]]), 0.9
     given = *given, np.array([[0.0, 1.0, 1e6], [3.0, 5.0, 1e10]])
     text = text_of(monkeypatch, side_by_side, lambda: compile_side_by_side.__wrapped__(FLOW_FORM, LANES))
     file = functions_of(text)
