@@ -75,8 +75,8 @@ def test_a_filters_bulk_modulus_goes_with_the_volume_and_against_the_gain(form: 
 
 @pytest.mark.slow
 def test_without_pressure_the_mass_holds_the_scale() -> None:
-    # 4 s leave room for optima 4 % apart, and no number is believed
-    record = log(HEALTHY, duration=8.0).replace(**{PRESSURE: None})
+    # 4 s leave room for optima 4 % apart, and of 8 s the bound may exceed 3 %: no number is believed
+    record = log(HEALTHY, duration=10.0).replace(**{PRESSURE: None})
     heavy = replace(HEALTHY, moving_mass=1.3 * HEALTHY.moving_mass)
     found = [estimate_bulk_modulus(record, rig, form="motion") for rig in (HEALTHY, heavy)]
     values = [{"bulk_modulus": one.value or 0.0, **{name: v for name, (v, _) in one.others.items()}} for one in found]

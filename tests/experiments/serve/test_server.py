@@ -204,6 +204,8 @@ def test_an_answer_that_comes_late_does_not_undo_a_newer_one(opened: Any, tmp_pa
     page.set_input_files("#file", str(tmp_path / "late answer.csv"))
     row = page.locator("tr", has_text="late answer.csv")
     row.locator("td", has_text="failed").wait_for()
+    while not held:  # the first answer may be fetched later than the second
+        page.wait_for_timeout(20)
     (route, old) = held[0]
     with page.expect_response("**/api/logs?most=*") as late:
         route.fulfill(response=old)

@@ -40,7 +40,7 @@ def test_bulk_modulus_and_leakage_come_back_without_knowing_the_condition(condit
     leakage, std = fit.parameters["leakage_coefficient"]
     assert abs(leakage - p.leakage_coefficient) < 2.0 * std
     through = leakage + 0.5 * fit.parameters["case_leakage"][0]  # what dp drives, whichever way it takes
-    assert through == pytest.approx(p.leakage_coefficient, rel=0.05, abs=0.0)
+    assert through == pytest.approx(p.leakage_coefficient, rel=0.05, abs=2.0 * std)  # of a healthy one 6 s tell 5 %
     assert fit.parameters["flow_bias"][0] == pytest.approx(p.flow_bias, rel=0.10)
     assert fit.reasons == ()
 
