@@ -187,7 +187,8 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
     )
     if strange is None:
         return None
-    wanted = _wanted(strange.names, plain, late=traits.filtered)
+    homed, late = homed_at_stop(plain.log), traits.filtered
+    wanted = _wanted(strange.names, plain.best, plain.swinging, homed=homed, late=late, worth=_worth(plain))
     believed = _known(strange.names, strange.fit) and explains(strange.fit) and strange.fit.cost < wanted
     return strange if believed else None
 
@@ -311,23 +312,36 @@ def _hopeless(swinging: GreyBoxFit, asked: Sequence[Hypothesis]) -> float:
     return swinging.cost - max(WORTH, LITTLE * left)
 
 
-def _wanted(names: Sequence[str], plain: PlainFits, *, late: bool) -> float:
-    """Return the cost below which what is strange is believed rather than the plain form.
+def _wanted(
+    names: Sequence[str],
+    best: GreyBoxFit,
+    swinging: GreyBoxFit,
+    *,
+    homed: bool,
+    late: bool,
+    worth: float = WORTH,
+) -> float:
+    """Return the cost below which what is strange is believed rather than the plain form, if it must gain ``worth``.
 
-    No actuator holds its chambers' volumes. So the zero of an encoder that may have been homed at a stop need explain a
-    log no better than held volumes do, and the lag of a filter (``late``) no better than none. How a play is crossed is
-    not known: with a second hypothesis it may explain a log that has neither. In a slow log that the plain
-    form explains, `WORTH` must be gained at each turn, which the motor passes alike.
+    No actuator holds its chambers' volumes. So the zero of an encoder that may have been homed at a stop (``homed``)
+    need explain a log no better than held volumes do, and the lag of a filter (``late``) no better than none. How a
+    play is crossed is not known: with a second hypothesis it may explain a log that has neither.
     """
-    best = plain.best
-    worth = WORTH * plain.log.passes if plain.explains(best) else WORTH
     if PLAY.name in names and len(names) > 1:
         return -np.inf
     if tuple(names) == (PRESSURE_LATE.name,) and late:
         return best.cost + WORTH
-    if tuple(names) == (ENCODER_ZERO.name,) and homed_at_stop(plain.log):
-        return min(best.cost + WORTH, plain.swinging.cost - worth)
+    if tuple(names) == (ENCODER_ZERO.name,) and homed:
+        return min(best.cost + WORTH, swinging.cost - worth)
     return best.cost - worth
+
+
+def _worth(plain: PlainFits) -> float:
+    """Return what a hypothesis must gain: in a slow log that the plain form explains, `WORTH` at each turn.
+
+    The motor passes turns alike, so what is strange is seen at each.
+    """
+    return WORTH * plain.log.passes if plain.explains(plain.best) else WORTH
 
 
 def _known(names: Sequence[str], fit: GreyBoxFit) -> bool:
