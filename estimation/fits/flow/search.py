@@ -243,8 +243,9 @@ def _led(
 ) -> list[_Rough]:
     """Return where the balances fit best with long model steps, each searched from where the first one ended."""
     afar = log.taken_at(parameters.bulk_modulus)
-    guess, near = _guess(forms[0], afar, parameters, starts)
-    screen = remembered(FreedProblem.of(forms[0], _begun(afar)).at)
+    begun = FreedProblem.of(forms[0], afar.beginning(_search(afar).screened).coarsened())
+    guess, near = _guess(begun, afar, parameters, starts)
+    screen = remembered(begun.at)
     if not near:  # in a wrong valley the whole log takes all steps that there are
         first = _searched(forms[0], log, afar, starts, hopeful=True, screen=screen)
         if _explains(first):
@@ -270,25 +271,19 @@ def _explains(one: _Rough) -> bool:
 
 
 def _guess(
-    form: GreyBoxModel, log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]
+    problem: FreedProblem, log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]
 ) -> tuple[Mapping[str, float], bool]:
     """Return where the likeliest of many guesses about the first start leads, and whether that explains the log.
 
-    Of the log its beginning is looked at.
+    Of the log its beginning is looked at, which the problem holds.
     """
     search = _search(log)
-    problem = FreedProblem.of(form, _begun(log))
     around = {STIFFNESS: 0.0, **starts[0]}
     guesses = _guesses_about(around, problem.model, parameters)
     likeliest = guesses[int(np.argmin(problem.costs(guesses, LANES)))]
-    bounds = flow_bounds(form, guesses, log)
+    bounds = flow_bounds(problem.model, guesses, log)
     found = descend(problem.at, likeliest, search.evaluations, bounds, search.near_enough, GUESSED_WITHIN)
     return problem.model.values(found.theta), explained(problem, found)
-
-
-def _begun(log: GreyBoxLog) -> GreyBoxLog:
-    """Return the beginning of a log on which starts are compared, with long model steps."""
-    return log.beginning(_search(log).screened).coarsened()
 
 
 def _guesses_about(around: Mapping[str, float], model: GreyBoxModel, p: EhaParameters) -> list[Array]:

@@ -61,8 +61,9 @@ def without_chatter(problem: FreedProblem, theta: Array) -> FreedProblem:
     """
     log, values = problem.log, problem.model.values(theta)
     times = min(ceil(_over(log, values, parameter_names(problem.model.parameters))), MOST_SHORTENED)
-    steps = np.where(log.steps == np.max(log.steps), times * log.steps, log.steps)
-    return problem if times <= 1 else problem.on(replace(log, steps=steps))
+    if times <= 1:
+        return problem
+    return problem.on(replace(log, steps=np.where(log.steps == np.max(log.steps), times * log.steps, log.steps)))
 
 
 def _over(log: GreyBoxLog, values: Mapping[str, float], names: tuple[str, ...]) -> float:
