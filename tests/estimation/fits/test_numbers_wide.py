@@ -130,8 +130,9 @@ def what_is_asked_of_a_log() -> dict[str, Any]:
 def first_guesses_of_the_flow_form() -> dict[str, Any]:
     log_of = seen(log(0.5))
     costs = FreedProblem.costs
+    begun = FreedProblem.of(FLOW_FORM, log_of.beginning(_search(log_of).screened).coarsened())
     with patch.object(FreedProblem, "costs", autospec=True, side_effect=costs) as asked:
-        found, near = _guess(FLOW_FORM, log_of, PAPER, flow_starts(PAPER, 2e8))
+        found, near = _guess(begun, log_of, PAPER, flow_starts(PAPER, 2e8))
     guesses = np.array(asked.call_args.args[1])
     return {
         "count": len(guesses),
