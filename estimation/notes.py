@@ -153,8 +153,9 @@ class EstimateCode(Code):
         "fit could not correct this: bulk modulus may be several percent too low"
     )
     RIG_CONTRADICTED = (
-        "the piston moves as if the pump delivered {percent:.0f} % of its displacement, which is impossible with this "
-        "rig file: pump displacement, piston area, or the unit or scale of motor speed or position is wrong"
+        "the piston moves as if the pump delivered about {percent:.0f} % of its displacement: the rig file is that of "
+        "another actuator, or its pump displacement or piston area is wrong, or the unit or scale of motor speed or "
+        "position"
     )
     TEETH_LEFT = (
         "the pressure residuals follow the shaft angle, as with a flow ripple of {percent:.0f} % from the pump's teeth "

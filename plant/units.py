@@ -300,5 +300,7 @@ def by_pint(unit: str, name: str, wanted: str) -> tuple[float, float]:
     except Exception as error:  # pint parses with several exception types of its own and of tokenize
         raise ValueError(f"unit {unit!r} cannot be read, wanted one that converts to {wanted!r}") from error
     if turns != ("rad" in wanted):  # pint takes 1 Hz for 1 rad/s
-        raise ValueError(f"unit {unit!r} leaves the angle out, wanted one that converts to {wanted!r}, as rpm does")
+        raise ValueError(
+            f"unit {unit!r} leaves the angle out, wanted one that converts to {wanted!r}, with rad, rev or rpm"
+        )
     return one - zero, zero

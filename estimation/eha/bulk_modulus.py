@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from estimation.eha.another_rig import unless_another_rig
 from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
 from estimation.eha.named import NAMED
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide, without_number
@@ -214,7 +215,7 @@ def estimate_clean(
         require_known("form", form, FORMS)
         how = options.filter_options
         found = estimate_by_filter(log, parameters, FORMS[form], guess, options.start_std, how)
-    return _doubting_sensors(_with_rig(found, parameters, spreads), log)
+    return _doubting_sensors(unless_another_rig(_with_rig(found, parameters, spreads), log, parameters), log)
 
 
 def _fit(

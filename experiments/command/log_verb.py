@@ -28,6 +28,11 @@ if TYPE_CHECKING:
 COMMON = frozenset({"logs", "plant", "rig", "columns", "report", "out", "seed", "as_json", "sample_time", "beside"})
 """Options of every kind of actuator."""
 
+ASSUMED = (
+    "no --rig: the paper's actuator is assumed; if yours is another one, `hydrostate rig init rig.toml` writes a file "
+    "to fill in"
+)
+
 
 @dataclass(frozen=True)
 class _Question:
@@ -126,6 +131,8 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
                 yield one, own
 
     batch = run_logs(logs, work, {**question.chosen.blank, **question.about}, doing)
+    if asked["rig"] is None and any(result["outcome"] != "failed" for result in batch.results):
+        note(ASSUMED)
     for one, results in of_each_kind(batch.results):
         for remark in one.chosen.remarks(results):
             note(remark)

@@ -179,6 +179,10 @@ def _estimate_message(found: "Finding") -> str:
             return clauses(
                 [f"no value of bulk modulus: {volume}; correct chamber_volume, then estimate this log again"]
             )
+        if found.outcome is Outcome.MISMATCH and found.gate.reasons and not mistakes:
+            return clauses(
+                ["no value of bulk modulus: the model does not describe the log", *map(str, found.gate.reasons)]
+            )
         return clauses(mistakes or [NOT_OBSERVABLE_WITH_PRESSURE if seen else OUTCOMES[found.outcome]])
     low, high = (1e-6 * end for end in modulus.ci95)
     digits = decimals_of(low, high)

@@ -171,6 +171,7 @@ def _content(path: Path) -> dict[str, Any]:
 
 def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> Rig[Any]:
     from plant.eha.rig_entries import RigEntries, numbers_of
+    from plant.eha.rig_quantities import numbers_with_units
     from plant.eha.rig_units import require_si
 
     if misplaced := [name for name in content if name in _names(parameter_class)]:
@@ -180,7 +181,8 @@ def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> 
     if file.plant not in (None, plant):
         raise RigError(f"a rig of plant {plant!r} is needed here, got one of {file.plant!r}")
     _known(file.parameters, _names(parameter_class), "parameters")
-    values = numbers_of(_unpaired(file.parameters, _pairs_of(parameter_class)), parameter_class)
+    given = numbers_with_units(file.parameters, {name: one.unit for name, one in notes(parameter_class).items()})
+    values = numbers_of(_unpaired(given, _pairs_of(parameter_class)), parameter_class)
     parameters = parameter_class(**values)
     if isinstance(parameters, EhaParameters):
         require_si(parameters)
@@ -251,7 +253,8 @@ def rig_template(
     parameters = parameter_class()
     lines = [
         "# A rig file: an actuator's parameters, how well each is known, and the names of the columns in its logs.",
-        "# All values are SI, and those of the healthy actuator.",
+        "# All values are those of the healthy actuator, in SI, or with a unit in quotes as a nameplate has them: "
+        + ('"3.5 cm^3/rev", "160 bar".' if parameter_class is EhaParameters else '"160 bar".'),
         "# A parameter that is left out keeps the value shown here.",
         "",
         *([f'name = "{UNNAMED}"'] if plant == EHA else [f'name = "{plant}"', f'plant = "{plant}"']),

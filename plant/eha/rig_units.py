@@ -19,28 +19,26 @@ class Limits(NamedTuple):
     ----------
     least, most : float
         Its limits [SI].
-    unit, slip : str
-        Its unit, and how what a nameplate says is converted to it.
+    unit, example : str
+        Its unit, and how a nameplate may have it.
     """
 
     least: float
     most: float
     unit: str
-    slip: str
+    example: str
 
-
-_PRESSURE = "bar times 1e5, MPa times 1e6 and psi times 6895 are Pa"
 
 LIMITS: Mapping[str, Limits] = MappingProxyType(
     {
-        "pump_displacement": Limits(1e-11, 1e-2, "m^3/rad", "cm^3 per revolution times 1.5915e-7 is m^3/rad"),
-        "piston_area": Limits(1e-6, 10.0, "m^2", "mm^2 times 1e-6 and cm^2 times 1e-4 are m^2"),
-        "bulk_modulus": Limits(1e6, 1e11, "Pa", f"{_PRESSURE}; GPa times 1e9 too"),
-        "leakage_coefficient": Limits(0.0, 1e-7, "m^3/(s Pa)", "L/min at a bar times 1.667e-10 is m^3/(s Pa)"),
-        "flow_bias": Limits(0.0, 1e-2, "m^3/s", "L/min times 1.667e-5 is m^3/s"),
-        "relief_pressure": Limits(1e4, 1e9, "Pa", _PRESSURE),
-        "accumulator_pressure": Limits(1e3, 1e9, "Pa", f"{_PRESSURE}, absolute"),
-        "stroke": Limits(1e-4, 30.0, "m", "mm times 1e-3 is m"),
+        "pump_displacement": Limits(1e-11, 1e-2, "m^3/rad", "8 cm^3/rev"),
+        "piston_area": Limits(1e-6, 10.0, "m^2", "31.2 cm^2"),
+        "bulk_modulus": Limits(1e6, 1e11, "Pa", "1.4 GPa"),
+        "leakage_coefficient": Limits(0.0, 1e-7, "m^3/(s Pa)", "0.03 L/min/bar"),
+        "flow_bias": Limits(0.0, 1e-2, "m^3/s", "0.1 L/min"),
+        "relief_pressure": Limits(1e4, 1e9, "Pa", "160 bar"),
+        "accumulator_pressure": Limits(1e3, 1e9, "Pa", "3 bar"),
+        "stroke": Limits(1e-4, 30.0, "m", "200 mm"),
     }
 )
 """What entries may be; judged."""
@@ -48,6 +46,10 @@ LIMITS: Mapping[str, Limits] = MappingProxyType(
 LENGTHS = (1e-3, 1e2)
 """Chamber volume over piston area [m]; judged: half a chamber, with port and hose, is as long as some pistons' travel.
 Litres are told by it in any size of actuator."""
+
+
+def _quoted(example: str) -> str:
+    return f'write another unit in quotes, as in "{example}"'
 
 
 def require_si(p: EhaParameters) -> None:
@@ -65,19 +67,19 @@ def require_si(p: EhaParameters) -> None:
 
     Examples
     --------
-    >>> require_si(EhaParameters(flow_bias=2.0))
+    >>> require_si(EhaParameters(stroke=200.0))  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    plant.errors.RigError: parameters.flow_bias must be from 0 to 0.01 m^3/s, got 2: L/min times 1.667e-5 is m^3/s
+    plant.errors.RigError: parameters.stroke must be from 0.0001 to 30 m, got 200; ... in quotes, as in "200 mm"
     """
     for name, one in LIMITS.items():
         value = getattr(p, name)
         if value is not None and not one.least <= value <= one.most:
             limits = f"from {one.least:g} to {one.most:g} {one.unit}"
-            raise RigError(f"parameters.{name} must be {limits}, got {value:g}: {one.slip}")
+            raise RigError(f"parameters.{name} must be {limits}, got {value:g}; {_quoted(one.example)}")
     length = p.chamber_volume / p.piston_area
     if not LENGTHS[0] <= length <= LENGTHS[1]:
         raise RigError(
             f"parameters.chamber_volume must be {LENGTHS[0]:g} to {LENGTHS[1]:g} m of the piston's area, got "
-            f"{p.chamber_volume:g} m^3, which is {length:.3g} m of {p.piston_area:g} m^2: L times 1e-3 and cm^3 times "
-            "1e-6 are m^3, and for piston_area cm^2 times 1e-4 and mm^2 times 1e-6 are m^2"
+            f"{p.chamber_volume:g} m^3, which is {length:.3g} m of {p.piston_area:g} m^2; "
+            f'{_quoted("0.6 L")}, and piston_area as in "31.2 cm^2"'
         )

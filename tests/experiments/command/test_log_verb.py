@@ -56,6 +56,15 @@ def test_the_command_says_where_the_page_went(log: Path, tmp_path: Path) -> None
     assert "written" not in done.stdout
 
 
+def test_the_command_says_that_it_assumed_an_actuator_unless_it_was_told_of_one(log: Path, tmp_path: Path) -> None:
+    assert invoke("rig", "init", tmp_path / "rig.toml").exit_code == 0
+    for given, said in (((), 1), (("--rig", tmp_path / "rig.toml"), 0)):
+        done = invoke("estimate", log, *given)
+        assert done.exit_code == 0, done.output
+        assert done.stderr.count("no --rig: the paper's actuator is assumed") == said
+        assert "--rig" not in done.stdout
+
+
 def test_a_page_that_cannot_be_written_costs_no_verdict(
     log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -99,7 +99,7 @@ def test_every_parameter_refuses_text(tmp_path: Path, field: str) -> None:
         ('[uncertainty]\nchamber_volume = "15 %"', r"must be a valid number \(a fraction: 0\.15 is 15 %\), got '15 %'"),
         (
             "[parameters]\npiston_area = 2.0",
-            r"parameters\.chamber_volume .* m of 2 m\^2: .* for piston_area .*mm\^2 times 1e-6",
+            r"parameters\.chamber_volume .* m of 2 m\^2; .* and piston_area as in \"31\.2 cm\^2\"",
         ),
         ("[parametres]\npiston_area = 1.0", r"parametres is unknown, did you mean 'parameters'\?"),
         (

@@ -1,4 +1,4 @@
-"""An entry of a rig file in another unit is refused with how to convert it, whatever actuator it is of."""
+"""An entry of a rig file in another unit is refused with how to write it, whatever actuator it is of."""
 
 from pathlib import Path
 
@@ -13,28 +13,41 @@ from plant.errors import RigError
 @pytest.mark.parametrize(
     ("entry", "words"),
     [
-        ("pump_displacement = 8", "must be from 1e-11 to 0.01 m^3/rad, got 8: cm^3 per revolution times 1.5915e-7"),
+        (
+            "pump_displacement = 8",
+            'from 1e-11 to 0.01 m^3/rad, got 8; write another unit in quotes, as in "8 cm^3/rev"',
+        ),
         ("pump_displacement = 1.27", "m^3/rad"),
-        ("piston_area = 1520", "must be from 1e-06 to 10 m^2, got 1520: mm^2 times 1e-6"),
-        ("piston_area = 15.2", "cm^2 times 1e-4"),
+        (
+            "piston_area = 1520",
+            'must be from 1e-06 to 10 m^2, got 1520; write another unit in quotes, as in "31.2 cm^2"',
+        ),
+        ("piston_area = 15.2", '"31.2 cm^2"'),
         ("piston_area = [31.2, 21.0]", "got 26.1"),
-        ("chamber_volume = 1.08", "which is 711 m of 0.00152 m^2: L times 1e-3"),
-        ("chamber_volume = 1080", "cm^3 times 1e-6"),
-        ("bulk_modulus = 207", "MPa times 1e6"),
-        ("bulk_modulus = 2.07", "GPa times 1e9"),
-        ("leakage_coefficient = 0.0287", "L/min at a bar times 1.667e-10"),
-        ("flow_bias = 0.14", "L/min times 1.667e-5"),
-        ("relief_pressure = 160", "bar times 1e5, MPa times 1e6 and psi times 6895 are Pa"),
-        ("accumulator_pressure = 3", "are Pa, absolute"),
-        ("stroke = 200", "mm times 1e-3 is m"),
+        ("chamber_volume = 1.08", 'which is 711 m of 0.00152 m^2; write another unit in quotes, as in "0.6 L"'),
+        ("chamber_volume = 1080", '"0.6 L"'),
+        ("bulk_modulus = 207", '"1.4 GPa"'),
+        ("bulk_modulus = 2.07", '"1.4 GPa"'),
+        ("leakage_coefficient = 0.0287", '"0.03 L/min/bar"'),
+        ("flow_bias = 0.14", '"0.1 L/min"'),
+        ("relief_pressure = 160", '"160 bar"'),
+        ("accumulator_pressure = 3", '"3 bar"'),
+        ("stroke = 200", '"200 mm"'),
     ],
 )
-def test_a_number_in_another_unit_is_refused_with_its_conversion(tmp_path: Path, entry: str, words: str) -> None:
+def test_a_number_in_another_unit_is_refused_with_how_to_write_it(tmp_path: Path, entry: str, words: str) -> None:
     (tmp_path / "rig.toml").write_text(f"[parameters]\n{entry}\n")
     with pytest.raises(RigError) as said:
         read_rig(tmp_path / "rig.toml")
     assert words in str(said.value)
     assert f"parameters.{entry.split(' ')[0]} must be" in str(said.value)
+
+
+@pytest.mark.parametrize("name", list(LIMITS))
+def test_what_a_refusal_offers_is_read(tmp_path: Path, name: str) -> None:
+    (tmp_path / "rig.toml").write_text(f'[parameters]\n{name} = "{LIMITS[name].example}"\n')
+    value = getattr(read_rig(tmp_path / "rig.toml").parameters, name)
+    assert LIMITS[name].least < value < LIMITS[name].most
 
 
 @pytest.mark.parametrize("scale", [0.1, 1.0, 10.0])

@@ -1,0 +1,55 @@
+"""A log of another actuator than the rig file's is told by where the pumped oil goes."""
+
+from dataclasses import replace
+
+import pytest
+
+from estimation.eha.another_rig import rig_contradicted, unless_another_rig
+from estimation.eha.estimate import estimate_log
+from estimation.eha.result import too_wide, without_number
+from estimation.finding import Outcome
+from estimation.fits.flow.fit import FLOW_CHANNELS
+from estimation.log_checks.clean import clean_log
+from estimation.notes import EstimateCode
+from experiments.eha.entries import estimate_entries
+from plant.eha.model import EhaParameters
+from plant.eha.rig import Rig
+from tests.estimation.fits.short_logs import PAPER, PRESSURE, WORN, log
+
+SMALL = replace(PAPER, piston_area=PAPER.piston_area / 3.0, chamber_volume=PAPER.chamber_volume / 30.0)
+"""A rig file of a smaller cylinder than the log's: with its pump the piston would go three times as far."""
+
+
+@pytest.mark.parametrize("times", [0.3, 0.5, 2.0, 3.0])
+def test_displacement_over_area_that_is_another_is_named_with_its_ratio(times: float) -> None:
+    rig = replace(PAPER, pump_displacement=PAPER.pump_displacement / times)
+    (note,) = rig_contradicted(log(4.0), rig)
+    assert note.code == EstimateCode.RIG_CONTRADICTED
+    assert note.data["percent"] == pytest.approx(100.0 * times, rel=0.25)
+
+
+@pytest.mark.parametrize("rig", [PAPER, WORN, replace(PAPER, pump_displacement=1.07 * PAPER.pump_displacement)])
+def test_a_rig_file_within_its_doubts_is_not_contradicted(rig: EhaParameters) -> None:
+    assert rig_contradicted(log(4.0), rig) == ()
+
+
+def test_without_pressure_leakage_may_be_what_the_piston_lacks() -> None:
+    rig = replace(PAPER, pump_displacement=2.0 * PAPER.pump_displacement)
+    assert rig_contradicted(log(2.0).replace(**{PRESSURE: None}), rig) == ()
+
+
+def test_a_log_of_another_actuator_is_a_mismatch_with_its_rig_file_and_not_a_drive_that_is_too_weak() -> None:
+    unseen = without_number(Outcome.NOT_OBSERVABLE, (too_wide(0.1),), "flow", FLOW_CHANNELS, 0.1)
+    found = unless_another_rig(unseen, clean_log(log(2.0), SMALL), SMALL)
+    assert found.outcome is Outcome.MISMATCH
+    assert [note.code for note in found.gate.reasons] == [EstimateCode.RIG_CONTRADICTED]
+    assert unless_another_rig(unseen, clean_log(log(2.0), PAPER), PAPER) is unseen
+
+
+@pytest.mark.slow
+def test_its_estimate_says_so_in_place_of_asking_for_pressure_that_is_logged() -> None:
+    found = estimate_log(log(2.0), Rig("small", SMALL))
+    assert found.outcome is Outcome.MISMATCH
+    said = estimate_entries(found)["message"]
+    assert said.startswith("no value of bulk modulus: the model does not describe the log; the piston moves as if")
+    assert "log pressure" not in said
