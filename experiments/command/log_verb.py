@@ -32,6 +32,7 @@ ASSUMED = (
     "no --rig: the paper's actuator is assumed; if yours is another one, `hydrostate rig init rig.toml` writes a file "
     "to fill in"
 )
+UNFILLED = "{rig}: its parameters are those of the paper's actuator; if yours is another one, enter them"
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,8 @@ class _Question:
         What the kind made of its rig and of these options.
     about : Mapping[str, Any]
         Entries that all logs have.
+    of_the_paper : bool
+        Whether nothing was told of the actuator, by a rig file or in it.
     """
 
     chosen: "LogVerb"
@@ -54,6 +57,7 @@ class _Question:
     prepared: Any
     read: "Callable[..., Record]"
     about: Mapping[str, Any]
+    of_the_paper: bool
 
     @classmethod
     def of(cls, context: typer.Context, verb: str, asked: Mapping[str, Any], plant: str | None) -> "_Question":
@@ -76,7 +80,7 @@ class _Question:
         rig, prepared = chosen.prepare(bench, {**options, "seed": asked["seed"]})
         about = {"plant": kind.name, "rig": bench.name, "seed": asked["seed"], "expected": expected}
         about |= {"condition": options["condition"]} if "condition" in options else {}
-        return cls(chosen, options, rig, prepared, read, about)
+        return cls(chosen, options, rig, prepared, read, about, bench.parameters == type(bench.parameters)())
 
 
 def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[str, Any]) -> NoReturn:
@@ -131,8 +135,8 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
                 yield one, own
 
     batch = run_logs(logs, work, {**question.chosen.blank, **question.about}, doing)
-    if asked["rig"] is None and any(result["outcome"] != "failed" for result in batch.results):
-        note(ASSUMED)
+    if question.of_the_paper and any(result["outcome"] != "failed" for result in batch.results):
+        note(ASSUMED if asked["rig"] is None else UNFILLED.format(rig=asked["rig"]))
     for one, results in of_each_kind(batch.results):
         for remark in one.chosen.remarks(results):
             note(remark)

@@ -56,13 +56,23 @@ def test_the_command_says_where_the_page_went(log: Path, tmp_path: Path) -> None
     assert "written" not in done.stdout
 
 
-def test_the_command_says_that_it_assumed_an_actuator_unless_it_was_told_of_one(log: Path, tmp_path: Path) -> None:
-    assert invoke("rig", "init", tmp_path / "rig.toml").exit_code == 0
-    for given, said in (((), 1), (("--rig", tmp_path / "rig.toml"), 0)):
-        done = invoke("estimate", log, *given)
-        assert done.exit_code == 0, done.output
-        assert done.stderr.count("no --rig: the paper's actuator is assumed") == said
-        assert "--rig" not in done.stdout
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        (None, "no --rig: the paper's actuator is assumed"),
+        ("", "rig.toml: its parameters are those of the paper's actuator"),
+        ("moving_mass = 8.0", ""),
+    ],
+)
+def test_the_command_says_where_nothing_was_told_of_the_actuator(
+    entry: str | None, said: str, log: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "rig.toml").write_text(f"[parameters]\n{entry or ''}\n")
+    done = invoke("estimate", log, *(() if entry is None else ("--rig", tmp_path / "rig.toml")))
+    assert done.exit_code == 0, done.output
+    assert done.stderr.count(" actuator") == bool(said)
+    assert said in done.stderr
+    assert "the paper's actuator" not in done.stdout
 
 
 def test_a_page_that_cannot_be_written_costs_no_verdict(
