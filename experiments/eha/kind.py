@@ -141,7 +141,9 @@ def _innovations(found: "Finding", log: str, path: Path) -> None:
 
 
 def _taken_as_known(results: Sequence[Result]) -> Iterable[str]:
-    if any(one["condition"] is None and one["form"] not in (None, "flow") for one in results):
+    from estimation.eha.bulk_modulus import FITTED
+
+    if any(one["condition"] is None and one["form"] not in (None, *FITTED) for one in results):
         rig = results[0]["rig"]
         yield f"no --condition: leakage and friction were taken to be those of the rig {rig!r}, healthy"
 

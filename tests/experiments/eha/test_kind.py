@@ -85,7 +85,7 @@ def test_the_rig_s_leakage_is_said_to_be_taken_as_known_unless_a_condition_is_na
     told = {"condition": None, "form": "pressure", "rig": "mine"}
     (said,) = remarks([told])
     assert "leakage and friction were taken to be those of the rig 'mine'" in said
-    for change in ({"condition": "normal"}, {"form": "flow"}, {"form": None}):
+    for change in ({"condition": "normal"}, {"form": "flow"}, {"form": "motion"}, {"form": None}):
         assert list(remarks([{**told, **change}])) == []
 
 
