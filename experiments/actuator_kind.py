@@ -168,11 +168,6 @@ class ActuatorKind:
     def read_rig(self, path: Path | None) -> "Rig[Any]":
         """Return the rig of a file, the default one where there is none.
 
-        Parameters
-        ----------
-        path : Path or None
-            The rig file.
-
         Raises
         ------
         RigError

@@ -53,6 +53,11 @@ def actuator(name: str) -> "ActuatorKind":
     raise HydrostateError(f"--plant must be one of {', '.join(known)}, got {name!r}")
 
 
+def actuator_of(rig: "Rig[Any]", usual: str) -> "ActuatorKind":
+    """Return the kind of actuator that a log's rig file names, or the usual one where it names none."""
+    return actuator(rig.plant or usual)
+
+
 def actuators() -> "Iterator[ActuatorKind]":
     """Yield every kind of actuator, the project's own first."""
     from importlib.metadata import entry_points  # 20 ms, which a log of the project's own kind can do without

@@ -98,11 +98,6 @@ def simulate_fmu(
 def fmu_variables(path: Path) -> frozenset[str]:
     """Return the names of an FMU's variables.
 
-    Parameters
-    ----------
-    path : Path
-        The FMU.
-
     Returns
     -------
     frozenset of str

@@ -63,11 +63,6 @@ def small_toml(path: Path) -> dict[str, Any]:
 def shown(entry: object) -> str:
     """Return an entry of a file as an error shows it: as it would be written, and not all of a long one.
 
-    Parameters
-    ----------
-    entry : object
-        Any.
-
     Returns
     -------
     str

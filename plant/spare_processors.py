@@ -62,11 +62,6 @@ def each(run: Callable[[Case], Found], cases: Iterable[Case]) -> list[Found]:
     cases : iterable
         The cases.
 
-    Returns
-    -------
-    list
-        One result a case.
-
     Examples
     --------
     >>> each(abs, [-2, 3])

@@ -233,11 +233,6 @@ def conclude(
         Share of the log, at its end, over which values are averaged [fraction].
     judged : Estimate, optional
         The reading of the log that passes the gate; the same if not given.
-
-    Returns
-    -------
-    BulkModulusEstimate
-        The result.
     """
     value, std = estimate.settled(BULK_MODULUS, fraction)
     finite = bool(np.isfinite(value) and np.isfinite(std))

@@ -261,11 +261,6 @@ def at_pump_speed(log: CleanLog, turning: Turning) -> CleanLog:
 def set_right(log: CleanLog, found: Explanation) -> CleanLog:
     """Return a log as its channels would be without the sensors' offsets and delays that explain it.
 
-    Parameters
-    ----------
-    found : Explanation
-        What explains it.
-
     Returns
     -------
     CleanLog
@@ -327,11 +322,6 @@ def rig_set_right(parameters: EhaParameters, found: Explanation) -> EhaParameter
         What the rig file says.
     found : Explanation
         What explains the log.
-
-    Returns
-    -------
-    EhaParameters
-        The rig.
     """
     names = [name for name in RIG_ENTRIES if name in found.values]
     return replace(parameters, **{name: found.values[name][0] for name in names})

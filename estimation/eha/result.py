@@ -127,11 +127,6 @@ def too_wide(bound: float) -> Note:
     ----------
     bound : float
         Relative Cramér-Rao bound of bulk modulus [fraction].
-
-    Returns
-    -------
-    Note
-        The note.
     """
     return EstimateCode.BOUND_TOO_WIDE.note(percent=100.0 * min(bound, 9.99))
 

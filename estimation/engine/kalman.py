@@ -29,11 +29,6 @@ def entry(P: Covariance, i: int, j: int) -> Expression:
     ----------
     P : dict
         Its upper triangle.
-
-    Returns
-    -------
-    Expression
-        The element.
     """
     return P[min(i, j), max(i, j)]
 
@@ -45,11 +40,6 @@ def total(terms: Sequence[Expression]) -> Expression:
     ----------
     terms : sequence of Expression
         What to add.
-
-    Returns
-    -------
-    Expression
-        The sum.
     """
     return sum(terms, ZERO)
 
@@ -78,11 +68,6 @@ def to_physical(model: ProcessModel, mean: Sequence[Expression]) -> tuple[Expres
     ----------
     mean : sequence of Expression
         The state in the filter's units.
-
-    Returns
-    -------
-    tuple of Expression
-        The state in SI.
     """
     return tuple(
         state.scale * (exp(z) if state.logarithmic else z) for z, state in zip(mean, model.states, strict=True)
@@ -90,13 +75,7 @@ def to_physical(model: ProcessModel, mean: Sequence[Expression]) -> tuple[Expres
 
 
 def drive_symbols(model: ProcessModel) -> list[tuple[Expression, Expression]]:
-    """Return each drive's value at the start and the end of a sub-step, linear between the samples ``a`` and ``b``.
-
-    Returns
-    -------
-    list of pairs of Expression
-        One pair a drive.
-    """
+    """Return each drive's value at the start and the end of a sub-step, linear between the samples ``a`` and ``b``."""
     pairs: list[tuple[Expression, Expression]] = []
     for i in range(len(model.drives)):
         slope = (symbol(f"b{i}") - symbol(f"a{i}")) * symbol("share")
@@ -107,11 +86,6 @@ def drive_symbols(model: ProcessModel) -> list[tuple[Expression, Expression]]:
 
 def moved(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]:
     """Advance a state by one step of the model, both in the filter's units.
-
-    Parameters
-    ----------
-    mean : sequence of Expression
-        The state.
 
     Returns
     -------

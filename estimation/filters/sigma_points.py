@@ -192,13 +192,7 @@ def image(function: Callable[[Vector], Vector], at: Vector, mean: Vector, L: Mat
 
 
 def covariance_of(found: Image, i: int, j: int, spread: Spread) -> Expression:
-    """Return the covariance of two components of an image.
-
-    Returns
-    -------
-    Expression
-        Their covariance.
-    """
+    """Return the covariance of two components of an image."""
     first = total([a * b for a, b in zip(found.slopes[i], found.slopes[j], strict=True)])
     second = total([a * b for a, b in zip(found.bends[i], found.bends[j], strict=True)])
     return first + second + found.shift[i] * found.shift[j] * spread.shift_weight

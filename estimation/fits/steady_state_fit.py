@@ -131,11 +131,6 @@ def steady_points(records: Iterable[Record], window: float = 1.0) -> SteadyPoint
     window : float
         Length of a window [s].
 
-    Returns
-    -------
-    SteadyPoints
-        The points.
-
     Raises
     ------
     LogError

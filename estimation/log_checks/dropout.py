@@ -32,11 +32,6 @@ LONG_GAP = 5
 def without_dropouts(record: Record) -> tuple[Record, tuple[Note, ...]]:
     """Return a log without the rows that its logger only wrote again while it had none.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-
     Returns
     -------
     tuple of (Record, tuple of Note)

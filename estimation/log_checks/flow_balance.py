@@ -72,11 +72,6 @@ def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance
         The actuator.
     length : float
         Length of the blocks over which flows are balanced [s].
-
-    Returns
-    -------
-    FlowBalance or None
-        The balance.
     """
     found = {name: whole(record, name) for name in (SPEED, PRESSURE, POSITION, VELOCITY)}
     moved = POSITION if found[POSITION] is not None else VELOCITY

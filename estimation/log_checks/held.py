@@ -47,11 +47,6 @@ class _Slow(NamedTuple):
 def without_held(record: Record) -> tuple[Record, tuple[Note, ...]]:
     """Return a log without the values that its logger only repeated, or put on lines between samples.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-
     Returns
     -------
     tuple of (Record, tuple of Note)

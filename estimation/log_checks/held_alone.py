@@ -39,11 +39,6 @@ def without_held_alone(record: Record) -> tuple[Record, tuple[Note, ...]]:
     ----------
     record : Record
         The log; rows that repeat all channels are missing.
-
-    Returns
-    -------
-    tuple of (Record, tuple of Note)
-        The log, and a note for each channel that was held.
     """
     changed: dict[str, Array] = {}
     notes: list[Note] = []

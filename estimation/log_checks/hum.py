@@ -50,11 +50,6 @@ STRETCH = 25.0
 def without_hum(record: Record) -> tuple[Record, tuple[Note, ...]]:
     """Return a log whose differential pressure holds no hum.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-
     Returns
     -------
     tuple of (Record, tuple of Note)

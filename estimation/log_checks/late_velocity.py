@@ -34,11 +34,6 @@ LEAST_STRETCHES = 20
 def without_late_velocity(record: Record) -> tuple[Record, tuple[Note, ...]]:
     """Return a log without a velocity that comes late; position tells the same, on time.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-
     Returns
     -------
     tuple of (Record, tuple of Note)

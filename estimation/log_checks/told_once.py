@@ -23,11 +23,6 @@ them alone bulk modulus was 15 deviations off."""
 def told_once(record: Record) -> Record:
     """Return a log in which position stands once where it is repeated, if it is rounded more than it is noisy.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-
     Returns
     -------
     Record

@@ -29,11 +29,6 @@ SLIPS = (10.0, 100.0, 1e3, 1e5, 1e6, 60.0 / (2.0 * np.pi), 6894.76, 14.5038)
 def unit_changes(record: Record) -> tuple[Note, ...]:
     """Return a note for each channel whose unit changed within the log.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-
     Returns
     -------
     tuple of Note

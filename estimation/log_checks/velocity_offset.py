@@ -31,11 +31,6 @@ def without_velocity_offset(record: Record) -> tuple[Record, tuple[Note, ...]]:
     Over each part of the log the mean velocity is ``offset + gain * (what position gained) / (its time)``. A wrong gain
     is thus no offset, and nothing is done about it.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-
     Returns
     -------
     tuple of (Record, tuple of Note)

@@ -37,11 +37,6 @@ def narrowed(shown: "Table", width: int) -> "Table | None":
 def as_lines(shown: "Table") -> str:
     """Return a table as lines: the first cell of a row, and below it a line for each other cell with its heading.
 
-    Parameters
-    ----------
-    shown : rich.table.Table
-        The table.
-
     Returns
     -------
     str

@@ -140,11 +140,6 @@ SEED = 2024
 def load_rig(path: Path | None) -> "Rig":
     """Return the rig of a file, the paper's where there is none.
 
-    Parameters
-    ----------
-    path : Path or None
-        The rig file.
-
     Raises
     ------
     RigError

@@ -20,7 +20,7 @@ MOST_STILL = 100
 
 MOST_OPEN, MOST_LISTED = 25, 10
 """Rows of the actuators that are not sound on paper, unless more are sick, and of the logs that could not be read or
-have no date there [count]: with what the states mean they fill two sheets. `report.css` hides the rest of
+have no date there [count]: with what the states mean they fill two sheets. `fleet.html` hides the rest of
 the latter."""
 
 UNREAD = ("log", "actuator", "why")

@@ -236,11 +236,6 @@ def _tidy(target: Path) -> None:
 def held(folder: Path) -> Generator[bool]:
     """Hold a folder as one that is written to, until the block or the process ends.
 
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-
     Yields
     ------
     bool

@@ -96,11 +96,6 @@ def load(name: TableName | MotorTableName) -> "pd.DataFrame":
 def as_printed(name: TableName | MotorTableName) -> "pd.DataFrame":
     """Return a published table as `load` does, every cell as the text that is printed.
 
-    Parameters
-    ----------
-    name : TableName or MotorTableName
-        Which table.
-
     Returns
     -------
     pandas.DataFrame

@@ -99,11 +99,6 @@ def run_study(study: Study[Settings], settings: Settings, out: Path, console: Co
     out : Path
         Folder of the result; replaced whole if it holds an earlier study.
 
-    Returns
-    -------
-    Path
-        The report.
-
     Raises
     ------
     HydrostateError

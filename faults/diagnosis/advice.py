@@ -37,11 +37,6 @@ HELD = 0.02
 def speeds_held(record: Record) -> int:
     """Return how many different motor speeds a log holds, regardless of the direction.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-
     Returns
     -------
     int

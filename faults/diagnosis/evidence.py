@@ -72,11 +72,6 @@ class Scoreboard:
         ----------
         evidence : str
             One of those in `log_odds`.
-
-        Returns
-        -------
-        str
-            The condition.
         """
         return list(CONDITIONS)[int(np.argmax(self.log_odds[evidence]))]
 
@@ -111,11 +106,6 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
     library : Mapping[str, LinearModel], optional
         Transfer functions of the nine conditions of this actuator; without it that evidence is absent.
 
-    Returns
-    -------
-    Scoreboard
-        All of them.
-
     Raises
     ------
     LogError
@@ -141,11 +131,6 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
 
 def models_scores(fits: ClassFits) -> Array:
     """Return how well the nominal circuit of each condition explains a log.
-
-    Parameters
-    ----------
-    fits : ClassFits
-        The fit.
 
     Returns
     -------

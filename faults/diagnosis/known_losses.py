@@ -76,11 +76,6 @@ def _told_better(rubbed: Mapping[str, Quantity], severity: Mapping[str, Quantity
 def known_losses(estimate: BulkModulusEstimate) -> KnownLosses | None:
     """Return leakage and flow bias of a log as the balance of flows tells them.
 
-    Parameters
-    ----------
-    estimate : BulkModulusEstimate
-        Of the log.
-
     Returns
     -------
     KnownLosses or None

@@ -74,13 +74,6 @@ def margin(scores: Scores) -> float:
 def models_verdict(scores: Scores, record: Record) -> ModelsVerdict:
     """Judge a log by the errors of nine models.
 
-    Parameters
-    ----------
-    scores : Scores
-        The errors.
-    record : Record
-        The log.
-
     Returns
     -------
     ModelsVerdict

@@ -94,11 +94,6 @@ def score_mathematical(record: Record, bank: Mapping[str, EhaParameters], *, pre
     pressure : bool
         Whether differential pressure counts where it is logged; Table 5 uses velocity alone.
 
-    Returns
-    -------
-    Scores
-        Errors by condition.
-
     Raises
     ------
     LogError

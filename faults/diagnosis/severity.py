@@ -254,11 +254,6 @@ def _centres(circuits: Sequence[OpenCircuit]) -> Array:
 def healthy_severities(actuator: Actuator) -> Mapping[str, float]:
     """Return the severities of a healthy actuator, kept for the next log.
 
-    Parameters
-    ----------
-    actuator : Actuator
-        It.
-
     Returns
     -------
     Mapping[str, float]

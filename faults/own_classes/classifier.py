@@ -88,11 +88,6 @@ class Classifier(ClassifierMixin, BaseEstimator):
         groups : array_like, shape (n,), optional
             Which runs belong together, as those of one specimen or one day; contiguous blocks of runs if not given.
 
-        Returns
-        -------
-        Classifier
-            This one.
-
         Raises
         ------
         ValueError

@@ -49,11 +49,6 @@ STACK_FAULTS: Mapping[str, StackFault] = {
 def stack_in_condition(healthy: PiezoStackParameters, name: str) -> PiezoStackParameters:
     """Return the actuator in one of the nine conditions: leakage across the cylinder, and friction on its rod.
 
-    Parameters
-    ----------
-    name : str
-        Condition name.
-
     Raises
     ------
     HydrostateError

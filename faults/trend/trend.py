@@ -135,13 +135,7 @@ class Trend:
 
 
 def trends(series: Series) -> Iterator[Trend]:
-    """Yield what a series says after each log; later logs play no part.
-
-    Yields
-    ------
-    Trend
-        One a log.
-    """
+    """Yield what a series says after each log; later logs play no part."""
     scaled = (series.values - series.healthy) / series.size
     known = first_logs_after(series.times, series.maintained)
     parts = stretches(series.times / series.step, scaled, series.stds / abs(series.size), known, settings())

@@ -244,11 +244,6 @@ def ordered(outputs: Iterable[Expression], *, by_slopes: bool = False) -> list[E
 def local_derivatives(item: Expression) -> Sequence[Expression]:
     """Return the derivative of a node with respect to each argument; signs and choices are held constant.
 
-    Returns
-    -------
-    sequence of Expression
-        One derivative an argument.
-
     Raises
     ------
     NotImplementedError

@@ -18,11 +18,6 @@ def cache_folder() -> Path:
 def objection(found: os.stat_result) -> str | None:
     """Return why code in a folder or a file may not be run, or None if it may.
 
-    Parameters
-    ----------
-    found : os.stat_result
-        Of the folder or the file.
-
     Returns
     -------
     str or None

@@ -117,11 +117,6 @@ def read_rig(path: str | Path, parameter_class: type[Any] = EhaParameters, plant
     plant : str
         What that actuator is called.
 
-    Returns
-    -------
-    Rig
-        The rig.
-
     Raises
     ------
     RigError
@@ -140,11 +135,6 @@ def read_rig(path: str | Path, parameter_class: type[Any] = EhaParameters, plant
 
 def plant_of(path: str | Path) -> str | None:
     """Return which kind of actuator a rig file says that it describes.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
 
     Returns
     -------

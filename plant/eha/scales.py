@@ -21,11 +21,6 @@ def leakage_scales(p: EhaParameters) -> Mapping[str, float]:
     Flow bias goes with the rated flow of the pump, the leakage coefficient with that flow over the differential
     pressure at which the healthy actuator settles.
 
-    Parameters
-    ----------
-    p : EhaParameters
-        The healthy actuator.
-
     Returns
     -------
     Mapping[str, float]

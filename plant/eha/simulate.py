@@ -189,11 +189,6 @@ def simulate(
     keep_truth : bool
         Whether the noiseless channels stand beside the sensors' as ``true_...``.
 
-    Returns
-    -------
-    Record
-        The run.
-
     Raises
     ------
     DriveError
@@ -240,11 +235,6 @@ def simulate_each(
         What the bench sees; `IDEAL` by default.
     rngs : sequence of numpy.random.Generator, optional
         Sources of sensor noise.
-
-    Returns
-    -------
-    list of Record
-        One run an actuator.
 
     Raises
     ------

@@ -11,11 +11,6 @@ PRESSURE, CHAMBERS = "differential_pressure_pa", ("pressure_a_pa", "pressure_b_p
 def tells_difference(channels: Collection[str]) -> bool:
     """Return whether a log tells the differential pressure: by a channel of its own, or by both chambers'.
 
-    Parameters
-    ----------
-    channels : collection of str
-        Channels of the log.
-
     Examples
     --------
     >>> tells_difference(["pressure_a_pa", "pressure_b_pa"]), tells_difference(["pressure_a_pa"])

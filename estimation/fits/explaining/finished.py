@@ -171,10 +171,5 @@ def in_vain(log: GreyBoxLog, cost: float) -> bool:
         The log, widened.
     cost : float
         Half the sum of squares that is left [dimensionless].
-
-    Returns
-    -------
-    bool
-        Whether it is.
     """
     return len(log.drives) >= FEW and left_by(log, cost) >= UNFINISHED

@@ -52,11 +52,6 @@ def doubted(fit: GreyBoxFit) -> bool:
     ----------
     fit : GreyBoxFit
         The fit of a log whose noise of position does not count.
-
-    Returns
-    -------
-    bool
-        Whether it does.
     """
     return fit.chi_square[0] > largest_chi_square(fit.seen, DOUBTED)
 

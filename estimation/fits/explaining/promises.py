@@ -68,11 +68,6 @@ def promised(
         What is asked.
     by_mass : bool
         Whether the plain fit balances mass: promises are of where it stands.
-
-    Returns
-    -------
-    Promise
-        Its promise.
     """
     return promised_each(log, parameters, plain, (one,), by_mass=by_mass)[0]
 
@@ -102,11 +97,6 @@ def promised_each(
         Whether the plain fit balances mass.
     slopes : Mapping[str, ndarray of shape (blocks,)], optional
         Derivatives of the plain fit's normalised residuals, by unknown; they need not be taken again [dimensionless].
-
-    Returns
-    -------
-    list of Promise
-        Their promises.
     """
     wide = widened(log, parameters, plain)
     return _promises(balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, asked, slopes)
@@ -127,11 +117,6 @@ def promised_beside(
         What the fit under them found [SI].
     one : Hypothesis
         What is asked.
-
-    Returns
-    -------
-    Promise
-        Its promise.
     """
     return _promises(log, together, found, (one,))[0]
 
@@ -202,13 +187,6 @@ def _promises(
 
 def slopes_of(fit: GreyBoxFit, log: GreyBoxLog) -> Mapping[str, Array]:
     """Return the slopes of a plain fit's residuals, where the wide form has the same.
-
-    Parameters
-    ----------
-    fit : GreyBoxFit
-        The fit.
-    log : GreyBoxLog
-        Its log.
 
     Returns
     -------

@@ -43,11 +43,6 @@ def screened(
         Cost above which a result is of no use [dimensionless].
     every : int
         How many samples are one, see `thinned` [count].
-
-    Yields
-    ------
-    Tried
-        One a start.
     """
     absent = usual_values(log)
     asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
@@ -121,11 +116,6 @@ def nearing(
         The least cost so far [dimensionless].
     every : int
         How many samples are one, see `thinned` [count].
-
-    Yields
-    ------
-    sequence of Tried
-        One a start.
     """
     lower: list[Sequence[Tried]] = []
     for one in sorted(asked, key=lambda each: not each.far):

@@ -50,11 +50,6 @@ def settled(log: GreyBoxLog, tried: Tried, wanted: float = np.inf, every: int = 
         Cost above which it is of no use, so that it is not followed there [dimensionless].
     every : int
         How many samples are one, see `thinned` [count].
-
-    Returns
-    -------
-    Tried
-        The set at its optimum.
     """
     early, known = coarse(log, tried.delays, tried.together, every), at_end(tried.together[:-1])
     best = _led_down(early, tried, tried.point.theta, *known, wanted=wanted)
@@ -189,11 +184,6 @@ def coarse(
         The set; by mass if one of them says so.
     every : int
         How many samples are one, see `thinned` [count].
-
-    Returns
-    -------
-    GreyBoxLog
-        The log.
     """
     row = thinned(delayed(log, delays), every)
     return balanced_by(row, 1.0) if any(one.by_mass for one in together) else row
@@ -201,11 +191,6 @@ def coarse(
 
 def at_end(together: Iterable[Hypothesis]) -> list[str]:
     """Return what hypotheses free only as a search comes to its end; beside another one it is free from the start.
-
-    Parameters
-    ----------
-    together : iterable of Hypothesis
-        The hypotheses.
 
     Returns
     -------

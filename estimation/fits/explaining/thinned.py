@@ -65,11 +65,6 @@ def thinned(log: GreyBoxLog, every: int) -> GreyBoxLog:
         The log, widened; one with pressures at no even distance is left as it is.
     every : int
         How many samples are one [count].
-
-    Returns
-    -------
-    GreyBoxLog
-        The log.
     """
     if every < 2:
         return log.coarsened()

@@ -163,18 +163,7 @@ def _by_chance(plain: GreyBoxFit, with_them: GreyBoxFit) -> bool:
 
 
 def asked_for_teeth(log: GreyBoxLog) -> GreyBoxLog:
-    """Return a log of which a fit asks for teeth, where it holds none and the shaft's angle is known.
-
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log.
-
-    Returns
-    -------
-    GreyBoxLog
-        The log.
-    """
+    """Return a log of which a fit asks for teeth, where it holds none and the shaft's angle is known."""
     return log if log.teeth or log.gaps.size else replace(log, counts=COUNTS)
 
 

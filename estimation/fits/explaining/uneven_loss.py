@@ -139,11 +139,6 @@ def uneven_loss(
 def loss_note(loss: UnevenLoss) -> Note:
     """Return what a loss is called.
 
-    Parameters
-    ----------
-    loss : UnevenLoss
-        The loss.
-
     Returns
     -------
     Note

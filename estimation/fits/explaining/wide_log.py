@@ -74,11 +74,6 @@ def widened(
 def shut_in(log: GreyBoxLog) -> float:
     """Return the most that a loaded chamber passes to the other one while no make-up flows: half of what loaded it.
 
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log.
-
     Returns
     -------
     float
@@ -108,11 +103,6 @@ def usual_pressure(log: GreyBoxLog, parameters: EhaParameters) -> float:
 def usual_values(log: GreyBoxLog) -> dict[str, float]:
     """Return the parameters of a widened log by name.
 
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log, widened.
-
     Returns
     -------
     dict
@@ -130,11 +120,6 @@ def balanced_by(log: GreyBoxLog, mass: float) -> GreyBoxLog:
         The log, widened.
     mass : float
         1 or 0 [dimensionless].
-
-    Returns
-    -------
-    GreyBoxLog
-        The log.
     """
     parameters = log.parameters.copy()
     parameters[parameter_names(WideFlowParameters).index("by_mass")] = mass

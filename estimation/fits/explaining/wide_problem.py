@@ -144,13 +144,6 @@ def worn_start(log: GreyBoxLog, plain: Mapping[str, float]) -> Sequence[Mapping[
 def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]]:
     """Return where the search under a hypothesis begins.
 
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log.
-    one : Hypothesis
-        The hypothesis.
-
     Returns
     -------
     sequence of Mapping[str, float]

@@ -108,7 +108,7 @@ def asked_of(
     shows_zero = best is swinging or homed_at_stop(log)
     if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
         zero = max(zero, promised(log, parameters, best.values, ENCODER_ZERO))
-    worth = WORTH * log.passes
+    worth = worth_in(log)
     worn = delivery.gain > worth and abs(delivery.size) > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and abs(zero.size) > LEAST_ZERO
     plays = play_shows(swinging.play, sensed)
@@ -124,6 +124,14 @@ def asked_of(
     lost = swinging is best and not fed and doubted(swinging)
     begun = promised(log.coarsened(), parameters, swinging.values, START_LOAD, by_mass=by_mass)
     return (BEGUN, *asked) if lost or _possible([begun], swinging)[0].gain > WORTH else asked, remarks
+
+
+def worth_in(log: GreyBoxLog) -> float:
+    """Return what a hypothesis must gain in a log that the plain form explains: `WORTH` at each turn of a slow log.
+
+    The motor passes turns alike, so what is strange is seen at each.
+    """
+    return WORTH * log.passes
 
 
 def _possible(promises: Sequence[Promise], fit: GreyBoxFit) -> Sequence[Promise]:

@@ -15,7 +15,7 @@ from estimation.fits.explaining.speed_instead import speed_instead
 from estimation.fits.explaining.toothed import asked_for_teeth
 from estimation.fits.explaining.tried import Explanation
 from estimation.fits.explaining.uneven_loss import UnevenLoss, loss_note, uneven_loss
-from estimation.fits.flow.asked import ALWAYS_ASKED, MOST_ASKED, asked_of, near_starts
+from estimation.fits.flow.asked import ALWAYS_ASKED, MOST_ASKED, asked_of, near_starts, worth_in
 from estimation.fits.flow.log import homed_at_stop, without_strays
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, stiffer
@@ -188,7 +188,8 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
     if strange is None:
         return None
     homed, late = homed_at_stop(plain.log), traits.filtered
-    wanted = _wanted(strange.names, plain.best, plain.swinging, homed=homed, late=late, worth=_worth(plain))
+    worth = worth_in(plain.log) if plain.explains(plain.best) else WORTH
+    wanted = _wanted(strange.names, plain.best, plain.swinging, homed=homed, late=late, worth=worth)
     believed = _known(strange.names, strange.fit) and explains(strange.fit) and strange.fit.cost < wanted
     return strange if believed else None
 
@@ -334,14 +335,6 @@ def _wanted(
     if tuple(names) == (ENCODER_ZERO.name,) and homed:
         return min(best.cost + WORTH, swinging.cost - worth)
     return best.cost - worth
-
-
-def _worth(plain: PlainFits) -> float:
-    """Return what a hypothesis must gain: in a slow log that the plain form explains, `WORTH` at each turn.
-
-    The motor passes turns alike, so what is strange is seen at each.
-    """
-    return WORTH * plain.log.passes if plain.explains(plain.best) else WORTH
 
 
 def _known(names: Sequence[str], fit: GreyBoxFit) -> bool:

@@ -229,11 +229,6 @@ def homed_at_stop(log: GreyBoxLog) -> bool:
     ----------
     log : GreyBoxLog
         The log, as the flow form sees it.
-
-    Returns
-    -------
-    bool
-        Whether it may.
     """
     read = log.drives[:, FLOW_FORM.drives.index("position_m")]
     low, high = float(np.min(read)), float(np.max(read))

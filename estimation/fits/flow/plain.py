@@ -47,13 +47,7 @@ class Logged:
     uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def seen_at(self, parameters: EhaParameters) -> GreyBoxLog:
-        """Return the log as the flow form sees it in an actuator.
-
-        Parameters
-        ----------
-        parameters : EhaParameters
-            The actuator.
-        """
+        """Return the log as the flow form sees it in an actuator."""
         return flow_log(self.record, parameters, self.uncertainties, self.variances)
 
 
@@ -172,11 +166,6 @@ def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
         The log.
     start : FitStart
         Where searches begin.
-
-    Returns
-    -------
-    PlainFits
-        The fits, and the log as they see it.
     """
     parameters = start.parameters
     log = logged.seen_at(parameters)

@@ -116,11 +116,6 @@ def completed_form(form: GreyBoxModel, *, bent: bool) -> GreyBoxModel:
         The form, completed or not.
     bent : bool
         Whether make-up valves must let in more than the pump delivers, so that they are orifices.
-
-    Returns
-    -------
-    GreyBoxModel
-        The form.
     """
     known = CRACKS[0] in form.unknowns or form.rates is HELD_FLOW_FORM.rates
     return form if known else completed(form, bent=bent)

@@ -178,11 +178,6 @@ def remembered(at: Callable[[Array], Point]) -> Callable[[Array], Point]:
     ----------
     at : callable
         The cost at given coordinates.
-
-    Returns
-    -------
-    callable
-        The same cost.
     """
     known: dict[bytes, Point] = {}
 

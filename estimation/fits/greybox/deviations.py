@@ -72,11 +72,6 @@ class Information:
 def believed(problem: Problem) -> Array:
     """Return one over the variance of each coordinate that counts in deviations beside what the log tells.
 
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-
     Returns
     -------
     ndarray, shape (unknowns,)

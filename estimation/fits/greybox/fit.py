@@ -153,11 +153,6 @@ def fit_greybox(
         How they are brought to the optimum.
     limits : Mapping[str, tuple of float], optional
         Least and largest value of an unknown, where physics gives them [SI].
-
-    Returns
-    -------
-    GreyBoxFit
-        The best fit.
     """
     problem, guesses = Problem(model, log), [model.theta(start) for start in starts]
     bounds = search_bounds(model, guesses, limits or {})
@@ -275,11 +270,6 @@ def concluded(
         Whether the caller is warned where unknowns are not separately determined; else their deviations are infinite.
     steps : ndarray of int, shape (n,), optional
         See `GreyBoxFit`; answers to the rig's doubts are as exact with them.
-
-    Returns
-    -------
-    GreyBoxFit
-        The fit.
     """
     model, theta = problem.model, point.theta
     errors, all_slopes = problem.linearised(theta)

@@ -86,11 +86,6 @@ class FreedProblem(Problem):
             The model, its unknowns fields of its parameters.
         log : GreyBoxLog
             The log.
-
-        Returns
-        -------
-        FreedProblem
-            The problem.
         """
         return cls(replace(model, unknowns=(), linear=()), log, model.unknowns, dict(model.linear))
 

@@ -89,11 +89,6 @@ class OutputNoise:
         ----------
         variance, walk : float
             Factors on the white noise's variance and on the random walk's [dimensionless].
-
-        Returns
-        -------
-        OutputNoise
-            The other noise.
         """
         return replace(
             self,

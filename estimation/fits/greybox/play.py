@@ -137,28 +137,12 @@ def shown_play(
 
 
 def play_shows(shown: ShownPlay, sensed: ShownPlay) -> bool:
-    """Return whether residuals or a velocity sensor show a play for which a log is asked.
-
-    Parameters
-    ----------
-    shown : ShownPlay
-        What the residuals show.
-    sensed : ShownPlay
-        What the sensor shows.
-    """
+    """Return whether residuals or a velocity sensor show a play for which a log is asked."""
     return sensed.gain > PLAY_SENSED or (shown.gain > PLAY_SHOWN and shown.size > LEAST_PLAY)
 
 
 def play_left(shown: ShownPlay, sensed: ShownPlay = NO_PLAY) -> tuple[Note, ...]:
-    """Return the objection to a fit that leaves a play which its residuals or a velocity sensor show.
-
-    Parameters
-    ----------
-    shown : ShownPlay
-        What the residuals show.
-    sensed : ShownPlay
-        What the sensor shows.
-    """
+    """Return the objection to a fit that leaves a play which its residuals or a velocity sensor show."""
     limits = (shown, PLAY_BELIEVED), (sensed, PLAY_SHOWN)
     large = [one.size for one, limit in limits if one.gain > limit and one.size > LEAST_PLAY]
     return (EstimateCode.PLAY_LEFT.note(play_um=1e6 * max(large)),) if large else ()

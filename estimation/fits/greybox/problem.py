@@ -59,13 +59,6 @@ class Problem:
     Averaging keeps what the log says about unknowns that act more slowly, and makes a 10 kHz log as cheap to judge as a
     1 kHz one.
 
-    Parameters
-    ----------
-    model : GreyBoxModel
-        The model.
-    log : GreyBoxLog
-        The log.
-
     Attributes
     ----------
     prior : ndarray, shape (unknowns,)
@@ -103,18 +96,7 @@ class Problem:
         return self.on(self.log.coarsened())
 
     def on(self, log: GreyBoxLog) -> "Problem":
-        """Return the same problem of another log.
-
-        Parameters
-        ----------
-        log : GreyBoxLog
-            The log.
-
-        Returns
-        -------
-        Problem
-            The problem.
-        """
+        """Return the same problem of another log."""
         return type(self)(self.model, log)
 
     def at(self, theta: Array) -> Point:

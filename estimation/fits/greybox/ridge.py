@@ -31,18 +31,7 @@ class Ridge(NamedTuple):
     ratio: float
 
     def placed(self, free: Sequence[str]) -> "PlacedRidge | None":
-        """Return the ridge among the unknowns of a fit, None where one of the two is not free.
-
-        Parameters
-        ----------
-        free : sequence of str
-            The unknowns.
-
-        Returns
-        -------
-        PlacedRidge or None
-            Their places.
-        """
+        """Return the ridge among the unknowns of a fit, None where one of the two is not free."""
         if self.nudged not in free or self.along not in free:
             return None
         return PlacedRidge(free.index(self.nudged), free.index(self.along), self.ratio)

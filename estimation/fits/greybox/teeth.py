@@ -135,11 +135,6 @@ def with_teeth(log: GreyBoxLog, teeth: Sequence[Teeth], offset: float = 0.0) -> 
     offset : float
         By how much the logged speed exceeds the shaft's [rad/s].
 
-    Returns
-    -------
-    GreyBoxLog
-        The log.
-
     Examples
     --------
     >>> log = GreyBoxLog(np.full((3, 1), 0.1), np.zeros((3, 1)), np.zeros(0), 0.01, np.ones(3, dtype=int), ())

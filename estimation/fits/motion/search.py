@@ -152,11 +152,6 @@ class MotionSearch:
             The log.
         starts : sequence of dict
             First guesses of the unknowns [SI].
-
-        Returns
-        -------
-        MotionSearch
-            The search.
         """
         whole = FreedProblem(form, log, UNKNOWNS, LINEAR)
         guesses = [whole.model.theta(start) for start in starts]
@@ -233,11 +228,6 @@ def likeliest(searches: Sequence[MotionSearch]) -> list[Ended]:
     ----------
     searches : sequence of MotionSearch
         One a structure of friction.
-
-    Returns
-    -------
-    list of Ended
-        One of each.
     """
     begun = Begun()
     tries = [_Tries(search, begun) for search in searches]
@@ -317,11 +307,6 @@ def rough(problem: FreedProblem, factors: tuple[float, float]) -> FreedProblem:
         The problem.
     factors : tuple of float
         Factors on variance and random walk [dimensionless].
-
-    Returns
-    -------
-    FreedProblem
-        The other problem.
     """
     log = problem.log.softened(*factors)
     return problem.on(replace(log, steps=np.maximum(log.steps // ROUGHLY, 1)))
@@ -329,11 +314,6 @@ def rough(problem: FreedProblem, factors: tuple[float, float]) -> FreedProblem:
 
 def explained(problem: FreedProblem) -> float:
     """Return the misfit up to which a point explains a log [dimensionless].
-
-    Parameters
-    ----------
-    problem : FreedProblem
-        The problem.
 
     Returns
     -------

@@ -199,13 +199,7 @@ class Scaling:
 
 
 def scaled(data: Channels) -> tuple[Channels, Scaling]:
-    """Return channels of zero mean and unit deviation, and what was taken off.
-
-    Returns
-    -------
-    tuple of Channels and Scaling
-        The scaled channels, and their scaling.
-    """
+    """Return channels of zero mean and unit deviation, and what was taken off."""
     together, outputs = np.concatenate(data.u), np.concatenate(data.y)
     by = Scaling(together.mean(axis=0), together.std(axis=0), float(np.nanmean(outputs)), float(np.nanstd(outputs)))
     return in_scale(data, by), by

@@ -159,13 +159,6 @@ def pieces(record: Record, inputs: Sequence[str]) -> list[Record]:
 
     How wrong is read off the input itself: where it is whole, stretches as long as the gap are bridged and compared.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-    inputs : sequence of str
-        Its inputs.
-
     Returns
     -------
     list of Record

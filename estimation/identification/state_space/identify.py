@@ -54,11 +54,6 @@ def identify_outputs(
     order, delay, n_numerator : int, optional
         As `identify_channels` takes them; of a state space the order is the number of states.
 
-    Returns
-    -------
-    list of Identified
-        One an output.
-
     Raises
     ------
     HydrostateError

@@ -92,11 +92,6 @@ def with_loads(p: EhaParameters, seen: Loads, names: Sequence[str]) -> EhaParame
         What the force balance shows beyond that.
     names : sequence of str
         Which of its loads.
-
-    Returns
-    -------
-    EhaParameters
-        It, with them.
     """
     return replace(p, **{name: getattr(p, name) + seen.of(name)[0] for name in names})
 

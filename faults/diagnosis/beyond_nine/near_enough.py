@@ -22,11 +22,6 @@ BESIDE = (AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS)
 def only_beside(against: Sequence[Note]) -> bool:
     """Return whether nothing speaks against the nine but that the circuit lies beside them.
 
-    Parameters
-    ----------
-    against : sequence of Note
-        What speaks against them.
-
     Returns
     -------
     bool

@@ -242,11 +242,6 @@ def softened(two: Parted) -> tuple[Note, ...]:
     It is asked whatever conditions the parts are in: air in the oil may pass for friction, and no condition softens
     the oil.
 
-    Parameters
-    ----------
-    two : Parted
-        The log in two parts.
-
     Returns
     -------
     tuple of Note
@@ -271,11 +266,6 @@ def part_of(blocks: Blocks, begin: int, end: int) -> Blocks:
         The log.
     begin, end : int
         First block that stays, and the one after the last.
-
-    Returns
-    -------
-    Blocks
-        The part.
     """
     there = np.arange(len(blocks.velocity))
     away = (there < begin) | (there >= end)

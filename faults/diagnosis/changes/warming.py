@@ -157,13 +157,6 @@ def course_of(logarithm: float, samples: int) -> Array:
 def with_course(log: CleanLog, found: Drift) -> tuple[CleanLog, Note]:
     """Return a log with the drift that it shows, and what that is called.
 
-    Parameters
-    ----------
-    log : CleanLog
-        The log.
-    found : Drift
-        Its drift.
-
     Returns
     -------
     tuple of CleanLog and Note

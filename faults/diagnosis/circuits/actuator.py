@@ -44,11 +44,6 @@ def actuator_of(parameters: EhaParameters) -> Actuator:
     parameters : EhaParameters
         The healthy actuator.
 
-    Returns
-    -------
-    Actuator
-        It, and its conditions.
-
     Raises
     ------
     RigError

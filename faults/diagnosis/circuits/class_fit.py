@@ -132,11 +132,6 @@ def scales_of(blocks: Blocks, fitted: Array) -> Array:
 def least_scales(blocks: Blocks) -> Array:
     """Return what a model leaves of a log at the least.
 
-    Parameters
-    ----------
-    blocks : Blocks
-        The log.
-
     Returns
     -------
     ndarray, shape (outputs,)

@@ -19,11 +19,6 @@ FRICTION_LAW = frozenset({"friction_rated", "friction_rest"})
 def not_shown(fits: ClassFits) -> frozenset[str]:
     """Return the coordinates of the best circuit that a log does not narrow.
 
-    Parameters
-    ----------
-    fits : ClassFits
-        The fit.
-
     Returns
     -------
     frozenset[str]

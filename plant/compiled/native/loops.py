@@ -53,11 +53,6 @@ def text_of(loop: Loop[..., Any]) -> str:
 def needed(loop: Loop[..., Any]) -> tuple[list[Loop[..., Any]], dict[str, object]]:
     """Return a loop and all that it calls, and the constants of their modules that they read.
 
-    Parameters
-    ----------
-    loop : Loop
-        The one that is called.
-
     Raises
     ------
     NameError

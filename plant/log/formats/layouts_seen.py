@@ -40,11 +40,6 @@ def remembered(start: bytes, lines: int) -> "Layout | None":
         What a file begins with.
     lines : int
         Lines of it that would be looked at.
-
-    Returns
-    -------
-    Layout or None
-        None if there was none.
     """
     for header, layout in _alike(start).items():
         if _plain(start, header, layout, lines):
