@@ -105,7 +105,7 @@ def test_the_interval_is_the_value_and_two_deviations() -> None:
 
 
 def test_filterpy_gives_the_same_number() -> None:
-    log, parameters = bench_log("lumped", "steps", "normal").slice(0, 2_500), EhaParameters()
+    log, parameters = bench_log("lumped", "steps", "normal").slice(0, 1_000), EhaParameters()
     ours, theirs = (
         estimate_bulk_modulus(log, parameters, form="pressure", method=method, start=1e8)
         for method in ("ekf", "filterpy-ekf")
@@ -327,7 +327,7 @@ def test_a_slow_speed_sensor_does_not_bias_a_filter(form: str) -> None:
 def test_a_log_that_begins_under_load_gives_its_bulk_modulus(first: int, shared: Path) -> None:
     log, _, truth = foreign_logs(shared)[10]
     assert abs(log[PRESSURE][first]) > 1e5
-    answer = estimate_bulk_modulus(log.slice(first, first + 4000), EhaParameters())
+    answer = estimate_bulk_modulus(log.slice(first, first + 2500), EhaParameters())
     assert answer.form == "flow"
     assert answer.value == pytest.approx(truth, rel=0.005)
 

@@ -165,7 +165,7 @@ def test_a_fit_that_explains_a_load_but_not_bulk_modulus_is_not_overruled_by_a_f
 ) -> None:
     whole = run("minor_leakage")[0]
     first = 2000 + int(np.argmax(np.abs(whole["differential_pressure_pa"][2000:]) > 4e5))
-    loaded = whole.slice(first, first + 4000)
+    loaded = whole.slice(first, first + 2000)
     told = subject.fit_flow(loaded, HEALTHY, TRUTH, {}, None, LOADED)
     assert told.explanation is not None
     untold = replace(told, bound=0.36)

@@ -88,7 +88,7 @@ def test_a_fit_is_refused_for_what_speaks_against_its_model_and_not_for_a_wide_b
     frozen = with_fault(log(duration=2.0), SensorFault(channel="position_m", kind="freeze", start=1.0))
     found = estimate_log(frozen, Rig())
     assert SensorCode.SENSOR_FROZE in [note.code for note in refused(found.evidence)]
-    stuck = log("major_friction", "sine").replace(**{PRESSURE: None})
+    stuck = log("major_friction", "sine", duration=1.0).replace(**{PRESSURE: None})
     unseen = estimate_log(stuck, Rig())
     assert unseen.outcome is Outcome.NOT_OBSERVABLE
     assert [note.code for note in unseen.gate.reasons] == [EstimateCode.BOUND_TOO_WIDE]

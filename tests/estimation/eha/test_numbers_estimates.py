@@ -60,10 +60,10 @@ def estimates_by_each_method() -> dict[str, Any]:
         "by filter, without pressure": told(blind, form="pressure", method="ekf"),
         "by filter, acceleration form": told(log(), form="acceleration", method="ekf"),
         "of a log that stands": told(
-            log().replace(
-                motor_speed_rad_s=np.zeros(len(log())),
-                position_m=np.zeros(len(log())),
-                velocity_m_s=np.zeros(len(log())),
+            log(0.3).replace(
+                motor_speed_rad_s=np.zeros(300),
+                position_m=np.zeros(300),
+                velocity_m_s=np.zeros(300),
             )
         ),
     }

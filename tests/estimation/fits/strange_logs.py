@@ -16,7 +16,7 @@ PRESSURE, SPEED = "differential_pressure_pa", "motor_speed_rad_s"
 
 
 def log(
-    drive: str = "multisine", duration: float = 2.5, parameters: EhaParameters = HEALTHY, sensors: Sensors = BENCH
+    drive: str = "multisine", duration: float = 1.5, parameters: EhaParameters = HEALTHY, sensors: Sensors = BENCH
 ) -> Record:
     rng = np.random.default_rng(5)
     signal = make_drive(drive, duration, 1e-3, parameters, rng)

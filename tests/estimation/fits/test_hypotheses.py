@@ -167,7 +167,7 @@ def test_a_delay_is_sought_no_longer_than_a_sensor_may_have(monkeypatch: pytest.
 
 
 def test_an_encoder_that_was_homed_at_the_end_stop_is_named_and_shifted() -> None:
-    record = log("steps", 4.0)
+    record = log("steps", 2.5)
     found = explained(record.replace(position_m=record["position_m"] + 0.12))
     assert "encoder_zero" in found.names
     shifted = set_right(clean_log(record.replace(position_m=record["position_m"] + 0.12), HEALTHY), found)
@@ -176,7 +176,7 @@ def test_an_encoder_that_was_homed_at_the_end_stop_is_named_and_shifted() -> Non
 
 @pytest.mark.parametrize(("share", "code"), [(1.04, RigCode.AREA_TO_DISPLACEMENT), (0.8, RigCode.PUMP_WORN)])
 def test_a_pump_that_delivers_otherwise_is_named_by_the_ratio(share: float, code: RigCode) -> None:
-    record = log("steps", 4.0, replace(HEALTHY, pump_displacement=share * HEALTHY.pump_displacement))
+    record = log("steps", 2.5, replace(HEALTHY, pump_displacement=share * HEALTHY.pump_displacement))
     found = explained(record)
     note = notes_of(found, HEALTHY)[0]
     assert note.code is code
@@ -186,7 +186,7 @@ def test_a_pump_that_delivers_otherwise_is_named_by_the_ratio(share: float, code
 
 @pytest.mark.slow
 def test_a_log_that_begins_under_load_says_so() -> None:
-    record = log()
+    record = log(duration=2.5)
     begun = record.slice(1500, len(record))
     found = explained(begun)
     assert "start_load" in found.names
@@ -228,7 +228,7 @@ def test_a_single_rod_whose_rig_file_gives_one_area_is_named_with_both() -> None
 
 
 def test_play_of_the_encoder_is_named_and_taken_up() -> None:
-    record, play = log("prbs", 4.0), 3e-5
+    record, play = log("prbs", 2.5), 3e-5
     read = record["position_m"].copy()
     for i in range(1, len(read)):
         read[i] = min(max(read[i - 1], read[i] - 0.5 * play), read[i] + 0.5 * play)
@@ -313,7 +313,7 @@ def test_wear_of_the_pump_is_not_excluded_by_a_log_at_one_speed() -> None:
     pressure[:5] = pressure[5]
     late = estimate_log(record.replace(differential_pressure_pa=pressure), Rig(HEALTHY))
     assert {RigCode.WEAR_NOT_EXCLUDED, "pressure_late"} <= {note.code for note in late.notes}
-    assert RigCode.WEAR_NOT_EXCLUDED not in [note.code for note in estimate_log(log("steps"), Rig(HEALTHY)).notes]
+    assert RigCode.WEAR_NOT_EXCLUDED not in [note.code for note in estimate_log(log("steps", 1.0), Rig(HEALTHY)).notes]
 
 
 def test_a_worn_pump_that_is_not_excluded_leaves_bulk_modulus_too_low_as_its_note_says() -> None:

@@ -19,9 +19,9 @@ PAPER = EhaParameters()
 
 
 def logged(crack_a: float, crack_b: float) -> Record:
-    """Return four seconds of an actuator whose make-up valves open so far below the accumulator's pressure [Pa]."""
+    """Return two and a half seconds of an actuator whose make-up valves open so far below the accumulator's pressure [Pa]."""
     machine = Machine(crack_a=crack_a, crack_b=crack_b, quadratic=1.1e6, linear=0.0, coulomb=490.0)
-    time = 1e-3 * np.arange(4000)
+    time = 1e-3 * np.arange(2500)
     course = np.ones((len(time), 5))
     course[:, 0] = 110.0 * np.sin(2.0 * np.pi * time) + 60.0 * np.sin(5.2 * np.pi * time)
     course[:, 3] = 0.0

@@ -27,7 +27,7 @@ from plant.sensors.sensors import RIG
 def diagnosed() -> tuple[Finding, Record]:
     p = parameters_for(CONDITIONS["minor_leakage"])
     rng = np.random.default_rng(2)
-    drive = make_drive("steps", 3.0, 1e-3, EhaParameters(), rng)
+    drive = make_drive("steps", 2.0, 1e-3, EhaParameters(), rng)
     log = simulate(CIRCUIT, drive, 1e-3, p, sensors=RIG, rng=rng).replace(differential_pressure_pa=None)
     return diagnose_log(log, Rig()), log
 

@@ -155,12 +155,12 @@ def columns(tmp_path_factory: pytest.TempPathFactory) -> Path:
     [
         (("--input", "a,b", "--output", "y"), ["page.html"], ("steady gain from b", "no covariance")),
         (
-            ("--input", "a,b", "--output", "y,z", "--structure", "state-space"),
+            ("--input", "a,b", "--output", "y,z", "--structure", "state-space", "--order", "1"),
             ["page-y.html", "page-z.html"],
             ("state space",),
         ),
         (
-            ("--input", "a", "--output", "w", "--structure", "narx"),
+            ("--input", "a", "--output", "w", "--structure", "narx", "--order", "1"),
             ["page.html"],
             ("polynomial", "The model is not linear"),
         ),

@@ -13,7 +13,7 @@ def test_noise_that_varies_is_asked_for_no_pair(monkeypatch: pytest.MonkeyPatch)
     def never(*_: object) -> None:
         raise AssertionError("no two explain what none alone takes any of")
 
-    calm = log(1.0)
+    calm = log(0.5)
     noise = np.random.default_rng(5).normal(0.0, 2e4, len(calm))
     noise[np.arange(len(calm)) % 7 > 0] = 0.0
     monkeypatch.setattr(explain, "_paired", never)

@@ -28,9 +28,9 @@ COURSES = (Course(BORE, 0.0018, 6e-4), Course(TOOTH, 2.0, 0.3), Course(FILLING, 
 
 
 def losing(course: Course) -> Record:
-    """Return three seconds of a log whose pump turned faster to make up for a loss."""
+    """Return two seconds of a log whose pump turned faster to make up for a loss."""
     rng = np.random.default_rng(4)
-    record = simulate(CIRCUIT, make_drive("multisine", 3.0, 1e-3, HEALTHY, rng), 1e-3, HEALTHY, sensors=BENCH, rng=rng)
+    record = simulate(CIRCUIT, make_drive("multisine", 2.0, 1e-3, HEALTHY, rng), 1e-3, HEALTHY, sensors=BENCH, rng=rng)
     speed, fill = record[SPEED], HEALTHY.pump_displacement
     for _ in range(30):  # the loss goes with the faster speed
         angle = np.concatenate([[0.0], np.cumsum(5e-4 * (speed[1:] + speed[:-1]))])

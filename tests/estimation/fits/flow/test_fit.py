@@ -132,7 +132,7 @@ def test_logs_of_a_foreign_bench_give_their_bulk_modulus_without_the_condition(s
 def test_a_draining_pump_and_oil_that_gives_way_do_not_bias_bulk_modulus(condition: str) -> None:
     rng = np.random.default_rng(3)
     p = circuit_of(parameters_for(CONDITIONS[condition]))
-    record = simulate(CIRCUIT, make_drive("steps", 6.0, 2e-3, p, rng), 2e-3, p, sensors=BENCH, rng=rng)
+    record = simulate(CIRCUIT, make_drive("steps", 4.0, 2e-3, p, rng), 2e-3, p, sensors=BENCH, rng=rng)
     fit = fit_flow(record, HEALTHY, 2e8)
     assert fit.parameters["bulk_modulus"][0] == pytest.approx(p.bulk_modulus, rel=0.005)
     assert fit.parameters["case_leakage"][0] == pytest.approx(p.pump_case_leakage, rel=0.5)
@@ -140,7 +140,7 @@ def test_a_draining_pump_and_oil_that_gives_way_do_not_bias_bulk_modulus(conditi
 
 
 def test_an_uncertain_chamber_volume_makes_bulk_modulus_as_uncertain() -> None:
-    fit = fit_flow(log("normal", 14, duration=4.0), HEALTHY, 2e8, {"chamber_volume": 0.04, "moving_mass": 0.5})
+    fit = fit_flow(log("normal", 14, duration=2.0), HEALTHY, 2e8, {"chamber_volume": 0.04, "moving_mass": 0.5})
     value, _ = fit.parameters["bulk_modulus"]
     assert fit.rig_slopes["chamber_volume"]["bulk_modulus"] / value == pytest.approx(1.0, rel=0.05)
 

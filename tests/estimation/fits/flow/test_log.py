@@ -45,7 +45,7 @@ def deviations(record: Record, true: float) -> float:
 
 @pytest.mark.parametrize("condition", thinned(["normal", "major_leakage"], ["normal"]))
 def test_noise_of_position_does_not_pass_for_soft_oil(condition: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    record, true = log(condition, 5)
+    record, true = log(condition, 5, duration=4.0)
     assert abs(deviations(record, true)) < 3.0
     monkeypatch.setattr("estimation.fits.flow.log.FELT_NOISE", np.inf)  # as if all of it were the pressure sensor's
     value, std = fit_flow(record, HEALTHY, 2e8).parameters["bulk_modulus"]
@@ -86,7 +86,7 @@ def lagging(values: np.ndarray, lag: float) -> np.ndarray:
 def test_a_position_sensor_that_lags_is_named_and_its_number_is_right(condition: str) -> None:
     rng = np.random.default_rng(9)
     p = circuit_of(parameters_for(CONDITIONS[condition]))
-    drive = make_drive("prbs", 3.0, 1e-3, p, rng)
+    drive = make_drive("prbs", 2.0, 1e-3, p, rng)
     record = simulate(CIRCUIT, drive, 1e-3, p, sensors=BENCH, rng=rng)
     fit = fit_flow(record.replace(position_m=lagging(record["position_m"], 3e-3)), HEALTHY, 2e8)
     assert fit.reasons == ()

@@ -33,7 +33,7 @@ RIG = replace(LARGE, bulk_modulus=EhaParameters().bulk_modulus)
 
 def fitted(condition: str, seed: int) -> tuple[FormFit, float]:
     drawing, driving, logging = np.random.default_rng(seed).spawn(3)
-    setup = replace(draw_plain(condition, "prbs", drawing, LARGE), rated_speed=157.08, duration=10.0, travel=0.2)
+    setup = replace(draw_plain(condition, "prbs", drawing, LARGE), rated_speed=157.08, duration=5.0, travel=0.2)
     setup = setup.with_machine(stroke=0.6, ripple=0.0)
     log = setup.logger.log(run(setup.machine, course_of(setup, driving)), logging)
     channels = {name: log[name].to_numpy() for name in log.columns if name != "time_s"}

@@ -1,11 +1,13 @@
 """What the motor's course between the samples of a slow log leaves open."""
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 import pytest
 
 from estimation.fits.explaining.between_samples import with_course
+from estimation.fits.explaining.form_fit import FormFit
 from estimation.fits.flow import fit
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log
@@ -62,24 +64,31 @@ def test_a_log_of_1_khz_is_left_as_it_is() -> None:
     assert with_course(log, lambda _: pytest.fail("it was fitted"), HEALTHY) is log
 
 
-@pytest.mark.parametrize("seed", [0, 4])
-def test_bulk_modulus_of_a_log_of_200_hz_is_within_its_interval(seed: int) -> None:
-    value, std = fit_flow(logged(200, seed), HEALTHY, HEALTHY.bulk_modulus).parameters["bulk_modulus"]
-    assert abs(value - HEALTHY.bulk_modulus) < 2.5 * std
-    assert std < 0.005 * value
-
-
-def test_balances_of_a_slow_log_are_weighed_by_what_they_gain_at_one_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+@cache
+def fitted(rate: int, seed: int) -> tuple[FormFit, float]:
+    """What a log says, and how sure a balance is of what it gains beside the others."""
     tempers, original = list[float](), fit.weights_of
 
     def heard(fits: Sequence[GreyBoxFit], temper: float, beforehand: Sequence[float]) -> np.ndarray:
         tempers.append(temper)
         return original(fits, temper, beforehand)
 
-    monkeypatch.setattr(fit, "weights_of", heard)
-    for rate in (200, 1000):
-        fit_flow(logged(rate, 0), HEALTHY, HEALTHY.bulk_modulus)
-    slow, fast = tempers
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fit, "weights_of", heard)
+        found = fit_flow(logged(rate, seed), HEALTHY, HEALTHY.bulk_modulus)
+    (temper,) = tempers
+    return found, temper
+
+
+@pytest.mark.parametrize("seed", [0, 4])
+def test_bulk_modulus_of_a_log_of_200_hz_is_within_its_interval(seed: int) -> None:
+    value, std = fitted(200, seed)[0].parameters["bulk_modulus"]
+    assert abs(value - HEALTHY.bulk_modulus) < 2.5 * std
+    assert std < 0.005 * value
+
+
+def test_balances_of_a_slow_log_are_weighed_by_what_they_gain_at_one_turn() -> None:
+    slow, fast = (fitted(rate, 0)[1] for rate in (200, 1000))
     assert fast == fit.SURER
     assert slow > 5.0 * fit.SURER
 

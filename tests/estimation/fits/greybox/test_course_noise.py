@@ -40,7 +40,7 @@ def test_what_unknowns_take_up_of_few_turns_is_counted_all_the_same() -> None:
     walk = np.where(np.arange(samples) % 62 == 31, (4e5) ** 2, 0.0)
     columns, _ = np.linalg.qr(np.vander(times, 9))
     without, found = list[float](), list[float]()
-    for _ in range(12):
+    for _ in range(8):
         made = np.cumsum(0.1 * np.sqrt(walk) * rng.standard_normal(samples)) + 5e3 * rng.standard_normal(samples)
         left = made - columns @ (columns.T @ made)
         found.append(restricted(left, columns, 25e6, walk, np.zeros(samples))[0])

@@ -49,10 +49,10 @@ def searches_of(log: GreyBoxLog) -> list[MotionSearch]:
     return [MotionSearch.of(form, log, starts) for form in MOTION_FORMS]
 
 
-def fine_searches(monkeypatch: pytest.MonkeyPatch) -> list[MotionSearch]:
-    """Return the searches of two seconds with steps that follow a stiff bristle, and no shorter ones at their end."""
+def fine_searches(monkeypatch: pytest.MonkeyPatch, seconds: float = 2.0) -> list[MotionSearch]:
+    """Return the searches of a log with steps that follow a stiff bristle, and no shorter ones at their end."""
     monkeypatch.setattr(motion_fit, "without_chatter", lambda problem, _: problem)
-    log = heard(short_log(2.0))
+    log = heard(short_log(seconds))
     return searches_of(replace(log, steps=np.where(log.steps == np.max(log.steps), 4 * log.steps, log.steps)))
 
 
@@ -250,7 +250,7 @@ def test_another_optimum_far_from_the_best_is_objected_to() -> None:
 def test_the_other_law_goes_on_on_the_whole_log_from_where_it_stands_better(
     near: bool, healthy: FormFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first, second = fine_searches(monkeypatch)
+    first, second = fine_searches(monkeypatch, 1.0)
     there = first.whole.model.theta({name: healthy.parameters[name][0] for name in UNKNOWNS})
     worst = max(second.guesses, key=lambda theta: second.whole.at(theta).cost)
     own = descend(second.whole.at, there, 40, second.bounds).theta if near else worst

@@ -28,7 +28,7 @@ def fitted(table6: dict[str, LinearModel]) -> LinearModel:
 def spread_over_draws(model: LinearModel, quantity: str) -> np.ndarray:
     rng = np.random.default_rng(2)
     centre = np.concatenate([model.numerator, model.denominator[1:]])
-    draws = rng.multivariate_normal(centre, model.covariance, size=2_000)
+    draws = rng.multivariate_normal(centre, model.covariance, size=1_000)
     found = [getattr(LinearModel(t[:3], np.array([1.0, *t[3:]]), 1e-3, "u", "y"), quantity) for t in draws]
     return np.array([np.sort_complex(np.atleast_1d(value)) for value in found])
 
