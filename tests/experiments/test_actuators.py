@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from experiments import actuators
-from experiments.actuators import actuator, kind_meant, kinds_by_columns, offered
+from experiments.actuators import actuator, actuator_of, kind_meant, kinds_by_columns, offered
+from plant.eha.rig import Rig
 from plant.errors import HydrostateError, NoChannelError
 
 
@@ -13,6 +14,11 @@ def test_a_kind_is_found_by_its_name_and_by_each_of_its_plants() -> None:
     assert {actuator(name).name for name in ("eha", "lumped", "circuit", "reduced")} == {"eha"}
     with pytest.raises(HydrostateError, match=r"--plant must be one of .*piezo-stack.*, got 'piezo'"):
         actuator("piezo")
+
+
+def test_a_log_is_of_the_kind_that_its_rig_file_names_and_of_the_usual_one_where_it_names_none() -> None:
+    assert actuator_of(Rig(plant="piezo-stack"), "eha").name == "piezo-stack"
+    assert actuator_of(Rig(), "diaphragm-motor").name == "diaphragm-motor"
 
 
 def test_a_kind_that_is_registered_under_another_name_than_its_own_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -130,6 +130,11 @@ def worth_in(log: GreyBoxLog) -> float:
     """Return what a hypothesis must gain in a log that the plain form explains: `WORTH` at each turn of a slow log.
 
     The motor passes turns alike, so what is strange is seen at each.
+
+    Returns
+    -------
+    float
+        Gain in log-likelihood [dimensionless].
     """
     return WORTH * log.passes
 

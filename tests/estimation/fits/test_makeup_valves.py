@@ -19,7 +19,7 @@ PAPER = EhaParameters()
 
 
 def logged(crack_a: float, crack_b: float) -> Record:
-    """Return two and a half seconds of an actuator whose make-up valves open so far below the accumulator's pressure [Pa]."""
+    """Return 2.5 s of an actuator whose make-up valves open so far below the accumulator's pressure [Pa]."""
     machine = Machine(crack_a=crack_a, crack_b=crack_b, quadratic=1.1e6, linear=0.0, coulomb=490.0)
     time = 1e-3 * np.arange(2500)
     course = np.ones((len(time), 5))

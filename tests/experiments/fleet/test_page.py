@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from experiments.fleet import page as subject
 from experiments.fleet.actuators import ActuatorRow, actuator_rows
 from experiments.fleet.log_pages import file_name, write_pages
 from experiments.fleet.naming import by_pattern
@@ -161,6 +162,14 @@ def test_logs_that_could_not_be_read_are_listed_with_the_reason() -> None:
     assert "no time" in page
     assert "Logs that could not be read" in page
     assert "Logs that could not be read" not in fleet_page(actuator_rows(log_rows(rows[:1], named, {})), {}, "hall")
+
+
+def test_paper_hides_the_rows_beyond_those_that_the_page_says_it_lists(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(subject, "MOST_LISTED", 3)
+    rows = [store_row("A_1.csv", 1.0, outcome="failed", found_condition=None, reason="A_1.csv: no time")]
+    page = fleet_page(actuator_rows(log_rows(rows, {}, {})), {}, "hall")
+    assert "on paper, at most 3." in page
+    assert re.findall(r"@media print { :is\(#unread, #undated\) tbody tr:nth-child\(n \+ (\d+)\)", page) == ["4"]
 
 
 def test_the_page_says_how_many_rows_have_a_page() -> None:

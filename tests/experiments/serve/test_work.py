@@ -37,7 +37,7 @@ def test_another_actuator_s_log_gets_its_condition_its_page_and_a_row(stack_log:
 
 def test_the_page_says_what_reading_the_log_brought_up(tmp_path: Path) -> None:
     log = tmp_path / "other.csv"
-    words = ["simulate", "--duration", "1", "--sample-time", "0.001", "--out", str(log)]
+    words = ["simulate", "--duration", "0.5", "--sample-time", "0.001", "--out", str(log)]
     assert CliRunner().invoke(app, words).exit_code == 0
     log.write_text(log.read_text().replace("differential_pressure_pa", "x").replace("pressure_b_pa", "y"))
     found = work_on(task(log, tmp_path, plant="eha", verb="estimate"))

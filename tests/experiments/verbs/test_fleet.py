@@ -27,7 +27,7 @@ def test_a_folder_without_logs_is_refused(tmp_path: Path) -> None:
 def test_a_folder_may_hold_logs_of_another_kind_of_actuator(tmp_path: Path) -> None:
     logs, stack = tmp_path / "logs", tmp_path / "logs" / "stacks"
     for name in ("A_1", "A_2"):
-        options = ("--duration", 2, "--sample-time", 1e-3, "--condition", "normal")
+        options = ("--duration", 1, "--sample-time", 1e-3, "--condition", "normal")
         assert invoke("simulate", *options, "--out", logs / f"{name}.csv")[0] == 0
         assert invoke("simulate", "--plant", "piezo-stack", "--out", stack / f"S{name}.csv")[0] == 0
     (stack / "rig.toml").write_text('name = "stack 3"\nplant = "piezo-stack"\n', encoding="utf-8")
