@@ -30,7 +30,7 @@ PRESSURE = "differential_pressure_pa"
 
 
 @cache
-def log(condition: str = "minor_leakage", duration: float = 3.0) -> Record:
+def log(condition: str = "minor_leakage", duration: float = 2.0) -> Record:
     p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(8)
     return simulate(LUMPED, make_drive("steps", duration, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
 
