@@ -15,6 +15,9 @@ NO_PLAIN = object()
 UNPARSED = "unable to parse string as a"
 """What pydantic says of a text that is no number, without the text."""
 
+OUTSIDE = "Input should be "
+"""How pydantic begins what it says of a number that is out of range, without the number."""
+
 ITS_PLACE = "_runtime_param"
 """Where a parameter of Typer keeps what turns values into what a command takes; None until it is asked for."""
 
@@ -57,6 +60,8 @@ class _Taken:
             if isinstance(value, str) and UNPARSED in said:
                 kind = "whole number" if "integer" in said else "number"
                 vars(error)["message"] = f"a {kind} is needed, got {value!r}"
+            elif isinstance(value, str) and said.startswith(OUTSIDE):
+                vars(error)["message"] = f"must be {said.removeprefix(OUTSIDE)}, got {value!r}"
             raise
 
     def _plain(self, value: Any, annotation: Any, param: Any, ctx: Any) -> Any:

@@ -112,10 +112,12 @@ def identify(
     of_columns = {"--reference": references, "--simulate": simulate, "--simulated": simulated, "--validate": validate}
     of_columns |= {"--response": response, "--resample": resample}
     refuse_given(of_columns, "goes with --input and --output that name columns, without --rig and --columns")
+    from estimation.identification.free_run.data import MOST_ORDER
+
     fit = ChannelFit(
         input=_one_channel("--input", inputs, INPUT),
         output=_one_channel("--output", outputs, OUTPUT),
-        order=whole_or_auto("--order", order or "2", 1),
+        order=whole_or_auto("--order", order or "2", 1, MOST_ORDER),
         delay=whole_or_auto("--delay", delay or "0", 0),
         filter_hz=filter_hz,
         seed=seed,
@@ -143,7 +145,7 @@ def _one_channel(option: str, given: list[str] | None, default: str) -> str:
     return channel
 
 
-def whole_or_auto(option: str, text: str, least: int) -> int | None:
+def whole_or_auto(option: str, text: str, least: int, most: int | None = None) -> int | None:
     """Return a whole number, or None for ``auto``.
 
     Returns
@@ -163,6 +165,7 @@ def whole_or_auto(option: str, text: str, least: int) -> int | None:
     """
     if text == "auto":
         return None
-    if not text.isdecimal() or int(text) < least:
-        raise HydrostateError(f"{option} must be a whole number from {least} on, or auto, got {text!r}")
+    if not text.isdecimal() or int(text) < least or (most is not None and int(text) > most):
+        end = "on" if most is None else f"to {most}"
+        raise HydrostateError(f"{option} must be a whole number from {least} {end}, or auto, got {text!r:.40}")
     return int(text)
