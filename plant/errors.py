@@ -73,11 +73,13 @@ class TextColumnError(LogError):
     ----------
     column : str
         What the column is called.
+    text : str
+        What it holds.
     """
 
-    def __init__(self, message: str, source: str | None = None, column: str = "") -> None:
+    def __init__(self, message: str, source: str | None = None, column: str = "", text: str = "") -> None:
         super().__init__(message, source)
-        self.column = column
+        self.column, self.text = column, text
 
 
 class NoChannelError(LogError):

@@ -42,10 +42,14 @@ class LogCode(Code):
         "cells of column {column!r} that are no numbers and were not used: {count} (the first is {said!r} in "
         "{where} {place})"
     )
-    CHANNEL_OF_TEXT = "{channel} is not used, because column {column!r} holds text"
+    CHANNEL_OF_TEXT = "{channel} is not used, because column {column!r} holds text, such as {text!r}"
     TIME_SET = (
         "{channel} jumps by {hours:+g} h at row {row}, as when a clock is set to summer time or back; the rows were "
         "taken as evenly spaced"
+    )
+    TIME_RAN_OVER = (
+        "{channel} falls back by {span_s:.10g} s as a counter that runs over does ({count} times, first at row {row}); "
+        "the rows were taken as one course"
     )
     END_LEFT_OUT = "lines left out after row {taken}, the last row of data: {count}"
     COLUMNS_ABSENT = "the rig file names columns that the log does not have: {columns}"

@@ -110,7 +110,7 @@ def _without_text(
         ):
             raise
         found.remove(text.channel)
-        notes.append(LogCode.CHANNEL_OF_TEXT.note(channel=text.channel, column=text.name[:80]))
+        notes.append(LogCode.CHANNEL_OF_TEXT.note(channel=text.channel, column=text.name[:80], text=error.text))
         return _without_text(table, [one for one in columns if one is not text], found, required, notes)
 
 

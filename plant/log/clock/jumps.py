@@ -1,4 +1,4 @@
-"""A clock that is set while it is logged: hours that stamps jump by where rows go on evenly."""
+"""A clock that is set while it is logged, or a counter that runs over: stamps jump where rows go on evenly."""
 
 import numpy as np
 
@@ -15,6 +15,16 @@ ROUNDING = 1e-9
 
 SLOWEST = 1.0
 """Longest step of stamps at which an hour, and a step, is no pause that came out so by chance [s]."""
+
+BITS = (16, 24, 31, 32)
+"""Bits of a counter that a logger or a controller keeps its time in [count]."""
+
+FINEST = 9
+"""Decimal places of a second in the finest tick of such a counter [count]."""
+
+BY_CHANCE, OFTEN = 1e-3, 3
+"""Step over what a counter counts to, from which a fall may be as long by chance, unless it comes so often [fraction,
+count]; judged: of ten such lengths a decade, a few thousandths are hit."""
 
 
 def without_jumps(time: Array) -> tuple[Array, list[tuple[int, int]]]:
@@ -43,8 +53,7 @@ def without_jumps(time: Array) -> tuple[Array, list[tuple[int, int]]]:
     far = np.flatnonzero(np.abs(step) > 0.5 * HOUR)
     if not 0 < len(far) <= MOST_JUMPS:
         return time, []
-    near = np.delete(step, far)
-    longest = GAP * max(usual_step(near), float(np.min(near[near > 0.0], initial=np.inf))) if len(near) else np.inf
+    longest = _longest(np.delete(step, far))
     hours = np.floor(step[far] / HOUR + ROUNDING)
     left = np.maximum(0.0, step[far] - HOUR * hours)
     if not longest <= GAP * SLOWEST or np.any((left > longest) | (np.abs(hours) > MOST_HOURS)):
@@ -53,3 +62,53 @@ def without_jumps(time: Array) -> tuple[Array, list[tuple[int, int]]]:
     for row, after in zip(far, left, strict=True):
         out[row + 1 :] -= step[row] - after
     return out, [(int(row) + 1, int(jump)) for row, jump in zip(far, hours, strict=True)]
+
+
+def _longest(step: Array) -> float:
+    """Return the longest of steps that leaves no row out."""
+    if not len(step):
+        return np.inf
+    return GAP * max(usual_step(step), float(np.min(step[step > 0.0], initial=np.inf)))
+
+
+def without_overruns(time: Array) -> tuple[Array, tuple[int, int, float] | None]:
+    """Return stamps of a counter that ran over, as if it had gone on counting.
+
+    All stamps that fall do so by one number of ticks, 2^16, 2^24, 2^31 or 2^32 of a power of ten of a second, less one
+    step. A test that begins again falls to where the log begins, and stays.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        The stamps [s].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        The stamps [s].
+    tuple of int, int and float, or None
+        How often it ran over, the first row after, from 0, and what it counts to [s].
+
+    Examples
+    --------
+    >>> on, overruns = without_overruns((0.06 + 1e-3 * np.arange(150.0)) % 0.065536)
+    >>> overruns, float(round(on[-1], 9))
+    ((3, 6, 0.065536), 0.209)
+    """
+    step = np.diff(time)
+    falls = np.flatnonzero(step < 0.0)
+    if not 0 < len(falls) < len(step) // 2:
+        return time, None
+    rising = np.delete(step, falls)
+    usual, longest = float(np.median(rising)), _longest(rising)
+    spans = np.array([2.0**bits * 10.0**-places for bits in BITS for places in range(FINEST + 1)])
+    after = spans + float(np.median(step[falls]))
+    span = float(spans[np.argmin(np.abs(after - usual))])
+    left = step[falls] + span
+    begins_again = np.abs(time[falls + 1] - time[0]) <= 0.1 * usual
+    chance = longest > BY_CHANCE * span and len(falls) < OFTEN
+    if np.any((left < 0.5 * usual) | (left > longest)) or begins_again.all() or chance or not usual > 0.0:
+        return time, None
+    out = time.copy()
+    out[1:] += span * np.cumsum(step < 0.0)
+    return out, (len(falls), int(falls[0]) + 1, span)

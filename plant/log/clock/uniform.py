@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from plant.arrays import Array
 from plant.errors import LogError, SparseLogError
 from plant.log.clock.jitter import GAP, grid_of, resampled, rounded_clock, usual_step
-from plant.log.clock.jumps import without_jumps
+from plant.log.clock.jumps import without_jumps, without_overruns
 from plant.log.columns import TIME
 from plant.log.notes import LogCode
 from plant.notes import Note
@@ -107,6 +107,10 @@ def on_uniform_clock(
     time, jumps = without_jumps(time)
     for row, hours in jumps:
         notes.append(LogCode.TIME_SET.note(channel=TIME, hours=hours, row=row + 1))
+    time, overruns = without_overruns(time)
+    if overruns is not None:
+        count, row, span = overruns
+        notes.append(LogCode.TIME_RAN_OVER.note(channel=TIME, count=count, row=row + 1, span_s=span))
     if _own_times(channels):
         return _merged(time, channels, source, notes)
     ticks = _whole_ticks(time)
@@ -195,7 +199,8 @@ def _not_increasing(time: Array, source: str) -> LogError:
     row = int(np.argmax(np.diff(time) <= 0.0))
     got = f"{time[row + 1]:.12g} in row {row + 2} after {time[row]:.12g}"
     return LogError(
-        f"{TIME} must increase, got {got}; if the clock was set there, or another test begins, keep one side of it",
+        f"{TIME} must increase, got {got}; if the clock was set there, or another test begins, keep one side of it; "
+        "if it counts rows or runs over, leave its column out and give --sample-time",
         source,
     )
 

@@ -27,6 +27,9 @@ _FORTRAN = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)[dD][-+]?\d+")
 MOST_STRANGE = 0.01
 """Cells of a column that may be no numbers, or rows that are no data, of all rows of a log [fraction]."""
 
+STAMP = "2026-03-04 12:00:00.001"
+"""A time as every reader takes it, for errors."""
+
 SHOWN = 60
 """Characters that a note shows of what is no number [count]."""
 
@@ -201,5 +204,6 @@ def not_a_number(source: str, name: str, row: int, value: object) -> LogError:
     row : int
         The row from 0; the sentence counts from 1, without the header.
     """
-    said = f"column {name[:80]!r} must hold numbers, got {str(value)[:40]!r} in row {row + 1}"
-    return TextColumnError(said, source, name)
+    text = str(value)[:40]
+    said = f"column {name[:80]!r} must hold numbers, got {text!r} in row {row + 1}; write 1234.5, or a time as {STAMP}"
+    return TextColumnError(said, source, name, text)

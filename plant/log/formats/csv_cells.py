@@ -1,6 +1,5 @@
 """A log of text, or of a sheet, cell by cell: which lines are rows of data, and which cell is no number."""
 
-import re
 import warnings
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,21 +12,17 @@ from plant.arrays import Array
 from plant.errors import LogError, LogWarning
 from plant.log.clock.stamps import is_stamp, read_stamps
 from plant.log.columns import TIME, TRUTH, Column
+from plant.log.formats.cell_texts import is_value
 from plant.log.formats.cells import MISSING, MOST_STRANGE, SHOWN, no_numbers, not_a_number, number, wrong_width
-from plant.log.formats.csv_layout import COMMENT, Layout, is_value
-from plant.log.formats.thousands import is_grouped, thousands_error
+from plant.log.formats.csv_column import Cells
+from plant.log.formats.csv_layout import COMMENT, Layout
+from plant.log.formats.thousands import without_thousands
 from plant.log.headings import unit_or_none
 from plant.log.notes import LogCode
 from plant.notes import Note
 
 TOGETHER = 1000
 """Rows that are put into columns at once [count]."""
-
-_THOUSANDS = {
-    ".": re.compile(r"[-+]?\d{1,3}(?:,\d{3})+\.\d*"),
-    ",": re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+,\d*"),
-}
-"""Numbers with separators of thousands, by decimal point: those that say both, for 1,234 may be either."""
 
 
 def read_cells(
@@ -63,7 +58,7 @@ def read_cells(
         If lines were left out, or cells are no numbers.
     """
     names = [one.name for one in layout.headings]
-    body = _Body(layout, {one: _Cells([] if one.position in layout.stamped else array("d")) for one in chosen}, source)
+    body = _Body(layout, {one: Cells([] if one.position in layout.stamped else array("d")) for one in chosen}, source)
     block: list[_Row] = []
     row = 0
     for line, cells in enumerate(rows, start=layout.skipped + 1):
@@ -118,31 +113,11 @@ class _Strange(NamedTuple):
 
 
 @dataclass
-class _Cells:
-    """A column as it is read: its values, and the cells that are no numbers by their place among the rows.
-
-    Where decimals have a comma, those with a point alone are kept apart as long as each can be a number of thousands.
-    """
-
-    values: Any
-    bad: dict[int, str] = field(default_factory=dict[int, str])
-    pointed: str = ""
-    only_thousands: bool = True
-
-    def note_points(self, cells: Sequence[str]) -> None:
-        pointed = [
-            plain for cell in cells if "." in cell and "," not in cell and (plain := cell.strip()) not in MISSING
-        ]
-        self.pointed = self.pointed or next(iter(pointed), "")
-        self.only_thousands = self.only_thousands and all(map(is_grouped, pointed))
-
-
-@dataclass
 class _Body:
     """The rows of a log as they are read."""
 
     layout: Layout
-    columns: dict[Column, _Cells]
+    columns: dict[Column, Cells]
     source: str
     rows: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
     timeless: dict[int, str] = field(default_factory=dict[int, str])
@@ -159,11 +134,7 @@ class _Body:
 
     def take(self, block: Sequence[_Row]) -> None:
         """Add rows to the columns, but for headers and units that stand among them."""
-        odd = {
-            place
-            for column in self.columns
-            for place in self._read(column, [row.cells[column.position] for row in block])[1]
-        }
+        odd = {place for column in self.columns for place in self._read(column, self._cells(column, block))[1]}
         headers = {place for place in odd if _is_header(block[place].cells)}
         for row in (block[place] for place in sorted(headers)):
             if self._units_again(row.cells):
@@ -177,14 +148,15 @@ class _Body:
             self.strange.append(_Strange(row.line, row.said, error, is_header=True))
         kept = [row for place, row in enumerate(block) if place not in headers]
         for column, cells in self.columns.items():
-            values, bad = self._read(column, [row.cells[column.position] for row in kept])
+            texts = self._cells(column, kept)
+            values, bad = self._read(column, texts)
             for place in bad:
                 cells.bad[len(self.rows) + place] = kept[place].cells[column.position]
                 if column.channel == TIME:
                     self.timeless[len(self.rows) + place] = kept[place].said
             cells.values.extend(values)
-            if self.layout.decimal_point == "," and column.position not in self.layout.stamped:
-                cells.note_points([row.cells[column.position] for row in kept])
+            if column.position not in self.layout.stamped:
+                cells.note_parted(texts, len(self.rows), self.layout.decimal_point)
         self.rows.extend((row.line, row.row) for row in kept)
 
     def _units_again(self, cells: Sequence[str]) -> bool:
@@ -192,6 +164,12 @@ class _Body:
         return any(one.said for one in self.layout.headings) and all(
             one.stamped or one.said == unit for one, unit in zip(self.layout.headings, units, strict=True)
         )
+
+    def _cells(self, column: Column, rows: Sequence[_Row]) -> list[str]:
+        """Return the cells of a column, without the unit that stands behind each number."""
+        cells = [row.cells[column.position] for row in rows]
+        unit = self.layout.in_cells.get(column.position)
+        return cells if unit is None else [cell.strip().removesuffix(unit).rstrip() for cell in cells]
 
     def _read(self, column: Column, cells: list[str]) -> tuple[list[Any], list[int]]:
         """Return values of some rows, and the places of cells that are no numbers."""
@@ -219,8 +197,9 @@ class _Body:
     def judged(self) -> tuple[dict[Column, Array], list[Note]]:
         """Return the columns without garbage, and what was left out; refuse a log that has much of it."""
         for column, cells in self.columns.items():
-            if cells.pointed and cells.only_thousands:
-                raise thousands_error(column.name, cells.pointed, self.source)
+            cells.settle(column, self.layout.decimal_point, self.source)
+            if column.channel == TIME:
+                self.timeless = {row: said for row, said in self.timeless.items() if row in cells.bad}
         found = {one: self._values(one, cells) for one, cells in self.columns.items()}
         allowed = MOST_STRANGE * len(self.rows)
         for column in [one for one in found if len(self.columns[one].bad) > allowed]:
@@ -247,7 +226,7 @@ class _Body:
         channels = [one.channel for one in self.columns]
         return TIME in channels or all(one.startswith(TRUTH) for one in channels)
 
-    def _values(self, column: Column, cells: _Cells) -> Any:
+    def _values(self, column: Column, cells: Cells) -> Any:
         if column.position not in self.layout.stamped:
             return np.frombuffer(cells.values, dtype=np.float64) if len(cells.values) else np.empty(0)
 
@@ -316,7 +295,6 @@ def _number(cell: str, decimal_point: str) -> float:
     try:
         return number(cell if decimal_point == "." else cell.replace(",", "."))
     except ValueError:
-        if not _THOUSANDS[decimal_point].fullmatch(cell.strip()):
+        if (plain := without_thousands(cell, decimal_point)) is None:
             raise
-        between = "," if decimal_point == "." else "."
-        return float(cell.replace(between, "").replace(",", "."))
+        return float(plain)

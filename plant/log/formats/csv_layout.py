@@ -4,14 +4,14 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
 from plant.errors import LogError
 from plant.log.clock.stamps import is_stamp
-from plant.log.formats.cells import MISSING
+from plant.log.formats.cell_texts import NUMBER, is_value, unit_behind, without_unit
 from plant.log.formats.csv_loggers import (
     HEADER_ENDS,
     LABVIEW,
@@ -22,7 +22,7 @@ from plant.log.formats.csv_loggers import (
 )
 from plant.log.formats.layouts_seen import remember, remembered
 from plant.log.formats.packed import opened
-from plant.log.formats.thousands import require_ungrouped
+from plant.log.formats.thousands import decimal_point_of, require_ungrouped
 from plant.log.headings import Heading, is_unit_row, names_and_units
 
 LOOKED_AT = 1 << 18
@@ -41,7 +41,6 @@ MOST_ZEROS = 0.02
 NO_TEXT = "a text file is needed for a CSV log, got binary data; export a logger's own format as CSV, MDF, TDMS or MAT"
 
 DELIMITERS = (",", ";", "\t", "|", BLANKS)
-_NUMBER = re.compile(r"[-+\u2212]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][-+]?\d+)?")
 COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
 """How a line of comment begins."""
 
@@ -66,6 +65,8 @@ class Layout:
         Columns of dates or times of the day.
     step : float or None
         Time between rows [s], where the lines above give it in place of a column.
+    in_cells : Mapping[int, str]
+        Units that stand behind each number of a column, by its place.
     """
 
     headings: tuple[Heading, ...]
@@ -75,6 +76,7 @@ class Layout:
     encoding: str = "utf-8"
     stamped: frozenset[int] = frozenset()
     step: float | None = None
+    in_cells: Mapping[int, str] = field(default_factory=dict[int, str])
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
@@ -260,8 +262,7 @@ class _Block:
             first -= 1
         closed = all(not row[-1] for _, row in self.rows)
         names, units = names_and_units(_above(lines[:first], self.delimiter, width, closed=closed), width)
-        numbers = "".join(cell for _, row in self.rows for cell in row if _NUMBER.fullmatch(cell))
-        comma = "," in numbers and "." not in numbers and self.delimiter != BLANKS
+        point = "." if self.delimiter == BLANKS else self._decimal_point()
         stamped = frozenset(
             place
             for place, one in enumerate(self.numeric)
@@ -269,28 +270,35 @@ class _Block:
         )
         clocks = {place for place in stamped if any(":" in row[place] for _, row in self.rows[:9])}
         stamped = frozenset(clocks) or stamped  # a column of days beside one of times says nothing that is read
+        in_cells = self._units_in_cells()
         headings = tuple(
-            Heading(name, None if place in stamped else unit, place in stamped)
+            Heading(name, None if place in stamped else in_cells.get(place, unit), place in stamped)
             for place, (name, unit) in enumerate(zip(names, units, strict=True))
         )
-        return Layout(headings, first, self.delimiter, "," if comma else ".", encoding, stamped)
+        return Layout(headings, first, self.delimiter, point, encoding, stamped, in_cells=in_cells)
+
+    def _decimal_point(self) -> str:
+        cells = (without_unit(cell) for _, row in self.rows for cell in row)
+        return decimal_point_of(cell for cell in cells if NUMBER.fullmatch(cell))
+
+    def _units_in_cells(self) -> dict[int, str]:
+        """Return the unit behind most numbers of a column, by its place; others of it are no numbers."""
+        found: dict[int, str] = {}
+        for place in range(len(self.numeric)):
+            units = Counter(unit_behind(row[place]) for _, row in self.rows)
+            (unit, count), *_ = units.most_common(1)
+            if unit and 2 * count > len(self.rows):
+                found[place] = unit
+        return found
 
 
 def _mostly_stamps(cells: Sequence[str]) -> bool:
-    return 2 * sum(is_stamp(cell) and not _NUMBER.fullmatch(cell) for cell in cells) > len(cells)
+    return 2 * sum(is_stamp(cell) and not NUMBER.fullmatch(cell) for cell in cells) > len(cells)
 
 
 def _has_number(cells: Sequence[str], width: int) -> bool:
     """Return whether a line is a row of data, though a broken one."""
-    return len(cells) == width and any(_NUMBER.fullmatch(cell.strip()) or is_stamp(cell) for cell in cells)
-
-
-def is_value(cell: str) -> bool:
-    """Return whether a cell is what rows of data hold: a number, a stamp, or a word for nothing measured."""
-    text = cell.strip()
-    if not text or len(text) > 60:
-        return False
-    return bool(_NUMBER.fullmatch(text)) or text in MISSING or text.lower() in ("inf", "-inf") or is_stamp(text)
+    return len(cells) == width and any(NUMBER.fullmatch(cell.strip()) or is_stamp(cell) for cell in cells)
 
 
 def _block(lines: Sequence[str], delimiter: str) -> _Block:
@@ -301,6 +309,8 @@ def _block(lines: Sequence[str], delimiter: str) -> _Block:
         if line.strip()
     ]
     judged = [(place, row, tuple(map(is_value, row))) for place, row in split if len(row) <= _WIDEST]
+    # a blank that parts thousands is told from one between two numbers only where something else parts the cells
+    judged = [(place, row, values) for place, row, values in judged if len(row) > 1 or " " not in "".join(row)]
     judged = [one for one in judged if any(one[2])]
     widths = Counter(len(row) for _, row, _ in judged)
     if not widths:

@@ -1,4 +1,4 @@
-"""Whole numbers with separators of thousands, which would be read as a thousandth of what they are."""
+"""Separators of thousands: those that can be nothing else are taken out, others would make a thousandth of a number."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -8,6 +8,22 @@ import numpy as np
 from plant.arrays import Array
 from plant.errors import LogError
 
+APART = " '\u2019\u00a0\u2009\u202f"
+"""What separates thousands and can be no decimal sign: blanks of several widths, and apostrophes as the Swiss write."""
+
+GROUPS = rf"\d{{1,3}}(?P<apart>[{APART}])\d{{3}}(?:(?P=apart)\d{{3}})*"
+"""A whole number with such separators, as a part of a regular expression."""
+
+_SURE = {
+    point: re.compile(
+        rf"[-+\u2212]?(?:{GROUPS}(?:{one}\d*)?|\d{{1,3}}(?:{by}\d{{3}}){{2,}}|\d{{1,3}}(?:{by}\d{{3}})+{one}\d*)"
+    )
+    for point, one, by in ((".", r"\.", ","), (",", ",", r"\."))
+}
+"""Numbers whose separators of thousands can be nothing else, by decimal point: 1,234 may be either."""
+
+_PARTS = re.compile(rf"[{APART}]")
+
 _GROUPED = re.compile(r"[-+\u2212]?[1-9]\d{0,2}[.,]\d{3}")
 _SMALL = re.compile(r"[-+\u2212]?\d{1,3}")
 
@@ -16,6 +32,55 @@ _LONGEST_SMALL = 4
 
 LEAST = 30
 """Cells with a separator from which a column may be judged [count]: decimals of as many would not all be three."""
+
+
+def without_thousands(cell: str, decimal_point: str) -> str | None:
+    """Return a number without its separators of thousands and with a decimal point, None if they may be decimal signs.
+
+    Parameters
+    ----------
+    cell : str
+        Such as 1'234.5.
+    decimal_point : str
+        Of the log.
+
+    Examples
+    --------
+    >>> without_thousands("1'234.5", "."), without_thousands("1.234.567", ","), without_thousands("1,234", ".")
+    ('1234.5', '1234567', None)
+    """
+    text = cell.strip()
+    if not _SURE[decimal_point].fullmatch(text):
+        return None
+    other = "," if decimal_point == "." else "."
+    return _PARTS.sub("", text).replace(other, "").replace(",", ".").replace("\u2212", "-")
+
+
+def decimal_point_of(numbers: Iterable[str]) -> str:
+    """Return the decimal sign of numbers in which points, commas or both stand.
+
+    Parameters
+    ----------
+    numbers : iterable of str
+        As they are written.
+
+    Returns
+    -------
+    str
+        A comma if no number has a point, or if all points, but not all commas, can only part thousands.
+
+    Examples
+    --------
+    >>> decimal_point_of(["0,5", "12"]), decimal_point_of(["0,5", "1.2"]), decimal_point_of(["0,5", "12.500"])
+    (',', '.', ',')
+    """
+    found = list(numbers)
+    commas = [one for one in found if "," in one]
+    points = [one for one in found if "." in one]
+    if not commas or not points:
+        return "," if commas else "."
+    whole = all(is_grouped(one) or without_thousands(one, ",") for one in points)
+    return "," if whole and not all(is_grouped(one) or without_thousands(one, ".") for one in commas) else "."
 
 
 def groups_thousands(cells: Sequence[str]) -> bool:

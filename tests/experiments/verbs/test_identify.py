@@ -81,7 +81,8 @@ def test_a_structure_can_be_named(structure: str, logs: list[Path]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("option", "value"), [("--order", "0"), ("--order", "two"), ("--order", "100"), ("--delay", "-1"), ("--structure", "oe")]
+    ("option", "value"),
+    [("--order", "0"), ("--order", "two"), ("--order", "100"), ("--delay", "-1"), ("--structure", "oe")],
 )
 def test_what_is_not_known_is_refused_before_any_work(option: str, value: str, logs: list[Path]) -> None:
     ran = CliRunner().invoke(app, ["identify", str(logs[0]), option, value])

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from plant.errors import LogError, LogWarning
-from plant.log.clock.jumps import without_jumps
+from plant.log.clock.jumps import without_jumps, without_overruns
 from plant.log.files import read_record
 from plant.log.frames import frame_table
 from plant.log.notes import LogCode
@@ -55,3 +55,31 @@ def test_pauses_of_an_hour_between_slow_samples_or_three_of_them_stand() -> None
         kept, jumps = without_jumps(time)
         assert jumps == []
         np.testing.assert_array_equal(kept, time)
+
+
+@pytest.mark.parametrize(
+    ("bits", "tick", "start"), [(16, 1e-3, 50.0), (16, 1e-6, 0.0), (24, 1e-6, 9.0), (32, 1e-6, 4290.0)]
+)
+def test_a_counter_that_runs_over_is_read_on_with_a_note(bits: int, tick: float, start: float) -> None:
+    ticks = np.rint((start + 1e-3 * np.arange(20_000.0)) / tick) % 2**bits
+    ramp = np.arange(float(len(ticks)))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        record = read_record(
+            frame_table({"time_s": ticks * tick, "motor_speed_rad_s": ramp % 7, "position_m": 1e-5 * ramp})
+        )
+    assert record.sample_time == pytest.approx(1e-3, rel=1e-6)
+    assert len(record) == len(ticks)
+    assert [one.message.note.code for one in caught if isinstance(one.message, LogWarning)] == [LogCode.TIME_RAN_OVER]
+
+
+@pytest.mark.parametrize("rows", [2**16, 1000, 65_537])
+def test_a_test_that_begins_again_is_no_counter_that_runs_over(rows: int) -> None:
+    time = 1e-3 * (np.arange(1.5 * rows) % rows)
+    assert without_overruns(time)[1] is None
+    assert without_overruns(time + 7.0)[1] is None
+
+
+def test_one_fall_of_slow_stamps_may_be_as_long_by_chance() -> None:
+    time = np.arange(1000.0)
+    assert without_overruns(time - 65.0 * (time > 500.0))[1] is None

@@ -174,7 +174,7 @@ def test_a_channel_of_text_that_nobody_asked_for_is_left_out(tmp_path: Path) -> 
     path.write_text(path.read_text().replace("said", "differential_pressure_bar", 1))
     record, notes = read(path)
     assert "differential_pressure_pa" not in record
-    left_out = {"channel": "differential_pressure_pa", "column": "differential_pressure_bar"}
+    left_out = {"channel": "differential_pressure_pa", "column": "differential_pressure_bar", "text": "text"}
     assert notes == [LogCode.CHANNEL_OF_TEXT.note(**left_out)]
     with pytest.raises(LogError, match="'differential_pressure_bar' must hold numbers, got 'text' in row 1"):
         read_record(path, required=("differential_pressure_pa",))

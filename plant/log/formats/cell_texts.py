@@ -1,0 +1,50 @@
+"""What a cell of a text log holds: a number, one with its unit, a stamp, or a word for nothing measured."""
+
+import re
+from functools import lru_cache
+
+from plant.log.clock.stamps import is_stamp
+from plant.log.formats.cells import MISSING
+from plant.log.formats.thousands import GROUPS
+from plant.log.headings import is_unit
+
+_GROUPED = rf"{GROUPS}(?:[.,]\d*)?|\d{{1,3}}(?:(?:,\d{{3}})+(?:\.\d*)?|(?:\.\d{{3}})+(?:,\d*)?)"
+_DIGITS = rf"[-+\u2212]?(?:\d+[.,]?\d*|[.,]\d+|{_GROUPED})(?:[eEdD][-+]?\d+)?"
+NUMBER = re.compile(_DIGITS)
+"""A number, with a decimal comma or point, and with its thousands apart or not."""
+
+_MEASURED = re.compile(rf"(?P<number>{_DIGITS})\s*(?P<unit>[^\W\d_].*|[%°\[].*)")
+"""A number and what may be its unit, in one cell."""
+
+
+def is_value(cell: str) -> bool:
+    """Return whether a cell is what rows hold: a number with or without a unit, a stamp, or a word for no value."""
+    text = cell.strip()
+    if not text or len(text) > 60:
+        return False
+    plain = bool(NUMBER.fullmatch(text)) or text in MISSING or text.lower() in ("inf", "-inf")
+    return plain or bool(unit_behind(text)) or is_stamp(text)
+
+
+def unit_behind(cell: str) -> str:
+    """Return the unit that a cell holds behind its number, empty where it holds none.
+
+    Examples
+    --------
+    >>> unit_behind("12.3 mm/s"), unit_behind("12.3"), unit_behind("12 pieces")
+    ('mm/s', '', '')
+    """
+    if not cell[-1:].isalpha() and cell[-1:] not in "%°²]":
+        return ""
+    found = _MEASURED.fullmatch(cell)
+    return found["unit"] if found and _is_known_unit(found["unit"]) else ""
+
+
+@lru_cache(maxsize=256)
+def _is_known_unit(text: str) -> bool:
+    return is_unit(text)
+
+
+def without_unit(cell: str) -> str:
+    """Return a cell without the unit behind its number."""
+    return cell.removesuffix(unit_behind(cell)).rstrip()
