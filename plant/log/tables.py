@@ -147,6 +147,7 @@ def resolve_tables(tables: Sequence[Table], mapping: Mapping[str, str] | None, s
     if len(tables) == 1:
         return [(tables[0], resolve_columns(_labelled(tables[0], mapping), mapping, source))]
     chosen: list[tuple[Table, tuple[Column, ...]]] = []
+    clocks: list[tuple[Table, tuple[Column, ...]]] = []
     taken: set[str] = set()
     for table in tables:
         headings = _labelled(table, mapping)
@@ -156,12 +157,16 @@ def resolve_tables(tables: Sequence[Table], mapping: Mapping[str, str] | None, s
         kept = tuple(one for one in columns if one.channel not in mapping or one.channel in own)
         if any(one.channel != TIME for one in kept):
             chosen.append((table, kept))
+        elif kept:
+            clocks.append((table, kept))
     for channel in mapping.keys() - taken:
         names = [one.name for table in tables for one in table.headings]
         raise MissingColumnError(
             channel, mapping[channel].rpartition(":")[0] or mapping[channel], listed(names), source
         )
     _once(chosen, source)
+    if any(table.step is None and all(one.channel != TIME for one in columns) for table, columns in chosen):
+        chosen += clocks  # of a group of its own, for tables that have none
     return chosen or [(table, ()) for table in tables[:1]]
 
 
@@ -191,16 +196,21 @@ def _has(headings: Sequence[Heading], channel: str, spec: str) -> bool:
 
 def _once(chosen: Chosen, source: str) -> None:
     """Refuse a channel that two tables have."""
-    owners: dict[str, Table] = {}
+    owners: dict[str, list[tuple[Table, Column]]] = {}
     for table, columns in chosen:
         for column in columns:
-            if column.channel != TIME and (first := owners.setdefault(column.channel, table)) is not table:
-                places = f"{first.label or first.source!r} and {table.label or table.source!r}"
-                raise LogError(
-                    f"{places} both give {column.channel}, wanted one; "
-                    f"name the right one as {column.channel}=GROUP/NAME:UNIT",
-                    source,
-                )
+            owners.setdefault(column.channel, []).append((table, column))
+    twice = [name for name, own in owners.items() if name != TIME and any(one is not own[0][0] for one, _ in own)]
+    if not twice:
+        return
+    first, other = (owners[twice[0]][place][0] for place in (0, -1))
+    options = ",".join(f"{name}={first.label}/{owners[name][0][1].name}" for name in twice)
+    such = f", such as --columns '{options[:400]}'" if first.label else ""
+    raise LogError(
+        f"{(first.label or first.source)!r} and {(other.label or other.source)!r} both give {', '.join(twice)}, "
+        f"wanted one; name the right one as CHANNEL=GROUP/NAME:UNIT{such}",
+        source,
+    )
 
 
 def _read(table: Table, columns: Sequence[Column], notes: list[Note]) -> dict[str, Array]:

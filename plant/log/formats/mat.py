@@ -10,6 +10,7 @@ import numpy as np
 from plant.arrays import Array
 from plant.errors import LogError
 from plant.log.formats.mat_reader import DamagedMatError, Value, read_variables
+from plant.log.formats.mat_structs import each_struct, structs_of
 from plant.log.table import Table, table_of
 
 STRUCT = "record"
@@ -62,8 +63,10 @@ def tables_of(content: Mapping[str, Value], source: str) -> tuple[Table, ...]:
     if isinstance(record := content.get(STRUCT), Mapping):
         content = {STRUCT: record}
     made: list[Table] = []
-    plain = {name: value for name, value in content.items() if not isinstance(value, Mapping)}
-    structs = {name: value for name, value in content.items() if isinstance(value, Mapping)}
+    structs: dict[str, Mapping[str, Value]] = {}
+    for name, value in content.items():
+        structs |= structs_of(name, value)
+    plain = {name: value for name, value in content.items() if not each_struct(value)}
     for name, value in {"": plain, **structs}.items():
         if recorded := _recorded(value):
             made += [table_of(source, columns, units=units, label=name) for columns, units in recorded]
@@ -98,7 +101,9 @@ def _recorded(struct: Mapping[str, Value]) -> list[tuple[dict[str, Any], dict[st
     """Return the columns of what dSPACE records, a raster each: signals in Y, each with its place in the times of X."""
     if not {"X", "Y"} <= struct.keys():
         return []
-    times, signals = ([one for one in _each(struct[name]) if isinstance(one.get("Data"), np.ndarray)] for name in "XY")
+    times, signals = (
+        [one for one in each_struct(struct[name]) if isinstance(one.get("Data"), np.ndarray)] for name in "XY"
+    )
     rasters: dict[int, tuple[dict[str, Any], dict[str, str | None]]] = {}
     for one in signals:
         place = one.get("XIndex")
@@ -108,12 +113,6 @@ def _recorded(struct: Mapping[str, Value]) -> list[tuple[dict[str, Any], dict[st
             columns, units = rasters.setdefault(raster, ({"time": np.ravel(_data(time))}, {"time": _unit(time) or "s"}))
             columns[name], units[name] = np.ravel(_data(one)), _unit(one)
     return list(rasters.values())
-
-
-def _each(value: Value) -> list[Mapping[str, Any]]:
-    """Return the structs of an array of them, or the only one."""
-    many: Any = [value] if isinstance(value, Mapping) else value if isinstance(value, Sequence) else []
-    return [one for one in many if isinstance(one, Mapping)]
 
 
 def _data(struct: Mapping[str, Any]) -> Any:

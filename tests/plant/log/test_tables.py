@@ -43,6 +43,22 @@ def test_a_channel_that_two_groups_have_is_refused_until_the_group_is_said() -> 
     np.testing.assert_allclose(of(*tables, mapping={"position_m": "right/position_m"})["position_m"], 2.0 * TIME)
 
 
+def test_all_channels_of_two_tests_in_one_file_are_named_at_once() -> None:
+    tests = [table(name, time_s=TIME, motor_speed_rad_s=TIME, position_m=TIME) for name in ("run 1", "run 2")]
+    named = {name: f"run 1/{name}" for name in ("motor_speed_rad_s", "position_m")}
+    option = ",".join(f"{name}={column}" for name, column in named.items())
+    with pytest.raises(LogError, match=f"both give motor_speed_rad_s, position_m, .*--columns '{option}'"):
+        of(*tests)
+    assert len(of(*tests, mapping=named)["position_m"]) == len(TIME)
+
+
+def test_a_group_that_holds_the_time_alone_is_that_of_groups_as_long() -> None:
+    found = of(table("motor", motor_speed_rad_s=TIME), table("rod", position_m=TIME), table("clock", time_s=TIME))
+    np.testing.assert_allclose(found["time_s"], TIME)
+    named = of(table("rod", position_m=TIME), table("clock", When=1e3 * TIME), mapping={"time_s": "When:ms"})
+    np.testing.assert_allclose(named["time_s"], TIME)
+
+
 def test_dates_in_the_place_of_numbers_are_refused() -> None:
     dated = table("rod", time_s=TIME, position_m=NOON + (1e9 * TIME).astype("timedelta64[ns]"))
     with pytest.raises(LogError, match="column 'position_m' must hold numbers, got dates"):

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plant.errors import LogError
+from plant.errors import LogError, LogWarning
 from plant.log.files import read_record
 from plant.log.formats.thousands import groups_thousands
 
@@ -75,3 +75,34 @@ def test_where_decimals_have_a_comma_a_point_that_parts_thousands_is_refused(tmp
                 read_record(path)
         else:
             assert read_record(path)["motor_speed_rad_s"][-1] == pytest.approx(0.98 * np.pi / 30.0)
+
+
+@pytest.mark.parametrize("apart", ["'", "\u2019", " ", "\u00a0", "\u202f", "\u2009", ","])
+def test_thousands_that_can_be_nothing_else_are_read(tmp_path: Path, apart: str) -> None:
+    cells = [f"{one / 3.0:,.4f}".replace(",", apart) for one in 2.0 * SPEED]
+    read = read_record(written(tmp_path, cells, "log.csv"))["motor_speed_rad_s"]
+    np.testing.assert_allclose(read, 2.0 * SPEED / 3.0 * np.pi / 30.0, atol=1e-4)
+
+
+@pytest.mark.parametrize(("apart", "point"), [(" ", ","), (".", ","), (",", ".")])
+def test_of_whole_numbers_one_beyond_a_million_says_what_its_signs_are(tmp_path: Path, apart: str, point: str) -> None:
+    pressure = np.round(2e6 * np.sin(40.0 * TIME))
+    cells = [f"{one:,.0f}".replace(",", apart) for one in pressure]
+    rows = [f"{t:.3f};{99.0 * t:.4f}".replace(".", point) + f";{cell}" for t, cell in zip(TIME, cells, strict=True)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["time_s;motor_speed_rad_s;differential_pressure_pa", *rows]) + "\n")
+    read = read_record(path, required=("differential_pressure_pa",))["differential_pressure_pa"]
+    np.testing.assert_allclose(read, pressure)
+
+
+def test_a_column_of_text_with_another_decimal_sign_than_the_log_is_read_by_its_own(tmp_path: Path) -> None:
+    cells = [f"{one / 7.0:.4f}".replace(".", ",") for one in SPEED]
+    read = read_record(written(tmp_path, cells, "log.csv"))["motor_speed_rad_s"]
+    np.testing.assert_allclose(read, SPEED / 7.0 * np.pi / 30.0, atol=1e-4)
+    # one glitch among whole numbers is none, and what may be thousands is not guessed
+    whole = [f"{one:.0f}" for one in SPEED]
+    with pytest.warns(LogWarning, match=r"'12,7' in line 2|is missing in 1 of 300"):
+        glitch = read_record(written(tmp_path, ["12,7", *whole[1:]], "log.csv"))
+    assert np.isnan(glitch["motor_speed_rad_s"][0])
+    with pytest.raises(LogError, match=r"'Motor speed \[rpm\]' must hold numbers, got '1,\d{3}' in row"):
+        read_record(written(tmp_path, [f"{abs(one):,.0f}" for one in SPEED], "log.csv"))

@@ -1,0 +1,88 @@
+"""Structs of a MAT file as tables: those within that have a time of their own, and arrays of structs."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from plant.log.columns import TIME, TIMES
+from plant.log.formats.mat_reader import Value
+from plant.log.headings import Heading
+
+NAMES, DATA, UNITS = ("name", "label", "channel"), ("data", "values", "value", "samples", "y"), ("unit", "units")
+"""Fields of a struct that is one signal, in lower case: what it is called, its samples, and its unit."""
+
+Struct = Mapping[str, Any]
+
+
+def structs_of(name: str, value: Value) -> dict[str, Struct]:
+    """Return a variable as structs that are a table each, by what they are called; none for other variables.
+
+    A struct within another is apart if it has a time of its own. An array of structs has one a sample, whose fields are
+    numbers; one a signal, with its name and samples; or one a test.
+
+    Parameters
+    ----------
+    name : str
+        The variable.
+    value : Mapping or Sequence of Mapping
+        As `plant.log.formats.mat_reader.read_variables` returns it.
+
+    Examples
+    --------
+    >>> list(structs_of("log", {"fast": {"time_s": np.arange(9.0)}, "bench": "2"}))
+    ['log', 'log.fast']
+    """
+    if isinstance(value, Mapping):
+        apart = {f"{name}.{field}": one for field, one in value.items() if isinstance(one, Mapping) and _has_time(one)}
+        return {name: {field: one for field, one in value.items() if f"{name}.{field}" not in apart}, **apart}
+    each = each_struct(value)
+    if not each:
+        return {}
+    return _of_samples(name, each) or _of_signals(name, each) or {f"{name}({k})": one for k, one in enumerate(each, 1)}
+
+
+def each_struct(value: Value) -> list[Struct]:
+    """Return the structs of an array of them, or the only one; none of anything else."""
+    many: Any = [value] if isinstance(value, Mapping) else value if isinstance(value, Sequence) else []
+    return [one for one in many if isinstance(one, Mapping)]
+
+
+def _has_time(struct: Struct) -> bool:
+    return any(_is_vector(value) and Heading(name).stem in (*TIMES, TIME) for name, value in struct.items())
+
+
+def _is_vector(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.size > 1
+
+
+def _of_samples(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
+    """Return an array with a struct a sample as one struct of columns; empty if it is none."""
+    numbers = [key for key, value in each[0].items() if isinstance(value, np.ndarray) and value.size == 1]
+    if not numbers or any(key not in one or np.size(one[key]) != 1 for one in each for key in numbers):
+        return {}
+    if any(_is_vector(value) for one in each for value in one.values()):
+        return {}
+    return {name: {key: np.array([np.ravel(one[key])[0] for one in each]) for key in numbers}}
+
+
+def _of_signals(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
+    """Return an array with a struct a signal: together, or apart where each has its times; empty if it is none."""
+    found: dict[str, Struct] = {}
+    together: dict[str, Any] = {}
+    for place, one in enumerate(each, start=1):
+        said = {kind: _first(one, names) for kind, names in (("name", NAMES), ("data", DATA), ("unit", UNITS))}
+        if not isinstance(said["name"], str) or not _is_vector(said["data"]):
+            return {}
+        unit = said["unit"]
+        label = f"{said['name']} [{unit}]" if isinstance(unit, str) and unit.strip() else said["name"]
+        times = {field: np.ravel(value) for field, value in one.items() if _has_time({field: value})}
+        if times:
+            found[f"{name}({place})"] = {**times, label: np.ravel(said["data"])}
+        else:
+            together[label] = np.ravel(said["data"])
+    return {name: together, **found} if together else found
+
+
+def _first(struct: Struct, names: Sequence[str]) -> Any:
+    return next((value for field, value in struct.items() if field.lower() in names), None)
