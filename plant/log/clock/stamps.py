@@ -16,16 +16,21 @@ Stamps = NDArray[np.datetime64]
 _CLOCK = r"(?P<h>\d{1,2}):(?P<m>\d{2})(?::(?P<s>\d{2})(?:[.,:](?P<f>\d{1,12}))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
 _ZONE = r"\s*(?P<zone>Z|UTC|GMT|[A-Z]{3,4}|[-+]\d{2}(?::?\d{2})?)?(?:\[[\w/+-]{1,40}\])?"
 _MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
-_COMPACT = r"T(?P<h>\d{2})(?P<m>\d{2})(?P<s>\d{2})(?:[.,](?P<f>\d{1,12}))?(?P<half>)"
-_AFTER_DAY = rf"(?:[ T,_]\s*){_CLOCK}"
+_WORD = rf"(?P<word>{'|'.join(_MONTHS)})[a-z]{{0,6}}\.?"
+_WEEKDAY = r"(?:(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun)[a-z]{0,6},?\s+)?"
+_COMPACT = r"[T_ -](?P<h>\d{2})(?P<m>\d{2})(?P<s>\d{2})(?:[.,_](?P<f>\d{1,12}))?(?P<half>)"
+_AFTER_DAY = rf"(?:[ T,_-]\s*){_CLOCK}"
 _EITHER = re.compile(rf"(?P<one>\d{{1,2}})[/-](?P<two>\d{{1,2}})[/-](?P<Y>\d{{4}}|\d{{2}}){_AFTER_DAY}{_ZONE}")
 _PATTERNS = (
     *(
         re.compile(rf"{day}{clock}{_ZONE}")
         for day, clock in (
-            (r"(?P<Y>\d{4})[-/.](?P<M>\d{1,2})[-/.](?P<D>\d{1,2})", rf"(?:(?:\s*[T,_]\s*|\s+){_CLOCK})?"),
+            (r"(?P<Y>\d{4})[-/.](?P<M>\d{1,2})[-/.](?P<D>\d{1,2})", rf"(?:(?:\s*[T,_-]\s*|\s+){_CLOCK})?"),
             (r"(?P<D>\d{1,2})\.(?P<M>\d{1,2})\.(?P<Y>\d{4}|\d{2})", _AFTER_DAY),
-            (rf"(?P<D>\d{{1,2}})[- ](?P<word>{'|'.join(_MONTHS)})[- ](?P<Y>\d{{4}}|\d{{2}})", _AFTER_DAY),
+            (rf"{_WEEKDAY}(?P<D>\d{{1,2}})[- ]{_WORD}[- ](?P<Y>\d{{4}}|\d{{2}})", _AFTER_DAY),
+            (rf"{_WEEKDAY}{_WORD}\s+(?P<D>\d{{1,2}}),?\s+(?P<Y>\d{{4}})", _AFTER_DAY),
+            (rf"{_WEEKDAY}{_WORD}\s+(?P<D>\d{{1,2}})\s+{_CLOCK}", r"\s+(?P<Y>\d{4})"),
+            (r"(?:(?P<Y>\d{4})[-:])?(?P<N>\d{3})", rf"[T: ]{_CLOCK}"),
             (r"(?P<Y>\d{4})(?P<M>\d{2})(?P<D>\d{2})", _COMPACT),
         )
     ),
@@ -170,12 +175,14 @@ def _fraction(digits: str | None) -> int:
 
 
 def _day(part: "dict[str, Any]", *, months_first: bool) -> int:
-    """Return the day, counted from 1970; 0 where a stamp has none."""
+    """Return the day, counted from 1970; 0 where a stamp has none, the day of the year where it has no year."""
     if part.get("Y") is None:
-        return 0
+        return 0 if part.get("N") is None else _day_of_year(part["N"])
     year = int(part["Y"])
     year += 2000 if year < 100 else 0
     word = part.get("word")
+    if part.get("N") is not None:
+        return (date(year, 1, 1) - _EPOCH).days + _day_of_year(part["N"])
     month, day = part.get("M") if word is None else _MONTHS.index(word) + 1, part.get("D")
     if month is None or day is None:
         month, day = (part["one"], part["two"]) if months_first else (part["two"], part["one"])
@@ -183,6 +190,13 @@ def _day(part: "dict[str, Any]", *, months_first: bool) -> int:
     if not -100_000 < found < 100_000:
         raise ValueError(year)
     return found
+
+
+def _day_of_year(text: str) -> int:
+    """Return a day of the year, counted from 0."""
+    if not 1 <= int(text) <= 366:
+        raise ValueError(text)
+    return int(text) - 1
 
 
 def _over_midnight(stamps: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -24,6 +24,14 @@ def read(*cells: str) -> list[str]:
         "1 Mar 2026 12:00:00.25 PM",
         "1-Mar-26 12:00:00.25 PM",
         "20260301T120000.250",
+        "20260301_120000_250",
+        "1 March 2026 12:00:00.250",
+        "Mar 01, 2026 12:00:00.250 PM",
+        "Sun Mar 1 12:00:00.250 2026",
+        "Sun, 01 Mar 2026 12:00:00.25 +0000",
+        "01.03.2026-12:00:00.250",
+        "2026-060T12:00:00.250",
+        "2026:060:12:00:00.250",
         "20260301T140000.250+0200",
     ],
 )
@@ -45,6 +53,11 @@ def test_days_that_would_be_months_apart_are_read_the_other_way(evening: str, mo
     assert first - last == np.timedelta64(1, "s")
 
 
+def test_a_day_of_the_year_without_the_year_counts_days() -> None:
+    last, first = (np.datetime64(one) for one in read("060:23:59:59.5", "061:00:00:00.5"))
+    assert first - last == np.timedelta64(1, "s")
+
+
 def test_a_time_of_the_day_goes_on_over_midnight() -> None:
     assert read("23:59:59.9", "00:00:00.1") == ["1970-01-01T23:59:59.900", "1970-01-02T00:00:00.100"]
 
@@ -54,7 +67,9 @@ def test_summer_time_that_ends_within_a_log_does_not_set_it_back_where_the_zone_
     assert (np.datetime64(after) - np.datetime64(before)) == np.timedelta64(1, "s")
 
 
-@pytest.mark.parametrize("cell", ["2026-13-01 00:00:00", "9999-01-01 00:00:00", "25:00:00", "1:2:3:4", "x", "9" * 500])
+@pytest.mark.parametrize(
+    "cell", ["2026-13-01 00:00:00", "9999-01-01 00:00:00", "25:00:00", "1:2:3:4", "2026-367T12:00:00", "x", "9" * 500]
+)
 def test_what_is_no_moment_is_refused_with_its_row(cell: str) -> None:
     with pytest.raises(ValueError, match=r"^1 "):
         read("2026-01-01 00:00:00", cell)
