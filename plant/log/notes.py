@@ -47,6 +47,7 @@ class LogCode(Code):
         "{channel} jumps by {hours:+g} h at row {row}, as when a clock is set to summer time or back; the rows were "
         "taken as evenly spaced"
     )
+    TIME_IS_DATES = "column {column!r} says no unit; it was read in {unit}, in which it begins at {began}"
     TIME_RAN_OVER = (
         "{channel} falls back by {span_s:.10g} s as a counter that runs over does ({count} times, first at row {row}); "
         "the rows were taken as one course"
@@ -60,7 +61,7 @@ class LogCode(Code):
     CHAMBER_ALONE = "{channel} was not used: differential pressure also needs {other}"
     METADATA_UNREADABLE = "the log's metadata are not a valid {wanted} and were ignored"
     SAMPLE_TIME_SHORT = (
-        "the sample time is {sample_time_s:.3g} s, which is unusually short: check the unit (s read as ms?)"
+        "the sample time is {sample_time_s:.3g} s, which is unusually short: check the unit (s read as ms, days as s?)"
     )
     SAMPLE_TIME_LONG = (
         "the sample time is {sample_time_s:.3g} s, which is unusually long: check the unit (ms read as s?)"

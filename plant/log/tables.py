@@ -1,7 +1,8 @@
 """The tables of a log, a logger or a group each: which column is which, when its rows were taken, one clock."""
 
+import warnings
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,9 @@ from plant.arrays import Array
 from plant.errors import LogError, MissingColumnError, TextColumnError
 from plant.log.checks import alternatives, lacking
 from plant.log.clock.merging import Timed, merged
+from plant.log.clock.time_unit import likely_unit, unit_of_dates
 from plant.log.columns import TIME, TRUTH, Column, converted, listed, resolve_columns
-from plant.log.guess import hint_of, missing_channels, overlooked
+from plant.log.guess import SHOWN, guess_by_name, hint_of, missing_channels, overlooked
 from plant.log.headings import Heading, cleaned
 from plant.log.lost_values import without_lost
 from plant.log.notes import LogCode
@@ -81,6 +83,13 @@ def gathered(
     found = [column.channel for _, columns in chosen for column in columns]
     missing = lacking(required, found)
     timeless = TIME not in found and sample_time is None and not any(table.step for table, _ in chosen)
+    if timeless and (time := _time_without_unit(tables)) is not None:
+        place, heading, dates = time
+        if dates is not None and not missing:
+            dated = gathered(tables, {**(mapping or {}), TIME: f"{heading.name}:{dates[0]}"}, required, source)
+            note = LogCode.TIME_IS_DATES.note(column=heading.name[:80], unit=dates[0], began=dates[1])
+            return replace(dated, notes=(note, *dated.notes))
+        headings[place] = heading
     if timeless or missing:
         wanted = [TIME] * timeless + missing
         raise missing_channels(wanted, headings, source, found)
@@ -91,6 +100,26 @@ def gathered(
     together = merged(timed, source)
     columns, began = _from_start(together.channels)
     return LogTables(columns, began, (*_overlooked(chosen, tables), *notes, *together.notes))
+
+
+def _time_without_unit(tables: Sequence[Table]) -> tuple[int, Heading, tuple[str, str] | None] | None:
+    """Return the column that may be the time but says no unit: its place, it with a likely unit, its unit as dates."""
+    owners = [(table, place) for table in tables for place in range(len(table.headings))]
+    headings = [table.headings[place] for table, place in owners]
+    (guess,) = guess_by_name(headings, [TIME])[:1] or (None,)
+    if guess is None or guess.sure < SHOWN or guess.unit is not None or headings[guess.place].stamped:
+        return None
+    table, place = owners[guess.place]
+    column = Column(place, guess.name, TIME)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            values = table.read([column])[column]
+    except LogError:
+        return None
+    dates = unit_of_dates(values) if values.dtype.kind == "f" else None
+    unit = dates[0] if dates else likely_unit(values) if values.dtype.kind == "f" else None
+    return None if unit is None else (guess.place, replace(headings[guess.place], said=unit), dates)
 
 
 def _without_text(

@@ -103,7 +103,7 @@ def read_stamps(cells: Sequence[str], refuse: Callable[[int, str], Exception | N
                 raise error
             value = int(np.iinfo(np.int64).min)
         out[row] = value
-    return _over_midnight(out).view("datetime64[ns]")
+    return over_midnight(out).view("datetime64[ns]")
 
 
 def _all_alike(cells: Sequence[str]) -> Stamps | None:
@@ -199,8 +199,19 @@ def _day_of_year(text: str) -> int:
     return int(text) - 1
 
 
-def _over_midnight(stamps: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Let times without a date that fall back by most of a day go on to the next one."""
+def over_midnight(stamps: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Let times without a date that fall back by most of a day go on to the next one.
+
+    Parameters
+    ----------
+    stamps : ndarray of int64, shape (n,)
+        Times [ns]; the least integer where there is none.
+
+    Returns
+    -------
+    ndarray of int64, shape (n,)
+        The times [ns].
+    """
     there = stamps != np.iinfo(np.int64).min
     if not there.any() or stamps[there].max() >= 2 * _DAY:
         return stamps

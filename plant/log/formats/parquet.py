@@ -114,7 +114,7 @@ def open_feather(path: Path) -> Table:
 def _table(path: Path, schema: pa.Schema, read: Any) -> Table:
     kinds = [schema.field(place).type for place in range(len(schema.names))]
     headings = tuple(
-        Heading(name, _said(schema.field(place)), pa.types.is_timestamp(kind))
+        Heading(name, _said(schema.field(place)), pa.types.is_timestamp(kind) or pa.types.is_time(kind))
         for place, (name, kind) in enumerate(zip(schema.names, kinds, strict=True))
     )
     text = (schema.metadata or {}).get(SCHEMA_KEY)
@@ -148,6 +148,12 @@ def _values(values: "pa.ChunkedArray[Any]", column: Column, source: str) -> Any:
     if pa.types.is_timestamp(kind):
         whole: Any = values.cast(pa.timestamp("ns", kind.tz)).cast(pa.int64())
         return np.array(whole.fill_null(np.iinfo(np.int64).min).to_numpy(), dtype=np.int64).view("datetime64[ns]")
+    if pa.types.is_time(kind):
+        from plant.log.clock.stamps import over_midnight
+
+        of_day: Any = values.cast(pa.time64("ns")).cast(pa.int64())
+        stamps = np.array(of_day.fill_null(np.iinfo(np.int64).min).to_numpy(), dtype=np.int64)
+        return over_midnight(stamps).view("datetime64[ns]")
     if pa.types.is_duration(kind):
         unit = SECONDS[_unit_of_duration(column.name)]
         whole = values.cast(pa.duration("ns")).cast(pa.int64())

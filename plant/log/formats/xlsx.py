@@ -178,6 +178,10 @@ def _table(path: Path, title: str, rows: Cells, uncomputed: bool = False) -> Tab
         return None
 
     below = rows[layout.skipped :]
+    lasting = {
+        place for row in below[:1] for place, cell in enumerate(row[:width]) if isinstance(cell, timedelta)
+    }  # written in seconds here
+    headings = tuple(replace(one, said="s") if place in lasting else one for place, one in enumerate(layout.headings))
     numeric = [any(_is_number(row[place]) for row in below if place < len(row)) for place in range(width)]
 
     def read(chosen: Sequence[Column]) -> dict[Column, Array]:
@@ -197,7 +201,7 @@ def _table(path: Path, title: str, rows: Cells, uncomputed: bool = False) -> Tab
         )
         return read_cells(texts, layout, chosen, str(path))
 
-    return Table(str(path), layout.headings, read, label=title)
+    return Table(str(path), headings, read, label=title)
 
 
 def _is_number(cell: Any) -> bool:

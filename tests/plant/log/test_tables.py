@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from plant.errors import LogError, MissingColumnError
+from plant.log.notes import LogCode
 from plant.log.table import Table, table_of
 from plant.log.tables import gathered, resolve_tables
 
@@ -50,6 +51,21 @@ def test_all_channels_of_two_tests_in_one_file_are_named_at_once() -> None:
     with pytest.raises(LogError, match=f"both give motor_speed_rad_s, position_m, .*--columns '{option}'"):
         of(*tests)
     assert len(of(*tests, mapping=named)["position_m"]) == len(TIME)
+
+
+@pytest.mark.parametrize(("unit", "per_s"), [("s", 1.0), ("ms", 1e3), ("us", 1e6), ("d", 1.0 / 86_400.0)])
+def test_a_time_without_unit_whose_values_are_dates_is_read_in_theirs(unit: str, per_s: float) -> None:
+    first = 46_085.5 if unit == "d" else 1_772_625_600.0 * per_s
+    found = gathered([table("rod", Time=first + per_s * TIME, position_m=TIME)], None, (), "log")
+    np.testing.assert_allclose(np.diff(found.columns["time_s"]), 0.01, rtol=1e-3)
+    assert found.notes == (LogCode.TIME_IS_DATES.note(column="Time", unit=unit, began="2026-03-04T12:00:00"),)
+
+
+def test_the_unit_of_any_other_time_is_only_offered_by_its_steps() -> None:
+    with pytest.raises(LogError, match="perhaps --columns 'time_s=Time:ms'"):
+        of(table("rod", Time=1e3 * TIME, position_m=TIME))
+    with pytest.raises(LogError, match="perhaps --columns 'time_s=Time:d'"):
+        of(table("rod", Time=0.5 + TIME / 86_400.0, position_m=TIME))
 
 
 def test_a_group_that_holds_the_time_alone_is_that_of_groups_as_long() -> None:

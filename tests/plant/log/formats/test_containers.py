@@ -44,6 +44,13 @@ def read(table: Table) -> dict[str, np.ndarray]:
 NUMBERS = [["time_s", "position_m"], *([0.1 * k, 0.01 * k] for k in range(6))]
 
 
+def test_cells_that_show_how_long_it_lasts_are_seconds(tmp_path: Path) -> None:
+    rows = [["Time", "position_m"], *([timedelta(milliseconds=100 * k), 0.01 * k] for k in range(6))]
+    (table,) = open_xlsx(workbook(tmp_path / "log.xlsx", rows))
+    assert table.headings[0].unit == "s"
+    np.testing.assert_allclose(read(table)["Time"], 0.1 * np.arange(6))
+
+
 def test_sheets_without_rows_of_numbers_are_passed_over(tmp_path: Path) -> None:
     path = workbook(tmp_path / "log.xlsx", [["a title"]], NUMBERS, [[None, None]])
     (table,) = open_xlsx(path)

@@ -110,3 +110,13 @@ def test_a_name_with_a_point_is_no_field_of_a_structure(tmp_path: Path) -> None:
             patch.setattr(parquet, "MANY", many)
             values = open_parquet(path).read([Column(place, "", f"true_{place}") for place in range(4)])
         assert [one[1] for one in values.values()] == [1.0, 10.0, 1.0]
+
+
+@pytest.mark.parametrize("kind", [pa.time32("ms"), pa.time64("us")])
+def test_times_of_the_day_are_stamps_that_go_on_over_midnight(tmp_path: Path, kind: pa.DataType) -> None:
+    of_day = pa.array([86_399_990, 0, None, 20], pa.int32()).cast(pa.time32("ms")).cast(kind)
+    table = open_parquet(written(tmp_path / "log.parquet", "parquet", Time=of_day))
+    assert table.headings[0].stamped
+    (read,) = table.read([Column(0, "Time", "time_s")]).values()
+    assert np.diff(read[[0, 1, 3]]).astype("timedelta64[ms]").astype(int).tolist() == [10, 20]
+    assert np.isnat(read[2])

@@ -1,0 +1,67 @@
+"""The unit of a column of time that says none: sure where its values are dates, else likely by the steps."""
+
+import numpy as np
+
+from plant.arrays import Array
+
+_UNITS = (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("d", 86_400.0))
+
+_YEARS = (946_684_800.0, 2_524_608_000.0)
+"""Beginning of 2000 and of 2050, counted from 1970 [s]."""
+
+_FROM = (("d", 25_569.0), ("d", 719_529.0))
+"""Where spreadsheets and MATLAB's datenum have the beginning of 1970, and their unit."""
+
+STEPS = (1e-6, 10.0)
+"""Steps of a log that dates may have [s]; judged: wider than those of any bench."""
+
+USUAL = 1e-3
+"""Step that logs of hydraulics usually have [s]; of two units that with the nearer step is likely."""
+
+
+def unit_of_dates(values: Array) -> tuple[str, str] | None:
+    """Return the unit in which values are dates since 2000, and the first of them; None if they are none.
+
+    Dates are counted from 1970 in s, ms, us or ns, or in days as spreadsheets and MATLAB do.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        A column of time [unknown unit].
+
+    Examples
+    --------
+    >>> unit_of_dates(46_000.0 + 1e-8 * np.arange(20.0)), unit_of_dates(46_000.0 + 0.01 * np.arange(20.0))
+    (('d', '2025-12-09T00:00:00'), None)
+    """
+    step, first = _usual_step(values), float(values[0]) if len(values) else np.nan
+    for unit, zero in (*((unit, 0.0) for unit, _ in _UNITS[:4]), *_FROM):
+        factor = dict(_UNITS)[unit]
+        since = (first - zero) * factor
+        if _YEARS[0] <= since <= _YEARS[1] and STEPS[0] <= step * factor <= STEPS[1]:
+            return unit, str(np.datetime64(0, "s") + np.timedelta64(round(since), "s"))
+    return None
+
+
+def likely_unit(values: Array) -> str | None:
+    """Return the unit in which the steps are most like those of a log; None where there are no steps.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        A column of time [unknown unit].
+
+    Examples
+    --------
+    >>> likely_unit(np.arange(9.0)), likely_unit(1e-3 * np.arange(9.0)), likely_unit(500.0 * np.arange(9.0))
+    ('ms', 's', 'us')
+    """
+    step = _usual_step(values)
+    if not step > 0.0:
+        return None
+    return min(_UNITS, key=lambda one: abs(float(np.log(step * one[1] / USUAL))))[0]
+
+
+def _usual_step(values: Array) -> float:
+    steps = np.diff(values[np.isfinite(values)])
+    return float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
