@@ -8,6 +8,7 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.log.clock.jitter import usual_step
+from plant.log.clock.time_unit import unit_of_dates
 from plant.log.headings import Heading
 from plant.log.table import Table
 
@@ -110,33 +111,17 @@ def inspect_table(table: Table) -> TableFacts:
     for place, heading in enumerate(table.headings):
         values = found.get(place)
         dated = values is not None and values.dtype.kind == "M"
-        said = heading.said if heading.unit is not None or dated or values is None else _unit_since_1970(values)
+        said = heading.said if heading.unit is not None or dated or values is None else _unit_of_dates(values)
         columns.append(ColumnFacts(Heading(heading.name, said, heading.stamped or dated), values))
     rows = max((len(values) for values in found.values()), default=0)
     return TableFacts(table, rows, tuple(columns))
 
 
-EXCEL = (36526.0, 73051.0)
-"""Days that Excel counts at the turn of this century and the next."""
-
-LONGEST_LOG = 1.0
-"""How much a column of Excel's days grows within a log at most [d]: a speed or a pressure of as many does not."""
-
-
-def _unit_since_1970(values: Array) -> str | None:
-    """Return the unit in which a column is a time since 1970, or since 1900 as Excel counts; None for others."""
+def _unit_of_dates(values: Array) -> str | None:
+    """Return the unit in which a column that never falls is dates; None for others."""
     there = values[np.isfinite(values)]
-    if not len(there):
-        return None
-    low, high = float(there.min()), float(there.max())
-    if (
-        EXCEL[0] < low <= high < min(EXCEL[1], low + LONGEST_LOG)
-        and len(there) > 2
-        and bool((np.diff(there) > 0.0).all())
-    ):
-        return "d"
-    fits = (unit for unit, least in (("ms", 1e12), ("us", 1e15), ("ns", 1e18)) if least < low <= high < 3.0 * least)
-    return next(fits, None)
+    dates = unit_of_dates(there) if len(there) > 2 and bool((np.diff(there) >= 0.0).all()) else None
+    return None if dates is None else dates[0]
 
 
 def clock_facts(stamps: Any) -> ClockFacts | None:

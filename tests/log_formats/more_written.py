@@ -208,7 +208,7 @@ MORE: Mapping[str, Way] = {
     "JSON, an object a row": Way(json_rows),
     "JSON, a list a column": Way(json_columns),
     "JSON, names and lists": Way(json_split),
-    "days as Excel counts them": Way(days_of_excel, inspected=True),
+    "days as Excel counts them": Way(days_of_excel),
     "dates of a MATLAB timetable": Way(dates_of_matlab),
     "Swedish minus": Way(swedish),
     "a clock of twelve hours": Way(half_days),

@@ -34,7 +34,8 @@ def unit_of_dates(values: Array) -> tuple[str, str] | None:
     >>> unit_of_dates(46_000.0 + 1e-8 * np.arange(20.0)), unit_of_dates(46_000.0 + 0.01 * np.arange(20.0))
     (('d', '2025-12-09T00:00:00'), None)
     """
-    step, first = _usual_step(values), float(values[0]) if len(values) else np.nan
+    there = values[np.isfinite(values)]
+    step, first = _usual_step(values), float(there[0]) if len(there) else np.nan
     for unit, zero in (*((unit, 0.0) for unit, _ in _UNITS[:4]), *_FROM):
         factor = dict(_UNITS)[unit]
         since = (first - zero) * factor
