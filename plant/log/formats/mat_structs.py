@@ -25,7 +25,7 @@ def structs_of(name: str, value: Value) -> dict[str, Struct]:
     ----------
     name : str
         The variable.
-    value : Mapping or Sequence of Mapping
+    value : ndarray of any shape, str, Mapping or Sequence
         As `plant.log.formats.mat_reader.read_variables` returns it.
 
     Examples
@@ -43,7 +43,13 @@ def structs_of(name: str, value: Value) -> dict[str, Struct]:
 
 
 def each_struct(value: Value) -> list[Struct]:
-    """Return the structs of an array of them, or the only one; none of anything else."""
+    """Return the structs of an array of them, or the only one; none of anything else.
+
+    Parameters
+    ----------
+    value : ndarray of any shape, str, Mapping or Sequence
+        A variable.
+    """
     many: Any = [value] if isinstance(value, Mapping) else value if isinstance(value, Sequence) else []
     return [one for one in many if isinstance(one, Mapping)]
 
