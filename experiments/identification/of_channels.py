@@ -129,6 +129,22 @@ def _page(result: Result, model: "LinearModel", u: "Array", y: "Array") -> str:
     )
 
 
+def judged_page(model: "LinearModel", u: "Array", y: "Array", title: str) -> str:
+    """Return the page of a model that no command has judged yet.
+
+    Parameters
+    ----------
+    u, y : ndarray, shape (n,)
+        Input, no gaps, and output, NaN where missing [in the channels' units].
+    title : str
+        What the page calls the log.
+    """
+    ends = {"input": model.input_name, "output": model.output_name}
+    return _page(
+        {"file": title, **ends, **linear_entries(model), **_judged(model, u, y, Path(title), None)}, model, u, y
+    )
+
+
 def _form(fit: ChannelFit) -> dict[str, Any]:
     """Return the form of the model as `identify_record` takes it."""
     require_known("--structure", fit.structure, list(STRUCTURES))

@@ -224,21 +224,9 @@ class Answer(Shown):
         HydrostateError
             If the file cannot be written, or its name ends as no page's does.
         """
-        from os import PathLike
-        from pathlib import Path
+        from experiments.python_user.own_page import write_page
 
-        from experiments.command.json_output import write_whole
-        from experiments.command.output_paths import PAGES
-        from plant.errors import HydrostateError
-
-        if not isinstance(path, str | PathLike):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
-            raise HydrostateError(f"the path of a page is needed, got {path!r:.80}")
-        file = Path(path)
-        if file.suffix.lower() not in PAGES:
-            raise HydrostateError(f"a page's name must end in .html, got {file.name!r}")
-        file = file.with_suffix(".html") if file.name and not file.suffix else file
-        write_whole(file, self._page(title), parents=True)
-        return file
+        return write_page(path, self._page(title))
 
     def plot(self) -> "list[Axes]":
         """Draw the probabilities, where there are some, and every quantity with its interval.
@@ -268,10 +256,16 @@ class Answer(Shown):
 
 
 class Model(Shown):
-    """A transfer function that was identified, with everything that `LinearModel` has."""
+    """A transfer function that was identified, with everything that `LinearModel` has.
 
-    def __init__(self, model: "LinearModel") -> None:
-        self.model = model
+    Parameters
+    ----------
+    page : callable
+        From a title to the page of the model, as HTML.
+    """
+
+    def __init__(self, model: "LinearModel", page: Callable[[str], str]) -> None:
+        self.model, self._page = model, page
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name == "model" or not hasattr(self.model, name):
@@ -293,6 +287,30 @@ class Model(Shown):
 
     def _repr_html_(self) -> str:
         return f"<p>{self._title}</p>{self.to_frame().to_html(float_format=_FIVE)}"
+
+    def report(self, path: "str | Path", title: str = "log") -> "Path":
+        """Write the page of the model, as `Answer.report` does that of a log.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to; ``.html`` is added to a name without an ending, and folders that are missing are made.
+        title : str
+            What the page calls the log.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        HydrostateError
+            If the file cannot be written, or its name ends as no page's does.
+        """
+        from experiments.python_user.own_page import write_page
+
+        return write_page(path, self._page(title))
 
     def to_control(self) -> "TransferFunction":
         """Return the transfer function for python-control.

@@ -231,6 +231,7 @@ class Log(Shown):
         import inspect
 
         from estimation.identification.from_record import identify_record
+        from experiments.python_user.own_page import page_of_channels
 
         known = {name: one.default for name, one in inspect.signature(identify_record).parameters.items()}
         del known["record"]
@@ -241,7 +242,9 @@ class Log(Shown):
                 if not isinstance(options.get(name), Integral | None) or isinstance(options.get(name), bool):
                     refuse(f"{name} must be a whole number, got {options[name]!r}")
             return self._relation([self, *logs], dict(options))
-        return Model(identify_record(self.whole(), **known_options(options, known, "identify")))
+        record, asked = self.whole(), known_options(options, known, "identify")
+        model = identify_record(record, **asked)
+        return Model(model, partial(page_of_channels, record, model, asked))
 
     def _relation(self, logs: "list[Log]", options: dict[str, Any]) -> "Relation":
         from experiments.python_user.relation import identified

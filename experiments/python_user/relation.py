@@ -195,6 +195,37 @@ class Relation(Shown):
             rows = {one.output: {"structure": one.structure, "n_values": one.n_values} for one in self.models}
         return pd.DataFrame.from_dict(rows, orient="index")
 
+    def report(self, path: str | Path, title: str = "log") -> list[Path]:
+        """Write the page of each model, as ``hydrostate identify --report`` does.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to; ``.html`` is added to a name without an ending, and of several outputs the name of each.
+        title : str
+            What the pages call the log.
+
+        Returns
+        -------
+        list of Path
+            The files written, one an output.
+
+        Raises
+        ------
+        HydrostateError
+            If a file cannot be written, its name ends as no page's does, or the models were loaded without a log.
+        """
+        from experiments.command.output_paths import own_paths
+        from experiments.python_user.own_page import page_of_columns, page_path, write_page
+
+        if not self._data:
+            refuse("models that were loaded have no log to show them on; a page is written where they are identified")
+        places = own_paths(page_path(path), [one.output for one in self.models])
+        shown = zip(self.models, self._entries, self._data, strict=True)
+        return [
+            write_page(places[one.output], page_of_columns(entries, one, data, title)) for one, entries, data in shown
+        ]
+
     def plot(self) -> "list[Axes]":
         """Draw measured and simulated output, and the difference, one figure an output.
 

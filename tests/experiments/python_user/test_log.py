@@ -108,6 +108,12 @@ def test_an_answer_writes_its_page_whole_or_says_why_not(log: hs.Log, tmp_path: 
         answer.report(page / "page.html")
 
 
+def test_a_transfer_function_writes_its_page(log: hs.Log, tmp_path: Path) -> None:
+    page = log.identify().report(tmp_path / "model", title="bench 7, Monday").read_text(encoding="utf-8")
+    assert "bench 7, Monday" in page
+    assert "held-back" in page
+
+
 def test_a_diagnosis_writes_the_page_of_its_actuator(log: hs.Log, tmp_path: Path) -> None:
     page = log.diagnose().report(tmp_path / "page.html").read_text(encoding="utf-8")
     assert "leakage" in page

@@ -61,6 +61,20 @@ def test_a_state_space_is_shared_as_long_as_all_its_outputs_are_there(shared: Re
     np.testing.assert_allclose(sorted(system.poles().real)[-2:], [0.5, 0.8], atol=0.05)
 
 
+def test_each_model_writes_the_page_that_the_command_does(both: Relation, tmp_path: Path) -> None:
+    places = both.report(tmp_path / "loop", title="bench 7, Monday")
+    assert [one.name for one in places] == ["loop-flow.html", "loop-heat.html"]
+    for place, output in zip(places, GAINS, strict=True):
+        page = place.read_text("utf-8")
+        assert page.startswith("<!DOCTYPE html>")
+        assert "bench 7, Monday" in page
+        assert output in page
+    with pytest.raises(HydrostateError, match=r"must end in \.html"):
+        both.report(tmp_path / "loop.png")
+    with pytest.raises(HydrostateError, match="loaded have no log"):
+        Relation(both.models).report(tmp_path / "loop")
+
+
 def test_one_model_has_what_it_was_fitted_with_as_attributes_and_two_have_not(both: Relation) -> None:
     one = identified([record(1)], "load", "heat", {"order": 1, "delay": 1})
     assert one.output == "heat"

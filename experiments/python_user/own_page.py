@@ -1,0 +1,90 @@
+"""The page of an answer in Python: one HTML file, with the name that the command line would take too."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from estimation.identification.free_run.data import Channels
+    from estimation.identification.free_run.model import FreeRunModel
+    from estimation.identification.model.linear_model import LinearModel
+    from plant.log.record import Record
+
+
+def page_path(path: "str | Path") -> Path:
+    """Return where a page goes, with the ending ``.html``.
+
+    Raises
+    ------
+    HydrostateError
+        If it is no path, or its name ends as no page's does.
+
+    Examples
+    --------
+    >>> page_path("pages/bench").name
+    'bench.html'
+    """
+    from os import PathLike
+
+    from experiments.command.output_paths import PAGES
+    from plant.errors import HydrostateError
+
+    if not isinstance(path, str | PathLike):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
+        raise HydrostateError(f"the path of a page is needed, got {path!r:.80}")
+    file = Path(path)
+    if file.suffix.lower() not in PAGES:
+        raise HydrostateError(f"a page's name must end in .html, got {file.name!r}")
+    return file.with_suffix(".html") if file.name and not file.suffix else file
+
+
+def write_page(path: "str | Path", page: str) -> Path:
+    """Write a page whole or not at all, and return the file; folders that are missing are made.
+
+    Raises
+    ------
+    HydrostateError
+        If the file cannot be written, or `page_path` refuses it.
+    """
+    from experiments.command.json_output import write_whole
+
+    file = page_path(path)
+    write_whole(file, page, parents=True)
+    return file
+
+
+def page_of_columns(entries: Mapping[str, Any], model: "FreeRunModel", data: "Channels", title: str) -> str:
+    """Return the page of a model between any columns, as ``identify --report`` writes it.
+
+    Parameters
+    ----------
+    entries : Mapping
+        Of the model by the names of the JSON contract.
+    data : Channels
+        That it was fitted to.
+    title : str
+        What the page calls the log.
+    """
+    from experiments.log_pages.identified_page import identified_page
+    from experiments.log_pages.identified_view import view_of_columns
+
+    return identified_page(view_of_columns({**entries, "file": title}, model, data))
+
+
+def page_of_channels(record: "Record", model: "LinearModel", options: Mapping[str, Any], title: str) -> str:
+    """Return the page of a transfer function between two channels of a bench, as ``identify --report`` writes it.
+
+    Parameters
+    ----------
+    record : Record
+        That it was fitted to.
+    options : Mapping
+        Of the fit.
+    title : str
+        What the page calls the log.
+    """
+    from estimation.identification.from_record import record_signals
+    from experiments.identification.of_channels import judged_page
+
+    taken = {name: options[name] for name in ("sample_time", "filter_cutoff_hz") if name in options}
+    u, y = record_signals(record, output=model.output_name, input=model.input_name, **taken)
+    return judged_page(model, u, y, title)
