@@ -44,6 +44,10 @@ class AbsoluteDynamics(OutputErrorDynamics):
         """Fitted coefficients."""
         return self.linear.n_values + (self.lag > 0.0)
 
+    def unanswered(self, length: int) -> int:
+        """Return how many outputs at the start of a log of some length [samples] no input of the log reaches."""
+        return self.linear.form.unanswered(length)
+
     def run(self, u: Array, y: Array) -> Array:
         """Return the free run, its initial state by least squares of the outputs that are there.
 

@@ -127,7 +127,7 @@ class AbsoluteProblem:
         steps: Any = {"tolerance": TOLERANCE, "most_steps": MOST_STEPS, "least_gain": least_gain}
         cost, best = levenberg(at, theta[fixed:], acceptable, **steps)
         values = np.concatenate([theta[:fixed], best])
-        return AbsoluteFit(float(values[0]), LinearFit(self.form, values[1:], cost))
+        return AbsoluteFit(float(values[0]), LinearFit(self.form, values[1:], self.inner.share * cost))
 
 
 def lagged(rows: Array, lag: float) -> Array:

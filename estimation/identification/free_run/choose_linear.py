@@ -8,9 +8,10 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.dead_times import estimate_delays
 from estimation.identification.free_run.held_back import BLOCKS, NEAR, held_back_blocks, pooled
 from estimation.identification.free_run.integrating import fit_integrating
-from estimation.identification.free_run.linear_fit import extended, fit_linear, quick_fit
+from estimation.identification.free_run.linear_fit import extended, fit_linear
 from estimation.identification.free_run.linear_problem import Form, LinearFit
 
 CLEARLY = 0.01
@@ -24,9 +25,6 @@ INTEGRATING = 0.7
 
 PATIENCE = 2
 """Orders without gain after which no higher one is tried."""
-
-LONGEST_DELAY = 20
-"""Dead time looked for at most [samples]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,27 +130,6 @@ def doubt_of(fit: LinearFit, data: Channels) -> str:
     if radius >= 1.0 or (radius > 0.0 and -1.0 / np.log(radius) > data.told):
         return "time_constant"
     return ""
-
-
-def estimate_delays(data: Channels, longest: int = LONGEST_DELAY) -> tuple[int, ...]:
-    """Return the dead time of each input with which models of second order fit best, one input after the other.
-
-    Parameters
-    ----------
-    data : Channels
-        Scaled.
-    """
-    m = len(data.inputs)
-    most = min(longest, data.longest // 20)
-    delays = [1] * m
-    for index in range(m):
-        costs: list[float] = []
-        for delay in range(most + 1):
-            tried = tuple(delay if k == index else one for k, one in enumerate(delays))
-            costs.append(quick_fit(Form(2, (2,) * m, tried), data))
-        least = min(costs)
-        delays[index] = next(k for k, cost in enumerate(costs) if cost <= 1.005 * least)
-    return tuple(delays)
 
 
 def linear_candidates(

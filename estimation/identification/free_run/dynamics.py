@@ -24,6 +24,10 @@ class Dynamics(Protocol):
         """Return the prediction one step ahead, shape (n,)."""
         ...
 
+    def unanswered(self, length: int) -> int:
+        """Return how many outputs at the start of a log of some length no input of the log reaches."""
+        ...
+
     def to_dict(self) -> dict[str, Any]:
         """Return JSON values."""
         ...
@@ -31,6 +35,16 @@ class Dynamics(Protocol):
 
 class OutputErrorDynamics(ABC):
     """Dynamics whose noise is the output sensor's: what was measured before says nothing of the next sample."""
+
+    def unanswered(self, length: int) -> int:
+        """Return how many outputs at the start of a log of some length no input of the log reaches: none unless told.
+
+        Parameters
+        ----------
+        length : int
+            Of the log [samples].
+        """
+        return 0 * length
 
     @abstractmethod
     def run(self, u: Array, y: Array) -> Array:

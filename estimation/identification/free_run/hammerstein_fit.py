@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.arrays import Array, BoolArray
+from estimation.arrays import Array
 from estimation.fits.greybox.covariance import automatic_lags, least_squares_covariance
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
-from estimation.identification.free_run.least_squares import Counted
 from estimation.identification.free_run.linear_fit import COARSE, fit_linear
 from estimation.identification.free_run.linear_kernel import decay_rows, settles
 from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
@@ -65,8 +64,8 @@ class HammersteinProblem:
         self.name = kind
         self.input = np.concatenate([u[:, 0] for u in data.u])
         self.target = np.concatenate(data.y)
-        self.used: BoolArray = np.isfinite(self.target)
-        self.counted = Counted(self.used)
+        linear = Problem(form, data)
+        self.used, self.counted, self.share = linear.used, linear.counted, linear.share
         self.n_static = len(self.kind.names)
         self.n_starts = len(data.u) if self.kind.remembers else 0
 
@@ -147,7 +146,7 @@ class HammersteinProblem:
             self.name,
             best[: self.n_static],
             best[self.n_static : ahead],
-            LinearFit(self.form, best[ahead:], cost),
+            LinearFit(self.form, best[ahead:], self.share * cost),
         )
 
 

@@ -127,7 +127,7 @@ def _written(form: Form, data: Channels, found: LinearFit, scales: Array) -> Lin
     free = columns[:, form.n_b + 1 :]
     states = np.linalg.lstsq(free[used], (problem.y - driven)[used], rcond=None)[0]
     left = (problem.y - driven - free @ states)[used]
-    cost = float(left @ left)
+    cost = problem.share * float(left @ left)
     # several logs have one offset, and had a ramp each
     cost = cost if len(data.u) > 1 or cost <= (1.0 + LOST) * found.cost else float("inf")
     return LinearFit(form, np.concatenate([*b, f[1:], [offset], states]), cost, integrates=True)

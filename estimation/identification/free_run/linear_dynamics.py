@@ -49,6 +49,10 @@ class LinearDynamics(OutputErrorDynamics):
             (np.concatenate([np.zeros(delay), b]), self.f) for b, delay in zip(parts, self.form.delays, strict=True)
         ]
 
+    def unanswered(self, length: int) -> int:
+        """Return how many outputs at the start of a log of some length [samples] no input of the log reaches."""
+        return self.form.unanswered(length)
+
     def run(self, u: Array, y: Array) -> Array:
         """Return the free run, its initial state by least squares of the outputs that are there.
 

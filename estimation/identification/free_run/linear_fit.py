@@ -10,12 +10,9 @@ from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.lagged_columns import columns_of
 from estimation.identification.free_run.least_squares import least_squares
 from estimation.identification.free_run.linear_kernel import decay_rows, longest_pole
-from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
+from estimation.identification.free_run.linear_problem import LONG_DEAD_TIME, Form, LinearFit, Problem
 from estimation.identification.search.criterion import Structure, held_within
 from estimation.identification.search.experiments import Experiments
-
-LONG_DEAD_TIME = 20
-"""Dead time beyond which outputs are brought forward in place of a free state of as many values [samples]."""
 
 FIRST_STEPS = 20
 """Evaluations of each of several starts."""

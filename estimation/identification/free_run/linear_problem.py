@@ -16,6 +16,31 @@ from estimation.identification.search.reflections import stable_step
 TOLERANCE, MOST_STEPS = 1e-9, 80
 """Share of the cost that a further step may promise at the end, and evaluations at most."""
 
+LONG_DEAD_TIME = 20
+"""Dead time beyond which the outputs before the first answer are left out of a fit; of a shorter one the free initial
+state and the input's first value tell nearly all of them [samples]."""
+
+
+def unanswered(dead_time: int, length: int) -> int:
+    """Return how many outputs at the start of a log are left out, since they answer inputs from before it.
+
+    Parameters
+    ----------
+    dead_time, length : int
+        The longest of the inputs, and of the log [samples].
+
+    Returns
+    -------
+    int
+        The dead time, if it is a long one and leaves half of the log [samples].
+
+    Examples
+    --------
+    >>> unanswered(5, 1000), unanswered(80, 1000), unanswered(80, 100)
+    (0, 80, 0)
+    """
+    return dead_time if LONG_DEAD_TIME < dead_time <= length // 2 else 0
+
 
 @dataclass(frozen=True)
 class Form:
@@ -43,6 +68,10 @@ class Form:
         """Coefficients of numerators and denominator, and the offset."""
         return self.n_b + self.order + 1
 
+    def unanswered(self, length: int) -> int:
+        """Return how many outputs at the start of a log of some length [samples] no input of the log reaches."""
+        return unanswered(max(self.delays), length)
+
 
 @dataclass(frozen=True, eq=False)
 class LinearFit:
@@ -53,7 +82,7 @@ class LinearFit:
     theta : ndarray, shape (p,)
         Numerators, denominator behind its 1, offset, and the initial state of each log.
     cost : float
-        Sum of squared residuals [dimensionless].
+        Sum of squared residuals; where outputs are left out, as if they had left as much [dimensionless].
     bounded : bool
         Whether time constants were held within the record.
     integrates : bool
@@ -86,6 +115,11 @@ class Problem:
         self.bounds = np.concatenate([[0], np.cumsum([y.size for y in data.y])])
         self.y = np.concatenate(data.y)
         self.used: BoolArray = np.isfinite(self.y)
+        told = int(np.count_nonzero(self.used))
+        self.begins = [form.unanswered(y.size) for y in data.y]
+        for first, unanswered in zip(self.bounds, self.begins, strict=False):
+            self.used[first : first + unanswered] = False
+        self.share = told / max(int(np.count_nonzero(self.used)), 1)
         self.counted = Counted(self.used)
         self.n_parameters = form.n_values + form.order * len(data.y)
 
@@ -124,8 +158,9 @@ class Problem:
                 for k in range(size):
                     lay_shifted(out[first:last, place + k], answer, delay + k, level)
                 place += size
+            begin = first + self.begins[index]
             for k in range(n):
-                out[first + k : last, offset + 1 + index * n + k] = rows[-1, : last - first - k]
+                out[begin + k : last, offset + 1 + index * n + k] = rows[-1, : last - begin - k]
 
     def first_columns(self, index: int) -> Array:
         """Return the lagged inputs before a log: every lag stands at the first value."""
@@ -146,7 +181,7 @@ class Problem:
         """
         n_b, columns = self.form.n_b, self.linear_columns(f)
         values, cost = least_squares(columns, self.y, self.counted)
-        return cost, np.concatenate([values[:n_b], f[1:], values[n_b:]])
+        return self.share * cost, np.concatenate([values[:n_b], f[1:], values[n_b:]])
 
     def jacobian(self, theta: Array) -> tuple[Array, Array]:
         """Return the output and its derivative by every value.
@@ -221,4 +256,4 @@ class Problem:
             least_gain=least_gain,
             within=lambda now, gram, slope, damping: stable_step(now, gram, slope, damping, poles, stretched),
         )
-        return LinearFit(self.form, best, cost, bounded)
+        return LinearFit(self.form, best, self.share * cost, bounded)

@@ -157,7 +157,7 @@ class FreeRunModel:
         return self.scaling.y_mean + self.scaling.y_std * self.dynamics.one_step(inputs, outputs)
 
     def quality(self, u: Sequence[Array], y: Sequence[Array]) -> FreeRunQuality:
-        """Return how well the model follows logs.
+        """Return how well the model follows logs; outputs that a long dead time leaves unanswered do not count.
 
         Parameters
         ----------
@@ -185,12 +185,16 @@ class FreeRunModel:
         tuple of FreeRunQuality and list of tuple of float
             How well, and what `judged_run` tells of each log; empty for models that have no other to stand in.
         """
-        measured = np.concatenate(y)
+        measured = np.concatenate([self._answered(one) for one in y])
         runs = [self.judged_run(one_u, one_y) for one_u, one_y in zip(u, y, strict=True)]
         free = np.concatenate([run for run, _ in runs])
         ahead = np.concatenate([self.predict(one_u, one_y) for one_u, one_y in zip(u, y, strict=True)])
         quality = FreeRunQuality(*_fit(measured, free, running=True), *_fit(measured, ahead, running=False))
         return quality, [errors for _, errors in runs if errors is not None]
+
+    def _answered(self, y: Array) -> Array:
+        """Return an output without those at its start that a long dead time leaves to inputs from before the log."""
+        return np.where(np.arange(y.size) < self.dynamics.unanswered(y.size), np.nan, y)
 
     def _scaled(self, u: ArrayLike, y: ArrayLike | None) -> tuple[Array, Array]:
         try:

@@ -10,6 +10,7 @@ from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels, Scaling
 from estimation.identification.free_run.fallback import Fallback
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
+from estimation.identification.free_run.linear_problem import unanswered
 from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs
 from estimation.identification.free_run.polynomial_variables import Variables, lagged_signals, products
@@ -52,6 +53,10 @@ class PolynomialDynamics:
     def n_values(self) -> int:
         """Fitted coefficients."""
         return self.coefficients.size + self.friction.size
+
+    def unanswered(self, length: int) -> int:
+        """Return how many outputs at the start of a log of some length [samples] no input of the log reaches."""
+        return unanswered(int(self.variables.lag.max(initial=0)), length)
 
     def run(self, u: Array, y: Array) -> Array:
         """Return the free run, or that of the linear model where it stands in.

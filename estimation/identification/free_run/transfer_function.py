@@ -37,7 +37,7 @@ def linear_model(fit: LinearFit, data: Channels, by: Scaling) -> LinearModel:
     coloured = ljung_box(np.where(used, residual, np.nan), n_lags=lags).p_value < COLOURED
     b = fit.theta[: form.n_b] * gain
     level = by.y_mean + by.y_std * float(fit.theta[n_main])
-    rss, n_used = float(residual @ residual) * by.y_std**2, data.n_samples
+    rss, n_used = float(residual @ residual) * by.y_std**2, int(np.count_nonzero(used))
     spread = np.concatenate(data.y)[used]
     deviation = float(np.sum((spread - spread.mean()) ** 2)) * by.y_std**2
     found = LinearModel(

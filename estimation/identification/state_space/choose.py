@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from estimation.identification.free_run.choose_linear import CLEARLY, PATIENCE, estimate_delays
+from estimation.identification.free_run.choose_linear import CLEARLY, PATIENCE
 from estimation.identification.free_run.data import Channels, blocks
+from estimation.identification.free_run.dead_times import estimate_delays
 from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled
 from estimation.identification.state_space.fit import Effort, StateSpaceFit, fit_state_space
 from estimation.identification.state_space.joint import Joint, joined

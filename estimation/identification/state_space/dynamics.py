@@ -9,6 +9,7 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Scaling
 from estimation.identification.free_run.dynamics import OutputErrorDynamics
+from estimation.identification.free_run.linear_problem import unanswered
 from estimation.identification.state_space.joint import delayed
 from estimation.identification.state_space.kernel import run_states
 from estimation.identification.state_space.system import StateSpace
@@ -39,6 +40,10 @@ class StateSpaceDynamics(OutputErrorDynamics):
     def level(self) -> float:
         """Output where inputs stand at zero [scaled]."""
         return float(self.system.level[self.place])
+
+    def unanswered(self, length: int) -> int:
+        """Return how many outputs at the start of a log of some length [samples] no input of the log reaches."""
+        return unanswered(max(self.system.delays), length)
 
     def run(self, u: Array, y: Array) -> Array:
         """Return the free run, its initial state by least squares of the outputs that are there.

@@ -8,6 +8,7 @@ import numpy as np
 
 from estimation.arrays import Array, BoolArray
 from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.linear_problem import unanswered
 from plant.errors import HydrostateError
 
 
@@ -53,12 +54,18 @@ class Joint:
     def delayed(self, delays: Sequence[int]) -> "Joint":
         """Return the same with inputs that come some samples later; before the log they stood at their first values.
 
+        Outputs that a long dead time leaves to inputs from before the log are held back.
+
         Parameters
         ----------
         delays : sequence of int
             Of each input [samples].
         """
-        return replace(self, u=tuple(delayed(u, delays) for u in self.u))
+        late = replace(self, u=tuple(delayed(u, delays) for u in self.u))
+        begins = [unanswered(max(delays), len(u)) for u in self.u]
+        if not any(begins):
+            return late
+        return late.without([np.arange(len(u)) < begin for u, begin in zip(self.u, begins, strict=True)])
 
 
 def delayed(u: Array, delays: Sequence[int]) -> Array:

@@ -16,7 +16,7 @@ from estimation.identification.design import dead_time
 from estimation.identification.fit import continuous, instrumental, output_error, prediction_error, profile_interval
 from estimation.identification.free_run import (
     choose_hammerstein,
-    choose_linear,
+    dead_times,
     dense_polynomial,
     hammerstein_fit,
     identify,
@@ -238,8 +238,8 @@ def choices() -> dict[str, Any]:
     n = 900
     long = channels_from([np.resize(U, n)[:, None]], [np.resize(answer(), n)], 0.1, ("a",), "y")
     costs = iter([2.0, 1.0051, 1.0049, 1.0, *np.full(90, 3.0)])
-    with watched(choose_linear, "quick_fit", lambda form, _: form.delays, lambda *_: next(costs)) as asked:
-        told["dead times"] = choose_linear.estimate_delays(long)
+    with watched(dead_times, "quick_fit", lambda form, _: form.delays, lambda *_: next(costs)) as asked:
+        told["dead times"] = dead_times.estimate_delays(long)
     told["dead times tried"] = [len(asked), asked[-1]]
     base = Form(1, (1,), (1,))
     linear = [

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.identification.free_run import believable, choose_linear, held_back, identify, linear_fit
+from estimation.identification.free_run import believable, choose_linear, dead_times, held_back, identify, linear_fit
 from estimation.identification.free_run.choose_linear import Candidate
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.least_squares import least_squares
@@ -140,10 +140,8 @@ def choices() -> dict[str, Any]:
     exact = choose_linear.candidate(replace(late, cost=0.0), data(lost=True))
     told["criteria of what leaves nothing"] = [exact.bic, exact.aic]
     told["prices"] = [made(0.5, 0.0, late=k).price for k in (0, 1, 2)]
-    told["delays"] = [
-        choose_linear.estimate_delays(data(delay=k), most) for k, most in ((0, 20), (3, 20), (3, 2), (1, 9))
-    ]
-    told["delays of two inputs"] = choose_linear.estimate_delays(data(2))
+    told["delays"] = [dead_times.estimate_delays(data(delay=k), most) for k, most in ((0, 20), (3, 20), (3, 2), (1, 9))]
+    told["delays of two inputs"] = dead_times.estimate_delays(data(2))
     told["forms"] = [
         [[form.sizes, form.delays] for form in choose_linear._forms(2, late, 1, size)]
         for late, size in (((0,), None), ((1,), None), ((3,), None), ((3,), 4))

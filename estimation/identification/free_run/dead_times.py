@@ -1,0 +1,145 @@
+"""Dead times of the inputs of a linear model: short ones tried one by one, long ones where a screen shows them."""
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations_with_replacement
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.lagged_columns import lay_shifted
+from estimation.identification.free_run.least_squares import least_squares
+from estimation.identification.free_run.linear_fit import fit_linear, quick_fit
+from estimation.identification.free_run.linear_kernel import decay_rows
+from estimation.identification.free_run.linear_problem import LONG_DEAD_TIME, Form
+
+LONGEST_SHARE = 5
+"""A dead time lasts at most one of so many parts of the record: the first block, which is never held back."""
+
+CLEARLY = 0.9
+"""Share of what shorter dead times leave that a long one may leave, to be looked for: among hundreds of dead times, the
+best is a few per cent better than the others by chance."""
+
+APART = 3.0
+"""Ratio of the time constants that the screen puts side by side, from one sample to a block: between two neighbours,
+the dead time that it shows moves by less than the time constant, and it is refined after."""
+
+ORDER, NEAR = 3, 1e-4
+"""Order of the fits that refine a long dead time, and their least gain as `levenberg` takes it: with fewer poles, the
+rise of a third one is taken for dead time."""
+
+NEARLY = 1.005
+"""The shortest of the dead times that leave nearly as little as the best is taken."""
+
+
+def estimate_delays(data: Channels, longest: int | None = None) -> tuple[int, ...]:
+    """Return the dead time of each input with which models of low order fit best, one input after the other.
+
+    Dead times up to `LONG_DEAD_TIME` are each tried with models of second order. Longer ones are looked for by
+    correlation of the output with the filtered input, and refined by fits.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    longest : int, optional
+        Dead time at most; a fifth of the record unless told [samples].
+
+    Returns
+    -------
+    tuple of int
+        One an input [samples].
+    """
+    m = len(data.inputs)
+    longest = data.told // LONGEST_SHARE if longest is None else min(longest, data.told // LONGEST_SHARE)
+    most = min(longest, LONG_DEAD_TIME, data.longest // 20)
+    delays = [1] * m
+    for index in range(m):
+        costs: list[float] = []
+        for delay in range(most + 1):
+            tried = tuple(delay if k == index else one for k, one in enumerate(delays))
+            costs.append(quick_fit(Form(2, (2,) * m, tried), data))
+        least = min(costs)
+        delays[index] = next(k for k, cost in enumerate(costs) if cost <= NEARLY * least)
+        delays[index] = _longer(data, index, delays, longest)
+    return tuple(delays)
+
+
+def _longer(data: Channels, index: int, delays: Sequence[int], most: int) -> int:
+    """Return a dead time of one input that is longer than those tried, where one leaves clearly less; or the given."""
+    longest = LONG_DEAD_TIME
+    if most <= longest:
+        return delays[index]
+    left = _unexplained(data, index, delays, most)
+    far = left[longest + 1 :]
+    if not far.min() < CLEARLY * left[: longest + 1].min():
+        return delays[index]
+    # inputs that repeat themselves, or come back with the other sign, explain as much one turn later
+    first = longest + 1 + int(np.argmax(far <= NEARLY * far.min()))
+    m, costs = len(data.inputs), dict[int, float]()
+
+    def cost(delay: int) -> float:
+        if delay not in costs:
+            tried = tuple(delay if k == index else one for k, one in enumerate(delays))
+            costs[delay] = fit_linear(Form(ORDER, (ORDER,) * m, tried), data, least_gain=NEAR).cost
+        return costs[delay]
+
+    def shortest() -> int:
+        least = min(costs.values())
+        return min(delay for delay, one in costs.items() if one <= NEARLY * least)
+
+    step, centre = max(first // 8, 1), first
+    cost(first)
+    while step:
+        for delay in (centre - step, centre + step):
+            cost(int(np.clip(delay, longest + 1, most)))
+        # a dead time that is too long cannot be made up for by poles, one that is too short can
+        moved, centre = centre, shortest()
+        step = step // 2 if centre == moved else step
+    return centre if cost(centre) < CLEARLY * cost(delays[index]) else delays[index]
+
+
+def _unexplained(data: Channels, index: int, delays: Sequence[int], most: int) -> Array:
+    """Return the squared error that one input leaves behind each dead time, shape (most + 1,).
+
+    The input goes through two poles of every pair, and has two coefficients behind the dead time. What the other inputs
+    and the initial state explain through the same poles is taken off the output before.
+    """
+    least = np.full(most + 1, np.inf)
+    others = [k for k in range(len(delays)) if k != index]
+    for f in _denominators(data.told // LONGEST_SHARE):
+        crossed, own, told = np.zeros(most + 2), np.zeros(2), 0.0
+        for u, y in zip(data.u, data.y, strict=True):
+            n = y.size
+            rows = np.zeros((u.shape[1] + 1, n))
+            rows[:-1], rows[-1, 0] = (u - u[0]).T, 1.0
+            decay_rows(f, rows, np.zeros(rows.shape[0]))
+            known = np.isfinite(y)
+            if not known.any():
+                continue
+            columns = np.ones((n, 3 + 2 * len(others)))
+            for place, (row, late) in enumerate([(-1, 0), *((k, delays[k]) for k in others)]):
+                for more in (0, 1):
+                    lay_shifted(columns[:, 1 + 2 * place + more], rows[row], late + more, 0.0)
+            values = least_squares(columns[known], y[known])[0]
+            output = np.where(known, y - columns @ values, 0.0)
+            told += float(output @ output)
+            size = 2 ** int(np.ceil(np.log2(n + most + 2)))
+            driven = np.fft.rfft(rows[index] - rows[index].mean(), size)
+            crossed += np.fft.irfft(np.fft.rfft(output, size) * driven.conj(), size)[: most + 2]
+            own += np.fft.irfft(np.abs(driven) ** 2, size)[:2]
+        now, later = crossed[:-1], crossed[1:]
+        apart = own[0] ** 2 - own[1] ** 2
+        gained = now**2 / max(own[0], 1e-300)
+        if apart > 1e-6 * own[0] ** 2:  # beyond, two neighbouring samples of the input are one but for rounding
+            gained = (own[0] * (now**2 + later**2) - 2.0 * own[1] * now * later) / apart
+        least = np.minimum(least, np.maximum(told - gained, 0.0))
+    return least
+
+
+def _denominators(longest: int) -> Iterator[Array]:
+    """Yield denominators of pairs of real poles: no time constant, one sample, and so on up to a number of samples."""
+    count = int(np.log(max(longest, 1)) / np.log(APART)) + 1
+    poles = [0.0, *(float(np.exp(-(APART**-k))) for k in range(count))]
+    for pair in combinations_with_replacement(poles, 2):
+        yield np.poly(pair)

@@ -1,0 +1,78 @@
+"""Dead times: long ones are found by the default, and cost a fit none of its certainty."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.identification.free_run.data import Channels, channels_from, scaled
+from estimation.identification.free_run.dead_times import estimate_delays
+from estimation.identification.free_run.identify import identify_channels
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_problem import Form, Problem
+from estimation.identification.state_space.joint import joined
+
+NOISE = 0.02
+
+
+def late_plant(delay: int, count: int = 700, seed: int = 0, held: int = 9) -> Channels:
+    """A second-order plant behind a dead time, driven by random levels from long before the log."""
+    rng = np.random.default_rng(seed)
+    before = 200
+    u = np.repeat(rng.choice([-1.0, 1.0], (count + before) // held + 1), held)[: count + before]
+    y = np.zeros(u.size)
+    for t in range(delay + 2, u.size):
+        y[t] = 1.7 * y[t - 1] - 0.74 * y[t - 2] + 0.04 * u[t - delay]
+    y += NOISE * y.std() * rng.normal(size=u.size)
+    return channels_from([u[before:, None]], [y[before:] + 3.0], 1e-3, ["valve"], "flow")
+
+
+@pytest.mark.parametrize("delay", [30, 80])
+def test_a_dead_time_beyond_those_tried_one_by_one_is_found(delay: int) -> None:
+    (found,) = estimate_delays(scaled(late_plant(delay))[0])
+    assert delay - 5 <= found <= delay + 1
+
+
+def test_each_of_two_inputs_has_its_dead_time() -> None:
+    first, second = scaled(late_plant(60))[0], scaled(late_plant(3, seed=1, held=7))[0]
+    both = replace(
+        first,
+        inputs=("a", "b"),
+        u=(np.column_stack([first.u[0], second.u[0]]),),
+        y=(first.y[0] + second.y[0],),
+    )
+    late, early = estimate_delays(both)
+    assert 55 <= late <= 61
+    assert early <= 4
+
+
+def test_inputs_that_come_back_have_the_shortest_dead_time() -> None:
+    u = np.tile(np.repeat([1.0, -1.0], 40), 10)
+    y = np.concatenate([np.full(3, -1.0), u[:-3]]) + 0.01 * np.random.default_rng(0).normal(size=u.size)
+    (found,) = estimate_delays(scaled(channels_from([u[:, None]], [y], 1.0, ["u"], "y"))[0])
+    assert 2 <= found <= 3
+
+
+def test_outputs_that_answer_inputs_from_before_the_log_are_left_out_of_a_fit() -> None:
+    data = scaled(late_plant(80))[0]
+    fit = fit_linear(Form(2, (1,), (80,)), data)
+    answered = (Problem(fit.form, data).jacobian(fit.theta)[0] - data.y[0])[80:]
+    assert np.sqrt(np.mean(answered**2)) == pytest.approx(NOISE, rel=0.1)
+    assert fit.cost == pytest.approx(np.sum(answered**2) * 700 / 620)
+    assert fit.f == pytest.approx([1.0, -1.7, 0.74], abs=0.01)
+
+
+def test_the_default_finds_a_dead_time_of_eighty_samples_and_judges_what_is_answered() -> None:
+    found = identify_channels(late_plant(80), order=2)
+    (numerator, _) = found.model.transfer_functions()[0]
+    assert found.sound
+    assert 75 <= np.flatnonzero(numerator)[0] <= 81
+    assert found.quality.fit_percent == pytest.approx(98.0, abs=0.5)
+    assert found.held_back_percent == pytest.approx(98.0, abs=0.5)
+
+
+def test_a_state_space_is_not_fitted_to_outputs_that_answer_inputs_from_before_the_log() -> None:
+    late = joined([scaled(late_plant(80))[0]]).delayed((79,))
+    assert np.isnan(late.y[0][:79]).all()
+    assert np.isfinite(late.y[0][79:]).all()
+    assert np.isfinite(joined([scaled(late_plant(80))[0]]).delayed((20,)).y[0]).all()
