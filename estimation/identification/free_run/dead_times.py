@@ -13,16 +13,17 @@ from estimation.identification.free_run.linear_fit import fit_linear, quick_fit
 from estimation.identification.free_run.linear_kernel import decay_rows
 from estimation.identification.free_run.linear_problem import LONG_DEAD_TIME, Form
 
-LONGEST_SHARE = 5
-"""A dead time lasts at most one of so many parts of the record: the first block, which is never held back."""
+LONGEST_SHARE = 3
+"""A dead time lasts at most one of so many parts of the record: as many outputs are left out of a fit, and others must
+be there to hold some back."""
 
 CLEARLY = 0.9
 """Share of what shorter dead times leave that a long one may leave, to be looked for: among hundreds of dead times, the
 best is a few per cent better than the others by chance."""
 
 APART = 3.0
-"""Ratio of the time constants that the screen puts side by side, from one sample to a block: between two neighbours,
-the dead time that it shows moves by less than the time constant, and it is refined after."""
+"""Ratio of the time constants that the screen puts side by side, from one sample to a third of the record: between two
+neighbours, the dead time that it shows moves by less than the time constant, and it is refined after."""
 
 ORDER, NEAR = 3, 1e-4
 """Order of the fits that refine a long dead time, and their least gain as `levenberg` takes it: with fewer poles, the
@@ -43,7 +44,7 @@ def estimate_delays(data: Channels, longest: int | None = None) -> tuple[int, ..
     data : Channels
         Scaled.
     longest : int, optional
-        Dead time at most; a fifth of the record unless told [samples].
+        Dead time at most; a third of the record unless told [samples].
 
     Returns
     -------
@@ -142,4 +143,4 @@ def _denominators(longest: int) -> Iterator[Array]:
     count = int(np.log(max(longest, 1)) / np.log(APART)) + 1
     poles = [0.0, *(float(np.exp(-(APART**-k))) for k in range(count))]
     for pair in combinations_with_replacement(poles, 2):
-        yield np.poly(pair)
+        yield np.asarray(np.poly(pair), dtype=np.float64)

@@ -34,13 +34,11 @@ def held_back_blocks(fit: LinearFit, data: Channels) -> tuple[float, ...]:
     tuple of float
         Over the output's deviation, one a block.
     """
-    target = np.concatenate(data.y)
-    errors: list[float] = []
+    problem, errors = Problem(fit.form, data), list[float]()
     tell("linear models")
     for masks in blocks(data, BLOCKS):
-        mask = np.concatenate(masks) & np.isfinite(target)
         part = refitted_linear(fit, data.without(masks), least_gain=NEAR)
-        errors.append(block_error(Problem(fit.form, data).jacobian(part.theta)[0] - target, mask))
+        errors.append(block_error(problem.jacobian(part.theta)[0] - problem.y, np.concatenate(masks) & problem.used))
     return tuple(errors)
 
 
