@@ -1,9 +1,11 @@
 """The page of one actuator: how every severity develops over its logs, and when a limit is reached."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from markupsafe import Markup, escape
 
 from estimation.finding import interval_95
 from experiments.fleet.actuators import ActuatorRow
@@ -15,13 +17,17 @@ from experiments.page.names_shown import SHOWN
 from experiments.page.numbers import MISSING, decimals_of, fixed, number, shop_unit
 from experiments.page.panels import Curve, Mark, Panel
 from experiments.page.render import render_page
+from experiments.page.sentences import whole_dates
 from experiments.page.tables import Cell, Column
 from faults.trend.kalman import moments, predict, settings
 from faults.trend.trend import FEWEST
 from plant.arrays import Array
 
-AHEAD = 30
-"""Logs for which the course is drawn on [count]."""
+AHEAD, LEAST_AHEAD = 30, 5
+"""Logs for which the course is drawn on, at most and at the least [count]."""
+
+LEAST_DAYS = 8.0
+"""Time over which logs must lie for an axis of dates, which has no hours [day]."""
 
 NORMAL_90 = 1.645
 """Half-width of a 90 % normal interval, in standard deviations."""
@@ -32,6 +38,9 @@ ROUNDING = 0.05
 ROOM = 0.25
 """Room above and below the logs, the healthy value and the limit in a chart, as a share of their range [fraction]."""
 
+DATE = "date"
+"""Label of an axis of dates."""
+
 MOST_LOGS = 30
 """Last logs that are listed [count]."""
 
@@ -40,47 +49,52 @@ FORECASTS = (
     Column("level", "level now, 95 % interval"),
     "limit",
     Column("growth", "growth per log"),
-    Column("half", "limit reached, 50 % interval"),
-    Column("most", "limit reached, 90 % interval"),
-    Column("outlook", "outlook"),
+    Column("half", "limit reached, 50 %", words=whole_dates),
+    Column("most", "limit reached, 90 %", words=whole_dates),
+    Column("outlook", words=whole_dates),
 )
 LOGS = (
-    Column("log", words=lambda name: Cell(name, "name")),
+    Column("log", of_row=lambda row: Cell(_link(row["log"], row["page"]), "name")),
     Column("date", words=lambda date: Cell(date, "name")),
     Column("state", words=lambda state: Cell(STATES[state], f"fleet-{state} name")),
     "found",
 )
 
 
-def actuator_page(row: ActuatorRow, log: str | None, fleet: str = "../index.html") -> str:
+def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../index.html") -> str:
     """Return the page of an actuator.
 
     Parameters
     ----------
-    log : str or None
-        Path of the page of its last log from this one, where there is one.
+    pages : Mapping[str, str]
+        Path of the page of a log from this one, by its file, of those that have one.
     fleet : str
         Path of the page of all actuators.
     """
     worst = row.outlook
     every = (worst if worst and worst.name == name else outlook_of(row.logs, name, row.maintained) for name in SHOWN)
     outlooks = [one for one in every if one is not None]
+    outlooks.sort(key=lambda one: worst is None or one.name != worst.name)  # what decides is read first
     counted = max((len(one.logs) for one in outlooks), default=0)
+    charts = _charts(outlooks, row.name)
     last = [*row.logs][-MOST_LOGS:][::-1]
     facts = {
         "name": row.name,
         "title": f"{row.name}: {STATES[row.state]}{f' ({found_in(row.last)})' if row.last.between else ''}.",
         "outlook": "" if worst is None else _sentence(worst),
-        "log": log,
+        "log": pages.get(row.last.file),
         "fleet": fleet,
         "apart": _apart(outlooks),
         "forecasts": pd.DataFrame([_forecast(one) for one in outlooks]),
         "logs": pd.DataFrame(
-            [(one.file.rsplit("/", 1)[-1], one.named.shown, one.state, found_in(one)) for one in last],
-            columns=["log", "date", "state", "found"],
+            [
+                (one.file.rsplit("/", 1)[-1], one.named.shown, one.state, found_in(one), pages.get(one.file, ""))
+                for one in last
+            ],
+            columns=["log", "date", "state", "found", "page"],
         ),
-        "charts": {one.name: _chart(one, row.name) for one in outlooks},
-        "names": [(one.name, SHOWN[one.name]) for one in outlooks],
+        "charts": {f"course-{place}": each for place, (_, each) in enumerate(charts)},
+        "captions": [caption for caption, _ in charts],
         "began": _restarts(outlooks, row.maintained),
         "counted": counted,
         "left_out": len(row.logs) - counted,
@@ -99,9 +113,9 @@ def _restarts(outlooks: Sequence[Outlook], maintained: Sequence[float]) -> list[
         begin = which[0].trend.begin
         log, before = which[0].logs[begin].named, which[0].logs[begin - 1].named
         repaired = any((before.place or 0.0) < one <= (log.place or 0.0) for one in maintained)
-        why = "after a repair" if repaired else "after a lasting jump"
+        why = "after a repair" if repaired else "after a lasting change"
         names = [SHOWN[one.name] for one in which]
-        subject = "Every severity" if len(names) == len(outlooks) else ", ".join(names).capitalize()
+        subject = "Every severity" if len(names) == len(outlooks) else _in_a_row(names).capitalize()
         verb = "is" if len(names) in (1, len(outlooks)) else "are"
         said.append(f"{subject} {verb} followed from the log of {log.shown or begin + 1} on, {why}.")
     return said
@@ -138,40 +152,79 @@ def _forecast(one: Outlook) -> dict[str, str]:
         "severity": SHOWN[one.name],
         "level": f"{shown} {unit} ({low} to {high})",
         "limit": f"{number(scale * one.series.limit, 3)} {unit}",
-        "growth": f"{fixed(growth, places)} ± {fixed(growth_std, places)} {unit}",
+        "growth": f"{fixed(growth, places)}\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}{fixed(growth_std, places)} {unit}",
         "half": one.when(1, 3) or MISSING,
         "most": one.when(0, 4) or MISSING,
         "outlook": one.words,
     }
 
 
-def _chart(one: Outlook, name: str) -> Charts:
-    """Return the logs of a severity, its level with a 90 % band, and the same for `AHEAD` logs to come."""
+def _ahead(outlooks: Sequence[Outlook]) -> int:
+    """Return for how many logs courses are drawn on: to where a limit may be reached, if that is within sight."""
+    ends = [end for one in outlooks for end in one.quantiles or () if end <= AHEAD]
+    few = max((len(one.logs) // 4 for one in outlooks), default=0)
+    return min(AHEAD, max(LEAST_AHEAD, few, *(math.ceil(end) + 2 for end in ends)))
+
+
+def _charts(outlooks: Sequence[Outlook], name: str) -> list[tuple[str, Charts]]:
+    """Return the course of severities, those over the same logs in one figure, each with its caption."""
+    ahead = _ahead(outlooks)
+    together: dict[tuple[float, ...], list[Outlook]] = {}
+    for one in outlooks:
+        together.setdefault(tuple(one.series.times), []).append(one)
+    found: list[tuple[str, Charts]] = []
+    for which in together.values():
+        x, label = _abscissa(which[0], ahead)
+        panels = [_panel(one, x, ahead) for one in which]
+        file = "-".join([name, *(one.name for one in which[: len(outlooks) - 1])])
+        caption = _in_a_row([SHOWN[one.name] for one in which]).capitalize()
+        found.append((caption, Charts(x, label, panels, file, label, dates=label == DATE)))
+    return found
+
+
+def _in_a_row(names: Sequence[str]) -> str:
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def _panel(one: Outlook, x: Array, ahead: int) -> Panel:
+    """Return the logs of a severity, its level with a 90 % band, and the same for logs to come."""
     scale, unit = shop_unit(one.unit)
     count = len(one.logs)
-    x = np.arange(1, count + AHEAD + 1, dtype=np.float64)
     measured = np.full(len(x), np.nan)
     measured[:count] = scale * one.series.values
-    level, std = _course(one)
+    level, std = _course(one, ahead)
     curves = (
         Curve("logs", measured, "black", "dots"),
         Curve("level", scale * level, "blue"),
         Curve("upper end, 90 %", scale * (level + NORMAL_90 * std), "blue", "edge"),
         Curve("lower end, 90 %", scale * (level - NORMAL_90 * std), "blue", "edge"),
     )
-    marks = (Mark("y", scale * one.series.limit, "limit"), Mark("x", float(count), "last log"))
+    marks = (Mark("y", scale * one.series.limit, "limit"), Mark("x", float(x[count - 1]), "last log"))
     ends = scale * np.array([*one.series.values, one.series.healthy, one.series.limit])
     room = ROOM * float(np.ptp(ends))  # a forecast that leaves it would leave no height for the logs
     told = (float(ends.min()) - room, float(ends.max()) + room)
-    panel = Panel(SHOWN[one.name], unit, curves, marks, [(2, 3)], told)
-    return Charts(x, "number of the log", [panel], f"{name}-{one.name}", "logs")
+    return Panel(SHOWN[one.name], unit, curves, marks, [(2, 3)], told)
 
 
-def _course(one: Outlook) -> tuple[Array, Array]:
-    """Return level and standard deviation after every log, and as forecast, shape (logs + AHEAD,) each."""
+def _abscissa(one: Outlook, ahead: int) -> tuple[Array, str]:
+    """Return places of the logs and of those to come, with the label of their axis: dates, or else numbers."""
+    days, count = one.days_apart, len(one.logs)
+    times = one.series.times
+    if days is None or np.any(np.diff(times) <= 0.0) or np.ptp(times) < LEAST_DAYS:
+        return np.arange(1, count + ahead + 1, dtype=np.float64), "number of the log"
+    return np.concatenate([times, times[-1] + days * np.arange(1, ahead + 1)]), DATE
+
+
+def _link(name: str, page: str) -> Markup:
+    return Markup('<a href="{}">{}</a>').format(page, name) if page else escape(name)
+
+
+def _course(one: Outlook, ahead: int) -> tuple[Array, Array]:
+    """Return level and standard deviation after every log, and as forecast, shape (logs + ahead,) each."""
     grid, series = settings(), one.series
     past = [trend.level for trend in one.course]
-    ahead = [moments(predict(one.trend.belief, float(step), grid), grid) for step in range(1, AHEAD + 1)]
+    ahead = [moments(predict(one.trend.belief, float(step), grid), grid) for step in range(1, ahead + 1)]
     future = [(series.healthy + series.size * mean, abs(series.size) * std) for mean, std in ahead]
     level, std = np.array([*past, *future]).T
     return level, std

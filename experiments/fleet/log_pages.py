@@ -61,7 +61,7 @@ def write_pages(
             links[row.name] = place.as_posix()
         if len(row.logs) > 1:
             course = Path("actuators") / file_name(row.name)
-            page = actuator_page(row, f"../{place.as_posix()}" if written else None)
+            page = actuator_page(row, {row.last.file: f"../{place.as_posix()}"} if written else {})
             write_whole(out / course, page, "--out", parents=True)
             links[row.name] = course.as_posix()
     return links

@@ -96,8 +96,9 @@ class Outlook:
             return "reached"
         if self.days_apart is None:
             return f"{span_of(*ends)} logs" if low != high else f"{ends[0]:.0f} log{'' if round(ends[0]) == 1 else 's'}"
-        ahead = [self.days_apart * end for end in ends]
-        places = [(self.logs[-1].named.place or 0.0) + days for days in ahead]
+        hours = any(len(one.named.shown) > len(one.named.day) for one in self.logs)
+        ahead = [max(self.days_apart * end, 0.0 if hours else HOURS) for end in ends]  # no hour where names have none
+        places = [(self.logs[-1].named.place or 0.0) + self.days_apart * end for end in ends]
         if low != high:
             return told_dates(places, ahead)
         farthest = self.days_apart * float(self.trend.crossing.quantiles[-1])

@@ -12,6 +12,7 @@ from experiments.page.names_shown import SHOWN
 from experiments.page.numbers import MISSING, alike_in_digits, fixed, number, shop_unit
 from experiments.page.render import render_page
 from experiments.page.scripting import data_block
+from experiments.page.sentences import whole_dates
 from experiments.page.tables import Cell, Column, right
 from experiments.page.words import in_words
 
@@ -84,7 +85,7 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
         "home": home,
         "title": title_of(rows),
         "sickest": sickest_of(rows),
-        "hint": rig_hint(rows),
+        "hint": rig_hint(rows, served=bool(home)),
         "counts": [(words, counts[name], name) for name, words in STATES.items() if counts[name]],
         "logs": sum(len(row.logs) for row in rows),
         "data": data_block(data),
@@ -102,6 +103,7 @@ def fleet_page(rows: Sequence[ActuatorRow], links: Mapping[str, str], source: st
         Column("state", words=lambda name: Cell(STATES[name], f"fleet-{name}")),
         Column("of the limit", unit="%", words=lambda share: right(fixed(share, 1))),
         Column("logs left", words=lambda left: right(number(left, 2))),
+        Column("outlook", words=whole_dates),
         Column("last log", words=lambda day: Cell(day, "name")),
     ]
     shown = [next((one for one in columns if one.source == each["label"]), each["label"]) for each in COLUMNS]
@@ -171,20 +173,27 @@ def title_of(rows: Sequence[ActuatorRow]) -> str:
     return f"{who} past a limit{''.join(more)}."
 
 
-def rig_hint(rows: Sequence[ActuatorRow]) -> str:
+def rig_hint(rows: Sequence[ActuatorRow], *, served: bool = False) -> str:
     """Return what to do where many actuators have no verdict; empty where few have none.
 
     Parameters
     ----------
     rows : sequence of ActuatorRow
         In any order.
+    served : bool
+        Whether a server has the logs, in no folder of the reader's.
     """
     unknown = [row for row in rows if row.state == "unknown" and not row.last.told]
     if len(unknown) < LEAST_OPEN or len(unknown) < SHARE_OPEN * len(rows):
         return ""
+    remedy = (
+        "give each of them a rig file: start the server with --rigs FOLDER, in which P-12.toml is the rig file of P-12."
+        if served
+        else "move their logs into a folder of their own, with their rig file in it as rig.toml."
+    )
     return (
         f"{len(unknown)} of {len(rows)} actuators fit none of the nine conditions. If they are of another size than "
-        "the rig file says, move their logs into a folder of their own, with their rig file in it as rig.toml."
+        f"the rig file says, {remedy}"
     )
 
 

@@ -36,6 +36,8 @@ class Charts:
         Charts of one group zoom together.
     log : bool
         Whether the x axis is logarithmic; all places are then above zero.
+    dates : bool
+        Whether places are dates, in days since 1970-01-01.
     """
 
     x: Array
@@ -44,6 +46,7 @@ class Charts:
     file: str
     group: str = "time"
     log: bool = False
+    dates: bool = False
 
     def html(self, name: str, caption: str) -> Markup:
         """Return the figure with its numbers, the still picture of them, and a table of their ranges.
@@ -54,7 +57,7 @@ class Charts:
             Anchor of the figure.
         """
         still = Markup('<div class="still">{}</div>').format(
-            image_of(still_picture(self.x, self.label, self.panels, log=self.log), caption)
+            image_of(still_picture(self.x, self.label, self.panels, log=self.log, dates=self.dates), caption)
         )
         body = Markup('<script type="application/json" class="numbers">{}</script>').format(self._json())
         said = Markup('<figure class="charts" id="figure-{}">{}<figcaption>{}</figcaption>{}{}</figure>')
@@ -64,7 +67,12 @@ class Charts:
         count = len(self.x)
         length = stretch_length(count, MOST_DRAWN)
         found = {
-            "x": {"label": self.label, "log": self.log, **_places(np.log10(self.x) if self.log else self.x, length)},
+            "x": {
+                "label": self.label,
+                "log": self.log,
+                "dates": self.dates,
+                **_places(np.log10(self.x) if self.log else self.x, length),
+            },
             "file": self.file,
             "group": self.group,
             "panels": [

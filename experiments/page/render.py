@@ -13,7 +13,7 @@ from experiments.page.errata import linked, linked_errata
 from experiments.page.figure_files import image_of
 from experiments.page.numbers import exact, number
 from experiments.page.scripting import with_scripts
-from experiments.page.sentences import rig_in_words
+from experiments.page.sentences import rig_in_words, whole_dates
 from experiments.page.tables import Columns, folded_tables, html_table
 
 _HEADING = re.compile(r'<section id="([^"]+)"[^>]*>\s*<h2>([^:<]*)')
@@ -77,6 +77,7 @@ def _templates() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {"linked": linked, "rig_in_words": rig_in_words, "number": number, "exact": exact}
+    environment.filters["whole_dates"] = whole_dates
     return environment
 
 

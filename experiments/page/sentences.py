@@ -1,10 +1,15 @@
 """Clauses of results as sentences, for a page and for a terminal."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
+from markupsafe import Markup, escape
+
 from plant.eha.rig import UNNAMED
 from plant.log.notes import LogCode
+
+_DATE = re.compile(r"\b\d{4}-\d\d-\d\d\b")
 
 
 def rig_in_words(name: str) -> str:
@@ -30,6 +35,17 @@ def sentence(said: str) -> str:
     """
     begin = said[:1] if "_" in said.split(" ", 1)[0] else said[:1].upper()
     return f"{begin}{said[1:].rstrip('.')}."
+
+
+def whole_dates(said: str) -> Markup:
+    """Return words in which no line ends within a date.
+
+    Examples
+    --------
+    >>> whole_dates("past since 2026-10-12")
+    Markup('past since <span class="date">2026-10-12</span>')
+    """
+    return Markup(_DATE.sub(r'<span class="date">\g<0></span>', str(escape(said))))  # noqa: S704 - it was escaped
 
 
 def left_unread(result: Mapping[str, Any]) -> list[str]:

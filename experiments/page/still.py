@@ -39,6 +39,12 @@ MOST_ACROSS, MOST_UP = 8, 4
 ROUND = (0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 2.5, 5.0, 10.0, 20.0)
 """Distances between ticks, times a power of ten [dimensionless]."""
 
+DATE_WIDE = 70.0
+"""Least distance between two dates on an axis [point]."""
+
+DAYS = (1, 2, 7, 14, 28, 56, 91, 182, 365, 730, 1825, 3650)
+"""Distances between ticks of an axis of dates [day]."""
+
 FEW_DECADES = 2.5
 """Powers of ten below which a logarithmic axis has ticks between them too [decade]."""
 
@@ -59,7 +65,7 @@ STROKES: Mapping[str, str] = {"dots": 'class="dots"', "edge": 'class="line" stro
 """How a curve is drawn, by its look; any other look is a line."""
 
 
-def still_picture(x: Array, label: str, panels: Sequence[Panel], *, log: bool = False) -> bytes:
+def still_picture(x: Array, label: str, panels: Sequence[Panel], *, log: bool = False, dates: bool = False) -> bytes:
     """Return the picture as an SVG file.
 
     Parameters
@@ -72,6 +78,8 @@ def still_picture(x: Array, label: str, panels: Sequence[Panel], *, log: bool = 
         From the top; two in a row where there are more than `ONE_COLUMN`.
     log : bool
         Whether the x axis is logarithmic.
+    dates : bool
+        Whether places are dates, in days since 1970-01-01.
     """
     places = np.log10(x) if log else x
     columns = 1 if len(panels) <= ONE_COLUMN else 2
@@ -88,12 +96,14 @@ def still_picture(x: Array, label: str, panels: Sequence[Panel], *, log: bool = 
         corner = f"{LEFT + column * (wide + ACROSS):g} {TOP + row * (high + DOWN):g}"
         last = place >= len(panels) - columns
         parts.append(f'<g transform="translate({corner})">')
-        parts.extend(_panel(places, panel, (wide, high), f"p{place}", label if last else "", log=log))
+        parts.extend(_panel(places, panel, (wide, high), f"p{place}", label if last else "", log=log, dates=dates))
         parts.append("</g>")
     return "".join([*parts, "</svg>"]).encode()
 
 
-def _panel(x: Array, panel: Panel, size: tuple[float, float], name: str, label: str, *, log: bool) -> Iterator[str]:
+def _panel(
+    x: Array, panel: Panel, size: tuple[float, float], name: str, label: str, *, log: bool, dates: bool
+) -> Iterator[str]:
     wide, high = size
     across, up = _range(x, 0.0), panel.ends or _range(_every(panel), ROOM)
     places = (x - across[0]) * (wide / (across[1] - across[0]))
@@ -103,7 +113,7 @@ def _panel(x: Array, panel: Panel, size: tuple[float, float], name: str, label: 
         return high - (values - up[0]) * scale
 
     yield f'<clipPath id="{name}"><path d="M0 -2H{wide:g}V{high + 2:g}H0z"/></clipPath>'
-    for tick, words in _decades(*across) if log else _ticks(*across, MOST_ACROSS):
+    for tick, words in _days(*across, wide) if dates else _decades(*across) if log else _ticks(*across, MOST_ACROSS):
         at = (tick - across[0]) * wide / (across[1] - across[0])
         yield f'<path class="grid" d="M{at:.1f} 0V{high:g}"/>'
         yield f'<text x="{at:.1f}" y="{high + 11:g}" text-anchor="middle">{words}</text>'
@@ -211,6 +221,13 @@ def _ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
     whole = len(f"{largest:.0f}") if largest < PLAIN_TO else 0
     digits = min(max(math.ceil(math.log10(largest / step + 1e-300)) + 2, 3, whole), 12)
     return [(one, f"{one:.{digits}g}".replace("-", "\N{MINUS SIGN}")) for one in within]
+
+
+def _days(low: float, high: float, wide: float) -> list[tuple[float, str]]:
+    """Return dates within a range of days since 1970-01-01 that is so wide [point], with their words."""
+    step = next((one for one in DAYS if (high - low) / one <= wide / DATE_WIDE), DAYS[-1])
+    within = np.arange(step * math.ceil(low / step - EDGE), high + EDGE * step, step, dtype=np.float64)
+    return [(float(one), str(np.datetime64(round(one), "D"))) for one in within]
 
 
 def _decades(low: float, high: float) -> list[tuple[float, str]]:

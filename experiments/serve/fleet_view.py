@@ -63,7 +63,7 @@ def actuator_view(
     row = next((one for one in found if one.name == name), None)
     if row is None:
         return ""
-    return actuator_page(row, None if row.last.state == "failed" else pages[row.last.file], "fleet")
+    return actuator_page(row, {one.file: pages[one.file] for one in row.logs if one.state != "failed"}, "fleet")
 
 
 def _actuators(
@@ -71,17 +71,16 @@ def _actuators(
 ) -> "tuple[list[ActuatorRow], dict[str, str]]":
     """Return the actuators, and the page of each log by its file."""
     from experiments.fleet.actuators import actuator_rows
-    from experiments.fleet.naming import UNNAMED, Named, by_pattern
+    from experiments.fleet.naming import by_dates, by_pattern
     from experiments.fleet.rows import log_rows
 
     counts = Counter(name for _, name, _ in rows)
     files = {identity: name if counts[name] == 1 else f"{name} ({identity[:6]})" for identity, name, _ in rows}
-    names: dict[str, Named] = {}
-    for identity, name, _ in rows if pattern else ():
-        try:
-            names[files[identity]] = by_pattern([name], pattern or "")[name]
-        except HydrostateError:  # a date that is none
-            names[files[identity]] = UNNAMED
+    try:
+        told = by_pattern(counts, pattern) if pattern else by_dates(counts)
+    except HydrostateError:  # no date is one
+        told = {}
+    names = {files[identity]: told[name] for identity, name, _ in rows if name in told}
     blank = dict.fromkeys(("outcome", "found_condition", "reason", "quantities", "against"))
     table = [{**blank, **entries, "verb": "diagnose", "file": files[identity]} for identity, _, entries in rows]
     pages = {file: f"logs/{identity}" for identity, file in files.items()}

@@ -34,6 +34,9 @@
 
   const digits = (value) => (value === null || value === undefined ? "–" : Number(value.toPrecision(5)).toString());
 
+  const dateOf = (day) => new Date(Math.round(864e5 * day)).toISOString().slice(0, 10); // of days since 1970-01-01
+  const DAYS = [1, 2, 7, 14, 28, 56, 91, 182, 365, 730, 1825]; // between two ticks of an axis of dates
+
   function element(tag, attributes = {}, ...children) {
     const made = document.createElement(tag);
     for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
@@ -96,7 +99,10 @@
       cursor: { sync: { key: figure.group }, drag: { x: true, y: false } },
       scales: { x: scaleOf(figure.x), y: panel.ends ? { range: () => panel.ends } : {} },
       axes: [
-        { ...axis, label: last ? figure.x.label : undefined, show: last, size: 34, labelSize: 20 },
+        {
+          ...axis, label: last ? figure.x.label : undefined, show: last, size: 34, labelSize: 20,
+          ...(figure.x.dates ? { space: 84, incrs: DAYS, values: (_, ticks) => ticks.map(dateOf) } : {}),
+        },
         { ...axis, size: 62 },
       ],
       series: [{}, ...panel.curves.map(series)],
@@ -200,12 +206,13 @@
   }
 
   function csvOf(x, panels) {
-    const columns = [x, ...panels.flatMap((panel) => panel.values)];
+    const columns = panels.flatMap((panel) => panel.values);
     const quoted = (words) => `"${words.replaceAll('"', '""')}"`;
     const heads = panels.flatMap((panel) => panel.curves.map((curve) => quoted(`${panel.label} ${curve.name} [${panel.unit}]`)));
     const lines = [[quoted(panels.abscissa), ...heads].join(",")];
     for (let i = 0; i < x.length; i++) {
-      lines.push(columns.map((column) => (column[i] === null ? "" : Number(column[i].toPrecision(7)))).join(","));
+      const cells = columns.map((column) => (column[i] === null ? "" : Number(column[i].toPrecision(7))));
+      lines.push([panels.dated ? dateOf(x[i]) : Number(x[i].toPrecision(7)), ...cells].join(","));
     }
     return `${lines.join("\r\n")}\r\n`;
   }
@@ -247,7 +254,7 @@
       live.append(box);
       const chart = new uPlot(optionsOf(panel, figure, live.clientWidth, i === panels.length - 1), [x, ...panel.values]);
       chart.placeOf = i === 0 ? place : null;
-      chart.placeWords = (at) => `${figure.x.label}: ${digits(x[at])}`;
+      chart.placeWords = (at) => `${figure.x.label}: ${figure.x.dates ? dateOf(x[at]) : digits(x[at])}`;
       box.append(legendOf(chart, panel), chart.root);
       box.addEventListener("keydown", keys(chart, figure.group));
       return chart;
@@ -263,6 +270,7 @@
       ...panel, values: await Promise.all(panel.curves.map(unpacked)),
     })));
     panels.abscissa = figure.x.label;
+    panels.dated = figure.x.dates;
     const live = element("div", { class: "live" });
     holder.querySelector(".still").before(live);
     holder.classList.add("is-live");

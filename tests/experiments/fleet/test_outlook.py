@@ -14,6 +14,7 @@ from experiments.fleet.actuators import ActuatorRow, actuator_rows
 from experiments.fleet.naming import by_pattern
 from experiments.fleet.outlook import outlook_of, read_maintenance
 from experiments.fleet.rows import log_rows
+from experiments.page.sentences import whole_dates
 from plant.errors import HydrostateError
 from tests.experiments.fleet.conftest import between, store_row
 
@@ -58,9 +59,9 @@ def test_a_forecast_is_told_in_dates_where_logs_have_them_and_holds_the_crossing
     assert row.outlook.left is not None
     assert row.outlook.left[0] < 2.0 / 0.09 - 17.0 < row.outlook.left[2]
     assert re.fullmatch(words, row.outlook.words)
-    page = actuator_page(row, None).replace("\N{NO-BREAK SPACE}", " ")
+    page = actuator_page(row, {}).replace("\N{NO-BREAK SPACE}", " ")
     assert re.search(r"Leakage reaches its limit in about \d logs.* \(50 % interval: .*; 90 %: .*\)\.</p>", page)
-    assert row.outlook.when(0, 4) in page
+    assert whole_dates(row.outlook.when(0, 4)) in page
 
 
 def test_what_has_been_past_its_limit_since_a_log_says_so_even_if_its_logs_are_few() -> None:
@@ -114,49 +115,103 @@ def test_logs_between_two_conditions_are_part_of_the_trend_and_may_raise_the_ala
     assert row.outlook is not None
     assert len(row.outlook.logs) == 30
     assert (row.last.state, row.state) == ("unknown", "alarm")
-    assert "<h1>P-1: nearing a limit (leakage none to minor).</h1>" in actuator_page(row, None)
+    assert "<h1>P-1: nearing a limit (leakage none to minor).</h1>" in actuator_page(row, {})
 
 
 def test_a_page_tells_logs_that_have_no_place_in_the_trend() -> None:
     logs = actuator(GROWING).logs
     lost = replace(logs[3], state="unknown")
-    page = actuator_page(ActuatorRow("P-1", (*logs[:3], lost, *logs[4:])), None)
+    page = actuator_page(ActuatorRow("P-1", (*logs[:3], lost, *logs[4:])), {})
     assert "1 of 30 logs has no severity that can be relied on" in page
-    assert "relied on" not in actuator_page(actuator(GROWING), None)
+    assert "relied on" not in actuator_page(actuator(GROWING), {})
 
 
 def test_an_actuator_without_any_severity_has_a_page_that_says_why() -> None:
-    page = actuator_page(actuator(GROWING[:5], outcome="failed", found_condition=None, reason="no time"), None)
+    page = actuator_page(actuator(GROWING[:5], outcome="failed", found_condition=None, reason="no time"), {})
     assert page.count("no time") == 5
     assert "When a limit is reached" not in page
 
 
 def test_a_chart_shows_the_limit_and_no_forecast_that_would_flatten_the_logs() -> None:
-    page = actuator_page(actuator(1.0 + 0.1 * np.arange(10)), None)
+    page = actuator_page(actuator(1.0 + 0.1 * np.arange(10)), {})
     low, high = json.loads(re.findall(r'"ends": ?(\[[^]]*\])', page)[0])
     assert low < 1.0
     assert 3.0 < high < 5.0
 
 
 def test_the_page_of_an_actuator_shows_every_severity_with_its_forecast() -> None:
-    page = actuator_page(actuator(GROWING), "../pages/last.html").replace("\N{NO-BREAK SPACE}", " ")
+    page = actuator_page(actuator(GROWING), {"P-1_29.csv": "../pages/last.html"}).replace("\N{NO-BREAK SPACE}", " ")
     assert "<h1>P-1: nearing a limit.</h1>" in page
-    assert page.count('class="charts"') == 2
+    assert page.count('class="charts"') == 1
     assert 'href="../pages/last.html"' in page
     assert "Leakage reaches its limit in about" in page
     assert "more than 300 logs" in page
 
 
+def weekly(leakages: Any, std: float = 0.05) -> ActuatorRow:
+    """Return an actuator with a log each week, dated without an hour."""
+    files = [f"P-1_{np.datetime64('2026-01-05') + 7 * place}.csv" for place in range(len(leakages))]
+    rows = [store_row(file, float(one), std) for file, one in zip(files, leakages, strict=True)]
+    (row,) = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {}))
+    return row
+
+
+def abscissa_of(page: str) -> dict[str, Any]:
+    (data,) = re.findall(r'class="numbers">(.*?)</script>', page, re.DOTALL)
+    return json.loads(data)["x"]
+
+
+def test_charts_of_dated_logs_have_dates_and_go_on_to_where_a_limit_may_be_reached() -> None:
+    grows, rests = (abscissa_of(actuator_page(weekly(one), {})) for one in (1.0 + 0.1 * np.arange(12), np.ones(12)))
+    assert grows["label"] == rests["label"] == "date"
+    assert rests["count"] == 12 + 5
+    assert rests["start"] == float(np.datetime64("2026-01-05").astype(int))
+    assert rests["step"] == 7.0
+    assert rests["count"] < grows["count"] < 12 + 30
+    undated = abscissa_of(actuator_page(actuator(np.ones(12)), {}))
+    assert (undated["label"], undated["dates"], undated["start"]) == ("number of the log", False, 1.0)
+
+
+def test_logs_of_one_day_are_numbered_since_an_axis_of_dates_has_no_hours() -> None:
+    files = [f"P-1_2026-01-05_{hour:02d}-00.csv" for hour in range(12)]
+    logs = log_rows([store_row(file, 1.0) for file in files], by_pattern(files, "{actuator}_{date}.csv"), {})
+    assert not abscissa_of(actuator_page(actuator_rows(logs)[0], {}))["dates"]
+
+
+def test_logs_that_are_dated_without_an_hour_have_no_forecast_with_one() -> None:
+    row = weekly(1.0 + 0.18 * np.arange(12), std=0.01)
+    assert row.outlook is not None
+    assert row.outlook.left is not None
+    assert 7.0 * row.outlook.left[2] < 2.0
+    assert row.outlook.when(0, 4) == "23 March 2026"
+
+
+def test_what_decides_is_read_first_and_logs_lead_to_their_pages() -> None:
+    row = actuator(1.0 + 0.1 * np.arange(30))
+    page = actuator_page(row, {"P-1_28.csv": "logs/28", "P-1_29.csv": "logs/29"})
+    stiffness_decides = actuator_page(weekly(np.ones(12)), {})
+    order = [re.findall(r'<td data-head="severity">(.*?)</td>', one) for one in (page, stiffness_decides)]
+    assert order == [["leakage", "bulk modulus"], ["bulk modulus", "leakage"]]
+    assert '<a href="logs/28">P-1_28.csv</a>' in page
+    assert '<a href="logs/29">Page of the last log</a>' in page
+    assert '<td class="name" data-head="log">P-1_27.csv</td>' in page
+
+
+def test_no_line_ends_within_a_date() -> None:
+    page = actuator_page(weekly([1.0] * 6 + [4.0] * 6), {})
+    assert 'past the limit since <span class="date">2026-02-16</span>.</p>' in page
+
+
 def test_a_repair_is_named_on_the_page() -> None:
-    page = actuator_page(actuator(GROWING, maintained=(9.5,)), None)
+    page = actuator_page(actuator(GROWING, maintained=(9.5,)), {})
     assert "Every severity is followed from the log of 10 on, after a repair." in page
-    few = actuator_page(actuator(GROWING, maintained=(27.0,)), None).replace("\N{NO-BREAK SPACE}", " ")
+    few = actuator_page(actuator(GROWING, maintained=(27.0,)), {}).replace("\N{NO-BREAK SPACE}", " ")
     assert re.search("no forecast yet, since it needs 4 logs, and there are [23] since the trend restarted", few)
 
 
-def test_a_lasting_jump_is_no_repair() -> None:
-    page = actuator_page(actuator([1.0] * 15 + [2.0] * 15), None)
-    assert "Leakage is followed from the log of 15 on, after a lasting jump." in page
+def test_a_lasting_change_is_no_repair() -> None:
+    page = actuator_page(actuator([1.0] * 15 + [2.0] * 15), {})
+    assert "Leakage is followed from the log of 15 on, after a lasting change." in page
 
 
 def test_repairs_are_read_from_a_table(tmp_path: Path) -> None:
@@ -172,7 +227,7 @@ def test_repairs_are_read_from_a_table(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_page_of_an_actuator_works_in_a_browser(browser: Any, tmp_path: Path) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
-    (tmp_path / "page.html").write_text(actuator_page(actuator(GROWING), None), encoding="utf-8")
+    (tmp_path / "page.html").write_text(actuator_page(weekly(GROWING), {}), encoding="utf-8")
     page = browser.new_page(viewport={"width": 390, "height": 800}, color_scheme="dark")
     complaints: list[str] = []
     page.on("console", lambda said: complaints.append(said.text))
@@ -181,6 +236,13 @@ def test_the_page_of_an_actuator_works_in_a_browser(browser: Any, tmp_path: Path
     page.wait_for_selector("html.charts-drawn", state="attached")
     assert page.locator(".live canvas").count() == 2
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    page.locator(".live .panel").first.focus()
+    page.keyboard.press("ArrowRight")
+    assert re.fullmatch(r"date: 2026-\d\d-\d\d", page.locator(".place").inner_text())
+    with page.expect_download() as started:
+        page.get_by_role("button", name="Download the numbers").click()
+    started.value.save_as(tmp_path / "numbers.csv")
+    assert (tmp_path / "numbers.csv").read_text("utf-8").splitlines()[1].startswith("2026-01-05,1,")
     found = axe.Axe().run(page).response["violations"]
     assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
     assert complaints == []

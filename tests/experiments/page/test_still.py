@@ -87,6 +87,17 @@ def test_a_logarithmic_axis_has_powers_of_ten_at_equal_distances() -> None:
     assert {"1", "2", "5", "10", "20"} <= set(words_of(picture(np.array([1.0, 30.0]))))
 
 
+@pytest.mark.parametrize(("days", "step"), [(20.0, 7), (100.0, 28), (4000.0, 1825)])
+def test_an_axis_of_dates_has_whole_days_that_do_not_touch(days: float, step: int) -> None:
+    x = 20700.0 + np.linspace(0.0, days, 50)
+    panels = [Panel("level", "N", [Curve("a", np.ones(50))])] * 5  # two columns
+    picture = ET.fromstring(still_picture(x, "date", panels, dates=True))  # noqa: S314 -- our own picture
+    texts = [one for one in picture.iter(f"{SVG}text") if re.fullmatch(r"\d{4}-\d\d-\d\d", one.text or "")]
+    places = {np.datetime64(str(one.text)): float(one.attrib["x"]) for one in texts}
+    assert {int(one) for one in np.diff(list(places)).astype(int)} == {step}
+    assert min(np.diff(list(places.values()))) >= 70.0
+
+
 def test_names_are_escaped_and_a_long_log_keeps_its_peak_with_few_points() -> None:
     values = np.zeros(100_000)
     values[77_777] = 1.0
