@@ -205,10 +205,45 @@ def by_dates(files: Iterable[str], folder: str = "") -> dict[str, Named]:
     return without_wrong_clocks(found) if together else {}
 
 
+def actuator_of(name: str, pattern: str | None) -> str:
+    """Return the actuator that the name of one log tells: by the pattern, or else by its date.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+    pattern : str or None
+        As `by_pattern` takes it.
+
+    Returns
+    -------
+    str
+        Empty if the name tells none.
+
+    Examples
+    --------
+    >>> actuator_of("P-12_2026-11-22.csv", None), actuator_of("run 7 of P-12.csv", "* of {actuator}.csv")
+    ('P-12', 'P-12')
+    >>> actuator_of("P-12.csv", None)
+    'P-12'
+    """
+    if pattern is None:
+        return _by_date(f"/{name}").actuator or _stem(name)
+    try:
+        return by_pattern([name], pattern)[name].actuator
+    except HydrostateError:  # a date that is none
+        return ""
+
+
+def _stem(name: str) -> str:
+    """Return the name of a file without what ends it."""
+    return re.sub(r"\.[A-Za-z][A-Za-z0-9]*(?:\.(?:gz|zst))?$", "", name)
+
+
 def _by_date(path: str) -> Named:
     """Return what the name of one file and of its folder says."""
     *_, folder, name = path.split("/")
-    stem = year_first(re.sub(r"\.[A-Za-z][A-Za-z0-9]*(?:\.(?:gz|zst))?$", "", name))
+    stem = year_first(_stem(name))
     dates = list(re.finditer(rf"(?<![0-9]){STAMP.pattern}(?![0-9])", stem))
     if len(dates) != 1:
         return UNNAMED

@@ -94,6 +94,8 @@ class Jobs:
             settings.plant,
             settings.rig,
             tuple(settings.columns.items()),
+            settings.rigs,
+            settings.pattern,
         )
         with self._lock:
             future: Future[Any] = self._pool.schedule(work_on, args=(task,), timeout=settings.seconds)

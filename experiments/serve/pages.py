@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from experiments.serve.rigs import rig_files
 from experiments.serve.settings import MB, VERBS, Settings
 
 _POLICY = re.compile(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">')
@@ -50,6 +51,8 @@ def home_page(settings: Settings) -> str:
             ("largest", settings.largest // MB),
             ("seconds", f"{settings.seconds:g}"),
             ("streams", tuple(settings.streams)),
+            ("rigs", tuple(rig_files(settings.rigs))),
+            ("others", None if settings.rig is None else settings.rig.name),
         ),
     )
 

@@ -32,6 +32,8 @@ class Settings:
         What a client must show; None only where this machine alone can connect.
     plant, rig, columns : str or None, Path or None, Mapping[str, str]
         Actuator of the logs, as the command line has it.
+    rigs : Path or None
+        Folder of rig files, each for the logs of the actuator that its name is; ``rig`` is then that of all others.
     pattern : str or None
         How logs are named, as `experiments.fleet.naming.by_pattern` takes it.
     limits : Mapping[str, float]
@@ -67,6 +69,7 @@ class Settings:
     token: str | None = None
     plant: str | None = None
     rig: Path | None = None
+    rigs: Path | None = None
     columns: Mapping[str, str] = field(default_factory=dict[str, str])
     pattern: str | None = None
     limits: Mapping[str, float] = field(default_factory=dict[str, float])

@@ -6,17 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from experiments.actuators import kind_meant
 from experiments.command.json_output import plain
 from experiments.command.log_verb import page_of
 from experiments.command.logs import caught, overheard, read_log, with_remarks
-from experiments.command.options import load_actuator
 from experiments.command.terminal import clauses, unexpected
 from experiments.log_pages.comparison import plain_words
 from experiments.page.sentences import sentence
 from experiments.serve.process import bind_to_server
+from experiments.serve.rigs import load_rig, rig_files, rig_of
 from plant.atomic import replacing
 from plant.errors import HydrostateError, MissingColumnError, NoChannelError
 
@@ -24,10 +24,12 @@ if TYPE_CHECKING:
     from experiments.actuator_kind import ActuatorKind, LogVerb
     from plant.eha.rig import Rig
 
+    _Tools: TypeAlias = tuple[ActuatorKind, Rig[Any], LogVerb, Rig[Any], Any]
+
 READING, WORKING, WRITING = "reading the log", "working it out", "writing the page"
 """Where the work on a log is."""
 
-OTHER_NAMES = "if the log has them under other names, the rig file of the server must say so"
+OTHER_NAMES = "if the log has them under other names, its rig file on the server must say so"
 """What helps a log that is refused for its columns: whoever sends it has no command line."""
 
 GUESSED: Mapping[bool, str] = {
@@ -56,6 +58,8 @@ class Task:
         File that says where the work is.
     plant, rig, columns : str or None, Path or None, tuple of tuple
         As the server was told them; columns are pairs of channel and foreign column.
+    rigs, pattern : Path or None, str or None
+        Likewise: folder of rig files, and how logs are named.
     """
 
     log: Path
@@ -66,6 +70,8 @@ class Task:
     plant: str | None
     rig: Path | None
     columns: tuple[tuple[str, str], ...]
+    rigs: Path | None = None
+    pattern: str | None = None
 
 
 @dataclass(frozen=True)
@@ -131,17 +137,19 @@ def work_on(task: Task) -> LogResult:
             worked = _failed(task, blank, unexpected(error))
     result = plain({"file": task.name, **with_remarks(worked.result, said)})
     said = worked.said or plain_words(result) or sentence(str(result.get("message") or ""))
-    return LogResult(_without_path(result, task), plain(worked.entries), _without_path(said, task))
+    entries = _without_path(plain(worked.entries), task)
+    return LogResult(_without_path(result, task), entries, _without_path(said, task))
 
 
 def _found(task: Task) -> LogResult:
-    kind, bench, chosen, rig, prepared = _prepared(task.plant, task.rig, task.verb)
+    own = _rig(task)
+    kind, bench, chosen, rig, prepared = _tools(task, own)
     with overheard() as said:
         try:
             record = read_log(task.log, bench.columns, dict(task.columns), kind.required)
         except NoChannelError as error:
-            meant = kind_meant(error, task.plant, task.rig)
-            kind, bench, chosen, rig, prepared = _prepared(meant, None, task.verb)
+            meant = kind_meant(error, task.plant, own)
+            kind, bench, chosen, rig, prepared = _prepared(meant, None, None, 0, task.verb)
             record = read_log(task.log, bench.columns, dict(task.columns), kind.required)
     task.phase.write_text(WORKING, encoding="utf-8")
     found = chosen.run(record, rig, prepared)
@@ -167,13 +175,25 @@ def _inspected(task: Task) -> LogResult:
     return LogResult({"outcome": "ok", **found}, None, GUESSED[bool(found["reads"])])
 
 
+def _rig(task: Task) -> Path | None:
+    return rig_of(task.name, task.pattern, rig_files(task.rigs), task.rig)
+
+
+def _tools(task: Task, rig: Path | None) -> "_Tools":
+    try:
+        changed = 0 if rig is None else rig.stat().st_mtime_ns
+    except OSError:  # reading it says why it cannot be read
+        changed = 0
+    return _prepared(task.plant, rig, task.rig, changed, task.verb)
+
+
 @cache
-def _prepared(
-    plant: str | None, rig: Path | None, verb: str
-) -> "tuple[ActuatorKind, Rig[Any], LogVerb, Rig[Any], Any]":
+def _prepared(plant: str | None, rig: Path | None, others: Path | None, changed: int, verb: str) -> "_Tools":
+    """Return what works on a log; a rig file counts as it was when it was last `changed` [ns since 1970]."""
+    del changed
     from experiments.actuators import offered
 
-    kind, bench = load_actuator(plant, rig)
+    kind, bench = load_rig(plant, rig, others)
     chosen = offered(kind, verb)
     return kind, bench, chosen, *chosen.prepare(bench, {**chosen.options, "seed": 0})
 
@@ -183,7 +203,7 @@ def _blank(task: Task) -> Mapping[str, Any]:
         from experiments.log_pages.inspected import BLANK
 
         return BLANK
-    kind, bench, chosen, *_ = _prepared(task.plant, task.rig, task.verb)
+    kind, bench, chosen, *_ = _tools(task, _rig(task))
     return {**chosen.blank, "plant": kind.name, "rig": bench.name}
 
 
@@ -202,6 +222,8 @@ def _write(task: Task, page: str) -> None:
 def _without_path(value: Any, task: Task) -> Any:
     """Return entries in which the log has the name that the client gave it, and no place on this machine."""
     if isinstance(value, str):
+        for folder in {one.parent for one in (task.rig, task.rigs and task.rigs / "*") if one}:
+            value = value.replace(f"{folder}{os.sep}", "")
         return value.replace(str(task.log), task.name).replace(task.log.name, task.name)
     if isinstance(value, dict):
         return {key: _without_path(one, task) for key, one in value.items()}

@@ -46,6 +46,10 @@ def serve(
     ] = None,
     plant: Plant = None,
     rig: RigFile = None,
+    rigs: Annotated[
+        Path | None,
+        option("FOLDER", "Rig files by actuator: a log of P-12 takes P-12.toml, others that of --rig, or are refused."),
+    ] = None,
     columns: Columns = None,
     workers: Annotated[int, option("N", "Number of logs to work on at once.", min=1, max=256)] = 1,
     seconds: Annotated[float, option("S", "Longest time for one log [s].", min=1.0)] = 300.0,
@@ -60,6 +64,7 @@ def serve(
     `pip install 'hydrostate[serve]'`.
     """
     try:
+        from experiments.serve.rigs import load_rig, rig_files
         from experiments.serve.server import run_server
         from experiments.serve.settings import MB, Settings, is_loopback
     except ImportError as error:
@@ -73,6 +78,8 @@ def serve(
     from experiments.verbs.fleet import limits_of_options
 
     load_actuator(plant, rig)
+    for file in rig_files(rigs).values():
+        load_rig(plant, file, rig)
     if pattern is not None:
         by_pattern([], pattern)
     read_maintenance(maintenance)
@@ -85,6 +92,7 @@ def serve(
         token=token,
         plant=plant,
         rig=None if rig is None else rig.resolve(),
+        rigs=None if rigs is None else rigs.resolve(),
         columns=load_columns(columns),
         pattern=pattern,
         limits=limits_of_options(limit or []),

@@ -1,0 +1,74 @@
+"""Which rig file a log takes on a server: that of its actuator, or that of all others."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from experiments.command.options import load_actuator
+from experiments.fleet.naming import actuator_of
+from plant.errors import HydrostateError
+
+if TYPE_CHECKING:
+    from experiments.actuator_kind import ActuatorKind
+    from plant.eha.rig import Rig
+
+
+def rig_files(folder: Path | None) -> dict[str, Path]:
+    """Return the rig files of a folder by actuator, whose name each of them has.
+
+    Raises
+    ------
+    HydrostateError
+        If the folder has none.
+    """
+    if folder is None:
+        return {}
+    found = {one.stem: one for one in sorted(folder.glob("*.toml"))}
+    if not found:
+        raise HydrostateError(f"{folder}: must hold a rig file of each actuator, such as P-12.toml, it has none")
+    return found
+
+
+def rig_of(name: str, pattern: str | None, files: Mapping[str, Path], others: Path | None) -> Path | None:
+    """Return the rig file of a log.
+
+    Parameters
+    ----------
+    name : str
+        Of the log.
+    pattern : str or None
+        How logs are named, as `experiments.fleet.naming.actuator_of` takes it.
+    files : Mapping[str, Path]
+        Rig files by actuator.
+    others : Path or None
+        Rig file of the logs whose actuator has none of its own.
+
+    Raises
+    ------
+    HydrostateError
+        If there are rig files, but none for this log: another actuator's would give wrong numbers.
+    """
+    actuator = actuator_of(name, pattern) if files else ""
+    if not files or actuator in files:
+        return files.get(actuator, others)
+    if others is None:
+        known = ", ".join(files)
+        of = f"its actuator is {actuator!r}" if actuator else "its name tells no actuator"
+        raise HydrostateError(f"no rig file for this log: {of}, and the server has rig files of {known}")
+    return others
+
+
+def load_rig(plant: str | None, rig: Path | None, others: Path | None) -> "tuple[ActuatorKind, Rig[Any]]":
+    """Return the kind of actuator of a log, and its rig.
+
+    Parameters
+    ----------
+    plant, rig, others : str or None, Path or None
+        Kind of actuator that the server was told, rig file of the log, and that of logs without one of their own. A
+        log's own rig file may name another kind.
+    """
+    if rig is not None and rig != others:
+        from plant.eha.rig import plant_of
+
+        plant = plant_of(rig) or plant
+    return load_actuator(plant, rig)

@@ -1,0 +1,125 @@
+"""Which rig file a log takes on a server, and that a log without one gets no wrong numbers."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from experiments.cli import app
+from experiments.serve.fleet_view import fleet_view
+from experiments.serve.pages import home_page
+from experiments.serve.rigs import load_rig, rig_files, rig_of
+from experiments.serve.settings import Settings
+from experiments.serve.work import Task, work_on
+from plant.errors import HydrostateError
+
+FILES: Mapping[str, Path] = {name: Path(f"{name}.toml") for name in ("P-1", "P-12")}
+
+
+@pytest.mark.parametrize(
+    ("name", "pattern", "rig"),
+    [
+        ("P-12_2026-11-22.csv", None, "P-12.toml"),
+        ("P-1_20261122_143000.csv.gz", None, "P-1.toml"),
+        ("P-12.csv", None, "P-12.toml"),
+        ("run 7, P-1.csv", "*, {actuator}.csv", "P-1.toml"),
+        ("P-13_2026-11-22.csv", None, "others.toml"),
+        ("P-1_someday.csv", "{actuator}_{date}.csv", "others.toml"),
+    ],
+)
+def test_a_log_takes_the_rig_file_of_the_actuator_that_its_name_tells(name: str, pattern: str | None, rig: str) -> None:
+    assert rig_of(name, pattern, FILES, Path("others.toml")) == Path(rig)
+
+
+def test_a_log_of_no_actuator_with_a_rig_file_is_refused_rather_than_compared_with_another() -> None:
+    with pytest.raises(HydrostateError, match=r"its actuator is 'P-13', and the server has rig files of P-1, P-12"):
+        rig_of("P-13_2026-11-22.csv", None, FILES, None)
+    with pytest.raises(HydrostateError, match="its name tells no actuator"):
+        rig_of("run.csv", "{actuator}_{date}.csv", FILES, None)
+    assert rig_of("run.csv", None, {}, None) is None
+
+
+def test_a_folder_of_rig_files_must_hold_one(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("none")
+    with pytest.raises(HydrostateError, match=r"must hold a rig file of each actuator, such as P-12\.toml"):
+        rig_files(tmp_path)
+    assert rig_files(None) == {}
+
+
+def test_an_own_rig_file_may_be_of_another_kind_than_the_server_was_told(tmp_path: Path) -> None:
+    own = tmp_path / "S-1.toml"
+    own.write_text('plant = "piezo-stack"\n')
+    assert load_rig("eha", own, None)[0].name == "piezo-stack"
+    own.write_text('name = "large"\n')
+    kind, rig = load_rig("piezo-stack", own, None)
+    assert (kind.name, rig.name) == ("piezo-stack", "large")
+
+
+@pytest.fixture
+def rig_folder(tmp_path: Path) -> Path:
+    folder = tmp_path / "rigs"
+    folder.mkdir()
+    (folder / "P-1.toml").write_text('name = "small"\n')
+    (folder / "P-2.toml").write_text('name = "large"\n[parameters]\npiston_area = 1.0e-3\n')
+    return folder
+
+
+def task(log: Path, folder: Path, name: str) -> Task:
+    page, phase = folder / "page.html", folder / "phase"
+    return Task(log, name, "estimate", page, phase, None, None, (), folder / "rigs")
+
+
+def test_work_takes_the_rig_file_as_it_is_now_and_names_no_folder(rig_folder: Path, tmp_path: Path) -> None:
+    log = tmp_path / "kept-under-a-number"
+    log.write_bytes(b"\x00")  # no log: what is told of the rig does not need one
+
+    def rig_of_work(name: str) -> str:
+        return work_on(task(log, tmp_path, name)).result["rig"]
+
+    assert rig_of_work("P-1_2026-11-22.csv") == "small"
+    assert rig_of_work("P-2_2026-11-22.csv") == "large"
+    changed = rig_folder / "P-1.toml"
+    changed.write_text('name = "mended"\n')
+    os.utime(changed, ns=(1, 1))
+    assert rig_of_work("P-1_2026-11-22.csv") == "mended"
+    changed.write_text("[parameters]\npiston_area = -1\n")
+    os.utime(changed, ns=(2, 2))
+    wrong = work_on(task(log, tmp_path, "P-1_2026-11-22.csv")).result
+    assert wrong["outcome"] == "failed"
+    assert "P-1.toml" in wrong["message"]
+    assert str(rig_folder) not in wrong["message"]
+    other = work_on(task(log, tmp_path, "P-3_2026-11-22.csv"))
+    assert "o rig file for this log: its actuator is 'P-3'" in other.said
+
+
+def test_the_page_says_how_logs_are_to_be_named_and_what_becomes_of_others(rig_folder: Path, tmp_path: Path) -> None:
+    told = home_page(Settings(folder=tmp_path, rigs=rig_folder))
+    assert "such as P-1_2026-11-22.csv" in told
+    assert "rig files of P-1, P-2. Other logs are refused." in " ".join(told.split())
+    others = home_page(Settings(folder=tmp_path, rigs=rig_folder, rig=tmp_path / "common.toml"))
+    assert "Other logs are compared with common.toml." in others
+    assert "Name a log after its actuator" not in home_page(Settings(folder=tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"), [("P-1.toml", "moving_mass = 1", "P-1.toml"), ("P-1.txt", "", "must hold a rig file")]
+)
+def test_a_server_starts_with_no_wrong_rig_file(tmp_path: Path, name: str, text: str, words: str) -> None:
+    (tmp_path / name).write_text(text)
+    done = CliRunner().invoke(app, ["serve", str(tmp_path / "kept"), "--rigs", str(tmp_path)])
+    assert done.exit_code == 2
+    assert words in " ".join(done.stderr.split())
+
+
+def test_logs_with_dates_in_their_names_are_one_actuator_on_a_server_without_a_pattern() -> None:
+    row = {"outcome": "ok", "found_condition": "normal"}
+    rows = [(f"{day}" * 16, f"P-1_2026-01-0{day}.csv", row) for day in (1, 2)]
+    assert "actuator?name=P-1" in fleet_view(rows, None, {}, {}, "here")
+
+
+def test_a_server_s_fleet_without_verdicts_says_how_a_server_gets_rig_files() -> None:
+    row = {"outcome": "mismatch", "reason": "no model fits"}
+    page = fleet_view([(str(k) * 16, f"P-{k}.csv", row) for k in range(4)], None, {}, {}, "here")
+    assert "start the server with --rigs FOLDER" in page
