@@ -4,6 +4,7 @@ import html
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,10 @@ WORDS: Mapping[str, str] = {
     "inspect": "what the file contains",
 }
 """What each verb answers."""
+
+FORMATS = ("CSV or other text", "Parquet", "Feather", "MAT")
+MORE_FORMATS: Mapping[str, str] = {"nptdms": "TDMS", "asammdf": "MDF", "h5py": "HDF5", "openpyxl": "XLSX"}
+"""Formats of logs that any server reads, and those that need a package, by its module."""
 
 HEAD = 4096
 """Letters of a page among which its policy stands [count]."""
@@ -44,10 +49,12 @@ def policy_of_file(path: Path) -> str:
 
 def home_page(settings: Settings) -> str:
     """Return the page on which logs are dropped."""
+    more = tuple(name for module, name in MORE_FORMATS.items() if find_spec(module) is not None)
     return _rendered(
         "serve/home.html",
         (
             ("verbs", tuple((verb, WORDS[verb]) for verb in VERBS)),
+            ("formats", (*FORMATS, *more)),
             ("largest", settings.largest // MB),
             ("seconds", f"{settings.seconds:g}"),
             ("streams", tuple(settings.streams)),

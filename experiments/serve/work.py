@@ -29,7 +29,10 @@ if TYPE_CHECKING:
 READING, WORKING, WRITING = "reading the log", "working it out", "writing the page"
 """Where the work on a log is."""
 
-OTHER_NAMES = "if the log has them under other names, its rig file on the server must say so"
+OTHER_NAMES = (
+    "if the log has them under other names, choose inspect and drop it again: its page gives the lines that the rig "
+    "file on the server must have"
+)
 """What helps a log that is refused for its columns: whoever sends it has no command line."""
 
 GUESSED: Mapping[bool, str] = {

@@ -61,7 +61,7 @@
       element(
         "tr",
         {},
-        element("th", { scope: "row" }, clock(event.received)),
+        element("th", { scope: "row", class: "date" }, clock(event.received)),
         element("td", { class: "number", "data-head": "time [s]" }, digits(event.time_s)),
         element("td", { "data-head": "event", class: event.event === "alarm" ? "bad" : "" }, event.event),
         element("td", { "data-head": "message" }, event.message ?? ""),

@@ -37,12 +37,6 @@
     }
   }
 
-  // The log's own message is for a terminal; here a log is looked into by dropping it again.
-  function advice(log) {
-    if (log.state !== "failed" || log.verb === "inspect") return [];
-    return [element("p", { class: "key-line" }, "To see which columns the file has, choose inspect and drop it again; the page also gives the lines for a rig file.")];
-  }
-
   function stateWords(log) {
     if (log.state === "running") return `running, ${log.phase}`;
     return log.state;
@@ -72,7 +66,7 @@
       {},
       named,
       element("td", { "data-head": "state", class: log.state === "failed" ? "bad" : "" }, `${stateWords(log)} (${log.verb})`),
-      element("td", { "data-head": "verdict" }, (log.message ?? "").replaceAll(" %", "\u00a0%"), ...advice(log)),
+      element("td", { "data-head": "verdict" }, (log.message ?? "").replaceAll(" %", "\u00a0%")),
       element("td", { "data-head": "compare" }, tick),
       element("td", { "data-head": "delete" }, remove),
     );

@@ -291,5 +291,5 @@ def test_the_page_of_an_actuator_is_served(served: Served, monkeypatch: pytest.M
     logs = [dropped(client, f"A_{day}.csv", b"a", "diagnose") for day in (1, 2)]
     assert [client.get(f"/api/logs/{one['id']}").json()["message"] for one in logs] == [said, said]
     page = client.get("/actuator", params={"name": "A"})
-    assert (page.status_code, page.text.count('data-head="log">A_')) == (200, 2)
+    assert (page.status_code, page.text.count('<td class="name" data-head="log"><a href="logs/')) == (200, 2)
     assert client.get("/actuator", params={"name": "B"}).status_code == 404

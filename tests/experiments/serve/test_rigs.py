@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from experiments.cli import app
+from experiments.serve import pages
 from experiments.serve.fleet_view import fleet_view
 from experiments.serve.pages import home_page
 from experiments.serve.rigs import load_rig, rig_files, rig_of
@@ -111,6 +112,18 @@ def test_a_server_starts_with_no_wrong_rig_file(tmp_path: Path, name: str, text:
     done = CliRunner().invoke(app, ["serve", str(tmp_path / "kept"), "--rigs", str(tmp_path)])
     assert done.exit_code == 2
     assert words in " ".join(done.stderr.split())
+
+
+def test_the_page_leads_to_fleet_and_streams_first_and_names_the_formats_that_can_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = home_page(Settings(folder=tmp_path, streams={"press": "tcp://h:1"}))
+    opening = told.split("<nav")[0]
+    assert 'href="fleet"' in opening
+    assert 'href="live/press"' in opening
+    assert "TDMS" in opening
+    monkeypatch.setattr(pages, "MORE_FORMATS", {"no_such_module": "PAPER"})
+    assert "PAPER" not in home_page(Settings(folder=tmp_path))
 
 
 def test_logs_with_dates_in_their_names_are_one_actuator_on_a_server_without_a_pattern() -> None:
