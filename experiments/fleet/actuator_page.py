@@ -224,7 +224,7 @@ def _course(one: Outlook, ahead: int) -> tuple[Array, Array]:
     """Return level and standard deviation after every log, and as forecast, shape (logs + ahead,) each."""
     grid, series = settings(), one.series
     past = [trend.level for trend in one.course]
-    ahead = [moments(predict(one.trend.belief, float(step), grid), grid) for step in range(1, ahead + 1)]
-    future = [(series.healthy + series.size * mean, abs(series.size) * std) for mean, std in ahead]
+    coming = [moments(predict(one.trend.belief, float(step), grid), grid) for step in range(1, ahead + 1)]
+    future = [(series.healthy + series.size * mean, abs(series.size) * std) for mean, std in coming]
     level, std = np.array([*past, *future]).T
     return level, std

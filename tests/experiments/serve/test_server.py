@@ -240,6 +240,8 @@ def test_the_live_view_shows_gauges_and_what_the_watch_tells(opened: Any) -> Non
     assert page.locator(".gauges li").count() == 7
     assert page.locator(".histories canvas").count() >= 3  # a channel each; a balance has one once it is learnt
     assert page.locator(".alarms tbody tr").first.is_visible()
+    when = page.locator(".alarms tbody th").first  # a date and a time on one line
+    assert when.evaluate("one => one.offsetHeight < 3 * parseFloat(getComputedStyle(one).fontSize)")
     told = page.locator(".gauges strong").last
     rows = told.inner_text()
     expect(told).not_to_have_text(rows, timeout=PATIENCE)
