@@ -11,6 +11,7 @@ from typing import Any
 
 from experiments.command.terminal import note
 from experiments.serve.gauges import StreamTask, watch_stream
+from experiments.serve.rigs import rig_of_stream
 from experiments.serve.settings import Settings
 from experiments.serve.store import Store
 from experiments.streams.watch_events import STATES
@@ -92,14 +93,17 @@ class Stream:
                 self._watch_once()
             except OSError as error:  # no process or pipe could be had; the next attempt may get them
                 self._fail(f"it cannot be watched: {error.strerror or error}")
+            except HydrostateError as error:  # its rig file is gone
+                self._fail(f"it cannot be watched: {error}")
             self._closed.wait(AGAIN_AFTER)
 
     def _watch_once(self) -> None:
         """Watch the stream in a process of its own until that ends."""
         settings, context = self._settings, multiprocessing.get_context("spawn")
         state = settings.folder / f"stream-{self.name}.npz"
+        rig = rig_of_stream(self.name, settings.rigs, settings.rig)
         columns = tuple(settings.columns.items())
-        task = StreamTask(self.address, settings.rig, columns, settings.false_alarms, state)
+        task = StreamTask(self.address, rig, columns, settings.false_alarms, state)
         ours, theirs = context.Pipe(duplex=False)
         with ours:
             with theirs, self._lock:

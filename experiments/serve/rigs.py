@@ -53,9 +53,27 @@ def rig_of(name: str, pattern: str | None, files: Mapping[str, Path], others: Pa
         return files.get(actuator, others)
     if others is None:
         known = ", ".join(files)
-        of = f"its actuator is {actuator!r}" if actuator else "its name tells no actuator"
-        raise HydrostateError(f"no rig file for this log: {of}, and the server has rig files of {known}")
+        of = f"the actuator is {actuator!r}" if actuator else f"{name} names no actuator"
+        raise HydrostateError(f"no rig file: {of}, and the server has rig files of {known}")
     return others
+
+
+def rig_of_stream(name: str, folder: Path | None, others: Path | None) -> Path | None:
+    """Return the rig file of a stream, which has the name of its actuator.
+
+    Parameters
+    ----------
+    folder : Path or None
+        Of the rig files by actuator.
+    others : Path or None
+        Rig file of the streams whose actuator has none of its own.
+
+    Raises
+    ------
+    HydrostateError
+        If there are rig files, but none for this stream.
+    """
+    return rig_of(name, "{actuator}", rig_files(folder), others)
 
 
 def load_rig(plant: str | None, rig: Path | None, others: Path | None) -> "tuple[ActuatorKind, Rig[Any]]":

@@ -64,7 +64,7 @@ def serve(
     `pip install 'hydrostate[serve]'`.
     """
     try:
-        from experiments.serve.rigs import load_rig, rig_files
+        from experiments.serve.rigs import load_rig, rig_files, rig_of_stream
         from experiments.serve.server import run_server
         from experiments.serve.settings import MB, Settings, is_loopback
     except ImportError as error:
@@ -80,6 +80,9 @@ def serve(
     load_actuator(plant, rig)
     for file in rig_files(rigs).values():
         load_rig(plant, file, rig)
+    streams = _streams(watch or [])
+    for name in streams:
+        rig_of_stream(name, rigs, rig)
     if pattern is not None:
         by_pattern([], pattern)
     read_maintenance(maintenance)
@@ -102,7 +105,7 @@ def serve(
         memory=memory * MB,
         largest=largest * MB,
         room=room * MB,
-        streams=_streams(watch or []),
+        streams=streams,
         false_alarms=false_alarms,
     )
     elsewhere = "; to keep them elsewhere: hydrostate serve FOLDER" if folder == FOLDER else ""

@@ -54,7 +54,8 @@
     const count = raised.length === 1 ? "1 alarm" : `${raised.length} alarms`;
     const before = last ? `${count}, the last at ${clock(last.received)}: ${last.message}. ` : "";
     const now = last && one.state === "watching" ? "Watching" : said;
-    state.textContent = `${before}${now[0].toUpperCase()}${now.slice(1)}.`;
+    const again = ["failed", "ended"].includes(one.state) ? " It is tried again every few seconds." : "";
+    state.textContent = `${before}${now[0].toUpperCase()}${now.slice(1)}.${again}`;
     state.classList.toggle("alarmed", raised.length > 0);
     todo.hidden = !raised.length;
     const rows = one.events.toReversed().map((event) =>

@@ -113,6 +113,26 @@ def test_a_stream_for_which_no_process_can_be_had_says_so_and_is_tried_again(
     assert stream.state["state"] == "failed"
 
 
+def test_a_stream_whose_rig_file_is_gone_says_so_and_is_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "press.toml").write_text("")
+    store = Store(tmp_path / "a.sqlite")
+    one = Stream("bench", "tcp://127.0.0.1:1", Settings(folder=tmp_path, rigs=tmp_path), store)
+    failed = threading.Event()
+    monkeypatch.setattr(live, "AGAIN_AFTER", 0.01)
+    monkeypatch.setattr(
+        one, "_fail", lambda said: failed.set() if "no rig file: the actuator is 'bench'" in said else 0
+    )
+    one.start()
+    assert failed.wait(10.0)
+    failed.clear()
+    assert failed.wait(10.0)
+    one._closed.set()
+    one._thread.join(10.0)
+    store.close()
+
+
 def test_a_view_is_told_the_history_and_then_what_is_new(stream: Stream, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("experiments.serve.events.EVERY", 0.0)
     heard(stream, ("gauges", {"time_s": 1.0}))

@@ -11,7 +11,7 @@ from experiments.cli import app
 from experiments.serve import pages
 from experiments.serve.fleet_view import fleet_view
 from experiments.serve.pages import home_page
-from experiments.serve.rigs import load_rig, rig_files, rig_of
+from experiments.serve.rigs import load_rig, rig_files, rig_of, rig_of_stream
 from experiments.serve.settings import Settings
 from experiments.serve.work import Task, work_on
 from plant.errors import HydrostateError
@@ -35,11 +35,22 @@ def test_a_log_takes_the_rig_file_of_the_actuator_that_its_name_tells(name: str,
 
 
 def test_a_log_of_no_actuator_with_a_rig_file_is_refused_rather_than_compared_with_another() -> None:
-    with pytest.raises(HydrostateError, match=r"its actuator is 'P-13', and the server has rig files of P-1, P-12"):
+    with pytest.raises(HydrostateError, match=r"the actuator is 'P-13', and the server has rig files of P-1, P-12"):
         rig_of("P-13_2026-11-22.csv", None, FILES, None)
-    with pytest.raises(HydrostateError, match="its name tells no actuator"):
+    with pytest.raises(HydrostateError, match=r"no rig file: run\.csv names no actuator"):
         rig_of("run.csv", "{actuator}_{date}.csv", FILES, None)
     assert rig_of("run.csv", None, {}, None) is None
+
+
+def test_a_stream_takes_the_rig_file_of_its_name(tmp_path: Path) -> None:
+    own = tmp_path / "press-8.toml"
+    own.write_text("")
+    assert rig_of_stream("press-8", tmp_path, None) == own
+    assert rig_of_stream("press", tmp_path, Path("others.toml")) == Path("others.toml")
+    assert rig_of_stream("press", None, None) is None
+    done = CliRunner().invoke(app, ["serve", str(tmp_path / "kept"), "--rigs", str(tmp_path), "--watch", "x=tcp://h:1"])
+    assert done.exit_code == 2
+    assert "no rig file: the actuator is 'x'" in " ".join(done.stderr.split())
 
 
 def test_a_folder_of_rig_files_must_hold_one(tmp_path: Path) -> None:
@@ -92,7 +103,7 @@ def test_work_takes_the_rig_file_as_it_is_now_and_names_no_folder(rig_folder: Pa
     assert "P-1.toml" in wrong["message"]
     assert str(rig_folder) not in wrong["message"]
     other = work_on(task(log, tmp_path, "P-3_2026-11-22.csv"))
-    assert "o rig file for this log: its actuator is 'P-3'" in other.said
+    assert "o rig file: the actuator is 'P-3'" in other.said
 
 
 def test_the_page_says_how_logs_are_to_be_named_and_what_becomes_of_others(rig_folder: Path, tmp_path: Path) -> None:

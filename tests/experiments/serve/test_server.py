@@ -214,11 +214,18 @@ def test_an_answer_that_comes_late_does_not_undo_a_newer_one(opened: Any, tmp_pa
     assert "failed" in row.inner_text()
 
 
-@pytest.mark.parametrize(("raised", "begin"), [(0, "Watching: learning is over."), (2, "2 alarms, the last at ")])
-def test_an_alarm_stays_in_the_heading_of_the_live_view(opened: Any, raised: int, begin: str) -> None:
+@pytest.mark.parametrize(
+    ("raised", "state", "begin"),
+    [
+        (0, "watching", "Watching: learning is over."),
+        (2, "watching", "2 alarms, the last at "),
+        (0, "failed", "Failed: learning is over. It is tried again every few seconds."),
+    ],
+)
+def test_an_alarm_stays_in_the_heading_of_the_live_view(opened: Any, raised: int, state: str, begin: str) -> None:
     alarm = {"event": "alarm", "time_s": 9.0, "received": 1.7e9, "message": "the flow balance changed"}
     ready = {"event": "ready", "time_s": 5.0, "received": 1.7e9, "message": "learning is over"}
-    told = {"name": "bench", "state": "watching", "message": "learning is over", "gauges": None, "history": []}
+    told = {"name": "bench", "state": state, "message": "learning is over", "gauges": None, "history": []}
     body = f"event: history\ndata: {json.dumps({**told, 'events': [ready, *[alarm] * raised]})}\n\n"
     page = opened("live")
     page.route("**/events", lambda route: route.fulfill(content_type="text/event-stream", body=body))
