@@ -20,7 +20,7 @@ from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import kernel_text, pasted
 from plant.compiled.simplify import fused, share_ratios, simplified
 from plant.compiled.source import lines_source, operations_source
-from plant.solvers.adaptive_loop import INNER, TINY, run_controlled
+from plant.solvers.adaptive_loop import INNER, NEARLY, TINY, run_controlled
 from plant.solvers.drive_pieces import ROUNDEST, smooth
 from plant.solvers.steps import Derivative, Parameters, State, parameter_names, parameter_symbols, solve_linear
 
@@ -163,7 +163,7 @@ def _text(name: str, derivative: Derivative, width: int, parameter_class: type[P
     sizes = {"LANES": lanes, "VECTOR": vector, "WIDTH": width, "COLUMNS": len(names), "NUMBERS": lanes * len(every)}
     parts = (
         operations_source(lines, slots, vector) + f"\nmove = moving({lanes})",
-        pasted(*INNER, constants={**sizes, "TINY": TINY, "ROUNDEST": ROUNDEST}, inlined=True),
+        pasted(*INNER, constants={**sizes, "TINY": TINY, "NEARLY": NEARLY, "ROUNDEST": ROUNDEST}, inlined=True),
         pasted(smooth, run_controlled),
     )
     title = f"trajectories of the {name} plant in steps of controlled error, {lanes} side by side"

@@ -12,6 +12,9 @@ from plant.solvers.fixed_step_loops import Operation, SideBySide, lay, share
 TINY = 1e-6
 """Share of a sample time within which a step ends at a sample."""
 
+NEARLY = 0.999999
+"""Share of what is left of a piece of the drive from which a step takes all of it [fraction]."""
+
 
 class ControlledKernel(SideBySide, Protocol):
     """What the kernel of error-controlled steps has.
@@ -108,7 +111,7 @@ def run_controlled(
         if left <= 0.0:
             break
         error = _largest(kernel, work, 7 * block, lost)
-        if not error <= 1.0 and size > shortest:
+        if not error <= 1.0 and NEARLY * size > shortest:  # else what is left is asked for again and again
             size = max(size * (0.5 if error < 64.0 else 0.25), shortest)
             continue
         if error == np.inf:  # no shorter step brings a run back that has no numbers: the others go on without it
@@ -142,7 +145,7 @@ def within(size: float, left: float, longest: float, shortest: float) -> float:
         The step [count of samples].
     """
     size = min(size, longest)
-    if size > 0.999999 * left:
+    if size > NEARLY * left:
         return left if left > 0.0 else shortest
     return 0.5 * left if size > 0.5 * left else size
 

@@ -124,6 +124,23 @@ def test_samples_before_a_change_of_parameters_know_nothing_of_it() -> None:
     np.testing.assert_allclose(found[:38], alone, rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.parametrize("steps", [8, 41, 240, 480])
+def test_a_run_in_its_shortest_steps_ends_where_these_fill_a_sample_but_for_rounding(steps: int) -> None:
+    asked = 0
+
+    def stages(address: int, _: float) -> None:
+        nonlocal asked
+        asked += 1
+        assert asked < 10 * steps, "the same step is asked for again and again"
+        ctypes.c_double.from_address(address + 8 * 7).value = 2.0  # an error that no step makes small
+
+    kernel: Any = SimpleNamespace(LANES=1, WIDTH=1, COLUMNS=1, NUMBERS=14, VECTOR=1, move=lambda *_: None)
+    kernel.settle_at, kernel.between_at, kernel.stages_at = (lambda *_: None), (lambda *_: None), stages
+    drive, rows, found = np.array([0.0, 1.0, 0.0]), np.ones((1, 1, 1)), np.empty((3, 1, 1))
+    run_controlled(kernel, np.zeros((1, 1)), drive, rows, T, np.ones(1), 1e-3, STRAIGHT, 20.0, 1.0 / steps, found)
+    assert asked > 2 * steps
+
+
 @pytest.mark.parametrize("lost", [(0,), (3,), (7,), (2, 5), tuple(range(8))])
 def test_a_run_without_numbers_ends_and_leaves_those_beside_it_as_they_are(lost: tuple[int, ...]) -> None:
     run = compile_adaptive("damper", rates, 2, Damper, 8)
