@@ -18,7 +18,7 @@ from estimation.fits.explaining.uneven_loss import UnevenLoss, loss_note, uneven
 from estimation.fits.flow.asked import ALWAYS_ASKED, MOST_ASKED, asked_of, near_starts, worth_in
 from estimation.fits.flow.log import homed_at_stop, without_strays
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
-from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, stiffer
+from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.flow.traits import AT_REST, LogTraits
 from estimation.fits.flow.valley import lower_valley
@@ -151,7 +151,7 @@ def fit_flow(
             if loss is not None:
                 return _losing_fit(plain, loss, sensed)
             return _plain_fit(plain, sensed, open_ends, begun=BEGUN in asked)
-        if (elsewhere := _elsewhere(plain, strange)) is None:
+        if (elsewhere := _elsewhere(plain, strange) or quieter(plain, strange.fit)) is None:
             return _explained_fit(plain, strange, sensed, traits)
         start = elsewhere
 

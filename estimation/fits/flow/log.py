@@ -193,7 +193,9 @@ def _noisy(log: GreyBoxLog, p: EhaParameters) -> GreyBoxLog:
     return replace(log, noise=(replace(log.noise[0], **by, lost=lost),), block=NOISY_BLOCK)
 
 
-def carried(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float]) -> GreyBoxLog:
+def carried(
+    log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float], stiffest: float = np.inf
+) -> GreyBoxLog:
     """Return a log with what noise of motor speed leaves in the chambers, as a random walk of pressure.
 
     What a noisy speed is off by is oil that the model pumps, and it stays until it has leaked off. To squares of the
@@ -207,13 +209,15 @@ def carried(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, flo
         The actuator.
     values : Mapping[str, float]
         Bulk modulus and leakage coefficient, as a first fit has found them [SI].
+    stiffest : float
+        Bulk modulus that counts at most [Pa].
 
     Returns
     -------
     GreyBoxLog
         The same log where the walk is not felt beside the pressure sensor's noise before the oil has leaked off.
     """
-    (noise,), stiffness = log.noise, values["bulk_modulus"] / parameters.chamber_volume
+    (noise,), stiffness = log.noise, min(values["bulk_modulus"], stiffest) / parameters.chamber_volume
     speed = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
     variance = min(log.drive_std[0] ** 2, struck_variance(speed))
     walk = (stiffness * parameters.pump_displacement) ** 2 * variance * log.sample_time

@@ -25,6 +25,11 @@ from plant.notes import Note
 LEAST_GUESS = 1e-2
 """Share of the rig file's bulk modulus that a first guess is at least [fraction]."""
 
+TOO_STIFF = 2.0
+"""Bulk modulus whose noise a log was judged by, over what explains it, from which it is judged anew [dimensionless]:
+noise of motor speed is then four times as large as it is, in squares. What a fit finds on the way, and what it ends at,
+differ by a third at most where both are in the right valley."""
+
 _cost = attrgetter("cost")
 
 
@@ -65,12 +70,15 @@ class FitStart:
         First guess of how much the logged speed exceeds the shaft's [rad/s].
     valley : Mapping[str, float], optional
         Values of the plain form's unknowns from which searches begin as well, see `lower_valley` [SI].
+    stiffest : float
+        Bulk modulus that counts at most in what noise of motor speed leaves, see `quieter` [Pa].
     """
 
     parameters: EhaParameters
     bulk_modulus: float
     speed_offset: float = 0.0
     valley: Mapping[str, float] | None = None
+    stiffest: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,12 +180,12 @@ def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
     starts = flow_starts(parameters, max(start.bulk_modulus, LEAST_GUESS * parameters.bulk_modulus))
     explains = partial(fit_explains, noisy=log.passes_on)
     largest, _ = limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))
-    fitted = partial(balanced, parameters=parameters, starts=starts, valley=start.valley)
+    fitted = partial(balanced, parameters=parameters, starts=starts, valley=start.valley, stiffest=start.stiffest)
     unturned = with_course(log, fitted, parameters)
     log, fits, teeth, left = toothed(unturned, fitted, explains, largest, start.speed_offset)
     turning = Turning(log.teeth, log.speed_offset)
     found = _swinging(fits).values
-    log = swept_evenly(carried(log, parameters, found), parameters, found)
+    log = swept_evenly(carried(log, parameters, found, start.stiffest), parameters, found)
     return PlainFits(start, starts, fitted, unturned, log, fits, explains, teeth, left, turning)
 
 
@@ -202,6 +210,30 @@ def stiffer(logged: Logged, plain: PlainFits) -> EhaParameters | None:
         return None
     stiff = replace(parameters, bulk_modulus=found)
     return stiff if logged.seen_at(stiff).passes_on else None
+
+
+def quieter(plain: PlainFits, strange: GreyBoxFit) -> FitStart | None:
+    """Return from where to fit a log anew that was judged by noise of a far stiffer oil than explains it.
+
+    Noise of motor speed goes with stiffness. Where the plain form ends in a wrong valley, at 100 GPa, that noise is
+    larger than all that an offset of 4 bar leaves, and wrong oil is known to a thousandth.
+
+    Parameters
+    ----------
+    plain : PlainFits
+        The log's fits.
+    strange : GreyBoxFit
+        What explains it.
+
+    Returns
+    -------
+    FitStart or None
+        None where the noise is that of the oil that explains it, or is not felt.
+    """
+    modulus, heard = strange.values["bulk_modulus"], plain.swinging.values["bulk_modulus"]
+    if plain.log.noise[0].walk == 0.0 or min(heard, plain.start.stiffest) < TOO_STIFF * modulus:
+        return None
+    return replace(plain.start, stiffest=modulus)
 
 
 def _swinging(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:

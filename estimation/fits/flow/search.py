@@ -118,6 +118,7 @@ def balanced(
     parameters: EhaParameters,
     starts: Sequence[Mapping[str, float]],
     valley: Mapping[str, float] | None = None,
+    stiffest: float = np.inf,
 ) -> Sequence[GreyBoxFit]:
     """Return the fits of the balances that count.
 
@@ -131,6 +132,8 @@ def balanced(
         Where searches begin, see `flow_starts` [SI].
     valley : Mapping[str, float], optional
         A place in a lower valley, see `lower_valley`, where searches with short model steps begin as well [SI].
+    stiffest : float
+        Bulk modulus that counts at most in what noise of motor speed leaves [Pa].
 
     Returns
     -------
@@ -144,7 +147,7 @@ def balanced(
     likely = [one for one in rough if one is near or one.point.cost < least + RIVAL]
     behind = [one for one in rough if not (_held(one.problem) or one in likely)]
     bent = outruns_pump(log, parameters)
-    log = swept_evenly(carried(log, parameters, near.values), parameters, near.values)
+    log = swept_evenly(carried(log, parameters, near.values, stiffest), parameters, near.values)
     first = rough[0] if rough[0] in likely else near  # whose kernel has fewer runs side by side
     steps = sparing_steps(first.problem.on(log), first.point.theta)
     done = each(lambda one: _finished(one, log, steps, bent=bent), likely)
