@@ -31,7 +31,7 @@ from estimation.fits.explaining.within_reach import within_reach
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, VOLUME, Hypothesis
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, START_LOAD, VOLUME, Hypothesis
 from estimation.models.wide_flow import GROWTH, grown_leakage
 from plant.eha.model import EhaParameters
 
@@ -111,6 +111,8 @@ def explain(
         if second and near and as_good and sought:
             pairs += _paired(wide, second, starts[0], accepted, rivalled=min(one.cost for one in (first, *pairs)))
         finished = _distinct([first, *pairs])
+        if begun := [one for one in asked if one.from_first_sample and one.free == START_LOAD.free]:
+            finished = _distinct([*finished, *_rig_and_load(wide, begun[0], finished[0], spared, accepted)])
     best = finished[0]
     if not best.fits:
         return None
@@ -233,6 +235,21 @@ def _paired(
         if more:
             pairs = ranked([*pairs, *likeliest(late, more, known, spared, useful)])
     return _better(first, pairs, least)
+
+
+def _rig_and_load(
+    log: GreyBoxLog, load: Hypothesis, best: Tried, spared: Spared, accepted: Accepted
+) -> list[Tried]:
+    """Return a load at the start of a log together with a pump and chambers that the rig file has wrong.
+
+    A load is no oddity of a rig, so two that are may come beside it. Found one by one, each ends where it takes up what
+    the others do. It is sought only where no two hypotheses explain the log.
+    """
+    if _explained(best, accepted):
+        return []
+    together = DELIVERY, VOLUME, load
+    tried = [*screened(log, together, spared.starts, every=spared.every)]
+    return [one for one in likeliest(log, [tried], best.cost, spared) if _explained(one, accepted)]
 
 
 def _better(first: Tried, pairs: Iterable[Tried], least: float) -> list[Tried]:
