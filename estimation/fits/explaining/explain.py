@@ -237,9 +237,7 @@ def _paired(
     return _better(first, pairs, least)
 
 
-def _rig_and_load(
-    log: GreyBoxLog, load: Hypothesis, best: Tried, spared: Spared, accepted: Accepted
-) -> list[Tried]:
+def _rig_and_load(log: GreyBoxLog, load: Hypothesis, best: Tried, spared: Spared, accepted: Accepted) -> list[Tried]:
     """Return a load at the start of a log together with a pump and chambers that the rig file has wrong.
 
     A load is no oddity of a rig, so two that are may come beside it. Found one by one, each ends where it takes up what

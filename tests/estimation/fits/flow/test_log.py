@@ -187,6 +187,7 @@ def test_noise_of_speed_stays_where_oil_is_stiff_and_hardly_leaks() -> None:
     noise = min(seen.drive_std[0] ** 2, struck_variance(seen.drives[:, 0]))
     assert stiff.walk == pytest.approx(kept**2 * noise * seen.sample_time)
     assert stiffer.walk == pytest.approx(4.0 * stiff.walk)
+    assert carried(seen, HEALTHY, {**found, "bulk_modulus": 1e3 * true}, stiffest=50.0 * true).noise[0] == stiff
     assert replace(stiff, walk=0.0) == seen.noise[0]
     assert carried(seen, HEALTHY, {**found, "leakage_coefficient": 1e4 * HEALTHY.leakage_coefficient}) is seen
 

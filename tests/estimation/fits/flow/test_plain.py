@@ -1,0 +1,32 @@
+"""What a log is fitted anew from, once it is known what explains it."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from estimation.fits.flow.plain import FitStart, quieter
+from plant.eha.model import EhaParameters
+
+START = FitStart(EhaParameters(), 2e8)
+
+
+@pytest.mark.parametrize(
+    ("heard", "walk", "again"),
+    [(1e11, 1e12, True), (5e8, 1e12, True), (2.5e8, 1e12, False), (1e8, 1e12, False), (1e11, 0.0, False)],
+)
+def test_a_log_that_was_judged_by_the_noise_of_far_stiffer_oil_is_judged_anew(
+    heard: float, walk: float, again: bool
+) -> None:
+    plain: Any = SimpleNamespace(
+        start=START,
+        swinging=SimpleNamespace(values={"bulk_modulus": heard}),
+        log=SimpleNamespace(noise=(SimpleNamespace(walk=walk),)),
+    )
+    strange: Any = SimpleNamespace(values={"bulk_modulus": 2e8})
+    start = quieter(plain, strange)
+    assert (start is not None) == again
+    assert start is None or start.stiffest == 2e8
+    plain.start = replace(START, stiffest=2e8)
+    assert quieter(plain, strange) is None
