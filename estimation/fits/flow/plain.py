@@ -25,10 +25,9 @@ from plant.notes import Note
 LEAST_GUESS = 1e-2
 """Share of the rig file's bulk modulus that a first guess is at least [fraction]."""
 
-TOO_STIFF = 2.0
-"""Bulk modulus whose noise a log was judged by, over what explains it, from which it is judged anew [dimensionless]:
-noise of motor speed is then four times as large as it is, in squares. What a fit finds on the way, and what it ends at,
-differ by a third at most where both are in the right valley."""
+TOO_LOUD = 2.0
+"""Variance of a residual by which a log was judged, over that at the bulk modulus that explains it, from which it is
+judged anew [dimensionless]: less blinds no gate of 1.1 to 1.44 times the noise, and sound searches stay as they are."""
 
 _cost = attrgetter("cost")
 
@@ -230,10 +229,11 @@ def quieter(plain: PlainFits, strange: GreyBoxFit) -> FitStart | None:
     FitStart or None
         None where the noise is that of the oil that explains it, or is not felt.
     """
-    modulus, heard = strange.values["bulk_modulus"], plain.swinging.values["bulk_modulus"]
-    if plain.log.noise[0].walk == 0.0 or min(heard, plain.start.stiffest) < TOO_STIFF * modulus:
-        return None
-    return replace(plain.start, stiffest=modulus)
+    modulus, log = strange.values["bulk_modulus"], plain.log
+    heard = min(plain.swinging.values["bulk_modulus"], plain.start.stiffest)
+    white, walked = log.noise[0].variance * log.sample_time / log.block, log.noise[0].walk * log.block
+    quiet = white + walked * min(modulus / heard, 1.0) ** 2
+    return replace(plain.start, stiffest=modulus) if white + walked > TOO_LOUD * quiet else None
 
 
 def _swinging(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:

@@ -14,7 +14,7 @@ START = FitStart(EhaParameters(), 2e8)
 
 @pytest.mark.parametrize(
     ("heard", "walk", "again"),
-    [(1e11, 1e12, True), (5e8, 1e12, True), (2.5e8, 1e12, False), (1e8, 1e12, False), (1e11, 0.0, False)],
+    [(1e11, 1e12, True), (4e8, 1e12, True), (2.5e8, 1e12, False), (1e8, 1e12, False), (1e11, 1e9, False)],
 )
 def test_a_log_that_was_judged_by_the_noise_of_far_stiffer_oil_is_judged_anew(
     heard: float, walk: float, again: bool
@@ -22,7 +22,7 @@ def test_a_log_that_was_judged_by_the_noise_of_far_stiffer_oil_is_judged_anew(
     plain: Any = SimpleNamespace(
         start=START,
         swinging=SimpleNamespace(values={"bulk_modulus": heard}),
-        log=SimpleNamespace(noise=(SimpleNamespace(walk=walk),)),
+        log=SimpleNamespace(noise=(SimpleNamespace(variance=1e8, walk=walk),), sample_time=1e-3, block=5e-3),
     )
     strange: Any = SimpleNamespace(values={"bulk_modulus": 2e8})
     start = quieter(plain, strange)
