@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache, lru_cache
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,14 +12,14 @@ from estimation.finding import Quantity
 from estimation.log_checks.order import percentile
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
-from faults.diagnosis.circuits.circuit_runs import COLUMN, friction_parts, parameter_rows
+from faults.diagnosis.circuits.circuit_runs import fitted_parameters, friction_parts
 from faults.diagnosis.circuits.class_regions import ClassFits
 from faults.diagnosis.circuits.friction_shape import FORCES
 from faults.diagnosis.circuits.open_classes import OpenCircuit
 from plant.arrays import Array
 from plant.components.friction import quadratic_friction
 from plant.components.oil import ATMOSPHERE
-from plant.eha.circuit_parameters import CircuitParameters, circuit_values
+from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.steady_state import steady_state
 
 DRAWS = 2_000
@@ -100,13 +101,13 @@ def severities_at(point: Array, actuator: Actuator) -> Mapping[str, float]:
 def _of_circuits(points: Array, actuator: Actuator, forces: Array | None = None) -> Mapping[str, Array]:
     """Return the severities of many circuits, each of shape (n,); ``forces``, shape (n, 3), are other friction."""
     healthy = actuator.circuit
-    rows = parameter_rows(points, healthy, actuator.rated)
+    values = fitted_parameters(points, healthy, actuator.rated)
     if forces is not None:
         rest, bent, whole = forces.T
-        rows[:, COLUMN["friction_coulomb"]] = rest
-        rows[:, COLUMN["friction_linear"]] = (whole - rest - bent) / actuator.rated
-        rows[:, COLUMN["friction_quadratic"]] = bent / actuator.rated**2
-    p = circuit_values(rows)
+        values["friction_coulomb"] = rest
+        values["friction_linear"] = (whole - rest - bent) / actuator.rated
+        values["friction_quadratic"] = bent / actuator.rated**2
+    p = SimpleNamespace(**{**vars(healthy), **values})  # rows of all parameters would be read a few columns of
     velocity, pressure = steady_state(healthy.rated_speed, p)
     sound_velocity, sound_pressure = _settled(healthy)
     rubbing, sound = (

@@ -274,8 +274,9 @@ def _step(point: Point, curvature: Array, radius: float, bounds: tuple[Array, Ar
         return step
     step, free = np.clip(step, lower, upper), ~outside
     while free.any():
-        gradient = point.gradient[free] + curvature[np.ix_(free, ~free)] @ step[~free]
-        step[free] = _shortened(curvature[np.ix_(free, free)], gradient, radius)
+        rows, held = np.flatnonzero(free)[:, None], np.flatnonzero(~free)
+        gradient = point.gradient[free] + curvature[rows, held] @ step[held]
+        step[free] = _shortened(curvature[rows, rows.T], gradient, radius)
         outside = (step < lower) | (step > upper)
         if not outside.any():
             break

@@ -18,7 +18,7 @@ from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import parameter_rows, predicted
 from faults.diagnosis.circuits.class_fit import WEAK, PointFit, fit_freely, misfit, nominal_runs
-from faults.diagnosis.circuits.model_doubt import left_of, seldom_known_slopes, spreads_of
+from faults.diagnosis.circuits.model_doubt import doubt_of, left_of, seldom_known_slopes, spreads_of
 from plant.arrays import Array
 
 ROUNDS = 3
@@ -129,6 +129,35 @@ def open_beside(fit: PointFit, blocks: Blocks, actuator: Actuator) -> tuple[Arra
     if blocks.between == 1:
         return slopes, spreads
     return np.concatenate([slopes, _slope(blocks, fit, actuator)[None]]), np.append(spreads, MOST_LEAD)
+
+
+def spread_with_pressure(
+    fit: PointFit, blocks: Blocks, actuator: Actuator, scores: Array, seen: Array, among: Array
+) -> Array:
+    """Return the covariance of the coordinates of a circuit that was fitted to a log with pressure, for intervals.
+
+    Parameters
+    ----------
+    fit : PointFit
+        The fit.
+    blocks : Blocks
+        Its log.
+    actuator : Actuator
+        The healthy actuator.
+    scores : ndarray, shape (9,)
+        How well each condition's region holds it: log-likelihoods [dimensionless].
+    seen : ndarray, shape (7,)
+        See `doubt_of`.
+    among : ndarray, shape (7, 7)
+        What lies between this and other circuits that fit as well [dimensionless].
+
+    Returns
+    -------
+    ndarray, shape (7, 7)
+        With what is unknown beside the coordinates [dimensionless].
+    """
+    slopes, spreads = open_beside(fit, blocks, actuator)
+    return doubt_of(fit, slopes, blocks, actuator.conditions, scores, seen, spreads) + among
 
 
 def _step(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float:

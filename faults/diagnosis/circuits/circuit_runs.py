@@ -110,24 +110,46 @@ def parameter_rows(points: Array, rig: CircuitParameters, rated: float) -> Array
     ndarray, shape (n, parameters)
         Rows for the circuit plant; the motor follows the logged speed at once.
     """
-    leakage, bias, rest, bent, full, modulus = np.exp(points[:, :-1].T)
-    yielding = np.exp(np.clip(points[:, -1], -PRESLIDING_REACH, PRESLIDING_REACH))
-    linear = np.maximum(full - rest - bent, -1.9 * np.sqrt(bent * rest))  # friction must oppose motion at every speed
     rows = np.tile(_at_once(rig), (len(points), 1))
-    for name, values in (
-        ("leakage_coefficient", leakage),
-        ("flow_bias", bias),
-        ("friction_quadratic", bent / rated**2),
-        ("friction_linear", linear / rated),
-        ("friction_coulomb", rest),
-        ("bulk_modulus", modulus),
-        ("presliding_displacement", rig.presliding_displacement * yielding),
-    ):
-        rows[:, COLUMN[name]] = values
+    values = fitted_parameters(points, rig, rated)
+    for name, one in values.items():
+        rows[:, COLUMN[name]] = one
+    leakage = values["leakage_coefficient"]
     share = np.minimum(1.0, leakage / rig.leakage_coefficient) if rig.leakage_coefficient > 0.0 else np.ones(len(rows))
     for name in ("pump_crossport_leakage", "pump_case_leakage"):
         rows[:, COLUMN[name]] *= share
     return rows
+
+
+def fitted_parameters(points: Array, rig: CircuitParameters, rated: float) -> dict[str, Array]:
+    """Return the parameters that are fitted, at coordinates.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 7)
+        Coordinates.
+    rig : CircuitParameters
+        The circuit around them.
+    rated : float
+        Rated velocity [m/s].
+
+    Returns
+    -------
+    dict[str, ndarray of shape (n,)]
+        By name [SI].
+    """
+    leakage, bias, rest, bent, full, modulus = np.exp(points[:, :-1].T)
+    yielding = np.exp(np.clip(points[:, -1], -PRESLIDING_REACH, PRESLIDING_REACH))
+    linear = np.maximum(full - rest - bent, -1.9 * np.sqrt(bent * rest))  # friction must oppose motion at every speed
+    return {
+        "leakage_coefficient": leakage,
+        "flow_bias": bias,
+        "friction_quadratic": bent / rated**2,
+        "friction_linear": linear / rated,
+        "friction_coulomb": rest,
+        "bulk_modulus": modulus,
+        "presliding_displacement": rig.presliding_displacement * yielding,
+    }
 
 
 @lru_cache(maxsize=16)

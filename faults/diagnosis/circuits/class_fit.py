@@ -156,7 +156,7 @@ def least_misfit(blocks: Blocks) -> float:
     return float(blocks.counts @ np.log(least_scales(blocks)))
 
 
-def misfit(blocks: Blocks, fitted: Array) -> float:
+def misfit(blocks: Blocks, fitted: Array, scales: Array | None = None) -> float:
     """Return minus the log-likelihood of a model with noise of its residuals' own size.
 
     Parameters
@@ -165,6 +165,8 @@ def misfit(blocks: Blocks, fitted: Array) -> float:
         The log.
     fitted : ndarray, shape (n, outputs)
         The model.
+    scales : ndarray, shape (outputs,), optional
+        What `scales_of` returns of it, if that is known [m/s, Pa].
 
     Returns
     -------
@@ -173,7 +175,7 @@ def misfit(blocks: Blocks, fitted: Array) -> float:
     """
     if not np.all(np.isfinite(fitted)):
         return float("inf")
-    return float(blocks.counts @ np.log(scales_of(blocks, fitted)))
+    return float(blocks.counts @ np.log(scales_of(blocks, fitted) if scales is None else scales))
 
 
 def fit_freely(
@@ -285,7 +287,7 @@ def _at(blocks: Blocks, actuator: Actuator, centre: Array, point: Array, pull: A
     weighted = np.where(blocks.seen, slopes[:, blocks.first :] / scales, 0.0).reshape(len(point), -1)
     information = weighted @ weighted.T
     off = point - centre
-    cost = misfit(blocks, runs[0]) + 0.5 * float(off @ pull @ off)
+    cost = misfit(blocks, runs[0], scales) + 0.5 * float(off @ pull @ off)
     return PointFit(point, cost, information, scales, runs[0], slopes)
 
 

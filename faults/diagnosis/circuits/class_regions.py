@@ -6,13 +6,15 @@ chapter 27) scores the condition. What a log says nothing of, as friction beyond
 counts for none.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 
 import numpy as np
 
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
-from faults.diagnosis.circuits.between_samples import open_beside
+from faults.diagnosis.circuits.between_samples import spread_with_pressure
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import (
@@ -30,7 +32,7 @@ from faults.diagnosis.circuits.class_fit import (
     scales_of,
 )
 from faults.diagnosis.circuits.friction_shape import bent_by, doubt_of_bends, told_of_bent
-from faults.diagnosis.circuits.model_doubt import distrust, doubt_of, lasting_power
+from faults.diagnosis.circuits.model_doubt import distrust, lasting_power
 from faults.diagnosis.circuits.region_scores import (
     apart_in_forces,
     region_scores,
@@ -72,9 +74,8 @@ class ClassFits:
         Root mean square of what it leaves [m/s, Pa].
     scores : ndarray, shape (9,)
         How well each condition's region holds the fitted circuits: log-likelihoods [dimensionless].
-    spread : ndarray, shape (7, 7)
-        Covariance of the coordinates for intervals [dimensionless], see
-        `faults.diagnosis.circuits.model_doubt`, and without pressure `spread_of`.
+    spreading : callable
+        Works out `spread`, for which circuits are run: of most fits scores alone are read.
     lasting : float
         By what a model error that lasts divides the information [dimensionless], see `lasting_misfit`; 1 at the least,
         and without pressure.
@@ -89,10 +90,18 @@ class ClassFits:
     nominal: Array
     nominal_scales: Array
     scores: Array
-    spread: Array
+    spreading: Callable[[], Array]
     lasting: float
     moved: Array = field(default_factory=lambda: np.zeros((len(COORDINATES), 1)))
     unbent: Array | None = None
+
+    @cached_property
+    def spread(self) -> Array:
+        """Covariance of the coordinates for intervals, shape (7, 7) [dimensionless].
+
+        See `faults.diagnosis.circuits.model_doubt`, and without pressure `spread_of`.
+        """
+        return self.spreading()
 
     @property
     def of_one_law(self) -> Array:
@@ -167,7 +176,8 @@ def fit_classes(
         The best circuit, and the conditions' scores.
     """
     runs = nominal_runs(blocks, actuator) if runs is None else runs
-    nominal = np.array([misfit(blocks, run) for run in runs])
+    errors = np.array([scales_of(blocks, run) for run in runs])
+    nominal = np.array([misfit(blocks, run, one) for run, one in zip(runs, errors, strict=True)])
     order = np.argsort(nominal)[: STARTS if start is None else 1]
     near = [int(i) for i in order if nominal[i] <= nominal[order[0]] + len(blocks.velocity)]
     gained = GAINED if start is None else ROUGHLY_GAINED
@@ -190,21 +200,19 @@ def fit_classes(
         moved = [bent_by(fit, blocks, actuator) for fit in fits]
         told = [told_of_bent(information, by) for information, by in zip(known, moved, strict=True)]
         scores = [scores_in_forces(fit, one, actuator) for fit, one in zip(fits, told, strict=True)]
-    likeliest = misfit(blocks, fits[least].fitted) / LASTING
+    likeliest = misfit(blocks, fits[least].fitted, fits[least].scales) / LASTING
     held, unbent = (np.max(np.array(one) - worse[:, None], axis=0) - likeliest for one in (scores, straight))
     centre = actuator.conditions[np.argmax(unbent)]
     best = fits[least] if blocks.pressure is not None else _scaled(fits[least], centre)
     # without pressure no balance of flows looks for another pump or other faults, so regions alone have to
     lasting = 1.0 if blocks.pressure is None else max(1.0, lasting_misfit(best.fitted, blocks))
     if blocks.pressure is None:
-        spread = spread_of(best, known[least], blocks, centre)
+        spreading = partial(spread_of, best, known[least], blocks, centre)
     else:
         seen = _NO_FRICTION if stuck else np.ones(len(COORDINATES))
-        seldom, spreads = open_beside(best, blocks, actuator)
-        spread = doubt_of(best, seldom, blocks, actuator.conditions, unbent, seen, spreads)
-        spread = spread + between_fits(fits, best, worse)
-    errors = np.array([scales_of(blocks, run) for run in runs])
-    return ClassFits(best, known[least], nominal, errors, held, spread, lasting, moved[least], unbent)
+        among = between_fits(fits, best, worse)
+        spreading = partial(spread_with_pressure, best, blocks, actuator, unbent, seen, among)
+    return ClassFits(best, known[least], nominal, errors, held, spreading, lasting, moved[least], unbent)
 
 
 def _scaled(fit: PointFit, centre: Array) -> PointFit:

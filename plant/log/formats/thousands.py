@@ -170,8 +170,8 @@ def require_ungrouped(rows: Sequence[Sequence[str]], names: Sequence[str], sourc
     LogError
         If a column does, by its name.
     """
-    for place, name in enumerate(names):
-        require_none_grouped((row[place] for row in rows), name, source)
+    for name, cells in zip(names, zip(*rows, strict=True), strict=False):  # no rows, no columns
+        require_none_grouped(cells, name, source)
 
 
 def require_none_grouped(cells: Iterable[str], name: str, source: str) -> None:

@@ -89,5 +89,11 @@ def made_classes(off: Array, one: Blocks, scores: Array | None = None, scale: fl
     fit = made_fit(off, scale * one.noise, INFORMATION, one)
     nine = np.linspace(0.0, -8.0, 9) if scores is None else scores
     return ClassFits(
-        fit, INFORMATION, nine, np.ones((9, 2)), nine, np.asarray(np.linalg.inv(INFORMATION), dtype=np.float64), 2.0
+        fit,
+        INFORMATION,
+        nine,
+        np.ones((9, 2)),
+        nine,
+        lambda: np.asarray(np.linalg.inv(INFORMATION), dtype=np.float64),
+        2.0,
     )

@@ -76,7 +76,7 @@ def fits(spread: np.ndarray, place: int = 0) -> ClassFits:
     empty = np.zeros((10, 2))
     best = PointFit(ACTUATOR.conditions[place], 0.0, np.eye(7), np.ones(2), empty, np.zeros((7, 10, 2)))
     nine = np.zeros(len(CONDITIONS))
-    return ClassFits(best, np.linalg.inv(spread), nine, np.zeros((9, 2)), nine, spread, 1.0)
+    return ClassFits(best, np.linalg.inv(spread), nine, np.zeros((9, 2)), nine, lambda: spread, 1.0)
 
 
 NARROW = np.diag(np.full(7, 0.01**2))

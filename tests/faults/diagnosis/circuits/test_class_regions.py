@@ -60,6 +60,16 @@ def test_without_pressure_the_scale_of_pressure_is_not_believed() -> None:
     assert believed_information(fit(0), blocks(pressure=True)) == pytest.approx(INFORMATION)
 
 
+def test_circuits_for_a_spread_are_run_where_it_is_asked_for_and_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    monkeypatch.setattr(class_regions, "spread_with_pressure", lambda *given: asked.append(given) or np.eye(7))
+    found = fit_classes(blocks(pressure=True), ACTUATOR, start=ACTUATOR.conditions[0])
+    assert found.scores.shape == (len(CONDITIONS),)
+    assert not asked
+    assert found.spread is found.spread
+    assert len(asked) == 1
+
+
 def test_a_model_error_widens_what_is_believed() -> None:
     near, far = (believed_information(fit(0, scale), blocks(pressure=True)) for scale in (1e-3, 1e-2))
     assert np.all(np.diag(far) < 0.02 * np.diag(near))
@@ -224,7 +234,9 @@ def test_along_the_scale_of_pressure_motion_stays_and_pressure_grows_alike() -> 
 def test_a_log_that_says_nothing_leaves_the_weak_belief_and_one_that_says_all_leaves_none() -> None:
     nine = np.zeros(len(CONDITIONS))
     said = (
-        class_regions.ClassFits(fit(0), scale * np.eye(7), nine, np.zeros((9, 2)), nine, np.eye(7), 1.0).covariance
+        class_regions.ClassFits(
+            fit(0), scale * np.eye(7), nine, np.zeros((9, 2)), nine, lambda: np.eye(7), 1.0
+        ).covariance
         for scale in (0.0, 1e9)
     )
     nothing, everything = said

@@ -53,7 +53,7 @@ def test_a_log_without_pressure_and_a_piston_that_sticks_leave_it_to_their_own_r
 
 def test_the_interval_spans_the_circuits_and_the_value_is_the_likeliers() -> None:
     sound, rubbing = (ACTUATOR.conditions[NAMES.index(name)] for name in ("normal", "minor_friction"))
-    known = replace(classes(), best=replace(classes().best, coordinates=sound), spread=1e-8 * np.eye(7))
+    known = replace(classes(), best=replace(classes().best, coordinates=sound), spreading=lambda: 1e-8 * np.eye(7))
     exact = {name: severities_at(point, ACTUATOR)["added_friction"] for name, point in (("s", sound), ("r", rubbing))}
     for share, value in ((0.6, "s"), (0.3, "r")):
         both = [OpenCircuit(sound, share), OpenCircuit(rubbing, 1.0 - share)]

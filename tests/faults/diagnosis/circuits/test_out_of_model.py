@@ -65,7 +65,9 @@ def fitted(blocks: Blocks, place: np.ndarray) -> ClassFits:
     weighted = (slopes[:, blocks.first :] / scales).reshape(len(place), -1)
     best = PointFit(place, 0.0, weighted @ weighted.T, scales, run_of(key).outputs, slopes)
     nine = np.zeros(len(CONDITIONS))
-    return ClassFits(best, INFORMATION, nine, np.zeros((len(CONDITIONS), 2)), nine, np.linalg.inv(INFORMATION), 1.0)
+    return ClassFits(
+        best, INFORMATION, nine, np.zeros((len(CONDITIONS), 2)), nine, lambda: np.linalg.inv(INFORMATION), 1.0
+    )
 
 
 def reasons(blocks: Blocks, place: np.ndarray | None = None) -> Mapping[AgainstCode, Note]:
