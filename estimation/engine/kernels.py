@@ -35,7 +35,7 @@ def kernel_source(rule: Rule, model: ProcessModel, channels: tuple[str, ...], la
     Parameters
     ----------
     lanes : int
-        One, or `LANES`.
+        One, or several vectors of the processor: `LANES`, or fewer where a batch is small.
 
     Returns
     -------
@@ -79,7 +79,7 @@ def compile_kernel(
     Parameters
     ----------
     lanes : int
-        One, or `LANES`.
+        One, or several vectors of the processor: `LANES`, or fewer where a batch is small.
     separate : bool
         Whether several lanes filter separate logs, by ``run``; else logs that lie side by side already, by ``steps``.
 

@@ -30,15 +30,18 @@ def filter_batch(
     rule: Rule = EKF,
     *,
     workers: int = 1,
+    lanes: int = LANES,
 ) -> Iterator[Trace]:
     """Run many filters.
 
     Parameters
     ----------
     problems : iterable of FilterProblem
-        The tasks, in any number; a block of 32 is drawn when it is its turn, so they need not fit in memory together.
+        The tasks, in any number; a block is drawn when it is its turn, so they need not fit in memory together.
     workers : int
         Threads, each running one block at a time.
+    lanes : int
+        Tasks in a block, side by side: empty lanes cost as much as full ones, and each width is compiled by itself.
 
     Yields
     ------
@@ -50,37 +53,37 @@ def filter_batch(
     HydrostateError
         If the tasks of a block differ in model, channels, sampling, settings or length.
     """
-    blocks = _blocks(problems)
+    blocks, run_block = _blocks(problems, lanes), partial(_run_block, rule, lanes)
     if workers == 1:
         for block in blocks:
-            yield from _run_block(rule, block)
+            yield from run_block(block)
         return
     with ThreadPoolExecutor(max_workers=workers) as executor:
         while group := list(islice(blocks, workers)):
-            for traces in executor.map(partial(_run_block, rule), group):
+            for traces in executor.map(run_block, group):
                 yield from traces
 
 
-def _blocks(problems: Iterable[FilterProblem]) -> Iterator[list[FilterProblem]]:
+def _blocks(problems: Iterable[FilterProblem], lanes: int) -> Iterator[list[FilterProblem]]:
     source = iter(problems)
-    while block := list(islice(source, LANES)):
+    while block := list(islice(source, lanes)):
         yield block
 
 
-def _run_block(rule: Rule, block: Sequence[FilterProblem]) -> list[Trace]:
+def _run_block(rule: Rule, width: int, block: Sequence[FilterProblem]) -> list[Trace]:
     first = block[0]
     for problem in block:
         _require_alike(first, problem)
     if len(block) < FEWEST_IN_LANES or len(first.measured) < ROWS:
         return [run_rule(rule, problem) for problem in block]
-    lanes = [block[min(lane, len(block) - 1)] for lane in range(LANES)]
+    lanes = [block[min(lane, len(block) - 1)] for lane in range(width)]
     places, kernel, work = prepared(rule, lanes)
-    track = np.empty(((len(first.measured) - 1) // first.every + 1, first.model.width, LANES))
-    track_variance, logs = np.empty_like(track), np.zeros((len(first.channels), LANES))
+    track = np.empty(((len(first.measured) - 1) // first.every + 1, first.model.width, width))
+    track_variance, logs = np.empty_like(track), np.zeros((len(first.channels), width))
     drives = [np.ascontiguousarray(problem.drives, np.float64) for problem in lanes]
     measured = [np.ascontiguousarray(problem.measured, np.float64) for problem in lanes]
     nothing = np.empty((0, len(first.channels)))
-    room = aligned(len(first.model.drives) + len(first.channels), ROWS, LANES)
+    room = aligned(len(first.model.drives) + len(first.channels), ROWS, width)
     results = track, track_variance, logs, nothing, nothing
     where = _places(drives), _places(measured)
     kernel.run(work.ravel(), *where, room, len(first.measured), first.substeps, first.every, results)

@@ -20,6 +20,9 @@ STEP = 2e-3
 SPREAD = 0.3
 """Standard deviation of the first guess of bulk modulus, as a share of it [dimensionless]."""
 
+SIDE_BY_SIDE = 16
+"""Filters in a kernel: two vectors of eight hold the nine."""
+
 
 def innovation_scores(record: Record, rig: EhaParameters) -> Array:
     """Return the log-likelihood of a log's innovations under each condition.
@@ -49,5 +52,5 @@ def innovation_scores(record: Record, rig: EhaParameters) -> Array:
         problems = [begun, *(replace(begun, parameters=parameter_row(one, model.parameters)) for one in others)]
     else:
         problems = [begun, *(replace(filter_problem(model, prior, slow, one), every=len(slow)) for one in others)]
-    found = np.array([trace.log_likelihood for trace in filter_batch(problems)])
+    found = np.array([trace.log_likelihood for trace in filter_batch(problems, lanes=SIDE_BY_SIDE)])
     return np.where(np.isfinite(found), found, -np.inf)

@@ -93,6 +93,11 @@ def test_steps_between_samples_give_the_same_bits_alone_and_in_a_batch(linear: P
     assert_batch_is_alone(EKF, [replace(one, substeps=substeps) for one in problems(linear, 40)])
 
 
+def test_a_kernel_of_fewer_lanes_gives_the_same_bits(linear: ProcessModel) -> None:
+    tasks = problems(linear, 9)
+    assert_same_bits(list(filter_batch(tasks, lanes=16)), list(filter_batch(tasks)))
+
+
 def test_samples_are_counted_but_for_missing_ones(linear: ProcessModel) -> None:
     tasks = problems(linear, 40)
     tasks[3] = replace(tasks[3], measured=np.nan_to_num(tasks[3].measured, nan=1e-3))
