@@ -26,6 +26,7 @@ from experiments.streams.rows import STANDARD_INPUT, stream_input
 from experiments.streams.watch_view import lines_wanted, viewed
 from experiments.streams.watched import Watched
 from experiments.streams.watching import LEARNING, WatchSettings, watch_file, watch_network, watch_rows
+from plant.errors import HydrostateError
 from plant.log.stream.source import is_stream
 
 commands = typer.Typer()
@@ -82,6 +83,8 @@ def watch(
     """
     require_positive("--heartbeat", heartbeat, "s")
     require_place("--state", state)
+    if state is not None and log != "-" and not is_stream(log):
+        raise HydrostateError(f"--state goes with a stream, '-' or tcp://HOST:PORT, got the file {log!r:.80}")
     told = Watched(STANDARD_INPUT if log == "-" else log)
     if lines_wanted(view):
         told.to(say_line)

@@ -151,6 +151,7 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
         ),
         (["diagnose", "a.csv", "--columns", "depth=X"], "channel 'depth' is unknown"),
         (["identify", "a.csv", "--filter-hz", "0"], "--filter-hz must be positive and finite, got 0 Hz"),
+        (["watch", "a.csv", "--state", "s"], "--state goes with a stream"),
         (["identify", "a.csv", "--order", "0"], "--order must be a whole number from 1 to 20, or auto, got '0'"),
         (["simulate"], "hydrostate simulate: Missing option '--out' / '-o'."),
         (["simulate", "-o", "a.xls"], "--out must end in .csv"),
