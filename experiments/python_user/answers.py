@@ -289,25 +289,7 @@ class Model(Shown):
         return f"<p>{self._title}</p>{self.to_frame().to_html(float_format=_FIVE)}"
 
     def report(self, path: "str | Path", title: str = "log") -> "Path":
-        """Write the page of the model, as `Answer.report` does that of a log.
-
-        Parameters
-        ----------
-        path : str or Path
-            Where to; ``.html`` is added to a name without an ending, and folders that are missing are made.
-        title : str
-            What the page calls the log.
-
-        Returns
-        -------
-        Path
-            The file written.
-
-        Raises
-        ------
-        HydrostateError
-            If the file cannot be written, or its name ends as no page's does.
-        """
+        """Write the page of the model to ``path``, as `Answer.report` does that of a log, and return the file."""
         from experiments.python_user.own_page import write_page
 
         return write_page(path, self._page(title))
