@@ -64,14 +64,13 @@ class FreedProblem(Problem):
         if not log.gaps.size:  # what a gap leaves open costs as much again to follow
             model = replace(model, jump=())
         super().__init__(replace(model, unknowns=tuple(free), linear=sizes), log, partial(_by_itself, model))
-        self._bare, self._sizes = model, linear
+        self._bare, self._sizes, self._ridge = model, linear, ridge
         self._most = LANES if model.jump else MANY  # with gaps, `MANY` take twice as long as `LANES`
         self._last: list[tuple[Array, Array, Array, Array]] = []
         self._columns = [parameter_names(model.parameters).index(name) for name in free]
         self._kernels: dict[int, ResidualsRun] = {}
         self._units = np.array([linear.get(name, np.nan) for name in free])
         self._logarithmic = np.isnan(self._units)
-        self._ridge = ridge
         self._placed = None if ridge is None else ridge.placed(self.model.unknowns)
 
     @classmethod
@@ -110,10 +109,8 @@ class FreedProblem(Problem):
         list of Point
             As of `Problem.at`.
         """
-        if self.log.passes_on:  # each has a variance of its own
+        if self.log.passes_on or len(thetas) == 1:  # else they have one variance
             return [self.at(theta) for theta in thetas]
-        if len(thetas) == 1:
-            return [self.at(thetas[0])]
         rows = np.vstack([self._rows(self._nudged(theta), self.log.parameters) for theta in thetas])
         found = self._residuals(rows, None, self._variances(thetas[0]))[..., : len(rows)]
         parts = np.split(found, len(thetas), axis=-1)
@@ -165,10 +162,8 @@ class FreedProblem(Problem):
             As of `Problem.at` [dimensionless]; noise of driving channels counts as at the first point.
         """
         points = np.array(thetas)
-        errors = self._residuals(self._rows(points, self.log.parameters), None, self._variances(points[0]), lanes)
-        errors = errors[..., : len(points)]
-        weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)
-        misfit = np.einsum("ijk,ijk->k", (1.0 - 0.5 * weight) * weight * errors, errors)
+        groups = self._in_groups(self._rows(points, self.log.parameters), None, self._variances(points[0]), lanes)
+        misfit = np.concatenate([*map(_misfits, groups)])[: len(points)]  # all together would not stay in a cache
         return self.log.stands_for * misfit + 0.5 * (points - self.presumed) ** 2 @ self.prior
 
     def residuals_of(self, theta: Array, parameters: Sequence[Array]) -> list[Array]:
@@ -293,18 +288,18 @@ class FreedProblem(Problem):
         rows[:, self._columns] = values
         return rows
 
-    def _residuals(self, rows: Array, drives: Array | None, variance: Array, most: int = MANY) -> Array:
-        """Return the normalised residuals under some parameters, shape (outputs, blocks, rows or more).
-
-        ``most`` run side by side.
-        """
-        if len(rows) == 1:  # cheaper alone
-            return np.stack([self._alone(row, drives, variance) for row in rows], axis=-1)
-        shared = (self.log.drives if drives is None else drives)[..., None]
-        most = min(most, self._most)
-        groups = [rows[first : first + most] for first in range(0, len(rows), most)]
-        found = each(lambda some: self._side_by_side(some, shared, variance), groups)
+    def _residuals(self, rows: Array, drives: Array | None, variance: Array) -> Array:
+        """Return the normalised residuals under some parameters, shape (outputs, blocks, rows or more)."""
+        found = self._in_groups(rows, drives, variance)
         return found[0] if len(found) == 1 else np.concatenate(found, axis=-1)
+
+    def _in_groups(self, rows: Array, drives: Array | None, variance: Array, most: int = MANY) -> list[Array]:
+        """Return the same in groups of rows, of which ``most`` run side by side."""
+        if len(rows) == 1:  # cheaper alone
+            return [self._alone(rows[0], drives, variance)[..., None]]
+        most, shared = min(most, self._most), (self.log.drives if drives is None else drives)[..., None]
+        groups = [rows[first : first + most] for first in range(0, len(rows), most)]
+        return each(lambda some: self._side_by_side(some, shared, variance), groups)
 
     def _side_by_side(self, rows: Array, drives: Array, variance: Array) -> Array:
         """Return the normalised residuals of up to `MANY` runs, shape (outputs, blocks, lanes)."""
@@ -330,6 +325,11 @@ class FreedProblem(Problem):
 def _by_itself(model: GreyBoxModel, *given: Any) -> tuple[float, Array, Array]:
     """Run a model by itself: most problems run it side by side alone, and need not load this kernel."""
     return compile_kernel(model)(*given)
+
+
+def _misfits(errors: Array) -> Array:
+    weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)  # half the sum of squares a lane, outliers linearly
+    return np.einsum("ijk,ijk->k", (1.0 - 0.5 * weight) * weight * errors, errors)
 
 
 @cache

@@ -309,6 +309,15 @@ def test_costs_of_a_search_may_be_taken_by_its_own_kernel(
     np.testing.assert_array_equal(found, problem.costs(thetas))
 
 
+def test_costs_of_many_points_are_summed_a_kernel_at_a_time(
+    problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    widths, summed = [], freed_problem._misfits
+    monkeypatch.setattr(freed_problem, "_misfits", lambda errors: widths.append(errors.shape[-1]) or summed(errors))
+    assert len(problem.costs([*points(problem, 2 * LANES + 3)], LANES)) == 2 * LANES + 3
+    assert widths == 3 * [LANES]
+
+
 def test_lines_of_a_model_are_written_once_for_all_widths(monkeypatch: pytest.MonkeyPatch) -> None:
     traced: list[GreyBoxModel] = []
     step = side_by_side.model_step
