@@ -106,8 +106,13 @@ def test_a_hypothesis_is_believed_where_it_gains_over_its_own_valley_alone(
     told: list[Mapping[str, float] | None] = []
 
     def lost(
-        _: GreyBoxLog, parameters: EhaParameters, starts: object, valley: Mapping[str, float] | None = None
+        _: GreyBoxLog,
+        parameters: EhaParameters,
+        starts: object,
+        valley: Mapping[str, float] | None = None,
+        stiffest: float = np.inf,
     ) -> Sequence[GreyBoxFit]:
+        assert stiffest == np.inf  # the noise is that of the oil found
         assert parameters is PAPER
         assert starts
         told.append(valley)
