@@ -31,10 +31,12 @@ def unit_behind(cell: str) -> str:
 
     Examples
     --------
-    >>> unit_behind("12.3 mm/s"), unit_behind("12.3"), unit_behind("12 pieces")
-    ('mm/s', '', '')
+    >>> unit_behind("12.3 mm/s"), unit_behind("9.81 m/s^2"), unit_behind("12.3"), unit_behind("12 pieces")
+    ('mm/s', 'm/s^2', '', '')
     """
-    if not cell[-1:].isalpha() and cell[-1:] not in "%°²]":
+    last, before = cell[-1:], cell[-2:-1]
+    ends_as_unit = last.isalpha() or last in "%°²³]" or before.isalpha() or before in "^-"
+    if not ends_as_unit or NUMBER.fullmatch(cell):
         return ""
     found = _MEASURED.fullmatch(cell)
     return found["unit"] if found and _is_known_unit(found["unit"]) else ""
@@ -48,3 +50,15 @@ def _is_known_unit(text: str) -> bool:
 def without_unit(cell: str) -> str:
     """Return a cell without the unit behind its number."""
     return cell.removesuffix(unit_behind(cell)).rstrip()
+
+
+def without_that_unit(cell: str, unit: str) -> str:
+    """Return a cell of a column whose numbers have one unit behind them without it; words for no value stay whole.
+
+    Examples
+    --------
+    >>> without_that_unit(" 12.3 N", "N"), without_that_unit("NaN", "N"), without_that_unit("N/A", "A")
+    ('12.3', 'NaN', 'N/A')
+    """
+    text = cell.strip()
+    return text if text in MISSING else text.removesuffix(unit).rstrip()

@@ -12,7 +12,7 @@ from plant.arrays import Array
 from plant.errors import LogError, LogWarning
 from plant.log.clock.stamps import is_stamp, read_stamps
 from plant.log.columns import TIME, TRUTH, Column
-from plant.log.formats.cell_texts import is_value
+from plant.log.formats.cell_texts import is_value, without_that_unit
 from plant.log.formats.cells import MISSING, MOST_STRANGE, SHOWN, no_numbers, not_a_number, number, wrong_width
 from plant.log.formats.csv_column import Cells
 from plant.log.formats.csv_layout import COMMENT, Layout
@@ -169,7 +169,7 @@ class _Body:
         """Return the cells of a column, without the unit that stands behind each number."""
         cells = [row.cells[column.position] for row in rows]
         unit = self.layout.in_cells.get(column.position)
-        return cells if unit is None else [cell.strip().removesuffix(unit).rstrip() for cell in cells]
+        return cells if unit is None else [without_that_unit(cell, unit) for cell in cells]
 
     def _read(self, column: Column, cells: list[str]) -> tuple[list[Any], list[int]]:
         """Return values of some rows, and the places of cells that are no numbers."""

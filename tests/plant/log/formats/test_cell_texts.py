@@ -7,6 +7,7 @@ import pytest
 
 from plant.errors import LogError
 from plant.log.files import read_record
+from plant.log.formats.cell_texts import without_that_unit
 
 TIME = 1e-3 * np.arange(400)
 NAMES = ("Time", "Motor speed", "Position")
@@ -29,6 +30,21 @@ def test_the_unit_behind_each_number_is_that_of_the_column(tmp_path: Path, betwe
     assert record.sample_time == pytest.approx(1e-3)
     np.testing.assert_allclose(record["position_m"], 0.05 - 0.02 * np.cos(40.0 * TIME), atol=1e-7)
     np.testing.assert_allclose(record["motor_speed_rad_s"], 40.0 * np.pi * np.sin(40.0 * TIME), atol=1e-4)
+
+
+@pytest.mark.parametrize(("unit", "step", "pascal"), [("kgf/cm2", 0.1, 98066.5), ("N/m^2", 1e4, 1.0)])
+def test_a_unit_may_end_in_a_power(tmp_path: Path, unit: str, step: float, pascal: float) -> None:
+    path = written(tmp_path, NAMES, ("ms", "rpm", "mm"), " ", ".")
+    header, *lines = path.read_text().splitlines()
+    rows = (f"{line};{step * row} {unit}" for row, line in enumerate(lines))
+    path.write_text("\n".join([f"{header};Differential pressure", *rows]) + "\n")
+    found = read_record(path)["differential_pressure_pa"]
+    np.testing.assert_allclose(found, step * pascal * np.arange(400))
+
+
+def test_a_word_for_no_value_may_end_like_the_unit_of_its_column() -> None:
+    words = ("NaN", "NA", "N/A", "#N/A")
+    assert tuple(without_that_unit(word, word[-1]) for word in words) == words
 
 
 def test_another_unit_than_the_name_says_is_refused(tmp_path: Path) -> None:
