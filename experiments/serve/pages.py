@@ -58,7 +58,7 @@ def home_page(settings: Settings) -> str:
             ("largest", settings.largest // MB),
             ("seconds", f"{settings.seconds:g}"),
             ("streams", tuple(settings.streams)),
-            ("rigs", tuple(rig_files(settings.rigs))),
+            ("rigs", None if settings.rigs is None else tuple(rig_files(settings.rigs))),
             ("others", None if settings.rig is None else settings.rig.name),
         ),
     )

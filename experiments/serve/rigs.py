@@ -1,6 +1,5 @@
 """Which rig file a log takes on a server: that of its actuator, or that of all others."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,22 +13,33 @@ if TYPE_CHECKING:
 
 
 def rig_files(folder: Path | None) -> dict[str, Path]:
-    """Return the rig files of a folder by actuator, whose name each of them has.
+    """Return the rig files of a folder by actuator, whose name each of them has."""
+    return {} if folder is None else {one.stem: one for one in sorted(folder.glob("*.toml"))}
+
+
+def require_rigs(plant: str | None, rigs: Path | None, others: Path | None) -> None:
+    """Read every rig file of a folder.
+
+    Parameters
+    ----------
+    plant, others : str or None, Path or None
+        As `load_rig` takes them.
+    rigs : Path or None
+        The folder.
 
     Raises
     ------
     HydrostateError
-        If the folder has none.
+        If the folder has none, or a file is wrong.
     """
-    if folder is None:
-        return {}
-    found = {one.stem: one for one in sorted(folder.glob("*.toml"))}
-    if not found:
-        raise HydrostateError(f"{folder}: must hold a rig file of each actuator, such as P-12.toml, it has none")
-    return found
+    files = rig_files(rigs)
+    if rigs is not None and not files:
+        raise HydrostateError(f"{rigs}: must hold a rig file of each actuator, such as P-12.toml, it has none")
+    for file in files.values():
+        load_rig(plant, file, others)
 
 
-def rig_of(name: str, pattern: str | None, files: Mapping[str, Path], others: Path | None) -> Path | None:
+def rig_of(name: str, pattern: str | None, folder: Path | None, others: Path | None) -> Path | None:
     """Return the rig file of a log.
 
     Parameters
@@ -38,24 +48,23 @@ def rig_of(name: str, pattern: str | None, files: Mapping[str, Path], others: Pa
         Of the log.
     pattern : str or None
         How logs are named, as `experiments.fleet.naming.actuator_of` takes it.
-    files : Mapping[str, Path]
-        Rig files by actuator.
+    folder : Path or None
+        Of rig files by actuator, if the server has one.
     others : Path or None
         Rig file of the logs whose actuator has none of its own.
 
     Raises
     ------
     HydrostateError
-        If there are rig files, but none for this log: another actuator's would give wrong numbers.
+        If there is a folder, but no rig file for this log: another actuator's would give wrong numbers.
     """
-    actuator = actuator_of(name, pattern) if files else ""
-    if not files or actuator in files:
-        return files.get(actuator, others)
-    if others is None:
-        known = ", ".join(files)
+    if folder is None:
+        return others
+    files, actuator = rig_files(folder), actuator_of(name, pattern)
+    if actuator not in files and others is None:
         of = f"the actuator is {actuator!r}" if actuator else f"{name} names no actuator"
-        raise HydrostateError(f"no rig file: {of}, and the server has rig files of {known}")
-    return others
+        raise HydrostateError(f"no rig file: {of}, and the server has rig files of {', '.join(files) or 'none'}")
+    return files.get(actuator, others)
 
 
 def rig_of_stream(name: str, folder: Path | None, others: Path | None) -> Path | None:
@@ -71,9 +80,9 @@ def rig_of_stream(name: str, folder: Path | None, others: Path | None) -> Path |
     Raises
     ------
     HydrostateError
-        If there are rig files, but none for this stream.
+        If there is a folder, but no rig file for this stream.
     """
-    return rig_of(name, "{actuator}", rig_files(folder), others)
+    return rig_of(name, "{actuator}", folder, others)
 
 
 def load_rig(plant: str | None, rig: Path | None, others: Path | None) -> "tuple[ActuatorKind, Rig[Any]]":

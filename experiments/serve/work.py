@@ -16,7 +16,7 @@ from experiments.command.terminal import clauses, unexpected
 from experiments.log_pages.comparison import plain_words
 from experiments.page.sentences import sentence
 from experiments.serve.process import bind_to_server
-from experiments.serve.rigs import load_rig, rig_files, rig_of
+from experiments.serve.rigs import load_rig, rig_of
 from plant.atomic import replacing
 from plant.errors import HydrostateError, MissingColumnError, NoChannelError
 
@@ -179,7 +179,7 @@ def _inspected(task: Task) -> LogResult:
 
 
 def _rig(task: Task) -> Path | None:
-    return rig_of(task.name, task.pattern, rig_files(task.rigs), task.rig)
+    return rig_of(task.name, task.pattern, task.rigs, task.rig)
 
 
 def _tools(task: Task, rig: Path | None) -> "_Tools":
@@ -225,7 +225,7 @@ def _write(task: Task, page: str) -> None:
 def _without_path(value: Any, task: Task) -> Any:
     """Return entries in which the log has the name that the client gave it, and no place on this machine."""
     if isinstance(value, str):
-        for folder in {one.parent for one in (task.rig, task.rigs and task.rigs / "*") if one}:
+        for folder in {one for one in (task.rig and task.rig.parent, task.rigs) if one}:
             value = value.replace(f"{folder}{os.sep}", "")
         return value.replace(str(task.log), task.name).replace(task.log.name, task.name)
     if isinstance(value, dict):

@@ -64,7 +64,7 @@ def serve(
     `pip install 'hydrostate[serve]'`.
     """
     try:
-        from experiments.serve.rigs import load_rig, rig_files, rig_of_stream
+        from experiments.serve.rigs import require_rigs, rig_of_stream
         from experiments.serve.server import run_server
         from experiments.serve.settings import MB, Settings, is_loopback
     except ImportError as error:
@@ -78,8 +78,7 @@ def serve(
     from experiments.verbs.fleet import limits_of_options
 
     load_actuator(plant, rig)
-    for file in rig_files(rigs).values():
-        load_rig(plant, file, rig)
+    require_rigs(plant, rigs, rig)
     streams = _streams(watch or [])
     for name in streams:
         rig_of_stream(name, rigs, rig)

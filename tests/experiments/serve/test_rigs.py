@@ -1,7 +1,6 @@
 """Which rig file a log takes on a server, and that a log without one gets no wrong numbers."""
 
 import os
-from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -11,12 +10,18 @@ from experiments.cli import app
 from experiments.serve import pages
 from experiments.serve.fleet_view import fleet_view
 from experiments.serve.pages import home_page
-from experiments.serve.rigs import load_rig, rig_files, rig_of, rig_of_stream
+from experiments.serve.rigs import load_rig, require_rigs, rig_of, rig_of_stream
 from experiments.serve.settings import Settings
 from experiments.serve.work import Task, work_on
 from plant.errors import HydrostateError
 
-FILES: Mapping[str, Path] = {name: Path(f"{name}.toml") for name in ("P-1", "P-12")}
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("two")
+    for name in ("P-1", "P-12"):
+        (folder / f"{name}.toml").touch()
+    return folder
 
 
 @pytest.mark.parametrize(
@@ -30,16 +35,18 @@ FILES: Mapping[str, Path] = {name: Path(f"{name}.toml") for name in ("P-1", "P-1
         ("P-1_someday.csv", "{actuator}_{date}.csv", "others.toml"),
     ],
 )
-def test_a_log_takes_the_rig_file_of_the_actuator_that_its_name_tells(name: str, pattern: str | None, rig: str) -> None:
-    assert rig_of(name, pattern, FILES, Path("others.toml")) == Path(rig)
+def test_a_log_takes_the_rig_file_of_the_actuator_that_its_name_tells(
+    two: Path, name: str, pattern: str | None, rig: str
+) -> None:
+    assert rig_of(name, pattern, two, two / "others.toml") == two / rig
 
 
-def test_a_log_of_no_actuator_with_a_rig_file_is_refused_rather_than_compared_with_another() -> None:
+def test_a_log_of_no_actuator_with_a_rig_file_is_refused_rather_than_compared_with_another(two: Path) -> None:
     with pytest.raises(HydrostateError, match=r"the actuator is 'P-13', and the server has rig files of P-1, P-12"):
-        rig_of("P-13_2026-11-22.csv", None, FILES, None)
+        rig_of("P-13_2026-11-22.csv", None, two, None)
     with pytest.raises(HydrostateError, match=r"no rig file: run\.csv names no actuator"):
-        rig_of("run.csv", "{actuator}_{date}.csv", FILES, None)
-    assert rig_of("run.csv", None, {}, None) is None
+        rig_of("run.csv", "{actuator}_{date}.csv", two, None)
+    assert rig_of("run.csv", None, None, None) is None
 
 
 def test_a_stream_takes_the_rig_file_of_its_name(tmp_path: Path) -> None:
@@ -56,8 +63,18 @@ def test_a_stream_takes_the_rig_file_of_its_name(tmp_path: Path) -> None:
 def test_a_folder_of_rig_files_must_hold_one(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("none")
     with pytest.raises(HydrostateError, match=r"must hold a rig file of each actuator, such as P-12\.toml"):
-        rig_files(tmp_path)
-    assert rig_files(None) == {}
+        require_rigs(None, tmp_path, None)
+
+
+def test_a_folder_that_has_lost_its_rig_files_refuses_logs_and_leaves_the_page(tmp_path: Path) -> None:
+    with pytest.raises(
+        HydrostateError, match=r"^no rig file: the actuator is 'P-1', and the server has rig files of none"
+    ):
+        rig_of("P-1.csv", None, tmp_path, None)
+    assert rig_of("P-1.csv", None, tmp_path, Path("others.toml")) == Path("others.toml")
+    assert "rig files of none. Other logs are refused." in " ".join(
+        home_page(Settings(folder=tmp_path, rigs=tmp_path)).split()
+    )
 
 
 def test_an_own_rig_file_may_be_of_another_kind_than_the_server_was_told(tmp_path: Path) -> None:
