@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 
-from experiments.actuators import kind_meant
+from experiments.actuators import DEFAULT, kind_meant
 from experiments.command.json_output import Result, prepare_output
 from experiments.command.logs import finish, overheard, read_log, run_logs, with_remarks
 from experiments.command.options import load_actuator, load_columns, require_positive, understood
@@ -29,8 +29,8 @@ COMMON = frozenset({"logs", "plant", "rig", "columns", "report", "out", "seed", 
 """Options of every kind of actuator."""
 
 ASSUMED = (
-    "no --rig: the paper's actuator is assumed; if yours is another one, `hydrostate rig init rig.toml` writes a file "
-    "to fill in"
+    "no --rig: the paper's actuator is assumed; if yours is another one, `hydrostate rig init rig.toml{plant}` writes "
+    "a file to fill in"
 )
 UNFILLED = "{rig}: its parameters are those of the paper's actuator; if yours is another one, enter them"
 
@@ -135,9 +135,9 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
                 yield one, own
 
     batch = run_logs(logs, work, {**question.chosen.blank, **question.about}, doing)
-    if question.of_the_paper and any(result["outcome"] != "failed" for result in batch.results):
-        note(ASSUMED if asked["rig"] is None else UNFILLED.format(rig=asked["rig"]))
     for one, results in of_each_kind(batch.results):
+        if one.of_the_paper and any(result["outcome"] != "failed" for result in results):
+            note(_untold(asked["rig"], one.about["plant"]))
         for remark in one.chosen.remarks(results):
             note(remark)
     pages.tell()
@@ -147,6 +147,13 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
             yield from one.chosen.screen(own, one.options)
 
     finish(batch, screen, as_json=asked["as_json"], out=asked["out"], lost=bool(pages.unwritten))
+
+
+def _untold(rig: "Path | None", plant: str) -> str:
+    """Return what to do where nothing was told of the actuator."""
+    if rig is not None:
+        return UNFILLED.format(rig=rig)
+    return ASSUMED.format(plant="" if plant == DEFAULT else f" --plant {plant}")
 
 
 def _agreement(result: Result, found: "Finding") -> list[str]:
