@@ -176,7 +176,7 @@ def _charts(outlooks: Sequence[Outlook], name: str) -> list[tuple[str, Charts]]:
     for which in together.values():
         x, label = _abscissa(which[0], ahead)
         panels = [_panel(one, x, ahead) for one in which]
-        file = "-".join([name, *(one.name for one in which[: len(outlooks) - 1])])
+        file = name if len(which) == len(outlooks) else "-".join([name, *(one.name for one in which)])
         caption = _in_a_row([SHOWN[one.name] for one in which]).capitalize()
         found.append((caption, Charts(x, label, panels, file, label, dates=label == DATE)))
     return found

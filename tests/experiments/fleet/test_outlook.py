@@ -144,6 +144,7 @@ def test_the_page_of_an_actuator_shows_every_severity_with_its_forecast() -> Non
     assert "<h1>P-1: nearing a limit.</h1>" in page
     assert page.count('class="charts"') == 1
     assert 'href="../pages/last.html"' in page
+    assert re.findall(r'"file": ?"([^"]*)"', page) == ["P-1"]  # of all severities
     assert "Leakage reaches its limit in about" in page
     assert "more than 300 logs" in page
 
