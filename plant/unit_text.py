@@ -22,6 +22,9 @@ _SIGNS = str.maketrans(
     {"²": "^2", "³": "^3", "⁻": "-", "¹": "1", "μ": "µ", "·": "*", "⋅": "*", "\u2212": "-", "\u00d7": "*"}
 )
 
+GAUGE = ("barg", "bar(g)")
+"""Bar above the atmosphere: of a difference of pressures, which a log has, just bar."""
+
 SPELLINGS: Mapping[str, str] = {
     "°": "degree",
     "°/s": "degree/s",
@@ -35,8 +38,7 @@ SPELLINGS: Mapping[str, str] = {
     "usec": "us",
     "Volt": "V",
     "Volts": "V",
-    "barg": "bar",
-    "bar(g)": "bar",
+    **dict.fromkeys(GAUGE, "bar"),
 }
 """What benches write, and what it means."""
 

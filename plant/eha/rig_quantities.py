@@ -6,6 +6,7 @@ from typing import Any
 
 from plant.errors import RigError
 from plant.small_file import shown
+from plant.unit_text import GAUGE
 from plant.units import conversion_to
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\s\d+\-.,].*?)\s*")
@@ -29,7 +30,7 @@ def numbers_with_units(given: Mapping[str, Any], units: Mapping[str, str]) -> di
     Raises
     ------
     RigError
-        If a unit is unknown, or measures something else.
+        If a unit is unknown, measures something else, or is a gauge pressure.
 
     Examples
     --------
@@ -52,4 +53,9 @@ def _in_si(name: str, value: Any, unit: str) -> Any:
         raise RigError(
             f"parameters.{name} must be a number or a quantity in {unit}, got {shown(value)}: {error}"
         ) from error
+    if found[2] in GAUGE:  # some parameters are absolute pressures
+        raise RigError(
+            f"parameters.{name} must be in bar or {unit}, got {shown(value)}, a pressure above the atmosphere: "
+            "add 1.013 bar if the parameter is absolute"
+        )
     return float(found[1]) * factor + offset

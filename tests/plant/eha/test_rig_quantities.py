@@ -43,6 +43,7 @@ def test_two_sides_may_differ_in_their_units(tmp_path: Path) -> None:
         ('pump_displacement = "8 cm^3"', "in m^3/rad, got '8 cm^3': unit 'cm^3' leaves the angle out"),
         ('relief_pressure = "160 furlong"', "in Pa, got '160 furlong': unit 'furlong' does not convert"),
         ('relief_pressure = "160 9**9**9"', "must be a"),
+        ('accumulator_pressure = "2 barg"', "got '2 barg', a pressure above the atmosphere: add 1.013 bar"),
         ('relief_pressure = "bar"', "must be a valid number, got 'bar'"),
         ('chamber_volume = "1,08 L"', "must be a valid number, got '1,08 L'"),
         ('piston_area = "1e999 cm^2"', "must be a finite number"),
