@@ -53,7 +53,7 @@ def actuator(name: str) -> "ActuatorKind":
     raise HydrostateError(f"--plant must be one of {', '.join(known)}, got {name!r}")
 
 
-def actuator_of(rig: "Rig[Any]", usual: str) -> "ActuatorKind":
+def kind_of_rig(rig: "Rig[Any]", usual: str) -> "ActuatorKind":
     """Return the kind of actuator that a log's rig file names, or the usual one where it names none."""
     return actuator(rig.plant or usual)
 

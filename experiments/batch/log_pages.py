@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from pathlib import Path
 
-from experiments.actuators import actuator_of, offered
+from experiments.actuators import kind_of_rig, offered
 from experiments.batch.cases import Plan
 from experiments.batch.folder import Folder
 from experiments.batch.part_store import PartStore
@@ -48,7 +48,7 @@ def write_log_pages(plan: Plan, store: PartStore, most: int) -> list[str]:
     for one in worst[:most]:
         series, work = logs[one.file]
         rig = plan.rig_of(series)
-        kind = actuator_of(rig, plan.study.plant)
+        kind = kind_of_rig(rig, plan.study.plant)
         chosen = offered(kind, "diagnose")
         options = {**chosen.options, "seed": 0} | ({} if work.pressure else {"no_pressure": True})
         try:

@@ -29,7 +29,7 @@ from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, first_beli
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
 from estimation.models.eha_forms import BULK_MODULUS, FORMS
 from experiments.actuator_kind import ActuatorKind
-from experiments.actuators import DEFAULT, actuator_of
+from experiments.actuators import DEFAULT, kind_of_rig
 from experiments.batch.cases import Task
 from experiments.batch.diagnosis import diagnosed
 from experiments.batch.lanes import Lanes, Waiting, write_filtered
@@ -177,7 +177,7 @@ class _Prepared:
 
 def _prepared(series: Series, task: Task) -> _Prepared:
     rig = task.rig_of(series)
-    kind = actuator_of(rig, task.plant)
+    kind = kind_of_rig(rig, task.plant)
     other = None if kind.name == DEFAULT else kind
     if isinstance(series, Log):
         with _one_at_a_time, caught() as said:

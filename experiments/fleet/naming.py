@@ -205,7 +205,7 @@ def by_dates(files: Iterable[str], folder: str = "") -> dict[str, Named]:
     return without_wrong_clocks(found) if together else {}
 
 
-def actuator_of(name: str, pattern: str | None) -> str:
+def actuator_in_name(name: str, pattern: str | None) -> str:
     """Return the actuator that the name of one log tells: by the pattern, or else by its date.
 
     Parameters
@@ -222,9 +222,9 @@ def actuator_of(name: str, pattern: str | None) -> str:
 
     Examples
     --------
-    >>> actuator_of("P-12_2026-11-22.csv", None), actuator_of("run 7 of P-12.csv", "* of {actuator}.csv")
+    >>> actuator_in_name("P-12_2026-11-22.csv", None), actuator_in_name("run 7 of P-12.csv", "* of {actuator}.csv")
     ('P-12', 'P-12')
-    >>> actuator_of("P-12.csv", None)
+    >>> actuator_in_name("P-12.csv", None)
     'P-12'
     """
     if pattern is None:

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.options import load_actuator
-from experiments.fleet.naming import actuator_of
+from experiments.fleet.naming import actuator_in_name
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ def require_rigs(plant: str | None, rigs: Path | None, others: Path | None) -> N
     Parameters
     ----------
     plant, others : str or None, Path or None
-        As `load_rig` takes them.
+        As `load_actuator_of_log` takes them.
     rigs : Path or None
         The folder.
 
@@ -36,7 +36,7 @@ def require_rigs(plant: str | None, rigs: Path | None, others: Path | None) -> N
     if rigs is not None and not files:
         raise HydrostateError(f"{rigs}: must hold a rig file of each actuator, such as P-12.toml, it has none")
     for file in files.values():
-        load_rig(plant, file, others)
+        load_actuator_of_log(plant, file, others)
 
 
 def rig_of(name: str, pattern: str | None, folder: Path | None, others: Path | None) -> Path | None:
@@ -47,7 +47,7 @@ def rig_of(name: str, pattern: str | None, folder: Path | None, others: Path | N
     name : str
         Of the log.
     pattern : str or None
-        How logs are named, as `experiments.fleet.naming.actuator_of` takes it.
+        How logs are named, as `experiments.fleet.naming.actuator_in_name` takes it.
     folder : Path or None
         Of rig files by actuator, if the server has one.
     others : Path or None
@@ -60,7 +60,7 @@ def rig_of(name: str, pattern: str | None, folder: Path | None, others: Path | N
     """
     if folder is None:
         return others
-    files, actuator = rig_files(folder), actuator_of(name, pattern)
+    files, actuator = rig_files(folder), actuator_in_name(name, pattern)
     if actuator not in files and others is None:
         of = f"the actuator is {actuator!r}" if actuator else f"{name} names no actuator"
         raise HydrostateError(f"no rig file: {of}, and the server has rig files of {', '.join(files) or 'none'}")
@@ -85,7 +85,7 @@ def rig_of_stream(name: str, folder: Path | None, others: Path | None) -> Path |
     return rig_of(name, "{actuator}", folder, others)
 
 
-def load_rig(plant: str | None, rig: Path | None, others: Path | None) -> "tuple[ActuatorKind, Rig[Any]]":
+def load_actuator_of_log(plant: str | None, rig: Path | None, others: Path | None) -> "tuple[ActuatorKind, Rig[Any]]":
     """Return the kind of actuator of a log, and its rig.
 
     Parameters

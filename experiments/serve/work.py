@@ -16,7 +16,7 @@ from experiments.command.terminal import clauses, unexpected
 from experiments.log_pages.comparison import plain_words
 from experiments.page.sentences import sentence
 from experiments.serve.process import bind_to_server
-from experiments.serve.rigs import load_rig, rig_of
+from experiments.serve.rigs import load_actuator_of_log, rig_of
 from plant.atomic import replacing
 from plant.errors import HydrostateError, MissingColumnError, NoChannelError
 
@@ -196,7 +196,7 @@ def _prepared(plant: str | None, rig: Path | None, others: Path | None, changed:
     del changed
     from experiments.actuators import offered
 
-    kind, bench = load_rig(plant, rig, others)
+    kind, bench = load_actuator_of_log(plant, rig, others)
     chosen = offered(kind, verb)
     return kind, bench, chosen, *chosen.prepare(bench, {**chosen.options, "seed": 0})
 

@@ -283,7 +283,7 @@ def _page_writer(
     columns: Any,
 ) -> Callable[[str, Path], bool]:
     """Return what writes the page of a log, and says whether the log is still there."""
-    from experiments.actuators import actuator_of, offered, read_own_rig
+    from experiments.actuators import kind_of_rig, offered, read_own_rig
     from experiments.batch.logs_listed import nearest_folder
 
     usual, common = load_actuator(plant, rig)
@@ -298,7 +298,7 @@ def _page_writer(
         from experiments.command.logs import caught, read_log
 
         bench = own.get(nearest_folder(file, own), common)
-        kind = actuator_of(bench, usual.name)
+        kind = kind_of_rig(bench, usual.name)
         chosen = offered(kind, "diagnose")
         with caught():
             record = read_log(log, bench.columns, mapping, kind.required)

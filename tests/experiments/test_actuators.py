@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from experiments import actuators
-from experiments.actuators import actuator, actuator_of, kind_meant, kinds_by_columns, offered
+from experiments.actuators import actuator, kind_meant, kind_of_rig, kinds_by_columns, offered
 from plant.eha.rig import Rig
 from plant.errors import HydrostateError, NoChannelError
 
@@ -17,8 +17,8 @@ def test_a_kind_is_found_by_its_name_and_by_each_of_its_plants() -> None:
 
 
 def test_a_log_is_of_the_kind_that_its_rig_file_names_and_of_the_usual_one_where_it_names_none() -> None:
-    assert actuator_of(Rig(plant="piezo-stack"), "eha").name == "piezo-stack"
-    assert actuator_of(Rig(), "diaphragm-motor").name == "diaphragm-motor"
+    assert kind_of_rig(Rig(plant="piezo-stack"), "eha").name == "piezo-stack"
+    assert kind_of_rig(Rig(), "diaphragm-motor").name == "diaphragm-motor"
 
 
 def test_a_kind_that_is_registered_under_another_name_than_its_own_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ from experiments.cli import app
 from experiments.serve import pages
 from experiments.serve.fleet_view import fleet_view
 from experiments.serve.pages import home_page
-from experiments.serve.rigs import load_rig, require_rigs, rig_of, rig_of_stream
+from experiments.serve.rigs import load_actuator_of_log, require_rigs, rig_of, rig_of_stream
 from experiments.serve.settings import Settings
 from experiments.serve.work import Task, work_on
 from plant.errors import HydrostateError
@@ -80,9 +80,9 @@ def test_a_folder_that_has_lost_its_rig_files_refuses_logs_and_leaves_the_page(t
 def test_an_own_rig_file_may_be_of_another_kind_than_the_server_was_told(tmp_path: Path) -> None:
     own = tmp_path / "S-1.toml"
     own.write_text('plant = "piezo-stack"\n')
-    assert load_rig("eha", own, None)[0].name == "piezo-stack"
+    assert load_actuator_of_log("eha", own, None)[0].name == "piezo-stack"
     own.write_text('name = "large"\n')
-    kind, rig = load_rig("piezo-stack", own, None)
+    kind, rig = load_actuator_of_log("piezo-stack", own, None)
     assert (kind.name, rig.name) == ("piezo-stack", "large")
 
 
