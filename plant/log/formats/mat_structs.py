@@ -73,7 +73,7 @@ def _of_samples(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
 
 
 def _of_signals(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
-    """Return an array with a struct a signal: together, or apart where each has its times; empty if it is none."""
+    """Return an array with a struct a signal: together, but apart those with own times; empty if it is none."""
     found: dict[str, Struct] = {}
     together: dict[str, Any] = {}
     for place, one in enumerate(each, start=1):
@@ -83,7 +83,7 @@ def _of_signals(name: str, each: Sequence[Struct]) -> dict[str, Struct]:
         unit = said["unit"]
         label = f"{said['name']} [{unit}]" if isinstance(unit, str) and unit.strip() else said["name"]
         times = {field: np.ravel(value) for field, value in one.items() if _has_time({field: value})}
-        if times:
+        if times or label in together:  # a name that comes twice is for the reader of the log to choose from
             found[f"{name}({place})"] = {**times, label: np.ravel(said["data"])}
         else:
             together[label] = np.ravel(said["data"])

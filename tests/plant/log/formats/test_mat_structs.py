@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from plant.errors import LogError
 from plant.log.formats.mat import tables_of
 from plant.log.tables import gathered
 
@@ -40,6 +41,12 @@ def test_an_array_of_signals_has_a_column_of_each_name_in_its_unit(timed: bool) 
     found = read({"signals": signals} if timed else {"signals": signals, "time_s": TIME})
     np.testing.assert_allclose(found["position_m"], 1e-3 * WAY)
     np.testing.assert_allclose(found["motor_speed_rad_s"], SPEED * np.pi / 30.0)
+
+
+def test_of_two_signals_with_one_name_none_is_lost() -> None:
+    signals = [{"name": "position_m", "data": WAY}, {"name": "position_m", "data": SPEED}]
+    with pytest.raises(LogError, match="'signals' and 'signals\\(2\\)' both give position_m"):
+        read({"signals": signals, "time_s": TIME})
 
 
 def test_an_array_with_a_struct_a_sample_is_a_table() -> None:
