@@ -180,16 +180,18 @@ def _day(part: "dict[str, Any]", *, months_first: bool) -> int:
         return 0 if part.get("N") is None else _day_of_year(part["N"])
     year = int(part["Y"])
     year += 2000 if year < 100 else 0
-    word = part.get("word")
     if part.get("N") is not None:
-        return (date(year, 1, 1) - _EPOCH).days + _day_of_year(part["N"])
-    month, day = part.get("M") if word is None else _MONTHS.index(word) + 1, part.get("D")
-    if month is None or day is None:
-        month, day = (part["one"], part["two"]) if months_first else (part["two"], part["one"])
-    found = (date(year, int(month), int(day)) - _EPOCH) // timedelta(days=1)
-    if not -100_000 < found < 100_000:
+        found = date(year, 1, 1) + timedelta(days=_day_of_year(part["N"]))
+    else:
+        word = part.get("word")
+        month, day = part.get("M") if word is None else _MONTHS.index(word) + 1, part.get("D")
+        if month is None or day is None:
+            month, day = (part["one"], part["two"]) if months_first else (part["two"], part["one"])
+        found = date(year, int(month), int(day))
+    days = (found - _EPOCH).days
+    if found.year != year or not -100_000 < days < 100_000:
         raise ValueError(year)
-    return found
+    return days
 
 
 def _day_of_year(text: str) -> int:

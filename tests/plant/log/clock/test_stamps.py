@@ -68,7 +68,17 @@ def test_summer_time_that_ends_within_a_log_does_not_set_it_back_where_the_zone_
 
 
 @pytest.mark.parametrize(
-    "cell", ["2026-13-01 00:00:00", "9999-01-01 00:00:00", "25:00:00", "1:2:3:4", "2026-367T12:00:00", "x", "9" * 500]
+    "cell",
+    [
+        "2026-13-01 00:00:00",
+        "9999-01-01 00:00:00",
+        "25:00:00",
+        "1:2:3:4",
+        "2026-366T12:00:00",
+        "9999-001T12:00:00",
+        "x",
+        "9" * 500,
+    ],
 )
 def test_what_is_no_moment_is_refused_with_its_row(cell: str) -> None:
     with pytest.raises(ValueError, match=r"^1 "):
