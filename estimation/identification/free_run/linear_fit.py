@@ -1,6 +1,7 @@
 """Output error of several inputs with one denominator, an offset, and a free initial state in every log."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -115,10 +116,14 @@ def _searched(problem: Problem) -> list[Array]:
     if len(form.sizes) > 1 or data.longest * len(data.y) > MOST_SEARCHED:
         return []
     found: list[Array] = []
-    bounds = problem.bounds.astype(np.int64)
+    # a log whose outputs are all left out tells nothing
+    parts = [slice(*ends) for ends in pairwise(problem.bounds.tolist()) if problem.used[slice(*ends)].any()]
+    bounds = np.cumsum([0, *(part.stop - part.start for part in parts)])
+    used, y = (np.concatenate([one[part] for part in parts]) for one in (problem.used, problem.y))
+    inputs = np.concatenate(data.u)
     for index, (size, delay) in enumerate(zip(form.sizes, form.delays, strict=True)):
-        u = np.concatenate([one[:, index] for one in data.u])
-        pair = Experiments(u, np.where(problem.used, problem.y, 0.0), problem.used, bounds)
+        u = np.concatenate([inputs[part, index] for part in parts])
+        pair = Experiments(u, np.where(used, y, 0.0), used, bounds)
         structure = Structure(size, form.order, delay)
         if delay > LONG_DEAD_TIME and pair.goes_on_behind(delay + form.order):
             pair, structure = pair.advanced(delay), Structure(size, form.order)

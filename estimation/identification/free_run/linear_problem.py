@@ -32,14 +32,14 @@ def unanswered(dead_time: int, length: int) -> int:
     Returns
     -------
     int
-        The dead time, if it is a long one and leaves half of the log [samples].
+        The dead time, if it is a long one; of a shorter log all of it [samples].
 
     Examples
     --------
-    >>> unanswered(5, 1000), unanswered(80, 1000), unanswered(80, 100)
-    (0, 80, 0)
+    >>> unanswered(5, 1000), unanswered(80, 1000), unanswered(80, 60)
+    (0, 80, 60)
     """
-    return dead_time if LONG_DEAD_TIME < dead_time <= length // 2 else 0
+    return min(dead_time, length) if dead_time > LONG_DEAD_TIME else 0
 
 
 @dataclass(frozen=True)
@@ -117,8 +117,8 @@ class Problem:
         self.used: BoolArray = np.isfinite(self.y)
         told = int(np.count_nonzero(self.used))
         self.begins = [form.unanswered(y.size) for y in data.y]
-        for first, unanswered in zip(self.bounds, self.begins, strict=False):
-            self.used[first : first + unanswered] = False
+        for first, begin in zip(self.bounds[:-1], self.begins, strict=True):
+            self.used[first : first + begin] = False
         self.share = told / max(int(np.count_nonzero(self.used)), 1)
         self.counted = Counted(self.used)
         self.n_parameters = form.n_values + form.order * len(data.y)
@@ -159,7 +159,7 @@ class Problem:
                     lay_shifted(out[first:last, place + k], answer, delay + k, level)
                 place += size
             begin = first + self.begins[index]
-            for k in range(n):
+            for k in range(min(n, last - begin)):
                 out[begin + k : last, offset + 1 + index * n + k] = rows[-1, : last - begin - k]
 
     def first_columns(self, index: int) -> Array:

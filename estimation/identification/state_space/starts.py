@@ -26,13 +26,14 @@ def subspace_starts(data: Joint, order: int) -> list[tuple[Array, Array]]:
         Transition and outputs.
     """
     p, m = data.y[0].shape[1], data.u[0].shape[1]
-    whole = [np.column_stack([bridged(column) for column in y.T]) for y in data.y]
+    logs = [(u, y) for u, y in zip(data.u, data.y, strict=True) if np.isfinite(y).any(axis=0).all()]
+    inputs, whole = [u for u, _ in logs], [np.column_stack([bridged(column) for column in y.T]) for _, y in logs]
     found: list[tuple[Array, Array]] = []
     for rows in sorted({max(one, order // p + 2) for one in HORIZONS}):
-        width = sum(max(len(u) - 2 * rows + 1, 0) for u in data.u)
+        width = sum(max(len(u) - 2 * rows + 1, 0) for u in inputs)
         if width < 2 * 2 * rows * (m + p):
             continue
-        left = _observability(data.u, whole, rows)
+        left = _observability(inputs, whole, rows)
         if left.shape[1] < order:
             continue
         gamma = left[:, :order]
@@ -41,7 +42,7 @@ def subspace_starts(data: Joint, order: int) -> list[tuple[Array, Array]]:
     return found
 
 
-def _observability(u: tuple[Array, ...], y: list[Array], rows: int) -> Array:
+def _observability(u: list[Array], y: list[Array], rows: int) -> Array:
     """Return left singular vectors of the future outputs that the past explains beside the future inputs."""
     blocks = [
         np.concatenate([_hankel(a, rows, rows), _hankel(a, 0, rows), _hankel(b, 0, rows)])

@@ -10,7 +10,8 @@ from estimation.identification.free_run.dead_times import estimate_delays
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form, Problem
-from estimation.identification.state_space.joint import joined
+from estimation.identification.state_space.joint import Joint, joined
+from estimation.identification.state_space.starts import subspace_starts
 
 NOISE = 0.02
 
@@ -60,6 +61,28 @@ def test_outputs_that_answer_inputs_from_before_the_log_are_left_out_of_a_fit() 
     assert np.sqrt(np.mean(answered**2)) == pytest.approx(NOISE, rel=0.1)
     assert fit.cost == pytest.approx(np.sum(answered**2) * 700 / 620)
     assert fit.f == pytest.approx([1.0, -1.7, 0.74], abs=0.01)
+
+
+@pytest.mark.parametrize("short", [60, 130])
+def test_a_short_log_beside_a_long_one_does_not_answer_inputs_from_before_it(short: int) -> None:
+    long, brief = late_plant(80), late_plant(80, short, seed=1)
+    both = scaled(replace(long, u=(*brief.u, *long.u), y=(*brief.y, *long.y)))[0]
+    fit = fit_linear(Form(2, (1,), (80,)), both)
+    assert fit.f == pytest.approx([1.0, -1.7, 0.74], abs=0.01)
+    problem = Problem(fit.form, both)
+    left = (problem.jacobian(fit.theta)[0] - problem.y)[problem.used]
+    assert left.size == max(short - 80, 0) + 620
+    assert np.sqrt(np.mean(left**2)) == pytest.approx(NOISE, rel=0.1)
+
+
+def test_a_state_space_begins_where_outputs_answer_inputs_of_their_log() -> None:
+    rng = np.random.default_rng(0)
+    y = np.zeros((300, 1))
+    u = rng.choice([-1.0, 1.0], (300, 1))
+    for t in range(1, 300):
+        y[t] = 0.8 * y[t - 1] + u[t - 1]
+    told, silent = Joint(1.0, (u,), (y,)), Joint(1.0, (u[:60], u), (np.full((60, 1), np.nan), y))
+    assert np.array_equal(subspace_starts(silent, 1)[0][0], subspace_starts(told, 1)[0][0])
 
 
 def test_the_default_finds_a_dead_time_of_eighty_samples_and_judges_what_is_answered() -> None:
