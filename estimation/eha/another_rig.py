@@ -17,8 +17,9 @@ from plant.log.record import Record
 from plant.notes import Note
 
 OFF = 0.3
-"""Logarithm of displacement over area, over that of the rig file, from which it is another actuator's [1]; judged: the
-usual doubts of both make 0.07 in two deviations, and balances of sound logs are up to 0.28 off."""
+"""Logarithm of displacement over area, over that of the rig file, from which it is another actuator's [dimensionless].
+It is a judgement: the usual doubts of both make 0.07 in two deviations, and balances of logs with their own rig file are
+up to 0.28 off."""
 
 
 def rig_contradicted(record: Record, p: EhaParameters) -> tuple[Note, ...]:
@@ -36,7 +37,7 @@ def rig_contradicted(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     Returns
     -------
     tuple of Note
-        None where the log does not tell the ratio, or it is that of the rig file; none without pressure.
+        Empty where the log does not tell the ratio, where it is that of the rig file, and without pressure.
     """
     balance = flow_balance(record, p, MIDDLE)
     if balance is None or balance.swept <= TOLD * balance.swept_std or balance.contradicts_rig < REFUTED:

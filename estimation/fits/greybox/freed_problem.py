@@ -328,7 +328,8 @@ def _by_itself(model: GreyBoxModel, *given: Any) -> tuple[float, Array, Array]:
 
 
 def _misfits(errors: Array) -> Array:
-    weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)  # half the sum of squares a lane, outliers linearly
+    """Return half the sum of squares of each run, where outliers count linearly, shape (lanes,)."""
+    weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)
     return np.einsum("ijk,ijk->k", (1.0 - 0.5 * weight) * weight * errors, errors)
 
 

@@ -96,7 +96,13 @@ def absolute_candidates(data: Channels, by: Scaling, asked: Asked) -> list[Absol
 
 
 def chosen_absolute(candidates: list[AbsoluteCandidate]) -> AbsoluteCandidate:
-    """Return, of the models that do nearly as well on held-back blocks as the best one, that of the least BIC."""
+    """Return, of the models that do nearly as well on held-back blocks as the best one, that of the least BIC.
+
+    Parameters
+    ----------
+    candidates : list of AbsoluteCandidate
+        One at least.
+    """
     return smallest(candidates, min(one.held_back for one in candidates))
 
 

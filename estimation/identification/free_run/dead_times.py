@@ -30,14 +30,15 @@ ORDER, NEAR = 3, 1e-4
 rise of a third one is taken for dead time."""
 
 NEARLY = 1.005
-"""The shortest of the dead times that leave nearly as little as the best is taken."""
+"""What a dead time may leave, over what the best one leaves, to be taken if it is shorter [dimensionless]."""
 
 
 def estimate_delays(data: Channels, longest: int | None = None) -> tuple[int, ...]:
     """Return the dead time of each input with which models of low order fit best, one input after the other.
 
-    Dead times up to `LONG_DEAD_TIME` are each tried with models of second order. Longer ones are looked for by
-    correlation of the output with the filtered input, and refined by fits.
+    Dead times up to `LONG_DEAD_TIME`, or a twentieth of the longest log if that is less, are each tried with models of
+    second order. Those beyond `LONG_DEAD_TIME` are looked for by correlation of the output with the filtered input, and
+    refined by fits.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ class Dynamics(Protocol):
         ...
 
     def unanswered(self, length: int) -> int:
-        """Return how many outputs at the start of a log of some length no input of the log reaches."""
+        """Return how many outputs at the start of a log of some length [samples] answer inputs from before it."""
         ...
 
     def to_dict(self) -> dict[str, Any]:
@@ -37,14 +37,12 @@ class OutputErrorDynamics(ABC):
     """Dynamics whose noise is the output sensor's: what was measured before says nothing of the next sample."""
 
     def unanswered(self, length: int) -> int:
-        """Return how many outputs at the start of a log of some length no input of the log reaches: none unless told.
+        """Return how many outputs at the start of a log of some length [samples] answer inputs from before it.
 
-        Parameters
-        ----------
-        length : int
-            Of the log [samples].
+        None do, unless a class says otherwise.
         """
-        return 0 * length
+        del length
+        return 0
 
     @abstractmethod
     def run(self, u: Array, y: Array) -> Array:

@@ -69,7 +69,7 @@ class Form:
         return self.n_b + self.order + 1
 
     def unanswered(self, length: int) -> int:
-        """Return how many outputs at the start of a log of some length [samples] no input of the log reaches."""
+        """Return how many outputs at the start of a log of some length [samples] answer inputs from before it."""
         return unanswered(max(self.delays), length)
 
 

@@ -55,7 +55,7 @@ class PolynomialDynamics:
         return self.coefficients.size + self.friction.size
 
     def unanswered(self, length: int) -> int:
-        """Return how many outputs at the start of a log of some length [samples] no input of the log reaches."""
+        """Return how many outputs at the start of a log of some length [samples] answer inputs from before it."""
         return unanswered(int(self.variables.lag.max(initial=0)), length)
 
     def run(self, u: Array, y: Array) -> Array:
