@@ -18,8 +18,8 @@ from plant.notes import Note
 
 OFF = 0.3
 """Logarithm of displacement over area, over that of the rig file, from which it is another actuator's [dimensionless].
-It is a judgement: the usual doubts of both make 0.07 in two deviations, and balances of logs with their own rig file are
-up to 0.28 off."""
+It is a judgement: the usual doubts of both make 0.07 in two deviations, and balances of logs with their own rig file
+are up to 0.28 off."""
 
 
 def rig_contradicted(record: Record, p: EhaParameters) -> tuple[Note, ...]:
