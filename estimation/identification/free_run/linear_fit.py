@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from estimation.arrays import Array
+from estimation.arrays import Array, BoolArray
 from estimation.identification.fit.output_error import FINAL_STEPS, descend_from, liveliest_section, screened
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.lagged_columns import columns_of
@@ -119,8 +119,8 @@ def _searched(problem: Problem) -> list[Array]:
     # a log whose outputs are all left out tells nothing
     parts = [slice(*ends) for ends in pairwise(problem.bounds.tolist()) if problem.used[slice(*ends)].any()]
     bounds = np.cumsum([0, *(part.stop - part.start for part in parts)])
-    used, y = (np.concatenate([one[part] for part in parts]) for one in (problem.used, problem.y))
-    inputs = np.concatenate(data.u)
+    used: BoolArray = np.concatenate([problem.used[part] for part in parts])
+    inputs, y = np.concatenate(data.u), np.concatenate([problem.y[part] for part in parts])
     for index, (size, delay) in enumerate(zip(form.sizes, form.delays, strict=True)):
         u = np.concatenate([inputs[part, index] for part in parts])
         pair = Experiments(u, np.where(used, y, 0.0), used, bounds)
