@@ -240,8 +240,8 @@ def _paired(
 def _rig_and_load(log: GreyBoxLog, load: Hypothesis, best: Tried, spared: Spared, accepted: Accepted) -> list[Tried]:
     """Return a load at the start of a log together with a pump and chambers that the rig file has wrong.
 
-    A load is no oddity of a rig, so two that are may come beside it. Found one by one, each ends where it takes up what
-    the others do. It is sought only where no two hypotheses explain the log.
+    A load is no error of a rig file, so two errors may come beside it. Searched one after the other, each of the three
+    takes up what belongs to the others. They are sought together only where no two hypotheses explain the log.
     """
     if _explained(best, accepted):
         return []

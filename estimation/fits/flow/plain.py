@@ -27,7 +27,8 @@ LEAST_GUESS = 1e-2
 
 TOO_LOUD = 2.0
 """Variance of a residual by which a log was judged, over that at the bulk modulus that explains it, from which it is
-judged anew [dimensionless]: less blinds no gate of 1.1 to 1.44 times the noise, and sound searches stay as they are."""
+judged anew [dimensionless]: up to it gates of 1.1 to 1.44 times the noise still see a misfit, and searches of sound
+logs stay as they are."""
 
 _cost = attrgetter("cost")
 
@@ -214,8 +215,9 @@ def stiffer(logged: Logged, plain: PlainFits) -> EhaParameters | None:
 def quieter(plain: PlainFits, strange: GreyBoxFit) -> FitStart | None:
     """Return from where to fit a log anew that was judged by noise of a far stiffer oil than explains it.
 
-    Noise of motor speed goes with stiffness. Where the plain form ends in a wrong valley, at 100 GPa, that noise is
-    larger than all that an offset of 4 bar leaves, and wrong oil is known to a thousandth.
+    What noise of motor speed leaves in the chambers grows with the oil's stiffness. Where the plain form ends in a
+    wrong valley, as at 100 GPa, it is so large that an offset of 4 bar which is not there explains the log, and a wrong
+    bulk modulus seems certain to a thousandth.
 
     Parameters
     ----------

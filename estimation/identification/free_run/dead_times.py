@@ -18,8 +18,8 @@ LONGEST_SHARE = 5
 third of it, a drift was taken for a dead time on one of 91 logs."""
 
 CLEARLY = 0.9
-"""Share of what shorter dead times leave that a long one may leave, to be looked for: among hundreds of dead times, the
-best is a few per cent better than the others by chance."""
+"""A long dead time is taken if it leaves less than this share of what shorter ones leave [fraction]: among hundreds of
+dead times, the best is a few per cent better than the others by chance."""
 
 APART = 3.0
 """Ratio of the time constants that the screen puts side by side, from one sample to a fifth of the record: between two
@@ -68,7 +68,7 @@ def estimate_delays(data: Channels, longest: int | None = None) -> tuple[int, ..
 
 
 def _longer(data: Channels, index: int, delays: Sequence[int], most: int) -> int:
-    """Return a dead time of one input that is longer than those tried, where one leaves clearly less; or the given."""
+    """Return the dead time of one input beyond those tried if it leaves clearly less, else the given one."""
     longest = LONG_DEAD_TIME
     if most <= longest:
         return delays[index]
