@@ -239,18 +239,18 @@ def _quantum(values: Array) -> float:
 def _dead_pressure(record: Record) -> Note | None:
     """Look for the load in the pressure: noise and nothing else, while the piston moves, is no live sensor's.
 
-    A pump that turns more slowly than it leaks moves no piston, and raises no pressure.
+    A pump that rests, or turns more slowly than it leaks, moves no piston and raises no pressure.
     """
     if PRESSURE not in record or SPEED not in record:
         return None
-    pressure = record[PRESSURE][np.isfinite(record[PRESSURE])]
-    if len(pressure) < FEWEST_HELD or np.ptp(pressure) == 0.0 or np.ptp(record[SPEED]) == 0.0:
+    pressure, speed = (record[name][np.isfinite(record[name])] for name in (PRESSURE, SPEED))
+    if min(len(pressure), len(speed)) < FEWEST_HELD or np.ptp(pressure) == 0.0:
         return None
     shown = record[POSITION][np.isfinite(record[POSITION])] if POSITION in record else pressure
     if len(shown) and np.ptp(shown) <= _quantum(shown):
         return None
-    white = 0.5 * float(np.var(np.diff(pressure)))
-    if white < NOISE_SHARE * float(np.var(pressure)):
+    white, of_speed = (0.5 * float(np.var(np.diff(one))) for one in (pressure, speed))
+    if white < NOISE_SHARE * float(np.var(pressure)) or of_speed >= NOISE_SHARE * float(np.mean(speed**2)):
         return None
     return SensorCode.SENSOR_NOISE_ONLY.note(channel=PRESSURE, noise=white**0.5)
 

@@ -98,6 +98,16 @@ def test_a_pump_that_turns_too_slowly_to_move_the_piston_leaves_its_pressure_sen
     assert SensorCode.SENSOR_NOISE_ONLY not in [one.code for one in sensor_objections(slow, RIG_PARAMETERS)]
 
 
+def test_a_pressure_sensor_is_alive_though_the_motor_rests() -> None:
+    """The noise of three sensors was told as a motor that turns and a sensor that is dead."""
+    rng = np.random.default_rng(1)
+    sizes = {"motor_speed_rad_s": 0.05, "position_m": 1e-6, PRESSURE: 3e3}
+    rest = Record(1e-3, {name: size * rng.normal(size=2000) for name, size in sizes.items()})
+    assert sensor_objections(rest, RIG_PARAMETERS) == ()
+    turns = rest.replace(motor_speed_rad_s=100.0 + rest["motor_speed_rad_s"])
+    assert [one.code for one in sensor_objections(turns, RIG_PARAMETERS)] == [SensorCode.SENSOR_NOISE_ONLY]
+
+
 def clipped(record: Record, share: float) -> tuple[Record, float]:
     limit = 500.0 * round(share * float(np.max(np.abs(record[PRESSURE]))) / 500.0)
     return with_fault(record, SensorFault(channel=PRESSURE, kind="saturation", size=limit)), limit
