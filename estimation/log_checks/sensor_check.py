@@ -244,7 +244,7 @@ def _dead_pressure(record: Record) -> Note | None:
     if PRESSURE not in record or SPEED not in record:
         return None
     pressure, speed = (record[name][np.isfinite(record[name])] for name in (PRESSURE, SPEED))
-    if min(len(pressure), len(speed)) < FEWEST_HELD or np.ptp(pressure) == 0.0:
+    if min(len(pressure), len(speed)) < FEWEST_HELD or np.ptp(pressure) == 0.0 or np.ptp(speed) == 0.0:
         return None
     shown = record[POSITION][np.isfinite(record[POSITION])] if POSITION in record else pressure
     if len(shown) and np.ptp(shown) <= _quantum(shown):
