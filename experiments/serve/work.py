@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -190,7 +190,7 @@ def _tools(task: Task, rig: Path | None) -> "_Tools":
     return _prepared(task.plant, rig, task.rig, changed, task.verb)
 
 
-@cache
+@lru_cache(maxsize=128)
 def _prepared(plant: str | None, rig: Path | None, others: Path | None, changed: int, verb: str) -> "_Tools":
     """Return what works on a log; a rig file counts as it was when it was last `changed` [ns since 1970]."""
     del changed
