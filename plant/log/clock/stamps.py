@@ -15,9 +15,22 @@ Stamps = NDArray[np.datetime64]
 
 _CLOCK = r"(?P<h>\d{1,2}):(?P<m>\d{2})(?::(?P<s>\d{2})(?:[.,:](?P<f>\d{1,12}))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
 _ZONE = r"\s*(?P<zone>Z|UTC|GMT|[A-Z]{3,4}|[-+]\d{2}(?::?\d{2})?)?(?:\[[\w/+-]{1,40}\])?"
-_MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
-_WORD = rf"(?P<word>{'|'.join(_MONTHS)})[a-z]{{0,6}}\.?"
-_WEEKDAY = r"(?:(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun)[a-z]{0,6},?\s+)?"
+_MONTHS = {
+    begun: month
+    for month, names in enumerate(
+        (
+            *("jan jän ene", "feb fév fev", "mar mär mae mrz", "apr avr abr", "may mai", "jun juin"),
+            *("jul juil", "aug aoû aou ago", "sep", "oct okt", "nov", "dec déc dez dic"),
+        ),
+        start=1,
+    )
+    for begun in names.split()
+}
+"""How names of months begin in English, German, French and Spanish, in lower case."""
+
+_WORD = rf"(?P<word>(?i:{'|'.join(_MONTHS)}))[^\W\d_]{{0,7}}\.?"
+_WEEKDAY = r"(?:[^\W\d_]{2,10}\.?,?\s+)?"
+_OF = r"(?:\.?[- ]\s?|\s+de\s+)"
 _COMPACT = r"[T_ -](?P<h>\d{2})(?P<m>\d{2})(?P<s>\d{2})(?:[.,_](?P<f>\d{1,12}))?(?P<half>)"
 _AFTER_DAY = rf"(?:[ T,_-]\s*){_CLOCK}"
 _EITHER = re.compile(rf"(?P<one>\d{{1,2}})[/-](?P<two>\d{{1,2}})[/-](?P<Y>\d{{4}}|\d{{2}}){_AFTER_DAY}{_ZONE}")
@@ -27,7 +40,7 @@ _PATTERNS = (
         for day, clock in (
             (r"(?P<Y>\d{4})[-/.](?P<M>\d{1,2})[-/.](?P<D>\d{1,2})", rf"(?:(?:\s*[T,_-]\s*|\s+){_CLOCK})?"),
             (r"(?P<D>\d{1,2})\.(?P<M>\d{1,2})\.(?P<Y>\d{4}|\d{2})", _AFTER_DAY),
-            (rf"{_WEEKDAY}(?P<D>\d{{1,2}})[- ]{_WORD}[- ](?P<Y>\d{{4}}|\d{{2}})", _AFTER_DAY),
+            (rf"{_WEEKDAY}(?P<D>\d{{1,2}}){_OF}{_WORD}{_OF}(?P<Y>\d{{4}}|\d{{2}})", _AFTER_DAY),
             (rf"{_WEEKDAY}{_WORD}\s+(?P<D>\d{{1,2}}),?\s+(?P<Y>\d{{4}})", _AFTER_DAY),
             (rf"{_WEEKDAY}{_WORD}\s+(?P<D>\d{{1,2}})\s+{_CLOCK}", r"\s+(?P<Y>\d{4})"),
             (r"(?:(?P<Y>\d{4})[-:])?(?P<N>\d{3})", rf"[T: ]{_CLOCK}"),
@@ -184,7 +197,7 @@ def _day(part: "dict[str, Any]", *, months_first: bool) -> int:
         found = date(year, 1, 1) + timedelta(days=_day_of_year(part["N"]))
     else:
         word = part.get("word")
-        month, day = part.get("M") if word is None else _MONTHS.index(word) + 1, part.get("D")
+        month, day = part.get("M") if word is None else _MONTHS[word.lower()], part.get("D")
         if month is None or day is None:
             month, day = (part["one"], part["two"]) if months_first else (part["two"], part["one"])
         found = date(year, int(month), int(day))

@@ -1,3 +1,5 @@
+from datetime import date
+
 import numpy as np
 import pytest
 
@@ -26,6 +28,12 @@ def read(*cells: str) -> list[str]:
         "20260301T120000.250",
         "20260301_120000_250",
         "1 March 2026 12:00:00.250",
+        "01-MAR-2026 12:00:00.250",
+        "1. März 2026 12:00:00,25",
+        "01-Mrz-2026 12:00:00.250",
+        "So, 1. Mär. 2026 12:00:00,25",
+        "dim. 1 mars 2026 12:00:00,25",
+        "1 de marzo de 2026 12:00:00,25",
         "Mar 01, 2026 12:00:00.250 PM",
         "Sun Mar 1 12:00:00.250 2026",
         "Sun, 01 Mar 2026 12:00:00.25 +0000",
@@ -92,3 +100,23 @@ def test_an_empty_cell_is_missing() -> None:
 def test_minutes_and_seconds_alone_are_a_time() -> None:
     stamps = read_stamps(["01:02.5", "01:03.25", "02:00.0"], lambda row, cell: ValueError(f"{row} {cell}"))
     assert np.diff(stamps).astype("timedelta64[ms]").astype(int).tolist() == [750, 56_750]
+
+
+@pytest.mark.parametrize(
+    ("names", "month"),
+    [
+        ("Jänner janv. enero", 1),
+        ("févr. fevrier Feb.", 2),
+        ("avril abril", 4),
+        ("Mai mayo", 5),
+        ("juin Juni junio", 6),
+        ("juil. Juli julio", 7),
+        ("août aout agosto", 8),
+        ("septiembre Sept.", 9),
+        ("Oktober octubre", 10),
+        ("Dezember déc. diciembre", 12),
+    ],
+)
+def test_months_are_read_in_german_french_and_spanish(names: str, month: int) -> None:
+    stamps = read_stamps([f"1 {name} 2026 12:00:00" for name in names.split()], lambda row, text: ValueError(text))
+    assert set(stamps.astype("M8[D]").tolist()) == {date(2026, month, 1)}
