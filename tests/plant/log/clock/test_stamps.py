@@ -118,5 +118,5 @@ def test_minutes_and_seconds_alone_are_a_time() -> None:
     ],
 )
 def test_months_are_read_in_german_french_and_spanish(names: str, month: int) -> None:
-    stamps = read_stamps([f"1 {name} 2026 12:00:00" for name in names.split()], lambda row, text: ValueError(text))
+    stamps = read_stamps([f"1 {name} 2026 12:00:00" for name in names.split()], lambda _, text: ValueError(text))
     assert set(stamps.astype("M8[D]").tolist()) == {date(2026, month, 1)}
