@@ -24,7 +24,7 @@ import pyarrow.parquet as pq
 from experiments.batch.folder import LOCK, TEMPORARY, Folder, open_folder
 from experiments.batch.rows import SCHEMA
 from experiments.page.folder import DESKTOP_FILES
-from experiments.running.refusal import refused
+from experiments.running.refusal import reason_of, refused
 from plant.errors import HydrostateError
 
 FORMAT = 1
@@ -119,7 +119,7 @@ class PartStore:
         except FileNotFoundError:
             return None
         except OSError as error:
-            raise HydrostateError(f"store {self.name} cannot be read: {error.strerror or error}") from error
+            raise HydrostateError(f"store {self.name} cannot be read: {reason_of(error)}") from error
         except (ValueError, KeyError, TypeError) as error:
             way = "; delete it, and the same command goes on from the parts" if self._parts() else ""
             raise HydrostateError(f"store {self.name}: {MANIFEST} is not one of a batch study{way}") from error

@@ -1,0 +1,19 @@
+from pathlib import Path
+
+import pytest
+
+from experiments.batch.part_store import open_store
+from experiments.running.refusal import refused
+from plant.errors import HydrostateError
+
+SAID = "out is a file, and a folder is needed there: choose another name, or move the file$"
+
+
+@pytest.mark.parametrize("below", ["", "b"])
+def test_a_file_where_a_folder_is_needed_is_named_with_what_to_do(tmp_path: Path, below: str) -> None:
+    out = tmp_path / "out"
+    out.write_text("x")
+    with pytest.raises(HydrostateError, match=SAID), refused("--out: the folder cannot be made"):
+        (out / below).mkdir(parents=True, exist_ok=True)
+    with pytest.raises(HydrostateError, match=SAID):
+        open_store(out / below).manifest()
