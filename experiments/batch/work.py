@@ -18,12 +18,11 @@ from typing import Any, TypeAlias
 import numpy as np
 import pyarrow.parquet as pq
 
-from estimation.eha.bulk_modulus import DEFAULT_OPTIONS, EstimateOptions, estimate_bulk_modulus, left_out
-from estimation.eha.estimate import estimated
+from estimation.eha.bulk_modulus import DEFAULT_OPTIONS, EstimateOptions, estimate_clean, left_out
+from estimation.eha.estimate import estimated, finding_of
 from estimation.eha.result import BulkModulusEstimate
 from estimation.engine.contract import FilterProblem
 from estimation.filters.run import METHODS, filter_problem, predicted_channels
-from estimation.finding import OUTCOMES
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, first_belief
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances
@@ -38,6 +37,7 @@ from experiments.batch.rows import NIS, TRUTH, Failure, Row, Rows, error_percent
 from experiments.batch.series import Log, Series, Simulated, Work, content_of
 from experiments.command.logs import caught, read_log
 from experiments.command.visible_text import spelt
+from experiments.eha.entries import estimate_message
 from experiments.running.random_streams import stream
 from faults.conditions import severity
 from plant.eha.drives import make_drive
@@ -246,19 +246,14 @@ def _told(prepared: _Prepared, work: Work) -> tuple[Record, EhaParameters]:
 def _estimated(record: Record, parameters: EhaParameters, work: Work, prepared: _Prepared) -> Row:
     seen = prepared.shared(record, parameters, work)
     if seen is None:
-        found = estimate_bulk_modulus(
-            record,
-            parameters,
-            form=work.form,
-            method=work.method,
-            start=work.start_pa,
-            start_std=work.start_std_pa,
-        )
-    else:
-        found = seen[1]
-        for note in left_out(*seen):
-            warnings.warn(LogWarning(note), stacklevel=2)
-    reasons = [str(note) for note in found.gate.reasons] if found.value is not None else [OUTCOMES[found.outcome]]
+        log = clean_log(record, parameters)
+        seen = log, estimate_clean(log, parameters, _options(work))
+    for note in left_out(*seen):
+        warnings.warn(LogWarning(note), stacklevel=2)
+    log, found = seen
+    reasons = [str(note) for note in found.gate.reasons]
+    if found.value is None:
+        reasons = [estimate_message(finding_of(log, found, prepared.rig))]
     row: Row = {"outcome": found.outcome.value, "reason": "; ".join(reasons) or None, "trusted": found.gate.passed}
     row |= {"bulk_modulus_pa": found.value, "bulk_modulus_std_pa": found.std}
     row["error_percent"] = error_percent(found.value, prepared.truth)
@@ -267,8 +262,13 @@ def _estimated(record: Record, parameters: EhaParameters, work: Work, prepared: 
 
 def _is_usual(work: Work) -> bool:
     """Return whether a case rests on the estimate of bulk modulus with all automatic."""
-    options = EstimateOptions(form=work.form, method=work.method, start=work.start_pa, start_std=work.start_std_pa)
-    return work.pressure and (work.verb == "diagnose" or (work.verb == "estimate" and options == DEFAULT_OPTIONS))
+    return work.pressure and (
+        work.verb == "diagnose" or (work.verb == "estimate" and _options(work) == DEFAULT_OPTIONS)
+    )
+
+
+def _options(work: Work) -> EstimateOptions:
+    return EstimateOptions(form=work.form, method=work.method, start=work.start_pa, start_std=work.start_std_pa)
 
 
 def _problem(record: Record, parameters: EhaParameters, work: Work, prepared: _Prepared) -> FilterProblem:

@@ -80,7 +80,7 @@ def estimate_entries(found: "Finding") -> dict[str, Any]:
         "gate": gate_entry(found.gate),
         "bound_percent": 100.0 * evidence.bound,
         "channels": list(found.channels),
-        "message": _estimate_message(found),
+        "message": estimate_message(found),
         **_notes(found),
     }
 
@@ -165,7 +165,14 @@ def _no_class_message(found: "Finding") -> str:
     return clauses(str(note) for note in (*accused, *(one for one in found.notes if one.code in NO_CLASS)))
 
 
-def _estimate_message(found: "Finding") -> str:
+def estimate_message(found: "Finding") -> str:
+    """Return what `estimate` says of a log, as one sentence.
+
+    Parameters
+    ----------
+    found : Finding
+        What was found.
+    """
     from estimation.finding import NOT_OBSERVABLE_WITH_PRESSURE, OUTCOMES, Outcome
     from estimation.log_checks.channel_names import PRESSURE
     from estimation.notes import ChannelCode, RigCode

@@ -6,12 +6,15 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
+from estimation.eha.estimate import estimate_log
 from experiments.batch import work
 from experiments.batch.cases import Plan, Task, plan_study
 from experiments.batch.series import Group
 from experiments.batch.study_file import parse_study
+from experiments.eha.entries import estimate_message
 from faults.conditions import severity
 from plant.eha.drives import make_drive
+from plant.eha.rig import Rig
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.files import write_record
 from plant.sensors.sensors import BENCH
@@ -27,6 +30,10 @@ def plan(tmp_path: Path) -> Plan:
     pressure = record["differential_pressure_pa"].copy()
     pressure[700] = 9e7  # left out, with a warning
     write_record(record.replace(differential_pressure_pa=pressure), tmp_path / "log.csv")
+    return plan_of(tmp_path)
+
+
+def plan_of(tmp_path: Path) -> Plan:
     study = parse_study({"name": "logs", "logs": [{"glob": "*.csv", "methods": METHODS}]}, "logs.toml")
     return plan_study(study, tmp_path)
 
@@ -51,3 +58,15 @@ def test_cases_together_have_the_rows_that_they_have_alone(plan: Plan, monkeypat
         assert rows_of(plan, order).equals(alone.take(order).combine_chunks())
     assert len(made) == 2
     assert alone["warnings"].to_pylist()[0]
+
+
+@pytest.mark.parametrize("place", [[0], [0, 1]])
+def test_a_log_without_a_number_gets_the_sentence_that_estimate_gives_it(tmp_path: Path, place: list[int]) -> None:
+    rng, p = np.random.default_rng(8), severity(0.6, 0.0)
+    record = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    reversed_speed = record.replace(motor_speed_rad_s=-record["motor_speed_rad_s"])
+    write_record(reversed_speed, tmp_path / "log.csv")
+    row = rows_of(plan_of(tmp_path), place).to_pylist()[0]
+    assert row["outcome"] == "mismatch"
+    assert row["reason"] == estimate_message(estimate_log(reversed_speed, Rig()))
+    assert "the sign of motor_speed_rad_s is wrong" in row["reason"]
