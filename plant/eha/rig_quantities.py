@@ -1,15 +1,14 @@
 """`numbers_with_units(...)`: entries of a rig file such as ``"3.5 cm^3/rev"``, as a nameplate has them, in SI."""
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
 from plant.errors import RigError
+from plant.log.formats.cell_texts import parted
+from plant.log.formats.cells import number
 from plant.small_file import shown
 from plant.unit_text import GAUGE
 from plant.units import conversion_to
-
-_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\s\d+\-.,].*?)\s*")
 
 
 def numbers_with_units(given: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, Any]:
@@ -18,7 +17,7 @@ def numbers_with_units(given: Mapping[str, Any], units: Mapping[str, str]) -> di
     Parameters
     ----------
     given : Mapping[str, Any]
-        What the file says: numbers in SI stay as they are, in lists too, and so does what is no quantity.
+        What the file says: numbers in SI stay as they are, in lists too, and so do names that are no parameter's.
     units : Mapping[str, str]
         The SI unit of each parameter.
 
@@ -30,7 +29,7 @@ def numbers_with_units(given: Mapping[str, Any], units: Mapping[str, str]) -> di
     Raises
     ------
     RigError
-        If a unit is unknown, measures something else, or is a gauge pressure.
+        If a text is no number with a unit, or its unit is unknown, measures something else, or is a gauge pressure.
 
     Examples
     --------
@@ -38,24 +37,30 @@ def numbers_with_units(given: Mapping[str, Any], units: Mapping[str, str]) -> di
     >>> [round(one, 6) for one in found["piston_area"]]
     [0.00312, 0.0021]
     """
-    return {name: _in_si(name, value, units.get(name, "1")) for name, value in given.items()}
+    return {name: _in_si(name, value, units[name]) if name in units else value for name, value in given.items()}
 
 
 def _in_si(name: str, value: Any, unit: str) -> Any:
     if isinstance(value, list):
         return [_in_si(name, one, unit) for one in value]
-    found = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
-    if found is None:
+    if not isinstance(value, str):
         return value
+    text, given = parted(value.strip())
+    wanted = "a number without quotes" if unit == "1" else f"a number in {unit}, or a number and its unit in quotes"
+    wrong = f"parameters.{name} must be {wanted}, got {shown(value)}"
+    if not given:
+        raise RigError(wrong)
     try:
-        factor, offset = conversion_to(found[2], unit)
+        amount = number(text)
     except ValueError as error:
-        raise RigError(
-            f"parameters.{name} must be a number or a quantity in {unit}, got {shown(value)}: {error}"
-        ) from error
-    if found[2] in GAUGE:  # some parameters are absolute pressures
+        raise RigError(f"{wrong}: write a decimal point, and nothing between thousands") from error
+    try:
+        factor, offset = conversion_to(given, unit)
+    except ValueError as error:
+        raise RigError(f"{wrong}: {error}") from error
+    if given in GAUGE:  # some parameters are absolute pressures
         raise RigError(
             f"parameters.{name} must be in bar or {unit}, got {shown(value)}, a pressure above the atmosphere: "
             "add 1.013 bar if the parameter is absolute"
         )
-    return float(found[1]) * factor + offset
+    return amount * factor + offset

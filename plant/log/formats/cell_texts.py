@@ -38,8 +38,20 @@ def unit_behind(cell: str) -> str:
     ends_as_unit = last.isalpha() or last in "%°²³]" or before.isalpha() or before in "^-"
     if not ends_as_unit or NUMBER.fullmatch(cell):
         return ""
-    found = _MEASURED.fullmatch(cell)
-    return found["unit"] if found and _is_known_unit(found["unit"]) else ""
+    _, unit = parted(cell)
+    return unit if unit and _is_known_unit(unit) else ""
+
+
+def parted(text: str) -> tuple[str, str]:
+    """Return a number, as it is written, and what stands behind it; nothing behind a text that is no such pair.
+
+    Examples
+    --------
+    >>> parted("1,08 L"), parted("8cc/rev"), parted("30"), parted("bar")
+    (('1,08', 'L'), ('8', 'cc/rev'), ('30', ''), ('bar', ''))
+    """
+    found = _MEASURED.fullmatch(text)
+    return (found["number"], found["unit"]) if found else (text, "")
 
 
 @lru_cache(maxsize=256)

@@ -83,7 +83,7 @@ def test_what_was_measured_is_surer_and_a_mass_is_sooner_too_small_than_too_larg
 
 @pytest.mark.parametrize("field", [field.name for field in fields(EhaParameters)])
 def test_every_parameter_refuses_text(tmp_path: Path, field: str) -> None:
-    with pytest.raises(RigError, match=rf"parameters\.{field} must be a valid number, got 'big'"):
+    with pytest.raises(RigError, match=rf"parameters\.{field} must be a number .*, got 'big'"):
         rig_of(tmp_path, f'[parameters]\n{field} = "big"\n')
 
 
