@@ -11,9 +11,7 @@ class SensorCode(Code):
         "sensor froze"
     )
     SENSOR_CONSTANT = "{channel} is {value:.4g|bar} bar throughout: the sensor is dead or not connected"
-    SENSOR_NOISE_ONLY = (
-        "{channel} shows nothing but noise ({noise:.3g|bar} bar) while the motor turns: the sensor is dead"
-    )
+    SENSOR_NOISE_ONLY = "{channel} shows only noise ({noise:.3g|bar} bar) while the motor turns: the sensor is dead"
     SENSOR_CLIPPED = (
         "{channel} is at the end of its range ({levels} {unit}) in {percent:.2g} % of its samples; they were left out"
     )
@@ -144,6 +142,7 @@ class EstimateCode(Code):
         "successive pressure residuals have a correlation of {correlation:.2f}: the log contains something that the "
         "flow balance leaves out"
     )
+    SEARCH_ENDED = "the search for what explains the log became too long and was ended: use a shorter part of the log"
     CHANNEL_LATE = (
         "{channel} is {milliseconds:.1f} ms too {when} for the flow balance: a sensor or its filter lags, and this was "
         "not corrected"

@@ -25,6 +25,7 @@ from estimation.fits.flow.valley import lower_valley
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
 from estimation.fits.greybox.small_teeth import with_small_teeth
+from estimation.fits.greybox.work import Work, WorkSpentError
 from estimation.fits.hypotheses import (
     AIR_MIDWAY,
     BEGUN,
@@ -105,7 +106,8 @@ def fit_flow(
     is asked what is strange about rig, oil or logger (`estimation.fits.explaining.explain`).
     Gross outliers are taken out, and what the pump delivered while its speed is missing is read off the pressure after.
     Where oil is so much stiffer than the rig file's that noise of position counts, a log is fitted anew from there. So
-    it is where what is strange leads to a lower valley of the plain form, or is an offset of speed.
+    it is where what is strange leads to a lower valley of the plain form, or is an offset of speed. A fit is not to be
+    believed if the search for what is strange did more than it may (`estimation.fits.greybox.work`).
 
     Parameters
     ----------
@@ -138,16 +140,21 @@ def fit_flow(
     if variances is None:
         record, variances = without_strays(record)
     logged = Logged(record, variances, uncertainties or {})
-    start = FitStart(parameters, bulk_modulus)
+    start, work = FitStart(parameters, bulk_modulus), Work()
     while True:
         plain = plain_fits(logged, start)
         if (stiff := stiffer(logged, plain)) is not None:
             start = replace(start, parameters=stiff, bulk_modulus=stiff.bulk_modulus, valley=None)
             continue
         asked, open_ends = _asked(plain, sensed, traits)
-        strange = _strange(plain, asked, traits) if asked else None
+        try:
+            with work.counted():
+                strange = _strange(plain, asked, traits) if asked else None
+                loss = _uneven(plain, traits) if strange is None and len(asked) >= len(HYPOTHESES) else None
+        except WorkSpentError:
+            fit = _plain_fit(plain, sensed, open_ends, begun=BEGUN in asked)
+            return replace(fit, reasons=(*fit.reasons, EstimateCode.SEARCH_ENDED.note()))
         if strange is None:
-            loss = _uneven(plain, traits) if len(asked) >= len(HYPOTHESES) else None
             if loss is not None:
                 return _losing_fit(plain, loss, sensed)
             return _plain_fit(plain, sensed, open_ends, begun=BEGUN in asked)

@@ -18,7 +18,8 @@ from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.normal_loops import fill_differences
 from estimation.fits.greybox.problem import OUTLIER, Problem, weighed
 from estimation.fits.greybox.ridge import Ridge
-from estimation.fits.greybox.side_by_side import LANES, MANY, ResidualsRun, compile_side_by_side
+from estimation.fits.greybox.side_by_side import LANES, MANY, ResidualsRun, compile_side_by_side, side_by_side
+from estimation.fits.greybox.work import spend
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
@@ -205,7 +206,7 @@ class FreedProblem(Problem):
             return
         waiting = iter(drives)
         while some := list(islice(waiting, MANY)):
-            lanes = LANES if len(some) <= LANES else MANY
+            lanes = side_by_side(len(some))
             found = self.disturbed_together(theta, np.stack([*some, *some[-1:] * (lanes - len(some))], axis=-1))
             yield from (found[..., i] for i in range(len(some)))
 
@@ -296,14 +297,16 @@ class FreedProblem(Problem):
     def _in_groups(self, rows: Array, drives: Array | None, variance: Array, most: int = MANY) -> list[Array]:
         """Return the same in groups of rows, of which ``most`` run side by side."""
         if len(rows) == 1:  # cheaper alone
+            spend(self.log)
             return [self._alone(rows[0], drives, variance)[..., None]]
         most, shared = min(most, self._most), (self.log.drives if drives is None else drives)[..., None]
         groups = [rows[first : first + most] for first in range(0, len(rows), most)]
+        spend(self.log, sum(side_by_side(len(some)) for some in groups))
         return each(lambda some: self._side_by_side(some, shared, variance), groups)
 
     def _side_by_side(self, rows: Array, drives: Array, variance: Array) -> Array:
         """Return the normalised residuals of up to `MANY` runs, shape (outputs, blocks, lanes)."""
-        lanes = LANES if len(rows) <= LANES else MANY
+        lanes = side_by_side(len(rows))
         found = self._room(lanes)
         filled = rows if len(rows) == lanes else np.concatenate([rows, np.repeat(rows[-1:], lanes - len(rows), axis=0)])
         with np.errstate(all="ignore"):  # a try that runs away is stepped back from

@@ -37,6 +37,11 @@ ResidualsRun: TypeAlias = Callable[..., None]
 errors; of a model that bears gaps, these come before the errors."""
 
 
+def side_by_side(runs: int) -> int:
+    """Return how many runs a kernel makes where so many are wanted, up to `MANY` [count]."""
+    return LANES if runs <= LANES else MANY
+
+
 @cache
 def compile_side_by_side(model: GreyBoxModel, lanes: int) -> ResidualsRun:
     """Generate the kernel that gives a model's normalised residuals under several parameter sets.

@@ -9,6 +9,7 @@ import pytest
 
 from estimation.fits.flow.fit import _told_by, fit_flow  # pyright: ignore[reportPrivateUsage]
 from estimation.fits.flow.log import speed_gaps
+from estimation.fits.greybox.work import Work
 from estimation.notes import EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import circuit_of
@@ -71,6 +72,15 @@ def test_a_wandering_pressure_sensor_is_objected_to() -> None:
     fit = fit_flow(record.replace(differential_pressure_pa=record["differential_pressure_pa"] + drift), HEALTHY, 2e8)
     (ratio,) = (note.data["ratio"] for note in fit.reasons if note.code == EstimateCode.PRESSURE_RESIDUALS_LARGE)
     assert ratio > 3.0
+
+
+def test_a_search_that_has_done_what_it_may_ends_and_nothing_is_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+    record = log("normal", 12, duration=2.0)
+    high = record.replace(differential_pressure_pa=record["differential_pressure_pa"] + 2e5)
+    monkeypatch.setattr("estimation.fits.flow.fit.Work", lambda: Work(most=1))
+    fit = fit_flow(high, HEALTHY, 2e8)
+    assert fit.explanation is None
+    assert EstimateCode.SEARCH_ENDED in [note.code for note in fit.reasons]
 
 
 @pytest.mark.slow

@@ -1,0 +1,77 @@
+"""`Work(most)`: how much searches may do together, in steps of the model: no result depends on the machine's speed."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+
+from estimation.fits.greybox.log import GreyBoxLog
+
+MOST_STEPS = 400_000_000
+"""Steps of the model that the searches for what is strange about a log may make, in all runs together [count]; a step
+takes 20 to 50 ns. Of one log of each kind of the open benchmark, the longest search takes 280 million steps and ends in
+vain, and the longest that ends in a right answer 210 million."""
+
+
+class WorkSpentError(Exception):
+    """Searches have done what they may."""
+
+
+@dataclass
+class Work:
+    """What searches may do, and what they have done.
+
+    Parameters
+    ----------
+    most : int
+        Steps of the model in all runs, side by side or not [count].
+    done : int
+        The same so far [count].
+
+    Examples
+    --------
+    >>> work = Work(most=100)
+    >>> with work.counted():
+    ...     pass
+    >>> work.done
+    0
+    """
+
+    most: int = MOST_STEPS
+    done: int = 0
+
+    @contextmanager
+    def counted(self) -> Iterator[None]:
+        """Count what this thread does within; a `WorkSpentError` ends it before it does more than it may."""
+        outer = _counted.set(self)
+        try:
+            yield
+        finally:
+            _counted.reset(outer)
+
+
+def spend(log: GreyBoxLog, runs: int = 1) -> None:
+    """Count runs over a log that are about to be made, if anybody counts.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, with its steps.
+    runs : int
+        How many [count].
+
+    Raises
+    ------
+    WorkSpentError
+        If they are more than what is left.
+    """
+    work = _counted.get()
+    if work is None:
+        return
+    steps = runs * int(log.steps.sum())
+    if work.done + steps > work.most:
+        raise WorkSpentError
+    work.done += steps
+
+
+_counted: ContextVar[Work | None] = ContextVar("counted", default=None)
