@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.command.options import load_actuator
+from experiments.command.options import load_actuator, load_rig
 from experiments.fleet.naming import actuator_in_name
 from plant.errors import HydrostateError
 
@@ -83,6 +83,20 @@ def rig_of_stream(name: str, folder: Path | None, others: Path | None) -> Path |
         If there is a folder, but no rig file for this stream.
     """
     return rig_of(name, "{actuator}", folder, others)
+
+
+def require_rig_of_stream(name: str, folder: Path | None, others: Path | None) -> None:
+    """Read the rig file of a stream, of which only the gear-pump actuator's can be watched; see `rig_of_stream`.
+
+    Raises
+    ------
+    HydrostateError
+        If it has none, or that of another kind of actuator.
+    """
+    try:
+        load_rig(rig_of_stream(name, folder, others))
+    except HydrostateError as error:
+        raise HydrostateError(f"--watch {name}: {error}") from error
 
 
 def load_actuator_of_log(plant: str | None, rig: Path | None, others: Path | None) -> "tuple[ActuatorKind, Rig[Any]]":

@@ -64,7 +64,7 @@ def serve(
     `pip install 'hydrostate[serve]'`.
     """
     try:
-        from experiments.serve.rigs import require_rigs, rig_of_stream
+        from experiments.serve.rigs import require_rig_of_stream, require_rigs
         from experiments.serve.server import run_server
         from experiments.serve.settings import MB, Settings, is_loopback
     except ImportError as error:
@@ -81,7 +81,7 @@ def serve(
     require_rigs(plant, rigs, rig)
     streams = _streams(watch or [])
     for name in streams:
-        rig_of_stream(name, rigs, rig)
+        require_rig_of_stream(name, rigs, rig)
     if pattern is not None:
         by_pattern([], pattern)
     read_maintenance(maintenance)

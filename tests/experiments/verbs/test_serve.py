@@ -31,6 +31,16 @@ def test_what_cannot_be_served_is_refused_in_a_sentence(tmp_path: Path, options:
     assert words in refused(tmp_path / "kept", *options)
 
 
+def test_a_stream_of_another_kind_of_actuator_is_refused_before_anything_is_served(tmp_path: Path) -> None:
+    rig = tmp_path / "stack.toml"
+    rig.write_text('plant = "piezo-stack"\n')
+    for how in (("--rig", rig), ("--rigs", tmp_path)):
+        said = refused(tmp_path / "kept", "--watch", "stack=tcp://127.0.0.1:1", *how)
+        assert "--watch stack: " in said
+        assert "a rig of plant 'eha' is needed here, got one of 'piezo-stack'" in said
+    assert not (tmp_path / "kept").exists()
+
+
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
     assert "the server's folder cannot be made" in refused(tmp_path / "file" / "kept", "--port", "0")
