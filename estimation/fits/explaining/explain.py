@@ -66,6 +66,7 @@ def explain(
     paired: bool = True,
     hopeless: float = np.inf,
     by_mass: bool = False,
+    useful: float = np.inf,
 ) -> Explanation | None:
     """Return the hypotheses that explain a log best, alone or two together.
 
@@ -88,6 +89,8 @@ def explain(
     by_mass : bool
         Whether mass is balanced while hypotheses are compared, as where the likelier plain fit does; else volume. At
         high pressure the two differ by more than what is strange.
+    useful : float
+        Cost above which what is tried alone is of no use [dimensionless].
 
     Returns
     -------
@@ -99,7 +102,7 @@ def explain(
     likely, others, gains = promising(wide, (), starts[0], asked)
     left = left_by(wide, plain.cost)
     spared = Spared(faithfully(wide, starts[0], skipping(wide, left)), left, starts)
-    finished = _alone(wide, plain.cost, (likely, others, gains), spared, accepted)
+    finished = _alone(wide, plain.cost, (likely, others, gains), spared, accepted, useful)
     if finished[0].fits and not _explained(finished[0], accepted):
         finished = ranked([*finished, *filter(None, [with_less_lag(wide, finished[0])])])
     if paired and finished[0].cost < hopeless and not _by_itself(wide, finished[0], accepted):
@@ -134,6 +137,7 @@ def _alone(
     asked: tuple[Sequence[Hypothesis], Sequence[Hypothesis], Mapping[str, float]],
     spared: Spared,
     accepted: Accepted,
+    useful: float = np.inf,
 ) -> list[Tried]:
     """Return what explains a log by itself, the best first: of what promises most, else of all.
 
@@ -157,7 +161,7 @@ def _alone(
         first, second = sorted((ended, more), key=lambda each: each[0].cost)
         finished = led_on(log, first, spared=spared)
         return ranked([*finished, *led_on(log, second, finished[0].cost, spared)])
-    finished = led_on(log, ended, spared=spared._replace(starts=hopeful(starts, begun)))
+    finished = led_on(log, ended, spared=spared._replace(starts=hopeful(starts, begun)), useful=useful)
     if _explained(finished[0], accepted):  # a stuck valve was told as a small step of leakage, at 1.1 times the noise
         others = [one for one in others if one.far] if left_by(log, finished[0].cost) > NOISE else []
     if not others:

@@ -182,6 +182,7 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
     near = near_starts(plain.swinging, plain.starts, explains, in_motion=traits.loaded or traits.moving)
     if plain.best is not plain.swinging and explains(plain.best):
         near = [plain.best.values, *near]
+    alone = len(asked) == 1 and asked[0] in ALWAYS_ASKED  # it has no rival
     strange = explain(
         asked_for_teeth(plain.log),
         plain.start.parameters,
@@ -191,14 +192,12 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
         paired=any(one not in (*ALWAYS_ASKED, PLAY) for one in asked),
         hopeless=_hopeless(plain.swinging, asked),
         by_mass=balances_mass(plain.swinging.model),
+        useful=_wanted((asked[0].name,), plain, traits) if alone else np.inf,
     )
     if strange is None:
         return None
-    homed, late = homed_at_stop(plain.log), traits.filtered
-    worth = worth_in(plain.log) if plain.explains(plain.best) else WORTH
-    wanted = _wanted(strange.names, plain.best, plain.swinging, homed=homed, late=late, worth=worth)
-    believed = _known(strange.names, strange.fit) and explains(strange.fit) and strange.fit.cost < wanted
-    return strange if believed else None
+    lower = strange.fit.cost < _wanted(strange.names, plain, traits)
+    return strange if lower and _known(strange.names, strange.fit) and explains(strange.fit) else None
 
 
 def _uneven(plain: PlainFits, traits: LogTraits) -> UnevenLoss | None:
@@ -320,27 +319,20 @@ def _hopeless(swinging: GreyBoxFit, asked: Sequence[Hypothesis]) -> float:
     return swinging.cost - max(WORTH, LITTLE * left)
 
 
-def _wanted(
-    names: Sequence[str],
-    best: GreyBoxFit,
-    swinging: GreyBoxFit,
-    *,
-    homed: bool,
-    late: bool,
-    worth: float = WORTH,
-) -> float:
-    """Return the cost below which what is strange is believed rather than the plain form, if it must gain ``worth``.
+def _wanted(names: Sequence[str], plain: PlainFits, traits: LogTraits) -> float:
+    """Return the cost below which what is strange is believed rather than the plain form.
 
-    No actuator holds its chambers' volumes. So the zero of an encoder that may have been homed at a stop (``homed``)
-    need explain a log no better than held volumes do, and the lag of a filter (``late``) no better than none. How a
-    play is crossed is not known: with a second hypothesis it may explain a log that has neither.
+    No actuator holds its chambers' volumes. So the zero of an encoder that may have been homed at a stop need explain a
+    log no better than held volumes do, and the lag of a filter no better than none. How a play is crossed is not known:
+    with a second hypothesis it may explain a log that has neither.
     """
+    best, worth = plain.best, worth_in(plain.log) if plain.explains(plain.best) else WORTH
     if PLAY.name in names and len(names) > 1:
         return -np.inf
-    if tuple(names) == (PRESSURE_LATE.name,) and late:
+    if tuple(names) == (PRESSURE_LATE.name,) and traits.filtered:
         return best.cost + WORTH
-    if tuple(names) == (ENCODER_ZERO.name,) and homed:
-        return min(best.cost + WORTH, swinging.cost - worth)
+    if tuple(names) == (ENCODER_ZERO.name,) and homed_at_stop(plain.log):
+        return min(best.cost + WORTH, plain.swinging.cost - worth)
     return best.cost - worth
 
 

@@ -1,6 +1,6 @@
 """`Work(most)`: how much searches may do together, in steps of the model: no result depends on the machine's speed."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ class Work:
     done: int = 0
 
     @contextmanager
-    def counted(self) -> Iterator[None]:
+    def counted(self) -> Generator[None]:
         """Count what this thread does within; a `WorkSpentError` ends it before it does more than it may."""
         outer = _counted.set(self)
         try:
