@@ -108,14 +108,17 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
     questions = {question.about["plant"]: question}
 
     def read(log: Path) -> "tuple[_Question, Record]":
+        from plant.log.files import opened_log
+
+        tables = opened_log(log)
         try:
-            return question, question.read(log, beside=beside)
+            return question, question.read(tables, beside=beside)
         except NoChannelError as error:
             name = kind_meant(error, asked["plant"], asked["rig"])
             note(f"{log}: read as a log of a {name} actuator, by its columns; --plant names another kind")
             if name not in questions:
                 questions[name] = _Question.of(context, verb, asked, name)
-            return questions[name], questions[name].read(log, beside=beside)
+            return questions[name], questions[name].read(tables, beside=beside)
 
     def work(log: Path) -> Result:
         with overheard() as said:

@@ -207,7 +207,7 @@ def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None, los
 
 
 def read_log(
-    path: "Path | Table",
+    path: "Path | Table | tuple[Table, ...]",
     rig_columns: Mapping[str, str],
     columns: Mapping[str, str],
     required: Collection[str] | None = None,
@@ -223,7 +223,7 @@ def read_log(
 
     Parameters
     ----------
-    path : Path or Table
+    path : Path, Table or tuple of Table
         The log's file, or a log that is open.
     rig_columns, columns : Mapping[str, str]
         Foreign column by channel, from the rig file and from the command line.

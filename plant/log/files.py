@@ -27,7 +27,7 @@ SUFFIXES = {".csv": "csv", ".txt": "csv", ".gz": "csv", ".parquet": "parquet", "
 
 
 def read_record(
-    path: str | Path | Table,
+    path: str | Path | Table | tuple[Table, ...],
     *,
     columns: Mapping[str, str] | None = None,
     required: Collection[str] = REQUIRED,
@@ -39,10 +39,10 @@ def read_record(
 
     Parameters
     ----------
-    path : str, Path or Table
+    path : str, Path, Table or tuple of Table
         Text with cells apart by commas, semicolons, tabs or blanks (also packed by gzip or zstd), Parquet, Feather or
         MAT; with the extra ``bench`` also XLSX, TDMS, MDF, HDF5 and MAT 7.3. The content says which, not the name.
-        Or one that is open, such as `plant.log.frames.frame_table` gives.
+        Or one that is open, as `opened_log` or `plant.log.frames.frame_table` gives it.
     columns : Mapping[str, str], optional
         Foreign columns by channel, with a unit where the file gives none and it is not SI:
         ``{"position_m": "POS_MM:mm"}``.
@@ -77,7 +77,7 @@ def read_record(
     source = source_of(path)
     if sample_time is not None and not (math.isfinite(sample_time) and sample_time > 0.0):
         raise LogError(f"sample_time must be positive and finite, got {sample_time!r}", source)
-    tables = [table for one in (path, *beside) for table in _opened(one)]
+    tables = [table for one in (path, *beside) for table in opened_log(one)]
     found = gathered(tables, columns, required, source, sample_time)
     document, notes = _document(next((one.metadata for one in tables if one.metadata), None))
     clock = None if beside else _clock(document)
@@ -88,12 +88,27 @@ def read_record(
     return Record(checked.sample_time, checked.channels, {**began, **document.get("metadata", {})}, checked.start_time)
 
 
-def source_of(log: str | Path | Table) -> str:
+def source_of(log: str | Path | Table | tuple[Table, ...]) -> str:
     """Return what messages call a log."""
-    return log.source if isinstance(log, Table) else str(log)
+    first = log[0] if isinstance(log, tuple) else log
+    return first.source if isinstance(first, Table) else str(first)
 
 
-def _opened(log: str | Path | Table) -> tuple[Table, ...]:
+def opened_log(log: str | Path | Table | tuple[Table, ...]) -> tuple[Table, ...]:
+    """Open a log that may be read more than once.
+
+    Parameters
+    ----------
+    log : str, Path, Table or tuple of Table
+        Its file; one that is open stays as it is.
+
+    Raises
+    ------
+    LogError
+        If the file is of no format that is read, damaged, or larger than a log is.
+    """
+    if isinstance(log, tuple):
+        return log
     return (log,) if isinstance(log, Table) else open_tables(Path(log), _beside(Path(log)))
 
 

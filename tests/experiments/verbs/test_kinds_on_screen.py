@@ -7,6 +7,7 @@ from typer.testing import CliRunner, Result
 
 import hydrostate
 from experiments.cli import app
+from plant.log import files
 
 
 def invoke(*arguments: object) -> Result:
@@ -29,13 +30,19 @@ def test_the_stack_s_condition_stands_with_what_to_do_below(stack_log: Path) -> 
     assert f"{stack_log}: major leakage next Inspect the seal" in " ".join(done.stdout.split())
 
 
-def test_logs_of_two_kinds_of_actuator_are_told_apart_by_their_columns(tmp_path: Path) -> None:
+def test_logs_of_two_kinds_of_actuator_are_told_apart_by_their_columns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+    usual = files.open_tables
+    monkeypatch.setattr(files, "open_tables", lambda path, *more: opened.append(path.name) or usual(path, *more))
     logs = {"piezo-stack": tmp_path / "stack.csv", "diaphragm-motor": tmp_path / "motor.csv"}
     for kind, words in {"piezo-stack": (0.03, "--fault", "air_doubled"), "diaphragm-motor": (0.15,)}.items():
         made = invoke("simulate", "--plant", kind, "--duration", *words, "--out", logs[kind])
         assert made.exit_code == 0, made.output
     done = invoke("estimate", *logs.values())
     assert done.exit_code == 0, done.output
+    assert opened == ["stack.csv", "motor.csv"]  # once each, though the first kind that is tried is not theirs
     for quantity in ("outlet reed stiffness", "gas fraction"):
         assert quantity in done.stdout
     for kind, log in logs.items():
