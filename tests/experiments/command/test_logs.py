@@ -12,8 +12,10 @@ from experiments.cli import app
 from experiments.command.logs import Batch, read_log
 from plant.errors import LogWarning, MissingColumnError
 from plant.log.files import read_record, write_record
+from plant.log.formats.detect import open_tables
 from plant.log.notes import LogCode
 from plant.log.record import Record
+from plant.log.table import Table
 
 WORDS = {outcome.value for outcome in OUTCOMES}
 VERBS = ("estimate", "identify", "diagnose")
@@ -88,12 +90,12 @@ def test_nothing_readable_is_exit_code_2(verb: str, tmp_path: Path) -> None:
 
 
 def test_an_internal_error_on_one_log_costs_the_others_nothing(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(path: Path, **_: object) -> Record:
+    def broken(path: Path, beside: str | None) -> tuple[Table, ...]:
         if path.name == "broken.csv":
             raise RuntimeError("the mill is broken")
-        return read_record(path)
+        return open_tables(path, beside)
 
-    monkeypatch.setattr(plant.log.files, "read_record", broken)
+    monkeypatch.setattr(plant.log.files, "open_tables", broken)
     done = invoke("diagnose", good.with_name("broken.csv"), good, "--json")
     assert done.exit_code == 1
     assert [one["outcome"] for one in json.loads(done.stdout)] == ["failed", "ok"]
@@ -101,12 +103,12 @@ def test_an_internal_error_on_one_log_costs_the_others_nothing(good: Path, monke
 
 
 def test_an_interruption_keeps_what_is_done(good: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(path: Path, **_: object) -> Record:
+    def interrupted(path: Path, beside: str | None) -> tuple[Table, ...]:
         if path.name == "second.csv":
             raise KeyboardInterrupt
-        return read_record(path)
+        return open_tables(path, beside)
 
-    monkeypatch.setattr(plant.log.files, "read_record", interrupted)
+    monkeypatch.setattr(plant.log.files, "open_tables", interrupted)
     done = invoke("diagnose", good, good.with_name("second.csv"), good, "--json", "--out", tmp_path)
     assert done.exit_code == 130
     assert "interrupted after 1 of 3 logs" in done.stderr.splitlines()
@@ -121,7 +123,7 @@ def test_an_interruption_before_the_first_log_leaves_earlier_results_as_they_are
         raise KeyboardInterrupt
 
     (tmp_path / "found.json").write_text("earlier")
-    monkeypatch.setattr(plant.log.files, "read_record", interrupted)
+    monkeypatch.setattr(plant.log.files, "open_tables", interrupted)
     done = CliRunner().invoke(app, ["estimate", str(good), "--out", str(tmp_path / "found.json")])
     assert (done.exit_code, "written" in done.stderr) == (130, False)
     assert (tmp_path / "found.json").read_text() == "earlier"
