@@ -24,7 +24,7 @@ from estimation.log_checks.channel_physics import FARTHEST, RPM, TURNS
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.log_checks.first_belief import START_STD, begins_in_motion, first_belief, first_load
 from estimation.models.eha_forms import FORMS
-from estimation.notes import ChannelCode
+from estimation.notes import ChannelCode, EstimateCode
 from estimation.trust.bounds import bulk_modulus_bound
 from estimation.trust.consistency import MISMATCH_NIS
 from plant.eha.doubts import Spread
@@ -232,7 +232,8 @@ def _fit(
     loaded = not chosen and first_load(record, log.variances) != 0.0
     traits = LogTraits(loaded, begins_in_motion(record), log.filtered, log.speed_held)
     fit = fit_flow(record, parameters, guess, doubted, log.variances, traits)
-    return None if loaded and fit.explanation is None else fit  # a filter needs no state at rest
+    ended = any(note.code == EstimateCode.SEARCH_ENDED for note in fit.reasons)
+    return None if loaded and fit.explanation is None and not ended else fit  # a filter needs no state at rest
 
 
 def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusEstimate:

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from estimation.eha.bulk_modulus import LEAST_SQUARES, estimate_bulk_modulus
 from estimation.fits.flow.fit import _told_by, fit_flow  # pyright: ignore[reportPrivateUsage]
 from estimation.fits.flow.log import speed_gaps
 from estimation.fits.greybox.work import Work
@@ -74,13 +75,18 @@ def test_a_wandering_pressure_sensor_is_objected_to() -> None:
     assert ratio > 3.0
 
 
-def test_a_search_that_has_done_what_it_may_ends_and_nothing_is_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("offset", [0.0, 2e5], ids=["at rest", "under load"])
+def test_a_log_whose_search_was_ended_is_refused_and_handed_to_no_filter(
+    offset: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     record = log("normal", 12, duration=2.0)
-    high = record.replace(differential_pressure_pa=record["differential_pressure_pa"] + 2e5)
+    late = np.roll(record["differential_pressure_pa"], 5) + offset
     monkeypatch.setattr("estimation.fits.flow.fit.Work", lambda: Work(most=1))
-    fit = fit_flow(high, HEALTHY, 2e8)
-    assert fit.explanation is None
-    assert EstimateCode.SEARCH_ENDED in [note.code for note in fit.reasons]
+    found = estimate_bulk_modulus(record.replace(differential_pressure_pa=late), HEALTHY)
+    assert found.explanation is None
+    assert found.form == "flow"
+    assert found.method == LEAST_SQUARES
+    assert EstimateCode.SEARCH_ENDED in [note.code for note in found.gate.reasons]
 
 
 @pytest.mark.slow
