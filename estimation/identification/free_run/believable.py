@@ -7,6 +7,7 @@ import numpy as np
 
 from estimation.identification.free_run.choose_linear import INTEGRATING, Candidate, chosen, slowest_pole
 from estimation.identification.free_run.data import Channels, Scaling
+from estimation.identification.free_run.excited_band import answers_beyond, band_ends
 from estimation.identification.free_run.held_back import halves_error, surely_better
 from estimation.identification.free_run.other_orders import wanders
 from estimation.identification.free_run.transfer_function import linear_model
@@ -30,15 +31,35 @@ def believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> 
     data, by : Channels, Scaling
         Scaled, and how.
     """
+    best, notes = _prompt_or_late(candidates, data, by)
+    ends = band_ends(data)
+    within = [one for one in candidates if not answers_beyond(one.fit, ends)]
+    if within and answers_beyond(best.fit, ends):
+        # inputs of the blocks do not go there either: what is made up above their band has to pay in it
+        other, said = _prompt_or_late(within, data, by)
+        pays = other.price > (1.0 + NEARLY_AS_GOOD) * best.price
+        if not (
+            other.doubt or _slower(other, best, data) or (pays and surely_better(best.block_errors, other.block_errors))
+        ):
+            return other, said
+    return best, notes
+
+
+def _prompt_or_late(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> tuple[Candidate, list[Note]]:
+    """Return the same where a gain above the band of the inputs is taken like any other."""
     best, notes = _believed(candidates, data, by)
     prompt = [one for one in candidates if max(one.form.delays) <= 1]
     if max(best.form.delays) > 1 and prompt:
         # a dead time was looked for among many and with models of second order: it has to win by more than chance
         other, said = _believed(prompt, data, by)
-        slower = other.outlasts_block(data) and not best.outlasts_block(data)
-        if not (other.doubt or slower or surely_better(best.block_errors, other.block_errors)):
+        if not (other.doubt or _slower(other, best, data) or surely_better(best.block_errors, other.block_errors)):
             return other, said
     return best, notes
+
+
+def _slower(other: Candidate, best: Candidate, data: Channels) -> bool:
+    """Return whether another model outlasts a block where the best one does not."""
+    return other.outlasts_block(data) and not best.outlasts_block(data)
 
 
 def _believed(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> tuple[Candidate, list[Note]]:

@@ -1,0 +1,79 @@
+"""A gain that is largest above the band of the inputs is taken only where it pays within the band."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.identification.free_run.believable import believable
+from estimation.identification.free_run.choose_linear import Candidate, candidate
+from estimation.identification.free_run.data import Channels, Scaling, channels_from, scaled
+from estimation.identification.free_run.excited_band import answers_beyond, band_ends
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_problem import Form, LinearFit
+from estimation.identification.model.recursion import filtered
+
+N = 600
+
+
+def rings(one: Candidate, pole: float, errors: tuple[float, ...]) -> Candidate:
+    """Return a model with a pole more and a zero beside it, which hardly change it within the band."""
+    b, f = np.convolve(one.fit.numerators[0], [1.0, -0.9 * pole]), np.convolve(one.fit.f, [1.0, -pole])
+    b *= b.sum() ** -1 * f.sum() * one.fit.numerators[0].sum() / one.fit.f.sum()
+    theta = np.concatenate([b, f[1:], [one.fit.theta[one.form.n_values - 1]], np.zeros(2)])
+    fit = LinearFit(Form(2, (2,), (1,)), theta, one.fit.cost)
+    held_back = float(np.sqrt(np.mean(np.square(errors))))
+    return replace(one, fit=fit, held_back=held_back, block_errors=errors, bic=one.bic - 100.0)
+
+
+@pytest.fixture(scope="module")
+def slow() -> tuple[Channels, Scaling, Candidate]:
+    """Return an input of sines up to 0.3 rad a sample, scaled channels, and a first-order model of them."""
+    rng, lines = np.random.default_rng(1), 2.0 * np.pi * np.arange(1, 30) / N
+    u = np.cos(np.outer(np.arange(N), lines) + rng.uniform(0.0, 6.0, lines.size)).sum(axis=1)
+    y = filtered([0.0, 0.3], [1.0, -0.7], u)
+    y = y + 0.05 * y.std() * rng.normal(size=N)
+    data, by = scaled(channels_from([u[:, None]], [y], 1.0, ["u"], "y"))
+    plain = candidate(fit_linear(Form(1, (1,), (1,)), data), data)
+    return data, by, replace(plain, block_errors=(0.1,) * 4, held_back=0.1)
+
+
+def test_a_band_ends_where_an_input_hardly_moves(slow: tuple[Channels, Scaling, Candidate]) -> None:
+    data, _, _ = slow
+    assert band_ends(data)[0] == pytest.approx(0.3, abs=0.05)
+    steps = np.repeat(np.random.default_rng(2).normal(size=N // 8), 8)
+    two = replace(data, inputs=("u", "v"), u=(np.column_stack([data.u[0][:, 0], steps]),))
+    assert band_ends(two)[0] == band_ends(data)[0]
+    assert band_ends(two)[1] > 2.0
+
+
+def test_a_pole_that_rings_above_the_band_answers_beyond(slow: tuple[Channels, Scaling, Candidate]) -> None:
+    data, _, plain = slow
+    ends, wild = band_ends(data), rings(plain, -0.999, (0.1,) * 4)
+    assert not answers_beyond(plain.fit, ends)
+    assert answers_beyond(wild.fit, ends)
+    assert not answers_beyond(wild.fit, [np.pi])
+    # the two run alike on the input that was measured, and not on one that goes beyond
+    u, quick = data.u[0], np.random.default_rng(3).normal(size=(N, 1))
+    for inputs, alike in ((u, True), (quick, False)):
+        one, other = (LinearDynamics.of(x.fit).run(inputs, np.full(N, np.nan)) for x in (plain, wild))
+        assert (np.std(one - other) < 0.1 * np.std(one)) == alike
+
+
+@pytest.mark.parametrize(
+    ("errors", "taken"),
+    [
+        ((0.0995, 0.0995, 0.0995, 0.0995), "plain"),  # in every block, and by too little
+        ((0.02, 0.09, 0.10, 0.115), "plain"),  # by more, in one block
+        ((0.08, 0.08, 0.08, 0.08), "wild"),
+    ],
+)
+def test_what_answers_beyond_has_to_pay_within(
+    slow: tuple[Channels, Scaling, Candidate], errors: tuple[float, ...], taken: str
+) -> None:
+    data, by, plain = slow
+    models = {"plain": plain, "wild": rings(plain, -0.98, errors)}
+    assert answers_beyond(models["wild"].fit, band_ends(data))
+    assert believable(list(models.values()), data, by)[0] is models[taken]
+    assert believable([models["wild"]], data, by)[0] is models["wild"]
