@@ -7,7 +7,7 @@ import numpy as np
 
 from estimation.identification.free_run.choose_linear import INTEGRATING, Candidate, chosen, slowest_pole
 from estimation.identification.free_run.data import Channels, Scaling
-from estimation.identification.free_run.excited_band import answers_beyond, band_ends
+from estimation.identification.free_run.excited_band import band_end, rings_beyond
 from estimation.identification.free_run.held_back import halves_error, surely_better
 from estimation.identification.free_run.other_orders import wanders
 from estimation.identification.free_run.transfer_function import linear_model
@@ -32,10 +32,10 @@ def believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> 
         Scaled, and how.
     """
     best, notes = _prompt_or_late(candidates, data, by)
-    ends = band_ends(data)
-    within = [one for one in candidates if not answers_beyond(one.fit, ends)]
-    if within and answers_beyond(best.fit, ends):
-        # inputs of the blocks do not go there either: what is made up above their band has to pay in it
+    end = band_end(data)
+    within = [one for one in candidates if not rings_beyond(one, data, end)]
+    if within and rings_beyond(best, data, end):
+        # inputs of the blocks do not go there either: what rings above their band has to pay in it
         other, said = _prompt_or_late(within, data, by)
         pays = other.price > (1.0 + NEARLY_AS_GOOD) * best.price
         if not (
@@ -46,7 +46,7 @@ def believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> 
 
 
 def _prompt_or_late(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> tuple[Candidate, list[Note]]:
-    """Return the same where a gain above the band of the inputs is taken like any other."""
+    """Return the same where what rings above the band of the inputs is taken like any other model."""
     best, notes = _believed(candidates, data, by)
     prompt = [one for one in candidates if max(one.form.delays) <= 1]
     if max(best.form.delays) > 1 and prompt:
