@@ -19,12 +19,17 @@ SMOOTHED = 64
 
 
 def band_end(data: Channels) -> float:
-    """Return the highest frequency that an input excites [rad/sample].
+    """Return the highest frequency that an input excites.
 
     Parameters
     ----------
     data : Channels
         Scaled.
+
+    Returns
+    -------
+    float
+        Angle from one sample to the next [rad].
 
     Examples
     --------
@@ -50,7 +55,7 @@ def rings_beyond(one: Candidate, data: Channels, end: float) -> bool:
     data : Channels
         That it was judged on.
     end : float
-        As `band_end` returns it [rad/sample].
+        As `band_end` returns it [rad].
     """
     poles = np.roots(one.fit.f)
     return bool(np.any((np.abs(np.angle(poles)) > end) & (np.abs(poles) > np.exp(-(BLOCKS + 1.0) / data.told))))
