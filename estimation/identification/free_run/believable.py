@@ -38,9 +38,7 @@ def believable(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> 
         # inputs of the blocks do not go there either: what rings above their band has to pay in it
         other, said = _prompt_or_late(within, data, by)
         pays = other.price > (1.0 + NEARLY_AS_GOOD) * best.price
-        if not (
-            other.doubt or _slower(other, best, data) or (pays and surely_better(best.block_errors, other.block_errors))
-        ):
+        if not (other.doubt or (pays and surely_better(best.block_errors, other.block_errors))):
             return other, said
     return best, notes
 
@@ -52,14 +50,10 @@ def _prompt_or_late(candidates: Sequence[Candidate], data: Channels, by: Scaling
     if max(best.form.delays) > 1 and prompt:
         # a dead time was looked for among many and with models of second order: it has to win by more than chance
         other, said = _believed(prompt, data, by)
-        if not (other.doubt or _slower(other, best, data) or surely_better(best.block_errors, other.block_errors)):
+        slower = other.outlasts_block(data) and not best.outlasts_block(data)
+        if not (other.doubt or slower or surely_better(best.block_errors, other.block_errors)):
             return other, said
     return best, notes
-
-
-def _slower(other: Candidate, best: Candidate, data: Channels) -> bool:
-    """Return whether another model outlasts a block where the best one does not."""
-    return other.outlasts_block(data) and not best.outlasts_block(data)
 
 
 def _believed(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> tuple[Candidate, list[Note]]:
