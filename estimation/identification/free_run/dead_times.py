@@ -11,7 +11,7 @@ from estimation.identification.free_run.lagged_columns import lay_shifted
 from estimation.identification.free_run.least_squares import least_squares
 from estimation.identification.free_run.linear_fit import fit_linear, quick_fit
 from estimation.identification.free_run.linear_kernel import decay_rows
-from estimation.identification.free_run.linear_problem import LONG_DEAD_TIME, Form
+from estimation.identification.free_run.linear_problem import Form, long_dead_time
 
 LONGEST_SHARE = 5
 """A dead time lasts at most one of so many parts of the record: the first block, which is never held back. Up to a
@@ -36,9 +36,8 @@ NEARLY = 1.005
 def estimate_delays(data: Channels, longest: int | None = None) -> tuple[int, ...]:
     """Return the dead time of each input with which models of low order fit best, one input after the other.
 
-    Dead times up to `LONG_DEAD_TIME`, or a twentieth of the longest log if that is less, are each tried with models of
-    second order. Those beyond `LONG_DEAD_TIME` are looked for by correlation of the output with the filtered input, and
-    refined by fits.
+    Dead times up to `long_dead_time` are each tried with models of second order. Those beyond are looked for by
+    correlation of the output with the filtered input, and refined by fits.
 
     Parameters
     ----------
@@ -54,7 +53,7 @@ def estimate_delays(data: Channels, longest: int | None = None) -> tuple[int, ..
     """
     m = len(data.inputs)
     longest = data.told // LONGEST_SHARE if longest is None else min(longest, data.told // LONGEST_SHARE)
-    most = min(longest, LONG_DEAD_TIME, data.longest // 20)
+    most = min(longest, long_dead_time(data.longest))
     delays = [1] * m
     for index in range(m):
         costs: list[float] = []
@@ -63,27 +62,26 @@ def estimate_delays(data: Channels, longest: int | None = None) -> tuple[int, ..
             costs.append(quick_fit(Form(2, (2,) * m, tried), data))
         least = min(costs)
         delays[index] = next(k for k, cost in enumerate(costs) if cost <= NEARLY * least)
-        delays[index] = _longer(data, index, delays, longest)
+        delays[index] = _longer(data, index, delays, most, longest)
     return tuple(delays)
 
 
-def _longer(data: Channels, index: int, delays: Sequence[int], most: int) -> int:
+def _longer(data: Channels, index: int, delays: Sequence[int], tried: int, most: int) -> int:
     """Return the dead time of one input beyond those tried if it leaves clearly less, else the given one."""
-    longest = LONG_DEAD_TIME
-    if most <= longest:
+    if most <= tried:
         return delays[index]
     left = _unexplained(data, index, delays, most)
-    far = left[longest + 1 :]
-    if not far.min() < CLEARLY * left[: longest + 1].min():
+    far = left[tried + 1 :]
+    if not far.min() < CLEARLY * left[: tried + 1].min():
         return delays[index]
     # inputs that repeat themselves, or come back with the other sign, explain as much one turn later
-    first = longest + 1 + int(np.argmax(far <= NEARLY * far.min()))
+    first = tried + 1 + int(np.argmax(far <= NEARLY * far.min()))
     m, costs = len(data.inputs), dict[int, float]()
 
     def cost(delay: int) -> float:
         if delay not in costs:
-            tried = tuple(delay if k == index else one for k, one in enumerate(delays))
-            costs[delay] = fit_linear(Form(ORDER, (ORDER,) * m, tried), data, least_gain=NEAR).cost
+            late = tuple(delay if k == index else one for k, one in enumerate(delays))
+            costs[delay] = fit_linear(Form(ORDER, (ORDER,) * m, late), data, least_gain=NEAR).cost
         return costs[delay]
 
     def shortest() -> int:
@@ -94,7 +92,7 @@ def _longer(data: Channels, index: int, delays: Sequence[int], most: int) -> int
     cost(first)
     while step:
         for delay in (centre - step, centre + step):
-            cost(int(np.clip(delay, longest + 1, most)))
+            cost(int(np.clip(delay, tried + 1, most)))
         # a dead time that is too long cannot be made up for by poles, one that is too short can
         moved, centre = centre, shortest()
         step = step // 2 if centre == moved else step
@@ -111,7 +109,7 @@ def _unexplained(data: Channels, index: int, delays: Sequence[int], most: int) -
     least = np.full(most + 1, np.inf)
     others = [k for k in range(len(delays)) if k != index]
     for f in _denominators(data.told // LONGEST_SHARE):
-        crossed, own, told = np.zeros(most + 2), np.zeros(2), 0.0
+        crossed, power, beside, told = np.zeros(most + 2), np.zeros(most + 2), np.zeros(most + 1), 0.0
         for u, y in zip(data.u, data.y, strict=True):
             n = y.size
             rows = np.zeros((u.shape[1] + 1, n))
@@ -128,16 +126,38 @@ def _unexplained(data: Channels, index: int, delays: Sequence[int], most: int) -
             output = np.where(known, y - columns @ values, 0.0)
             told += float(output @ output)
             size = 2 ** int(np.ceil(np.log2(n + most + 2)))
-            driven = np.fft.rfft(rows[index] - rows[index].mean(), size)
-            crossed += np.fft.irfft(np.fft.rfft(output, size) * driven.conj(), size)[: most + 2]
-            own += np.fft.irfft(np.abs(driven) ** 2, size)[:2]
-        now, later = crossed[:-1], crossed[1:]
-        apart = own[0] ** 2 - own[1] ** 2
-        gained = now**2 / max(own[0], 1e-300)
-        if apart > 1e-6 * own[0] ** 2:  # beyond, two neighbouring samples of the input are one but for rounding
-            gained = (own[0] * (now**2 + later**2) - 2.0 * own[1] * now * later) / apart
-        least = np.minimum(least, np.maximum(told - gained, 0.0))
+            driven = rows[index] - rows[index].mean()
+            crossed += _met(output, driven, size)[: most + 2]
+            # what an input does where the output is missing tells nothing; behind the log's end all is taken to be there
+            there = np.concatenate([known, np.ones(size - n)])
+            power += _met(there, driven**2, size)[: most + 2]
+            beside[:] += _met(there[1:], driven[1:] * driven[:-1], size)[: most + 1]
+        least = np.minimum(least, np.maximum(told - _gained(crossed, power, beside), 0.0))
     return least
+
+
+def _met(later: Array, series: Array, size: int) -> Array:
+    """Return the sum of products of one series with another one so many samples before it, by FFT of a size."""
+    return np.fft.irfft(np.fft.rfft(later, size) * np.fft.rfft(series, size).conj(), size)
+
+
+def _gained(crossed: Array, power: Array, beside: Array) -> Array:
+    """Return what two coefficients explain behind each dead time, shape (most + 1,).
+
+    Parameters
+    ----------
+    crossed, power : ndarray, shape (most + 2,)
+        Products of the output with the input so many samples before, and the input's own squares, summed.
+    beside : ndarray, shape (most + 1,)
+        Products of two neighbouring samples of the input, likewise.
+    """
+    (now, later), (one, other) = ((x[:-1], x[1:]) for x in (crossed, power))
+    alone = now**2 / np.maximum(one, 1e-300)
+    apart = one * other - beside**2
+    # otherwise two neighbouring samples of the input are one but for rounding
+    both = apart > 1e-6 * one * other
+    together = (other * now**2 + one * later**2 - 2.0 * beside * now * later) / np.where(both, apart, 1.0)
+    return np.where(both, together, alone)
 
 
 def _denominators(longest: int) -> Iterator[Array]:

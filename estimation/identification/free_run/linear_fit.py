@@ -11,7 +11,7 @@ from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.lagged_columns import columns_of
 from estimation.identification.free_run.least_squares import least_squares
 from estimation.identification.free_run.linear_kernel import decay_rows, longest_pole
-from estimation.identification.free_run.linear_problem import LONG_DEAD_TIME, Form, LinearFit, Problem
+from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem, long_dead_time
 from estimation.identification.search.criterion import Structure, held_within
 from estimation.identification.search.experiments import Experiments
 
@@ -125,7 +125,7 @@ def _searched(problem: Problem) -> list[Array]:
         u = np.concatenate([inputs[part, index] for part in parts])
         pair = Experiments(u, np.where(used, y, 0.0), used, bounds)
         structure = Structure(size, form.order, delay)
-        if delay > LONG_DEAD_TIME and pair.goes_on_behind(delay + form.order):
+        if delay > long_dead_time(data.longest) and pair.goes_on_behind(delay + form.order):
             pair, structure = pair.advanced(delay), Structure(size, form.order)
         # what is found there is a start: the best after a few steps goes on alone
         begun = screened(structure, pair)[0][1]

@@ -16,9 +16,21 @@ from estimation.identification.search.reflections import stable_step
 TOLERANCE, MOST_STEPS = 1e-9, 80
 """Share of the cost that a further step may promise at the end, and evaluations at most."""
 
-LONG_DEAD_TIME = 20
-"""Dead time beyond which the outputs before the first answer are left out of a fit; of a shorter one the free initial
-state and the input's first value tell nearly all of them [samples]."""
+LONG_DEAD_TIME, LONG_SHARE = 20, 20
+"""Dead time beyond which the outputs before the first answer are left out of a fit, and the part of a log beyond which
+they are too if that is less: of a shorter one the free initial state and the input's first value tell nearly all of
+them [samples, one of so many parts]."""
+
+
+def long_dead_time(length: int) -> int:
+    """Return the longest dead time that is still a short one in a log of some length, both in samples.
+
+    Examples
+    --------
+    >>> long_dead_time(1000), long_dead_time(200)
+    (20, 10)
+    """
+    return min(LONG_DEAD_TIME, length // LONG_SHARE)
 
 
 def unanswered(dead_time: int, length: int) -> int:
@@ -36,10 +48,10 @@ def unanswered(dead_time: int, length: int) -> int:
 
     Examples
     --------
-    >>> unanswered(5, 1000), unanswered(80, 1000), unanswered(80, 60)
-    (0, 80, 60)
+    >>> unanswered(12, 1000), unanswered(80, 1000), unanswered(12, 200), unanswered(80, 60)
+    (0, 80, 12, 60)
     """
-    return min(dead_time, length) if dead_time > LONG_DEAD_TIME else 0
+    return min(dead_time, length) if dead_time > long_dead_time(length) else 0
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,8 @@ class StateSpaceDynamics(OutputErrorDynamics):
     def run(self, u: Array, y: Array) -> Array:
         """Return the free run, its initial state by least squares of the outputs that are there.
 
-        Where there are too few of them it begins at rest under the first inputs.
+        It begins at rest under the first inputs. Where there are enough outputs, the state is theirs from the first one
+        on that answers the log's inputs.
 
         Parameters
         ----------
@@ -70,10 +71,10 @@ class StateSpaceDynamics(OutputErrorDynamics):
         out = states @ one.c[self.place] + late @ one.d[self.place] + self.level
         if np.count_nonzero(known) <= n:
             return out
-        free = np.empty((len(u), n))
+        free, begin = np.zeros((len(u), n)), self.unanswered(len(u))
         for k in range(n):
-            run_states(a, quiet, np.eye(n)[k], states)
-            free[:, k] = states @ one.c[self.place]
+            run_states(a, quiet[begin:], np.eye(n)[k], states[begin:])
+            free[begin:, k] = states[begin:] @ one.c[self.place]
         return out + free @ np.linalg.lstsq(free[known], (y - out)[known], rcond=1e-10)[0]
 
     def transfer_functions(self) -> list[tuple[Array, Array]]:

@@ -24,17 +24,21 @@ class Joint:
         Inputs of each log, no gaps.
     y : tuple of ndarray, shape (n, p)
         Outputs of each log; NaN where missing.
+    begins : tuple of int
+        From which of its samples on each log is run; from its first unless told [samples].
     """
 
     sample_time: float
     u: tuple[Array, ...]
     y: tuple[Array, ...]
+    begins: tuple[int, ...] = ()
 
     @property
     def slices(self) -> list[slice]:
-        """Where each log stands."""
+        """Where each log is run."""
         ends = np.cumsum([0, *(len(one) for one in self.u)])
-        return [slice(int(a), int(b)) for a, b in pairwise(ends)]
+        begins = self.begins or (0,) * len(self.u)
+        return [slice(int(a) + begin, int(b)) for (a, b), begin in zip(pairwise(ends), begins, strict=True)]
 
     @property
     def n_samples(self) -> int:
@@ -54,7 +58,8 @@ class Joint:
     def delayed(self, delays: Sequence[int]) -> "Joint":
         """Return the same with inputs that come some samples later; before the log they stood at their first values.
 
-        Outputs that a long dead time leaves to inputs from before the log are held back.
+        Outputs that a long dead time leaves to inputs from before the log are held back, and the log is run behind them:
+        of an initial state at its first sample, what has decayed by then could not be fitted.
 
         Parameters
         ----------
@@ -62,10 +67,10 @@ class Joint:
             Of each input [samples].
         """
         late = replace(self, u=tuple(delayed(u, delays) for u in self.u))
-        begins = [unanswered(max(delays), len(u)) for u in self.u]
+        begins = tuple(unanswered(max(delays), len(u)) for u in self.u)
         if not any(begins):
             return late
-        return late.without([np.arange(len(u)) < begin for u, begin in zip(self.u, begins, strict=True)])
+        return replace(late, begins=begins).without([np.arange(len(u)) < begin for u, begin in zip(self.u, begins, strict=True)])
 
 
 def delayed(u: Array, delays: Sequence[int]) -> Array:

@@ -17,9 +17,11 @@ def run_states(a: Array, pushed: Array, start: Array, out: Array) -> None:
     start : ndarray, shape (n,)
         State at the first sample.
     out : ndarray, shape (samples, n)
-        Room for the states.
+        Room for the states; there may be none.
     """
     n = start.size
+    if out.shape[0] == 0:
+        return
     for i in range(n):
         out[0, i] = start[i]
     for t in range(1, out.shape[0]):

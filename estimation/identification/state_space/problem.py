@@ -47,7 +47,7 @@ class Values:
     level : ndarray, shape (p,)
         Output where states and inputs are zero [scaled].
     starts : ndarray, shape (logs, n)
-        First states, scaled.
+        States where each log's run begins, scaled.
     """
 
     a: Array
@@ -86,8 +86,8 @@ class Problem:
         return np.concatenate([v.a.ravel(), v.b.ravel(), v.c.ravel(), *feed, v.level, v.starts.ravel()])
 
     def states(self, v: Values) -> Array:
-        """Return the states, shape (samples, n)."""
-        out = np.empty((len(self.u), self.size.n))
+        """Return the states, shape (samples, n); zero before a log's run begins."""
+        out = np.zeros((len(self.u), self.size.n))
         pushed = np.ascontiguousarray(self.u @ v.b.T)
         for part, start in zip(self.data.slices, v.starts, strict=True):
             run_states(np.ascontiguousarray(v.a), pushed[part], np.ascontiguousarray(start), out[part])
@@ -100,7 +100,7 @@ class Problem:
     def _answers(self, a: Array, c: Array, source: Array) -> Array:
         """Return the outputs where a series pushes each state in turn, shape (p, samples, n)."""
         n, p = self.size.n, self.size.p
-        out = np.empty((len(source), p * n))
+        out = np.zeros((len(source), p * n))
         for part in self.data.slices:
             answers(a, c, np.ascontiguousarray(source[part]), np.zeros((n, 2 * n)), out[part])
         return out.reshape(-1, p, n).transpose(1, 0, 2)

@@ -26,7 +26,8 @@ def subspace_starts(data: Joint, order: int) -> list[tuple[Array, Array]]:
         Transition and outputs.
     """
     p, m = data.y[0].shape[1], data.u[0].shape[1]
-    logs = [(u, y) for u, y in zip(data.u, data.y, strict=True) if np.isfinite(y).any(axis=0).all()]
+    inputs, outputs = np.concatenate(data.u), np.concatenate(data.y)
+    logs = [(inputs[part], outputs[part]) for part in data.slices if np.isfinite(outputs[part]).any(axis=0).all()]
     inputs, whole = [u for u, _ in logs], [np.column_stack([bridged(column) for column in y.T]) for _, y in logs]
     found: list[tuple[Array, Array]] = []
     for rows in sorted({max(one, order // p + 2) for one in HORIZONS}):

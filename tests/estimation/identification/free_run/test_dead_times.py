@@ -10,7 +10,9 @@ from estimation.identification.free_run.dead_times import estimate_delays
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form, Problem
+from estimation.identification.state_space.fit import fit_state_space
 from estimation.identification.state_space.joint import Joint, joined
+from estimation.identification.state_space.problem import Size
 from estimation.identification.state_space.starts import subspace_starts
 
 NOISE = 0.02
@@ -32,6 +34,22 @@ def late_plant(delay: int, count: int = 700, seed: int = 0, held: int = 9) -> Ch
 def test_a_dead_time_beyond_those_tried_one_by_one_is_found(delay: int) -> None:
     (found,) = estimate_delays(scaled(late_plant(delay))[0])
     assert delay - 5 <= found <= delay + 1
+
+
+def test_a_dead_time_beyond_a_twentieth_of_a_short_log_is_found_and_left_out() -> None:
+    data = late_plant(18, 200, seed=1, held=5)
+    (found,) = estimate_delays(scaled(data)[0])
+    assert 16 <= found <= 19
+    fit = fit_linear(Form(2, (1,), (18,)), scaled(data)[0])
+    assert fit.cost / 200 == pytest.approx(NOISE**2, rel=0.15)
+
+
+def test_a_dead_time_is_found_where_nearly_half_of_the_outputs_are_missing() -> None:
+    data = late_plant(80)
+    y = data.y[0].copy()
+    y[80:400] = np.nan
+    (found,) = estimate_delays(scaled(replace(data, y=(y,)))[0])
+    assert 75 <= found <= 81
 
 
 def test_each_of_two_inputs_has_its_dead_time() -> None:
@@ -96,6 +114,9 @@ def test_the_default_finds_a_dead_time_of_eighty_samples_and_judges_what_is_answ
 
 def test_a_state_space_is_not_fitted_to_outputs_that_answer_inputs_from_before_the_log() -> None:
     late = joined([scaled(late_plant(80))[0]]).delayed((79,))
+    assert late.slices == [slice(79, 700)]
+    fit = fit_state_space(Size(2, 1, 1, direct=False), late)
+    assert np.sqrt(fit.noise[0, 0]) == pytest.approx(NOISE, rel=0.1)
     assert np.isnan(late.y[0][:79]).all()
     assert np.isfinite(late.y[0][79:]).all()
     assert np.isfinite(joined([scaled(late_plant(80))[0]]).delayed((20,)).y[0]).all()
