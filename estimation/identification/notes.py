@@ -88,4 +88,16 @@ class IdentificationCode(Code):
         "the inputs explain {output!r} no better than the same inputs in a shuffled order: the output drifts by itself,"
         " and a slow model imitates the drift; do not rely on the model"
     )
+    OUTLIERS = (
+        "{count} of {total} samples of {output!r} stand out from their neighbours and decide what is fitted: if the "
+        "sensor is at fault there, leave their cells empty and identify again"
+    )
+    INPUTS_ALIKE = (
+        "input {channel!r} is a linear function of {others}: the log does not tell their effects apart, so how the "
+        "gain is shared between them means nothing; leave one out, or log inputs that differ"
+    )
+    NOTHING_ANSWERED = (
+        "no log is longer than the dead time of the model of {output!r} ({longest} samples in the longest): all its "
+        "outputs answer inputs from before the log, so it has no fit"
+    )
     NO_FIT = "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): do not rely on it"

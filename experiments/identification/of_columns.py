@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -176,7 +177,7 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
             str(result["n_values"]),
             f"{result['fit_percent']:.2f}",
             f"{result['held_back_percent']:.2f}",
-            "-" if test is None else f"{test['fit_percent']:.2f}",
+            "-" if test is None or isnan(test["fit_percent"]) else f"{test['fit_percent']:.2f}",
             f"{result['rmse']:.4g}",
             _gains(result["dc_gain"]),
         )

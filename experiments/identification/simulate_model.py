@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -54,11 +55,15 @@ def simulate_model(logs: Sequence[Path], path: Path, fit: "ColumnFit", *, as_jso
             results.append({"inputs": list(inputs), "output": outputs[index], "structure": model.structure, **quality})
             if log in simulated:
                 write_simulated(model, data, own_paths(simulated[log], outputs)[outputs[index]])
-        message = clauses([f"{one['output']}: fit {one['fit_percent']:.1f} % running free" for one in results])
+        message = clauses([_said(one["output"], one["fit_percent"]) for one in results])
         return {"outcome": "ok", **results[0], "outputs": results, "model_file": str(path), "message": message}
 
     blank: Result = {**dict.fromkeys(("inputs", "output", "structure", "fit_percent", "rmse")), "outputs": []}
     finish(run_logs(logs, work, blank, "simulating"), _simulated_screen, as_json=as_json, out=out)
+
+
+def _said(output: str, fit: float) -> str:
+    return f"{output}: no fit" if isnan(fit) else f"{output}: fit {fit:.1f} % running free"
 
 
 def _models_of(models: "Sequence[FreeRunModel]", outputs: Sequence[str]) -> "list[FreeRunModel]":
@@ -131,6 +136,7 @@ def quality_of(model: "FreeRunModel", data: "Channels") -> dict[str, Any]:
 def _simulated_screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     shown = table("log", "output", "fit [%]", "rms error", "one step [%]")
     for log, one in ((str(result["file"]), one) for result in results for one in result["outputs"]):
-        numbers = (f"{one['fit_percent']:.2f}", f"{one['rmse']:.4g}", f"{one['one_step_percent']:.2f}")
-        shown.add_row(log, one["output"], *numbers)
+        numbers = (one["fit_percent"], one["rmse"], one["one_step_percent"])
+        texts = (f"{value:{how}}" for value, how in zip(numbers, (".2f", ".4g", ".2f"), strict=True))
+        shown.add_row(log, one["output"], *("-" if text == "nan" else text for text in texts))
     yield shown

@@ -128,7 +128,7 @@ def _unexplained(data: Channels, index: int, delays: Sequence[int], most: int) -
             size = 2 ** int(np.ceil(np.log2(n + most + 2)))
             driven = rows[index] - rows[index].mean()
             crossed += _met(output, driven, size)[: most + 2]
-            # what an input does where the output is missing tells nothing; behind the log's end all is taken to be there
+            # what an input does where the output is missing tells nothing; beyond the log's end none is missing
             there = np.concatenate([known, np.ones(size - n)])
             power += _met(there, driven**2, size)[: most + 2]
             beside[:] += _met(there[1:], driven[1:] * driven[:-1], size)[: most + 1]

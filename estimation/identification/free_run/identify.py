@@ -42,6 +42,7 @@ from estimation.identification.free_run.data import (
     section,
 )
 from estimation.identification.free_run.dense_polynomial import Asked
+from estimation.identification.free_run.doubtful_channels import inputs_alike, outputs_that_stand_out
 from estimation.identification.free_run.fallback import Fallback
 from estimation.identification.free_run.fewer_samples import on_fewer
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
@@ -69,6 +70,8 @@ WARNED = (
     IdentificationCode.SLOWER_THAN_PERIOD,
     IdentificationCode.SIGN_NOT_MEASURED,
     IdentificationCode.FEEDBACK,
+    IdentificationCode.INPUTS_ALIKE,
+    IdentificationCode.OUTLIERS,
 )
 """Notes that are raised as warnings too; the others say only what was passed over."""
 
@@ -81,6 +84,9 @@ model is fitted at the end."""
 
 SIGNLESS = 0.5
 """Share of the linear model's held-back error that a model without a sign may leave: signs that are told are many."""
+
+ROUNDING = 1e-9
+"""Held-back error of a linear model below which nothing is left but rounding: no bend is looked for [dimensionless]."""
 
 CLEAR_MARGIN = 0.15
 """Share by which a nonlinear model must do better than the linear one on what was held back."""
@@ -155,6 +161,7 @@ def identify_channels(
     require_room(data, order, delay, n_numerator)
     with threadpool_limits(limits=1, user_api="blas"):
         found = _identified(data, structure, order, delay, n_numerator)
+    found = replace(found, notes=(*found.notes, *inputs_alike(data), *outputs_that_stand_out(found.model, data)))
     for note in found.notes:
         if note.code in WARNED:
             warnings.warn(LogWarning(note), stacklevel=2)
@@ -176,6 +183,8 @@ def _identified(
     sound = related and not best.doubt
     if structure in ADOPTED:
         return _adopted(structure, best, data, by, rows, [] if related else notes)
+    if structure == "auto" and best.held_back < ROUNDING:
+        structure = "output-error"
     asked = Asked(order, delay, n_numerator)
     if structure in ("output-error", "auto", "wiener"):
         signless = _without_sign(section(whole, MOST_COMPARED), by, asked, best, rows, surely=structure != "wiener")

@@ -103,6 +103,8 @@ def doubts_about_inputs(
     Returns
     -------
     list of Note
-        That a linear model stands in; else one on each input beyond its range.
+        That no log is longer than the dead time, or a linear model stands in; else one on each input beyond its range.
     """
+    if all(model.dynamics.unanswered(y.size) == y.size for y in data.y):
+        return [IdentificationCode.NOTHING_ANSWERED.note(output=data.output, longest=data.longest)]
     return linear_instead(model, data, judged) or inputs_beyond(model, data)

@@ -315,10 +315,12 @@ class FreeRunModel:
 
 
 def _fit(measured: Array, found: Array, *, running: bool) -> tuple[float, float]:
-    """Return fit [%] and root-mean-square error; a free run that ran away has none."""
+    """Return fit [%] and root-mean-square error; NaN of no samples, and a free run that ran away has none."""
     known = np.isfinite(measured) & (np.isfinite(found) | running)
     left = (measured - found)[known]
-    if left.size == 0 or not np.isfinite(left).all():
+    if left.size == 0:
+        return float("nan"), float("nan")
+    if not np.isfinite(left).all():
         return float("-inf"), float("inf")
     spread = measured[known] - measured[known].mean()
     power = float(spread @ spread)

@@ -58,8 +58,8 @@ class Joint:
     def delayed(self, delays: Sequence[int]) -> "Joint":
         """Return the same with inputs that come some samples later; before the log they stood at their first values.
 
-        Outputs that a long dead time leaves to inputs from before the log are held back, and the log is run behind them:
-        of an initial state at its first sample, what has decayed by then could not be fitted.
+        Outputs that a long dead time leaves to inputs from before the log are held back, and the log is run behind
+        them: of an initial state at its first sample, what has decayed by then could not be fitted.
 
         Parameters
         ----------
@@ -70,7 +70,8 @@ class Joint:
         begins = tuple(unanswered(max(delays), len(u)) for u in self.u)
         if not any(begins):
             return late
-        return replace(late, begins=begins).without([np.arange(len(u)) < begin for u, begin in zip(self.u, begins, strict=True)])
+        held = [np.arange(len(u)) < begin for u, begin in zip(self.u, begins, strict=True)]
+        return replace(late, begins=begins).without(held)
 
 
 def delayed(u: Array, delays: Sequence[int]) -> Array:

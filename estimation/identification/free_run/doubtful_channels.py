@@ -1,0 +1,68 @@
+"""What is doubtful in channels themselves: inputs that are alike, and outputs that stand out from their neighbours."""
+
+import numpy as np
+
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.notes import IdentificationCode
+from estimation.log_checks.outliers import without_outliers
+from plant.notes import Note
+
+ALIKE = 1e-10
+"""Share of an input's variance that other inputs may leave of it for it to be their linear function: far above what
+rounding leaves, and far below the noise of any sensor or converter [fraction]."""
+
+MOST_OF_IT = 0.5
+"""Share of a model's squared error above which a few outputs decide what is fitted, and not the others [fraction]."""
+
+
+def inputs_alike(data: Channels) -> list[Note]:
+    """Return a note on each input that is a linear function of those before it.
+
+    Parameters
+    ----------
+    data : Channels
+        In any scale.
+    """
+    together = np.concatenate(data.u)
+    scaled = (together - together.mean(axis=0)) / together.std(axis=0)
+    notes: list[Note] = []
+    for k in range(1, len(data.inputs)):
+        before, own = scaled[:, :k], scaled[:, k]
+        shares = np.linalg.lstsq(before, own, rcond=1e-6)[0]
+        if np.mean((own - before @ shares) ** 2) < ALIKE:
+            others = [repr(name) for name, share in zip(data.inputs, shares, strict=False) if abs(share) > ALIKE**0.5]
+            said = IdentificationCode.INPUTS_ALIKE.note(channel=data.inputs[k], others=" and ".join(others))
+            notes.append(said)
+    return notes
+
+
+def outputs_that_stand_out(model: FreeRunModel, data: Channels) -> list[Note]:
+    """Return a note if a few outputs that stand out from their neighbours decide what is fitted.
+
+    They hold most of the model's error, or have taken it farther from the others than their mean is. Outputs that stand
+    out because the inputs drive them are followed by the model, and take it from no others.
+
+    Parameters
+    ----------
+    model : FreeRunModel
+        Fitted to the logs.
+    data : Channels
+        In units of the channels.
+
+    Returns
+    -------
+    list of Note
+        One at most.
+    """
+    y, sound = np.concatenate(data.y), np.concatenate([without_outliers(one) for one in data.y])
+    outside = np.isfinite(y) & np.isnan(sound)
+    count = int(np.count_nonzero(outside))
+    if not count:
+        return []
+    left = np.concatenate([model.simulate(u, one) for u, one in zip(data.u, data.y, strict=True)]) - y
+    theirs, others = float(np.sum(left[outside] ** 2)), float(np.nansum(left[~outside] ** 2))
+    spread = float(np.nansum((sound - np.nanmean(sound)) ** 2))
+    if not theirs > MOST_OF_IT * (theirs + others) and not others > spread:
+        return []
+    return [IdentificationCode.OUTLIERS.note(output=data.output, count=count, total=data.n_samples)]

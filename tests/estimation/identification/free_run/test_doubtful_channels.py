@@ -1,0 +1,75 @@
+"""Channels that are doubtful in themselves are told: inputs that are alike, outputs that stand out."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.identification.free_run.data import Channels, channels_from
+from estimation.identification.free_run.doubtful_channels import inputs_alike, outputs_that_stand_out
+from estimation.identification.free_run.identify import identify_channels
+from estimation.identification.free_run.input_range import doubts_about_inputs
+from estimation.identification.free_run.model import FreeRunModel
+
+DELAY = 30
+
+
+def channels(count: int = 400, seed: int = 0) -> Channels:
+    rng = np.random.default_rng(seed)
+    u = rng.normal(size=count)
+    y = np.concatenate([np.zeros(DELAY), u[:-DELAY]]) + 0.05 * rng.normal(size=count)
+    return channels_from([u[:, None]], [y], 1e-3, ["valve"], "flow")
+
+
+@pytest.fixture(scope="module")
+def model() -> FreeRunModel:
+    return identify_channels(channels(), order=1, delay=DELAY).model
+
+
+def test_an_input_that_follows_others_exactly_is_told_and_one_with_noise_is_not() -> None:
+    u = np.random.default_rng(0).normal(size=(300, 3))
+    names = ("a", "b", "sum")
+
+    def told(third: np.ndarray) -> list[tuple[object, object]]:
+        data = Channels(names, "y", 1.0, (np.column_stack([u[:, :2], third]),), (u[:, 0],))
+        return [(note.data["channel"], note.data["others"]) for note in inputs_alike(data)]
+
+    assert told(u[:, 0] - 2.0 * u[:, 1] + 5.0) == [("sum", "'a' and 'b'")]
+    assert told(3.0 * u[:, 1]) == [("sum", "'b'")]
+    assert told(u[:, 0] + 1e-3 * u[:, 2]) == []
+
+
+@pytest.mark.parametrize("size", [30.0, 1e6])
+def test_outputs_that_stand_out_and_decide_the_fit_are_told(size: float) -> None:
+    data = channels()
+    y = data.y[0].copy()
+    y[[50, 200, 310]] += size
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # how much else is wrong with such a fit is told too
+        found = identify_channels(replace(data, y=(y,)), order=1, delay=DELAY)
+    assert [note.data["count"] for note in found.notes if note.code == "outliers"] == [3]
+
+
+def test_peaks_that_the_input_drives_are_no_outliers(model: FreeRunModel) -> None:
+    data = channels()
+    u = 0.01 * data.u[0]
+    u[[50, 200, 310]] = 40.0
+    y = model.simulate(u) + 0.01 * data.y[0]
+    assert outputs_that_stand_out(model, replace(data, u=(u,), y=(y,))) == []
+
+
+def test_a_log_no_longer_than_the_dead_time_has_no_fit_and_says_why(model: FreeRunModel) -> None:
+    brief = channels(DELAY + 1)
+    brief = replace(brief, u=(brief.u[0][:DELAY],), y=(brief.y[0][:DELAY],))
+    assert np.isnan(model.quality(brief.u, brief.y).fit_percent)
+    assert [note.code for note in doubts_about_inputs(model, brief)] == ["nothing_answered"]
+    assert doubts_about_inputs(model, channels()) == []
+
+
+def test_an_output_that_is_its_input_is_identified_as_that() -> None:
+    u = np.repeat([1.0, -1.0, 1.0, 1.0, -1.0], 60)
+    found = identify_channels(channels_from([u[:, None]], [u], 1.0, ["u"], "y"), structure="auto")
+    assert found.sound
+    assert found.model.structure == "output-error"
+    assert found.quality.fit_percent == pytest.approx(100.0)
