@@ -134,11 +134,11 @@ def pages_sentence(written: Sequence[Path]) -> str:
     >>> pages_sentence([Path("page.html")])
     'written: page.html; open it in a browser'
     >>> pages_sentence([Path("page-a.html"), Path("page-b.html")])
-    'written: page-a.html to page-b.html, 2 pages, one a log; open them in a browser'
+    'written: page-a.html to page-b.html, 2 pages; open them in a browser'
     """
     if len(written) == 1:
         return f"written: {written[0]}; open it in a browser"
-    return f"written: {written[0]} to {written[-1]}, {len(written)} pages, one a log; open them in a browser"
+    return f"written: {written[0]} to {written[-1]}, {len(written)} pages; open them in a browser"
 
 
 def _labels(owners: Sequence[Owner]) -> list[str]:
