@@ -56,6 +56,9 @@ class LinearDynamics(OutputErrorDynamics):
     def run(self, u: Array, y: Array) -> Array:
         """Return the free run, its initial state by least squares of the outputs that are there.
 
+        Behind a long dead time it begins with the first output that answers the log's inputs; that one stands for those
+        before it too.
+
         Parameters
         ----------
         u : ndarray, shape (n, m)
@@ -74,8 +77,10 @@ class LinearDynamics(OutputErrorDynamics):
         known = np.isfinite(y)
         if np.count_nonzero(known) <= form.order:
             return driven
-        free = columns[:, n_b + 1 :]
-        return driven + free @ np.linalg.lstsq(free[known], (y - driven)[known], rcond=None)[0]
+        free, begin = columns[:, n_b + 1 :], self.unanswered(y.size)
+        run = driven + free @ np.linalg.lstsq(free[known], (y - driven)[known], rcond=None)[0]
+        run[:begin] = run[begin : begin + 1] if begin < y.size else driven
+        return run
 
     def to_dict(self) -> dict[str, Any]:
         """Return JSON values."""

@@ -48,8 +48,8 @@ class StateSpaceDynamics(OutputErrorDynamics):
     def run(self, u: Array, y: Array) -> Array:
         """Return the free run, its initial state by least squares of the outputs that are there.
 
-        It begins at rest under the first inputs. Where there are enough outputs, the state is theirs from the first one
-        on that answers the log's inputs.
+        Where there are too few of them it begins at rest under the first inputs. Behind a long dead time it begins with
+        the first output that answers the log's inputs; that one stands for those before it too.
 
         Parameters
         ----------
@@ -75,7 +75,9 @@ class StateSpaceDynamics(OutputErrorDynamics):
         for k in range(n):
             run_states(a, quiet[begin:], np.eye(n)[k], states[begin:])
             free[begin:, k] = states[begin:] @ one.c[self.place]
-        return out + free @ np.linalg.lstsq(free[known], (y - out)[known], rcond=1e-10)[0]
+        run = out + free @ np.linalg.lstsq(free[known], (y - out)[known], rcond=1e-10)[0]
+        run[:begin] = run[begin : begin + 1] if begin < len(u) else out
+        return run
 
     def transfer_functions(self) -> list[tuple[Array, Array]]:
         """Return numerator and denominator from each input [scaled], in powers of the delay operator."""

@@ -8,6 +8,7 @@ import pytest
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.dead_times import estimate_delays
 from estimation.identification.free_run.identify import identify_channels
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form, Problem
 from estimation.identification.state_space.fit import fit_state_space
@@ -110,6 +111,17 @@ def test_the_default_finds_a_dead_time_of_eighty_samples_and_judges_what_is_answ
     assert 75 <= np.flatnonzero(numerator)[0] <= 81
     assert found.quality.fit_percent == pytest.approx(98.0, abs=0.5)
     assert found.held_back_percent == pytest.approx(98.0, abs=0.5)
+
+
+def test_a_run_stays_where_it_begins_before_its_first_answer() -> None:
+    # an integrator that has long been under its first input is nowhere
+    form = Form(2, (1,), (13,))
+    dynamics = LinearDynamics(form, np.array([0.3, -1.69999999, 0.699999993, 0.0]))
+    u = np.random.default_rng(0).normal(1.0, 1.0, 220)
+    y = 3.0 + np.concatenate([np.zeros(13), np.cumsum(u[:-13])])
+    run = dynamics.run(u[:, None], y)
+    assert np.abs(run - y).max() < 5.0 * np.std(y)
+    assert np.ptp(run[:14]) == 0.0
 
 
 def test_a_state_space_is_not_fitted_to_outputs_that_answer_inputs_from_before_the_log() -> None:
