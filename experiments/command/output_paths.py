@@ -115,10 +115,26 @@ def page_place(report: Path | None) -> Path | None:
     require_place("--report", report)
     if report is None:
         return None
-    if report.suffix.lower() not in PAGES:
-        print_it = "; a browser prints the page as PDF" if report.suffix.lower() == ".pdf" else ""
-        raise HydrostateError(f"--report must end in .html, got {report.name!r}{print_it}")
-    return report.with_suffix(".html")
+    return with_page_ending("--report", report)
+
+
+def with_page_ending(what: str, page: Path) -> Path:
+    """Return the name of a page with the ending ``.html``, whatever is given.
+
+    Parameters
+    ----------
+    what : str
+        What the reader called it, such as ``--report``.
+
+    Raises
+    ------
+    HydrostateError
+        If it ends as no page does.
+    """
+    if page.suffix.lower() not in PAGES:
+        print_it = "; a browser prints the page as PDF" if page.suffix.lower() == ".pdf" else ""
+        raise HydrostateError(f"{what} must end in .html, got {page.name!r}{print_it}")
+    return page.with_suffix(".html")
 
 
 def pages_sentence(written: Sequence[Path]) -> str:

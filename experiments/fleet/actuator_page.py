@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -20,7 +22,7 @@ from experiments.page.render import render_page
 from experiments.page.sentences import whole_dates
 from experiments.page.tables import Cell, Column
 from faults.trend.kalman import moments, predict, settings
-from faults.trend.trend import FEWEST
+from faults.trend.trend import FEWEST, trends
 from plant.arrays import Array
 
 AHEAD, LEAST_AHEAD = 30, 5
@@ -223,8 +225,29 @@ def _link(name: str, page: str) -> Markup:
 def _course(one: Outlook, ahead: int) -> tuple[Array, Array]:
     """Return level and standard deviation after every log, and as forecast, shape (logs + ahead,) each."""
     grid, series = settings(), one.series
-    past = [trend.level for trend in one.course]
+    past = followed(one)
     coming = [moments(predict(one.trend.belief, float(step), grid), grid) for step in range(1, ahead + 1)]
     future = [(series.healthy + series.size * mean, abs(series.size) * std) for mean, std in coming]
     level, std = np.array([*past, *future]).T
     return level, std
+
+
+def followed(one: Outlook) -> list[tuple[float, float]]:
+    """Return level and standard deviation after each log, among those of its own stretch [the severity's unit].
+
+    A lasting change is told from an outlier only some logs after it, and the trend follows the level before it until
+    then. Here the last log says where stretches begin.
+
+    Returns
+    -------
+    list of tuple of float
+        One a log.
+    """
+    series, course = one.series, one.course
+    begins = sorted({trend.begin for trend in course})
+    found: list[tuple[float, float]] = []
+    for begin, end in pairwise([*begins, len(course)]):
+        part = replace(series, times=series.times[begin:end], values=series.values[begin:end], stds=series.stds[begin:end])
+        early = [trend.level for trend in trends(part)] if any(each.begin != begin for each in course[begin:end]) else []
+        found += [each.level if each.begin == begin else early[k] for k, each in enumerate(course[begin:end])]
+    return found

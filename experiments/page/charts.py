@@ -12,7 +12,7 @@ from experiments.page.numbers import number
 from experiments.page.packed import ends_of_stretches, packed, stretch_length
 from experiments.page.panels import Curve, Panel
 from experiments.page.scripting import data_block
-from experiments.page.still import still_picture
+from experiments.page.still import DAYS, still_picture
 from plant.arrays import Array
 
 MOST_DRAWN = 200_000
@@ -70,7 +70,7 @@ class Charts:
             "x": {
                 "label": self.label,
                 "log": self.log,
-                "dates": self.dates,
+                "dates": DAYS if self.dates else False,
                 **_places(np.log10(self.x) if self.log else self.x, length),
             },
             "file": self.file,

@@ -43,7 +43,7 @@ DATE_WIDE = 70.0
 """Least distance between two dates on an axis [point]."""
 
 DAYS = (1, 2, 7, 14, 28, 56, 91, 182, 365, 730, 1825, 3650)
-"""Distances between ticks of an axis of dates [day]."""
+"""Distances between ticks of an axis of dates, here and in a browser [day]."""
 
 FEW_DECADES = 2.5
 """Powers of ten below which a logarithmic axis has ticks between them too [decade]."""
@@ -147,7 +147,7 @@ def _panel(
     if label:
         yield f'<text x="{wide / 2:g}" y="{high + 25:g}" text-anchor="middle">{escape(label)}</text>'
     if len(panel.curves) >= LEGEND_FROM:
-        yield from _legend(panel.curves, wide)
+        yield from _legend([curve for curve in panel.curves if curve.look != "edge"], wide)  # captions tell bands
 
 
 def _place(at: float, axis: str, log: bool) -> float:

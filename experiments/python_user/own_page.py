@@ -26,15 +26,13 @@ def page_path(path: "str | Path") -> Path:
     """
     from os import PathLike
 
-    from experiments.command.output_paths import PAGES
+    from experiments.command.output_paths import with_page_ending
     from plant.errors import HydrostateError
 
     if not isinstance(path, str | PathLike):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         raise HydrostateError(f"the path of a page is needed, got {path!r:.80}")
     file = Path(path)
-    if file.suffix.lower() not in PAGES:
-        raise HydrostateError(f"a page's name must end in .html, got {file.name!r}")
-    return file.with_suffix(".html") if file.name and not file.suffix else file
+    return with_page_ending("the name of a page", file) if file.name else file
 
 
 def write_page(path: "str | Path", page: str) -> Path:

@@ -35,7 +35,6 @@
   const digits = (value) => (value === null || value === undefined ? "–" : Number(value.toPrecision(5)).toString());
 
   const dateOf = (day) => new Date(Math.round(864e5 * day)).toISOString().slice(0, 10); // of days since 1970-01-01
-  const DAYS = [1, 2, 7, 14, 28, 56, 91, 182, 365, 730, 1825]; // between two ticks of an axis of dates
 
   function element(tag, attributes = {}, ...children) {
     const made = document.createElement(tag);
@@ -101,7 +100,7 @@
       axes: [
         {
           ...axis, label: last ? figure.x.label : undefined, show: last, size: 34, labelSize: 20,
-          ...(figure.x.dates ? { space: 84, incrs: DAYS, values: (_, ticks) => ticks.map(dateOf) } : {}),
+          ...(figure.x.dates ? { space: 84, incrs: figure.x.dates, values: (_, ticks) => ticks.map(dateOf) } : {}),
         },
         { ...axis, size: 62 },
       ],
@@ -235,7 +234,8 @@
       act("←", figure.x.log ? "Lower" : "Earlier", () => zoom(group, 1, -0.5)),
       act("→", figure.x.log ? "Higher" : "Later", () => zoom(group, 1, 0.5)),
       button("Show all", () => reset(group)),
-      button("Download the numbers (CSV)", () => download(`${figure.file}.csv`, csvOf(x, panels))));
+      button("Download the numbers (CSV)", () => download(`${figure.file}.csv`, csvOf(x, panels))),
+      element("span", {}, "Drag across a chart to zoom, double-click to show all."));
   }
 
   function describe(panel) {

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.fleet.actuator_page import actuator_page
+from experiments.fleet.actuator_page import actuator_page, followed
 from experiments.fleet.actuators import ActuatorRow, actuator_rows
 from experiments.fleet.naming import by_pattern
 from experiments.fleet.outlook import outlook_of, read_maintenance
@@ -90,6 +90,15 @@ def test_few_logs_have_no_outlook_and_a_repair_makes_them_few() -> None:
     repaired = actuator(GROWING, maintained=(27.0,)).outlook
     assert repaired is not None
     assert repaired.words == "too few logs"
+
+
+def test_the_line_follows_a_lasting_change_from_its_first_log_on() -> None:
+    outlook = actuator([1.0] * 6 + [2.0] * 5).outlook
+    assert outlook is not None
+    assert [trend.begin for trend in outlook.course][-5:] == [0, 0, 6, 6, 6]  # two logs after it, it might be chance
+    levels = np.array(followed(outlook))[:, 0]
+    np.testing.assert_allclose(levels, [1.0] * 6 + [2.0] * 5, atol=0.15)
+    assert levels[-1] == outlook.trend.level[0]
 
 
 def test_what_is_past_its_limit_says_so() -> None:
