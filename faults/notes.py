@@ -43,7 +43,11 @@ class AgainstCode(Code):
         "at about {at_s:.1f} s the oil's bulk modulus fell to {share:.2f} of what it was before: air got in, which is "
         "none of the nine conditions"
     )
-    OUTSIDE_CONDITIONS = "the actuator that fits best is in none of the nine conditions, nor between them"
+    OUTSIDE_CONDITIONS = (
+        "the circuit that fits the log is in none of the nine conditions, nor between them: its leakage is "
+        "{leakage:.3g} and its friction {friction:.3g} (0 is none, 1 is minor, 2 is major, or more), but its {part} is "
+        "{ratio:.2g} times what goes with them"
+    )
     BETWEEN_CONDITIONS = (
         "the fault lies between the nine conditions: to the nearest quarter, leakage {leakage:.3g} and friction "
         "{friction:.3g}, where 0 is none, 1 is minor and 2 is major; a sensor with a wrong gain would look the same"

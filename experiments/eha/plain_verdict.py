@@ -43,6 +43,10 @@ WRONG_SENSORS = frozenset(
 )
 """Codes of sensors of which nothing can be used."""
 
+BESIDE = str(AgainstCode.OUTSIDE_CONDITIONS)
+SIZED = (BESIDE, str(AgainstCode.BETWEEN_CONDITIONS))
+"""Codes of logs that a circuit explains, whose leakage and friction are none of the nine conditions'."""
+
 OUTSIDE: Mapping[str, str] = {
     str(RigCode.LEAKAGE_GROWS): "Leakage grows while the actuator runs.",
     str(RigCode.PUMP_WORN): "The pump delivers less than it should: it is worn, or the rig file is wrong.",
@@ -138,14 +142,14 @@ def _named(result: Mapping[str, Any]) -> list[str]:
     words = {"leakage": "leaks more inside", "friction": "has more friction"}
     raised = [words[name] for name in _raised(result)] if not found else []
     if raised:
-        found.append(f"The actuator {' and '.join(raised)} than a healthy one, or a sensor has a wrong gain.")
+        found.append(f"The actuator {' and '.join(raised)} than a healthy one, or the rig file or a sensor is wrong.")
     return found
 
 
 def _raised(result: Mapping[str, Any]) -> dict[str, float]:
     """Return what is raised to another size than minor or major: 1 is minor, 2 is major [dimensionless]."""
-    sizes = [one["data"] for one in result["notes"] if one["code"] == str(AgainstCode.BETWEEN_CONDITIONS)]
-    return {name: size for data in sizes for name, size in data.items() if size > 0.0}
+    sizes = [one["data"] for one in result["notes"] if one["code"] in SIZED]
+    return {name: data[name] for data in sizes for name in ("leakage", "friction") if data[name] > 0.0}
 
 
 def of_another_size(result: Mapping[str, Any]) -> bool:
@@ -174,6 +178,8 @@ def sureness(result: Mapping[str, Any]) -> str:
     """
     if result["unknown"]:
         reasons = "; ".join(result["reasons"])
+        if of_another_size(result) and any(one["code"] == BESIDE for one in result["notes"]):
+            return f"None of the nine conditions explains this: {reasons}."
         if of_another_size(result):
             sizes = " and ".join(f"{name} {size:g}" for name, size in _raised(result).items())
             return (

@@ -12,7 +12,7 @@ from markupsafe import Markup, escape
 from estimation.finding import interval_95
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.outlook import Outlook, outlook_of
-from experiments.fleet.page import found_in
+from experiments.fleet.page import IF_RIGHT, found_in, untold_since, worst_in
 from experiments.fleet.rows import STATES
 from experiments.page.charts import Charts
 from experiments.page.names_shown import SHOWN
@@ -60,6 +60,7 @@ LOGS = (
     Column("date", words=lambda date: Cell(date, "name")),
     Column("state", words=lambda state: Cell(STATES[state], f"fleet-{state} name")),
     "found",
+    "worst",
 )
 
 
@@ -83,17 +84,24 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
     facts = {
         "name": row.name,
         "title": f"{row.name}: {STATES[row.state]}{f' ({found_in(row.last)})' if row.last.between else ''}.",
-        "outlook": "" if worst is None else _sentence(worst),
+        "outlook": _sentence(worst) if worst is not None and row.last.told else _untold(row),
         "log": pages.get(row.last.file),
         "fleet": fleet,
         "apart": _apart(outlooks),
         "forecasts": pd.DataFrame([_forecast(one) for one in outlooks]),
         "logs": pd.DataFrame(
             [
-                (one.file.rsplit("/", 1)[-1], one.named.shown, one.state, found_in(one), pages.get(one.file, ""))
+                (
+                    one.file.rsplit("/", 1)[-1],
+                    one.named.shown,
+                    one.state,
+                    found_in(one),
+                    worst_in(one) if one.shown else "",
+                    pages.get(one.file, ""),
+                )
                 for one in last
             ],
-            columns=["log", "date", "state", "found", "page"],
+            columns=["log", "date", "state", "found", "worst", "page"],
         ),
         "charts": {f"course-{place}": each for place, (_, each) in enumerate(charts)},
         "captions": [caption for caption, _ in charts],
@@ -130,6 +138,14 @@ def _sentence(one: Outlook) -> str:
     past = f"{one.past}; " if one.past else ""
     there = f"there {'is' if count == 1 else 'are'} {count}{' since the trend restarted' if one.trend.begin else ''}"
     return f"{name}: {past}no forecast yet, since it needs {FEWEST} logs, and {there}"
+
+
+def _untold(row: ActuatorRow) -> str:
+    """Return since when there is no verdict, and what the last log shows if the rig file is right."""
+    since = untold_since(row)
+    worst = f"{worst_in(row.last)} now{IF_RIGHT}" if row.last.shown and row.last.worst else ""
+    said = "; ".join(one for one in (since, worst) if one)
+    return said[:1].upper() + said[1:]
 
 
 def _apart(outlooks: Sequence[Outlook]) -> str:
@@ -247,7 +263,9 @@ def followed(one: Outlook) -> list[tuple[float, float]]:
     begins = sorted({trend.begin for trend in course})
     found: list[tuple[float, float]] = []
     for begin, end in pairwise([*begins, len(course)]):
-        part = replace(series, times=series.times[begin:end], values=series.values[begin:end], stds=series.stds[begin:end])
-        early = [trend.level for trend in trends(part)] if any(each.begin != begin for each in course[begin:end]) else []
-        found += [each.level if each.begin == begin else early[k] for k, each in enumerate(course[begin:end])]
+        which = slice(begin, end)
+        part = replace(series, times=series.times[which], values=series.values[which], stds=series.stds[which])
+        late = any(each.begin != begin for each in course[which])
+        early = [trend.level for trend in trends(part)] if late else []
+        found += [each.level if each.begin == begin else early[k] for k, each in enumerate(course[which])]
     return found

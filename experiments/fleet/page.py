@@ -30,6 +30,9 @@ UNREAD = ("log", "actuator", "why")
 LEVELS = ("none", "minor", "major")
 """Levels of leakage and friction, by size."""
 
+IF_RIGHT = ", if the rig file is right"
+"""Behind the levels of a circuit that lies beside the nine conditions."""
+
 MOST_NAMED = 5
 """Actuators that are named above the table [count]."""
 
@@ -127,7 +130,9 @@ def _still(rows: Sequence[ActuatorRow], cells: Sequence[Sequence[Any]]) -> dict[
 
 
 def sickest_of(rows: Sequence[ActuatorRow]) -> list[str]:
-    """Return the names with which to begin: those past a limit, else those nearing one, five at most.
+    """Return the names with which to begin, five at most: those past a limit, be it only if the rig file is right.
+
+    Where there are none, those that near one.
 
     Parameters
     ----------
@@ -135,7 +140,13 @@ def sickest_of(rows: Sequence[ActuatorRow]) -> list[str]:
         The sickest first.
     """
     sick = [row.name for row in rows if row.state in SICK]
+    if not rig_hint(rows):  # one actuator beside the nine has a fault; many have another rig file
+        sick += [row.name for row in rows if row.state == "unknown" and row.last.beside and _past(row.last)]
     return (sick or [row.name for row in rows if row.state == "alarm"])[:MOST_NAMED]
+
+
+def _past(log: LogRow) -> bool:
+    return log.worst is not None and log.worst.share > 1.0
 
 
 def title_of(rows: Sequence[ActuatorRow]) -> str:
@@ -210,25 +221,33 @@ def row_cells(row: ActuatorRow) -> list[Any]:
     share = round(100.0 * last.worst.share, 1) if last.worst is not None and told else None
     outlook = row.outlook
     left = None if outlook is None or outlook.left is None or not told else round(outlook.left[1], 1)
-    words = "" if outlook is None or not told else outlook.words.replace("past the limit ", "past ", 1)
+    words = "" if outlook is None else outlook.words.replace("past the limit ", "past ", 1)
     return [
         row.name,
         row.state,
         found_in(last),
-        worst_in(last) if told else "",
+        worst_in(last) if last.shown else "",
         share,
-        words,
+        words if told else untold_since(row),
         left,
         last.named.day,
         len(row.logs),
     ]
 
 
+def untold_since(row: ActuatorRow) -> str:
+    """Return since when there is no verdict; empty where there never was one, and where logs have no dates."""
+    read = [one for one in row.logs if one.state != "failed"]
+    known = [place for place, one in enumerate(read) if one.state != "unknown"]
+    day = read[known[-1] + 1].named.day if known and known[-1] + 1 < len(read) else ""
+    return f"no verdict since {day}" if day else ""
+
+
 def found_in(log: LogRow) -> str:
     """Return what was found in a log, or why nothing was, without the folder that the log was in."""
     levels = [level_in_words(name, size) for name, size in log.between.items() if size > 0.0]
     if levels:
-        return "; ".join(levels)
+        return "; ".join(levels) + (IF_RIGHT if log.beside else "")
     return in_words(log.condition) if log.condition else log.reason.split(f"{log.file}: ", 1)[-1]
 
 

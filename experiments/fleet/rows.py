@@ -21,7 +21,8 @@ STATES: Mapping[str, str] = {
 }
 """States of a log or an actuator, the most urgent first, and what a reader is told."""
 
-BETWEEN = str(AgainstCode.BETWEEN_CONDITIONS)
+BETWEEN, BESIDE = str(AgainstCode.BETWEEN_CONDITIONS), str(AgainstCode.OUTSIDE_CONDITIONS)
+"""Codes of logs that one circuit explains, though none of the nine conditions does."""
 
 RANKS: Mapping[str, int] = {name: place for place, name in enumerate(STATES)}
 
@@ -82,8 +83,10 @@ class LogRow:
     reason : str
         Why there is none.
     between : Mapping[str, float]
-        Where one circuit explains the log, but its leakage and friction lie between those of two conditions: both to
-        the nearest quarter, where 1 is minor and 2 is major [dimensionless]; else empty.
+        Where one circuit explains the log, but its leakage and friction are those of no condition: both to the nearest
+        quarter, where 1 is minor and 2 is major [dimensionless]; else empty.
+    beside : bool
+        Whether such a circuit does not even lie between two conditions: the rig file may be another actuator's.
     """
 
     file: str
@@ -93,11 +96,17 @@ class LogRow:
     reason: str
     amounts: Mapping[str, Amount]
     between: Mapping[str, float] = field(default_factory=dict[str, float])
+    beside: bool = False
 
     @property
     def told(self) -> bool:
         """Whether the severities are the actuator's: a model explains the log, of one of the nine conditions or not."""
-        return self.state not in ("unknown", "failed") or bool(self.between)
+        return self.state not in ("unknown", "failed") or (bool(self.between) and not self.beside)
+
+    @property
+    def shown(self) -> bool:
+        """Whether severities are shown: they are the actuator's, if the rig file is."""
+        return self.told or self.beside
 
     @property
     def worst(self) -> Amount | None:
@@ -137,17 +146,22 @@ def log_rows(
 
 def _row(row: Mapping[str, Any], named: Named, limits: Mapping[str, float]) -> LogRow:
     amounts = _amounts(row["quantities"], limits)
-    between = _between(row.get("against"))
+    code, between = _placed(row.get("against"))
     state = _state(row, amounts)
-    if state == "unknown" and between and any(one.share > 1.0 for one in amounts.values()):
+    if state == "unknown" and code == BETWEEN and any(one.share > 1.0 for one in amounts.values()):
         state = "likely"  # a sensor with a wrong gain would look alike
-    return LogRow(row["file"], named, state, row["found_condition"] or "", row["reason"] or "", amounts, between)
+    beside = code == BESIDE
+    return LogRow(
+        row["file"], named, state, row["found_condition"] or "", row["reason"] or "", amounts, between, beside
+    )
 
 
-def _between(text: str | None) -> dict[str, float]:
-    """Return leakage and friction of a log that is unknown only because they lie between two conditions."""
+def _placed(text: str | None) -> tuple[str, dict[str, float]]:
+    """Return code, leakage and friction of a log that is unknown only because they are those of no condition."""
     against = json.loads(text or "[]")
-    return against[0]["data"] if [one["code"] for one in against] == [BETWEEN] else {}
+    if len(against) != 1 or against[0]["code"] not in (BETWEEN, BESIDE) or not against[0]["data"]:
+        return "", {}
+    return against[0]["code"], {name: against[0]["data"][name] for name in ("leakage", "friction")}
 
 
 def _amounts(text: str | None, limits: Mapping[str, float]) -> dict[str, Amount]:

@@ -16,6 +16,7 @@ from estimation.fits.greybox.averaged import samples_a_block
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, severity
 from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.beside import beside_note
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.circuits.class_fit import LASTING, SEALS, STEP, WEAK, PointFit, fit_freely
@@ -320,7 +321,7 @@ def _outside(blocks: Blocks, fits: ClassFits, region: float, actuator: Actuator)
     if between >= -FARTHEST_OUT:
         return [AgainstCode.BETWEEN_CONDITIONS.note(leakage=leakage, friction=friction)]
     farthest = FARTHEST_OUT if blocks.pressure is None else FARTHEST_BESIDE
-    return [AgainstCode.OUTSIDE_CONDITIONS.note()] if between < -farthest else []
+    return [beside_note(fits, actuator)] if between < -farthest else []
 
 
 def _nearest_severity(fits: ClassFits, actuator: Actuator) -> tuple[float, float, float]:

@@ -81,6 +81,15 @@ def test_a_fault_of_another_size_is_in_the_verdict(leakage: float, friction: flo
     assert "to the nearest quarter" in str(note)
 
 
+def test_a_circuit_beside_the_nine_is_told_by_its_levels_and_by_what_does_not_go_with_them() -> None:
+    note = AgainstCode.OUTSIDE_CONDITIONS.note(leakage=1.25, friction=0.0, part="flow bias", ratio=0.19)
+    result = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=[str(note)])
+    assert verdict(result) == "The actuator leaks more inside than a healthy one, or the rig file or a sensor is wrong."
+    assert "its leakage is 1.25 and its friction 0 " in sureness(result)
+    assert sureness(result).endswith("but its flow bias is 0.19 times what goes with them.")
+    assert work_on(result)[0].startswith("If rig file and sensors are right: plan a check of pump and piston seal.")
+
+
 def test_a_size_beside_another_reason_is_no_ground_for_work() -> None:
     note = AgainstCode.BETWEEN_CONDITIONS.note(leakage=0.5, friction=0.0)
     result = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=[str(note), "the pressure froze"])

@@ -21,3 +21,9 @@ def between(leakage: float, friction: float) -> str:
     return json.dumps(
         [{"code": str(AgainstCode.BETWEEN_CONDITIONS), "data": {"leakage": leakage, "friction": friction}}]
     )
+
+
+def beside(leakage: float, friction: float) -> str:
+    """Return what speaks against a log whose circuit does not even lie between two conditions, for a row."""
+    data = {"leakage": leakage, "friction": friction, "part": "flow bias", "ratio": 0.2}
+    return json.dumps([{"code": str(AgainstCode.OUTSIDE_CONDITIONS), "data": data}])

@@ -15,6 +15,7 @@ from experiments.fleet.naming import by_pattern
 from experiments.fleet.outlook import outlook_of, read_maintenance
 from experiments.fleet.rows import log_rows
 from experiments.page.sentences import whole_dates
+from experiments.page.still import DAYS
 from plant.errors import HydrostateError
 from tests.experiments.fleet.conftest import between, store_row
 
@@ -177,6 +178,7 @@ def test_charts_of_dated_logs_have_dates_and_go_on_to_where_a_limit_may_be_reach
     assert rests["count"] == 12 + 5
     assert rests["start"] == float(np.datetime64("2026-01-05").astype(int))
     assert rests["step"] == 7.0
+    assert tuple(rests["dates"]) == DAYS
     assert rests["count"] < grows["count"] < 12 + 30
     undated = abscissa_of(actuator_page(actuator(np.ones(12)), {}))
     assert (undated["label"], undated["dates"], undated["start"]) == ("number of the log", False, 1.0)

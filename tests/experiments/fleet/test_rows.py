@@ -5,11 +5,12 @@ from typing import Any
 
 import pytest
 
-from experiments.fleet.actuators import actuator_rows
+from experiments.fleet.actuator_page import actuator_page
+from experiments.fleet.actuators import ActuatorRow, actuator_rows
 from experiments.fleet.naming import by_pattern
-from experiments.fleet.page import fleet_page, title_of
+from experiments.fleet.page import fleet_page, rig_hint, row_cells, sickest_of, title_of
 from experiments.fleet.rows import STATES, log_rows
-from tests.experiments.fleet.conftest import between, store_row
+from tests.experiments.fleet.conftest import beside, between, store_row
 
 
 @pytest.mark.parametrize(
@@ -51,6 +52,30 @@ def test_a_log_between_two_conditions_has_severities_and_is_never_surely_past_a_
     ]
     found = log_rows(rows, {}, {})
     assert [(one.state, one.told) for one in found] == [("unknown", True), ("likely", True), ("unknown", False)]
+
+
+def test_a_circuit_beside_the_nine_has_no_verdict_but_is_shown_and_named_if_few_are() -> None:
+    doubt: dict[str, Any] = {"outcome": "mismatch", "found_condition": None, "against": beside(1.25, 0.0)}
+    files = [f"P-{number}_{place}.csv" for number in range(9) for place in range(5)]
+    rows = [store_row(one, 4.0, **(doubt if one > "P-8_1.csv" else {})) for one in files]
+
+    def fleet(sick: list[Any]) -> list[ActuatorRow]:
+        return actuator_rows(log_rows(sick, by_pattern(files, "{actuator}_{date}.csv"), {}))
+
+    (row,) = fleet(rows[-5:])
+    assert (row.state, row.last.told, row.last.shown) == ("unknown", False, True)
+    assert row_cells(row)[2:6] == [
+        "leakage minor to major, if the rig file is right",
+        "leakage 4.00 L/min",
+        None,
+        "no verdict since 2",
+    ]
+    assert "No verdict since 2; leakage 4.00 L/min now, if the rig file is right" in actuator_page(row, {}).replace(
+        "\N{NO-BREAK SPACE}", " "
+    )
+    assert sickest_of(fleet([store_row(files[0], 1.0), *rows[-5:]])) == ["P-8"]
+    assert sickest_of(fleet([store_row(one, 4.0, **doubt) for one in files])) == []  # of another size, rather
+    assert "move their logs" in rig_hint(fleet([store_row(one, 4.0, **doubt) for one in files]))
 
 
 def test_a_log_against_which_more_speaks_than_its_size_has_no_severities() -> None:

@@ -1,0 +1,48 @@
+"""A circuit beside the nine conditions is told by its levels of leakage and friction, and by what is odd there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faults.conditions import severity
+from faults.diagnosis.circuits.beside import beside_note
+from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of
+from plant.arrays import Array
+from plant.notes import Note
+from tests.faults.diagnosis.short_logs import ACTUATOR, classes
+
+
+def at(leakage: float, friction: float) -> Array:
+    return coordinates_of(severity(leakage, friction, ACTUATOR.circuit), ACTUATOR.rated)
+
+
+def told_of(place: Array) -> Note:
+    fits = classes()
+    return beside_note(replace(fits, best=replace(fits.best, coordinates=place)), ACTUATOR)
+
+
+def test_leakage_that_grows_without_the_flow_bias_of_the_tables_is_told_by_its_size() -> None:
+    place, bias = at(1.25, 0.0), COORDINATES.index("bias")
+    healthy = ACTUATOR.conditions[0][bias]
+    ratio = float(np.exp(healthy - place[bias]))
+    place[bias] = healthy
+    note = told_of(place)
+    assert note.data == {"leakage": 1.25, "friction": 0.0, "part": "flow bias", "ratio": pytest.approx(ratio, rel=0.02)}
+    assert str(note).endswith("but its flow bias is 0.17 times what goes with them")
+
+
+def test_what_lies_beyond_the_last_level_is_told_as_that_level_and_so_many_times_it() -> None:
+    place = at(2.0, 0.0) + np.log(3.0) * (np.array(COORDINATES) == "leakage")
+    expected = {"leakage": 2.0, "friction": 0.0, "part": "leakage coefficient", "ratio": pytest.approx(3.0)}
+    assert told_of(place).data == expected
+
+
+def test_friction_has_a_level_of_its_own() -> None:
+    place = at(0.0, 1.5) + np.log(0.4) * (np.array(COORDINATES) == "friction_rest")
+    assert told_of(place).data == {
+        "leakage": 0.0,
+        "friction": 1.5,
+        "part": "friction at rest",
+        "ratio": pytest.approx(0.4, rel=0.05),
+    }
