@@ -45,8 +45,8 @@ def standing_of(rows: pa.Table) -> list[LogRow]:
     return list(first.values())
 
 
-def standing_in_words(logs: Sequence[LogRow]) -> str:
-    """Return how many logs are past a limit, and with which to begin; empty where no log was diagnosed.
+def standing_in_words(logs: Sequence[LogRow]) -> tuple[str, str]:
+    """Return how many logs are past a limit, and with which to begin; empty where there are none.
 
     Parameters
     ----------
@@ -54,13 +54,13 @@ def standing_in_words(logs: Sequence[LogRow]) -> str:
         Of `standing_of`.
     """
     if not logs:
-        return ""
+        return "", ""
     counts = Counter(one.state for one in logs)
     others = [words.format(counts[name]) for name, words in OTHERS.items() if counts[name]]
     said = f"{counts['over'] or 'None'} of {len(logs)} logs {'is' if counts['over'] < 2 else 'are'} past a limit"
     told = f"{said}; {', '.join(others)}." if others else f"{said}."
     sick = [basename(one.file) for one in logs if one.state in SICK][:MOST_NAMED]
-    return f"{told} Start with {', '.join(sick)}." if sick else told
+    return told, f"Start with {', '.join(sick)}." if sick else ""
 
 
 def with_standing(table: pd.DataFrame, logs: Sequence[LogRow]) -> pd.DataFrame:

@@ -3,7 +3,7 @@
 import contextlib
 import signal
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -20,6 +20,8 @@ from plant.errors import HydrostateError
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+    from faults.watch.events import Event
 
 EVERY = 0.25
 """Time between two messages of gauges [s]."""
@@ -40,6 +42,14 @@ class Gauges(WatchEvents):
         self._whole = 0
         self._ends: dict[str, tuple[float, float]] = {}
         self._sent = 0.0
+        self._peaks: dict[str, float] = {}
+
+    def events(self, events: "Sequence[Event]") -> None:
+        """Tell what has happened; a balance that raised an alarm begins again at once, and its peak is told once."""
+        from faults.watch.events import Alarm
+
+        super().events(events)
+        self._peaks |= {event.balance: event.score for event in events if isinstance(event, Alarm)}
 
     def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
         """Take notice of samples; every `EVERY` the range of each channel since then is told.
@@ -82,6 +92,8 @@ class Gauges(WatchEvents):
         """
         if self.watch is None:
             return
+        near = self.nearness()
+        near["scores"] |= self._peaks
         told = {
             "time_s": last,
             "rows": self._whole,
@@ -90,10 +102,10 @@ class Gauges(WatchEvents):
             "values": dict(values),
             "low": {name: low for name, (low, _) in self._ends.items()},
             "high": {name: high for name, (_, high) in self._ends.items()},
-            **self.nearness(),
+            **near,
         }
         self._out.send(("gauges", plain(told)))
-        self._ends = {}
+        self._ends, self._peaks = {}, {}
 
 
 @dataclass(frozen=True)

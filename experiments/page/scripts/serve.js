@@ -43,7 +43,7 @@
   }
 
   function row(log) {
-    const named = element("th", { scope: "row" });
+    const named = element("th", { scope: "row", class: "name" });
     named.append(log.state === "done" ? element("a", { href: `logs/${log.id}` }, log.name) : log.name);
     const tick = element("input", { type: "checkbox", "aria-label": `Compare ${log.name}` });
     tick.checked = ticked.has(log.id);
@@ -77,7 +77,7 @@
     return element(
       "tr",
       {},
-      element("th", { scope: "row" }, name),
+      element("th", { scope: "row", class: "name" }, name),
       element("td", { "data-head": "state" }, "sending"),
       element("td", {}, bar),
       element("td"),
@@ -221,5 +221,6 @@
     asked += MOST;
     look();
   });
+  document.querySelector(".api").textContent = new URL("api/logs", window.location.href).href;
   look();
 })();

@@ -94,12 +94,14 @@ def test_a_report_of_logs_opens_with_the_worst_and_lists_them_first() -> None:
     table = pa.Table.from_pylist([{"plant": "log", **row} for row in rows], schema=SCHEMA)
     worst = standing_of(table)
     others = "1 probably past one, 1 within limits, 1 could not be read"
-    said = f"1 of 4 logs is past a limit; {others}. Start with b.csv, c.csv."
+    said = (f"1 of 4 logs is past a limit; {others}.", "Start with b.csv, c.csv.")
     assert standing_in_words(worst) == said
     manifest = dict.fromkeys(("study", "question", "source", "config_hash", "rig", "python", "machine", "commit"), "x")
     tables = summary_tables(frame_of(table))
     page = render_batch_report({**manifest, "cases": 4, "versions": {}}, tables, {}, 4, worst=worst)
-    assert said in page
+    assert f"<h1>{said[0]}</h1>" in page
+    assert f'<p class="answer">{said[1]}</p>' in page
+    assert "Classes found in the logs" not in page  # a line at the top says it
     assert re.findall(r'data-head="log">(.)\.csv', page) == ["b", "c", "a", "d"]
     assert page.index('<section id="logs">') < page.index('<section id="outcomes">')
     assert 'class="fleet-over" data-head="state">past a limit<' in page

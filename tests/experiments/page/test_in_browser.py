@@ -31,6 +31,9 @@ from plant.sensors.sensors import BENCH
 pytestmark = pytest.mark.slow
 
 WIDTHS = (390, 768, 1280)
+SHEET = 703
+"""Width of an A4 sheet between its margins of 12 mm [pixel]."""
+
 DARKEST_LIGHT, LIGHTEST_DARK = 200, 60
 """Mean brightness of a light figure at the least, and of a dark one at the most [0 to 255]."""
 
@@ -217,6 +220,10 @@ def test_a_page_prints_on_two_sheets_and_names_no_folder(opened: Any, name: str)
     sheets = len(re.findall(rb"/Type\s*/Page\b", page.pdf(format="A4", margin=edges)))
     assert sheets <= 2
     assert "/private/place" not in page.content()
+    page.emulate_media(media="print")
+    page.set_viewport_size({"width": SHEET, "height": 900})
+    ends = "[...document.querySelectorAll('table, figure')].map(one => one.getBoundingClientRect().right)"
+    assert max(page.evaluate(ends)) <= SHEET
 
 
 def test_a_logarithmic_axis_zooms_by_shares_of_decades_and_its_model_is_downloaded(opened: Any, tmp_path: Path) -> None:

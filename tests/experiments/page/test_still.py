@@ -75,6 +75,18 @@ def test_a_line_across_is_named_and_an_axis_may_be_given() -> None:
     assert {"0", "500", "1000"} <= set(words)
 
 
+def test_the_edges_of_a_band_are_not_in_the_legend() -> None:
+    curves = [
+        Curve("level", np.ones(3)),
+        Curve("to", 2.0 * np.ones(3), look="edge"),
+        Curve("from", np.zeros(3), look="edge"),
+    ]
+    picture = still_picture(np.arange(3.0), "log", [Panel("force", "N", curves, bands=[(1, 2)])])
+    words = words_of(ET.fromstring(picture))  # noqa: S314 -- our own picture
+    assert "level" in words
+    assert not {"to", "from"} & set(words)
+
+
 def test_a_logarithmic_axis_has_powers_of_ten_at_equal_distances() -> None:
     def picture(x: np.ndarray) -> ET.Element:
         panel = Panel("gain", "dB", [Curve("a", np.ones(x.size))])

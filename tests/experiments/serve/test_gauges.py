@@ -10,6 +10,7 @@ import pytest
 
 from experiments.serve import gauges
 from experiments.serve.gauges import EVERY, Gauges, StreamTask, watch_stream
+from faults.watch.events import Alarm
 
 HEADER = "time_s,motor_speed_rad_s,velocity_m_s\n"
 
@@ -50,6 +51,15 @@ def test_gauges_come_no_more_often_than_they_may_and_lose_no_extreme_meanwhile(s
     assert [entries["rows"] for _, entries in sent] == [1, 4]
     last = sent[-1][1]
     assert (last["low"], last["high"], last["values"]) == ({"a": -9.0}, {"a": 9.0}, {"a": 0.0})
+
+
+def test_an_alarm_is_a_peak_of_its_balance_though_the_balance_begins_again(sent: list[Any], clock: Clock) -> None:
+    found = watching(sent)
+    found.events([Alarm(6.9, "flow", 6.5, (6.4, 6.6), 4.3, 4.0)])
+    found.saw({"a": np.array([1.0])}, 7.0, False)
+    clock.now += EVERY
+    found.saw({"a": np.array([1.0])}, 7.3, False)
+    assert [told["scores"] for kind, told in sent if kind == "gauges"] == [{"flow": 4.3}, {"flow": 1.0}]
 
 
 def test_a_channel_that_is_silent_has_no_range_and_its_rows_are_not_whole(sent: list[Any], clock: Clock) -> None:
