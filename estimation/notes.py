@@ -122,8 +122,8 @@ class EstimateCode(Code):
         "observable"
     )
     KNOWN_AS_THE_RIG = (
-        "{entry} in the rig file causes {percent:.0f} % of the variance of {quantity!w} with rig error: measure "
-        "{entry} to narrow that interval"
+        "measure {entry}: its uncertainty in the rig file causes {percent:.0f} % of the variance of {quantity!w} with "
+        "rig error"
     )
     STIFFER_THAN_RIG = (
         "bulk modulus is {ratio:.2g} times that in the rig file: if the oil is stiffer, enter its bulk_modulus there, "
@@ -135,12 +135,11 @@ class EstimateCode(Code):
     )
     DIVERGED = "the estimate became infinite or no number: check units, the rig file and --form"
     PRESSURE_RESIDUALS_LARGE = (
-        "the pressure residuals are {ratio:.1f} times the sensor's noise: the log contains something that the flow "
-        "balance leaves out"
+        "the flow balance does not explain the log: the pressure residuals are {ratio:.1f} times the sensor's noise"
     )
     PRESSURE_RESIDUALS_CORRELATED = (
-        "successive pressure residuals have a correlation of {correlation:.2f}: the log contains something that the "
-        "flow balance leaves out"
+        "the flow balance leaves something out: successive pressure residuals have a correlation of {correlation:.2f} "
+        "(noise alone: 0)"
     )
     SEARCH_ENDED = "the search for what explains the log became too long and was ended: use a shorter part of the log"
     CHANNEL_LATE = (

@@ -45,7 +45,7 @@ class AgainstCode(Code):
     )
     OUTSIDE_CONDITIONS = (
         "the circuit that fits the log is in none of the nine conditions, nor between them: its leakage is "
-        "{leakage:.3g} and its friction {friction:.3g} (0 is none, 1 is minor, 2 is major, or more), but its {part} is "
+        "{leakage:.3g} and its friction {friction:.3g} (0 is none, 1 is minor, 2 is major or more), but its {part} is "
         "{ratio:.2g} times what goes with them"
     )
     BETWEEN_CONDITIONS = (

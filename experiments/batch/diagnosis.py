@@ -9,6 +9,7 @@ from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Finding, Outcome
 from estimation.log_checks.clean import CleanLog
 from estimation.notes import ChannelCode, SensorCode
+from experiments.eha.plain_verdict import WRONG_INPUT
 from experiments.log_pages.entries import quantity_entry
 from experiments.page.condition_names import in_words
 from faults.diagnosis.diagnose import diagnose_log
@@ -81,9 +82,10 @@ def class_row(found: Finding) -> dict[str, Any]:
 
 
 def _why_unknown(found: Finding) -> str:
-    """Return what speaks against the nine conditions; that none fits is left out where more is known."""
+    """Return what speaks against the nine conditions: sensors and columns alone if they are wrong."""
+    wrong = [one for one in found.against if one.code in WRONG_INPUT]
     more = [one for one in found.against if one.code != AgainstCode.OUTSIDE_CONDITIONS]
-    return "; ".join(map(str, more or found.against))
+    return "; ".join(map(str, wrong or more or found.against))
 
 
 def _severities(found: Finding) -> dict[str, Any]:

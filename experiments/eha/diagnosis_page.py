@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from experiments.eha.plain_verdict import of_another_size, sureness, verdict, what_to_do
+from experiments.eha.plain_verdict import causes, of_another_size, sureness, verdict, what_to_do
 from experiments.eha.verdict_words import SHOWN, amount, library_sentence
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.page.charts import Charts
@@ -51,11 +51,7 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "another_size": of_another_size(result),
         "library": library_sentence(result),
         "not_told": [sentence(said) for said in result["not_told"]],
-        "warnings": [
-            sentence(said)
-            for said in result.get("warnings", [])
-            if not result["unknown"] or said not in result["reasons"]
-        ],
+        "warnings": [sentence(said) for said in _beside(result)],
         "shares": [
             (in_words(condition), 100.0 * share, percent_text(share), share < LEAST_SHARE)
             for condition, share in shares
@@ -72,6 +68,15 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         },
     }
     return render_page("eha/diagnosis.html", facts, {}, {})
+
+
+def _beside(result: Mapping[str, Any]) -> list[str]:
+    """Return the notes below the charts: what the opening does not say."""
+    warned = list(result.get("warnings", []))
+    if not result["unknown"]:
+        return warned
+    reasons, told = result["reasons"], causes(result)
+    return [one for one in reasons if one not in told] + [one for one in warned if one not in reasons]
 
 
 def fit_charts(found: "Finding", stem: str) -> Charts:

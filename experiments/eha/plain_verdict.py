@@ -43,6 +43,9 @@ WRONG_SENSORS = frozenset(
 )
 """Codes of sensors of which nothing can be used."""
 
+WRONG_INPUT = WRONG_SENSORS.union(ChannelCode)
+"""Codes of sensors and columns that are wrong, from which other reasons against a verdict may follow."""
+
 BESIDE = str(AgainstCode.OUTSIDE_CONDITIONS)
 SIZED = (BESIDE, str(AgainstCode.BETWEEN_CONDITIONS))
 """Codes of logs that a circuit explains, whose leakage and friction are none of the nine conditions'."""
@@ -177,9 +180,9 @@ def sureness(result: Mapping[str, Any]) -> str:
         Sentences.
     """
     if result["unknown"]:
-        reasons = "; ".join(result["reasons"])
+        reasons = "; ".join(causes(result))
         if of_another_size(result) and any(one["code"] == BESIDE for one in result["notes"]):
-            return f"None of the nine conditions explains this: {reasons}."
+            return sentence(reasons)
         if of_another_size(result):
             sizes = " and ".join(f"{name} {size:g}" for name, size in _raised(result).items())
             return (
@@ -190,6 +193,18 @@ def sureness(result: Mapping[str, Any]) -> str:
             return f"This is none of the nine conditions, so do not rely on the numbers below: {reasons}."
         return f"Do not rely on anything on this page: {reasons}."
     return " ".join(one for one in (how_sure(result), _cost(result), _since(result)) if one)
+
+
+def causes(result: Mapping[str, Any]) -> list[str]:
+    """Return the reasons against a verdict, without those that may follow from a sensor or column that is wrong.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of a diagnosis.
+    """
+    first = [one["text"] for one in result["notes"] if one["code"] in WRONG_INPUT and one["text"] in result["reasons"]]
+    return first or list(result["reasons"])
 
 
 def how_sure(result: Mapping[str, Any]) -> str:

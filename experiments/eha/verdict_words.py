@@ -209,8 +209,12 @@ def _interval(low: float, high: float) -> str:
 
 def believed(result: Mapping[str, Any]) -> str:
     """Return whether the verdict may be believed."""
+    from experiments.eha.plain_verdict import causes
+
     if result["unknown"]:
-        return "no: " + "; ".join(result["reasons"])
+        told = causes(result)
+        more = len(result["reasons"]) - len(told)
+        return f"no: {'; '.join(told)}{f'; {more} more in --json, which may follow from this' if more else ''}"
     return "; ".join(["yes: a circuit in one of the nine conditions reproduces the log", *result["not_told"]])
 
 

@@ -12,7 +12,7 @@ from markupsafe import Markup, escape
 from estimation.finding import interval_95
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.outlook import Outlook, outlook_of
-from experiments.fleet.page import IF_RIGHT, found_in, untold_since, worst_in
+from experiments.fleet.page import IF_RIGHT, amount_in, found_in, untold_since, worst_in
 from experiments.fleet.rows import STATES
 from experiments.page.charts import Charts
 from experiments.page.names_shown import SHOWN
@@ -60,7 +60,6 @@ LOGS = (
     Column("date", words=lambda date: Cell(date, "name")),
     Column("state", words=lambda state: Cell(STATES[state], f"fleet-{state} name")),
     "found",
-    "worst",
 )
 
 
@@ -81,6 +80,7 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
     counted = max((len(one.logs) for one in outlooks), default=0)
     charts = _charts(outlooks, row.name)
     last = [*row.logs][-MOST_LOGS:][::-1]
+    decides = row.last.worst.name if row.last.worst else ""
     facts = {
         "name": row.name,
         "title": f"{row.name}: {STATES[row.state]}{f' ({found_in(row.last)})' if row.last.between else ''}.",
@@ -96,12 +96,12 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
                     one.named.shown,
                     one.state,
                     found_in(one),
-                    worst_in(one) if one.shown else "",
+                    amount_in(one, decides) if one.shown else "",
                     pages.get(one.file, ""),
                 )
                 for one in last
             ],
-            columns=["log", "date", "state", "found", "worst", "page"],
+            columns=["log", "date", "state", "found", "decides", "page"],
         ),
         "charts": {f"course-{place}": each for place, (_, each) in enumerate(charts)},
         "captions": [caption for caption, _ in charts],
@@ -109,7 +109,8 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
         "counted": counted,
         "left_out": len(row.logs) - counted,
     }
-    return render_page("fleet/actuator.html", facts, {"forecasts": FORECASTS, "logs": LOGS}, {})
+    logs = (*LOGS, Column("decides", SHOWN.get(decides, decides.replace("_", " ")))) if decides else LOGS
+    return render_page("fleet/actuator.html", facts, {"forecasts": FORECASTS, "logs": logs}, {})
 
 
 def _restarts(outlooks: Sequence[Outlook], maintained: Sequence[float]) -> list[str]:
@@ -144,7 +145,7 @@ def _untold(row: ActuatorRow) -> str:
     """Return since when there is no verdict, and what the last log shows if the rig file is right."""
     since = untold_since(row)
     worst = f"{worst_in(row.last)} now{IF_RIGHT}" if row.last.shown and row.last.worst else ""
-    said = "; ".join(one for one in (since, worst) if one)
+    said = "; ".join(one for one in (f"no verdict {since}" if since else "", worst) if one)
     return said[:1].upper() + said[1:]
 
 

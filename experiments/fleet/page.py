@@ -240,7 +240,7 @@ def untold_since(row: ActuatorRow) -> str:
     read = [one for one in row.logs if one.state != "failed"]
     known = [place for place, one in enumerate(read) if one.state != "unknown"]
     day = read[known[-1] + 1].named.day if known and known[-1] + 1 < len(read) else ""
-    return f"no verdict since {day}" if day else ""
+    return f"since {day}" if day else ""
 
 
 def found_in(log: LogRow) -> str:
@@ -271,10 +271,16 @@ def level_in_words(name: str, size: float) -> str:
 
 
 def worst_in(log: LogRow) -> str:
-    """Return the severity that is nearest to its limit, or farthest beyond."""
-    one = log.worst
+    """Return the severity that is nearest to its limit, or farthest beyond, with its name."""
+    name = log.worst.name if log.worst else ""
+    return f"{SHOWN.get(name, name.replace('_', ' '))} {amount_in(log, name)}" if name else ""
+
+
+def amount_in(log: LogRow, name: str) -> str:
+    """Return a severity with its unit; empty where the log does not tell it."""
+    one = log.amounts.get(name)
     if one is None:
         return ""
     scale, unit = shop_unit(one.unit)
     shown, *_ = alike_in_digits(scale * one.value, [scale * one.low, scale * one.high], unit)
-    return f"{SHOWN.get(one.name, one.name.replace('_', ' '))} {shown} {unit}"
+    return f"{shown} {unit}"

@@ -199,7 +199,7 @@ def test_another_pump_or_piston_with_the_papers_leakage_and_friction_is_noted(
 def test_an_entry_of_the_rig_is_named_once_of_all_logs_that_it_limits() -> None:
     found = [estimate_entries(estimate_log(log(condition), Rig())) for condition in ("normal", "major_leakage")]
     (said,) = costs(found)
-    assert said.startswith("2 of 2 logs: chamber_volume in the rig file causes ")
+    assert said.startswith("2 of 2 logs: measure chamber_volume: ")
 
 
 def test_nominal_models_that_miss_a_log_are_named_beside_what_the_circuit_says() -> None:

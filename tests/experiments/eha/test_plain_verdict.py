@@ -6,6 +6,7 @@ import pytest
 
 from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
 from experiments.eha.plain_verdict import sureness, verdict, what_to_do, work_on
+from experiments.eha.verdict_words import believed
 from faults.conditions import CONDITIONS
 from faults.notes import AdviceCode, AgainstCode
 from plant.notes import Note
@@ -101,6 +102,16 @@ def test_a_fault_that_has_a_name_comes_before_its_size() -> None:
     notes = [RigCode.MAKEUP_BLOCKED.note(side="B"), AgainstCode.BETWEEN_CONDITIONS.note(leakage=0.5, friction=0.5)]
     result = said_of("normal", unknown=True, notes=[one.to_dict() for one in notes])
     assert verdict(result) == "A make-up valve is stuck shut."
+
+
+def test_what_may_follow_from_a_frozen_sensor_is_not_said_beside_it() -> None:
+    froze = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.016, length_s=3.0, begin_s=3.0)
+    follows = AgainstCode.UNEXPLAINED.note(percent=102.0, channel="velocity")
+    notes, reasons = [one.to_dict() for one in (follows, froze)], [str(follows), str(froze)]
+    result = said_of("normal", unknown=True, notes=notes, reasons=reasons, not_told=[])
+    assert sureness(result) == f"Do not rely on anything on this page: {froze}."
+    assert believed(result) == f"no: {froze}; 1 more in --json, which may follow from this"
+    assert believed({**result, "notes": notes[:1], "reasons": reasons[:1]}) == f"no: {follows}"
 
 
 def test_soft_oil_is_in_the_verdict_and_leaves_something_to_repair() -> None:

@@ -92,7 +92,7 @@ def test_an_outlook_is_no_better_known_than_the_last_log() -> None:
     rows.append(store_row(files[5], 3.6, outcome="mismatch", found_condition=None, reason="the pump is worn"))
     (row,) = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {}))
     _, state, _, _, _, outlook, left, *_ = row_cells(row)
-    assert (state, outlook, left) == ("unknown", "no verdict since 5", None)
+    assert (state, outlook, left) == ("unknown", "since 5", None)
 
 
 def test_what_cannot_be_read_is_no_actuator_within_limits() -> None:
