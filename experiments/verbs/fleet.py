@@ -62,9 +62,9 @@ def fleet(
 ) -> None:
     """Write the page of a fleet: which actuators are faulty, how badly, with links to the pages of their logs.
 
-    The command diagnoses the logs of a folder into a store beside the page; run it again to continue where it stopped.
-    Logs of actuators of another size or kind go into a folder of their own, with their rig file in it as rig.toml. The
-    last line of standard output is the path of the page.
+    The command diagnoses the logs of a folder into a store beside the page. Run again, it diagnoses only logs that are
+    new or have changed. Logs of actuators of another size or kind go into a folder of their own, with their rig file in
+    it as rig.toml. The last line of standard output is the path of the page.
     """
     from experiments.batch.part_store import open_store
     from experiments.fleet.actuators import actuator_rows
@@ -188,7 +188,7 @@ def _say_split(named: "Mapping[str, Named]") -> None:
     file, first = next(iter(known.items()))
     count = len({one.actuator for one in known.values()})
     note(
-        f"file names hold dates: {file} is taken for actuator {first.actuator}, {first.date}; {len(known)} logs are of "
+        f"file names hold dates: {file} is taken for actuator {first.actuator}, {first.date}; {len(known)} file names give "
         f"{count} actuator{'s' if count > 1 else ''}. If that is wrong, give --pattern or --names"
     )
 

@@ -118,7 +118,7 @@ def test_names_that_hold_a_date_group_logs_without_an_option_and_it_says_so(
     monkeypatch.setattr("experiments.batch.part_store.open_store", lambda _: stored)
     code, _, said = invoke("fleet", tmp_path, "--out", tmp_path / "fleet")
     assert code == 0
-    assert "A_20261121.csv is taken for actuator A, 20261121; 3 logs are of 2 actuators" in said
+    assert "A_20261121.csv is taken for actuator A, 20261121; 3 file names give 2 actuators" in said
     assert "None of 2 actuators is past a limit." in (tmp_path / "fleet" / "index.html").read_text("utf-8")
     code, _, said = invoke("fleet", tmp_path, "--pattern", "{actuator}.csv", "--out", tmp_path / "apart")
     assert code == 0
