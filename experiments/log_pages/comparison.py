@@ -46,7 +46,8 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
         "logs": logs,
         "links": None if identities is None else [f"logs/{one}" for one in identities],
         "turned": identities and f"compare?first={identities[1]}&second={identities[0]}",
-        "title": title_of(rows),
+        "title": conditions_of(first, second) or title_of(rows),
+        "changes": title_of(rows) if conditions_of(first, second) else "",
         "quantities": quantities_shown(rows),
         "probabilities": _probabilities_shown(first.get("probabilities"), second.get("probabilities")),
     }
@@ -233,6 +234,20 @@ def plain_words(result: Mapping[str, Any]) -> str:
         return ""
     said = verdict(result)
     return said if result["unknown"] else f"{said} {how_sure(result)}"
+
+
+def conditions_of(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
+    """Return the conditions of two logs, in the order of the logs; empty where one of them was not diagnosed.
+
+    Parameters
+    ----------
+    first, second : Mapping
+        Their entries of the JSON contract.
+    """
+    if not all(one.get("condition") and one.get("probabilities") for one in (first, second)):
+        return ""
+    one, other = ("no verdict" if each.get("unknown") else in_words(each["condition"]) for each in (first, second))
+    return f"From {one} to {other}." if one != other else sentence(f"{one} in both logs")
 
 
 def title_of(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -13,7 +13,14 @@ from experiments.command.logs import read_log, run_logs
 from experiments.command.options import load_actuator, load_columns
 from experiments.command.output_paths import require_no_log
 from experiments.command.terminal import emit, note, rendered, short_names, table
-from experiments.log_pages.comparison import compare_view, compared, plain_words, quantities_shown, title_of
+from experiments.log_pages.comparison import (
+    compare_view,
+    compared,
+    conditions_of,
+    plain_words,
+    quantities_shown,
+    title_of,
+)
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -82,4 +89,5 @@ def _shown(first: Mapping[str, Any], second: Mapping[str, Any]) -> "list[Rendera
     shown = table("quantity", "verdict", first["file"], second["file"], "difference", "95 % interval of the difference")
     for row in quantities_shown(rows).to_dict("records"):
         shown.add_row(*(row[name] for name in ("quantity", "says", "first", "second", "difference", "interval")))
-    return [title_of(rows), "", *said, shown]
+    heading = [one for one in (conditions_of(first, second), title_of(rows)) if one]
+    return [*heading, "", *said, shown]

@@ -79,6 +79,22 @@ def test_the_title_says_what_the_second_log_has_more_of_and_less() -> None:
     assert "<h1>In the second log, a is higher; b and c are lower.</h1>" in compare_view(first, second)
 
 
+@pytest.mark.parametrize(
+    ("second", "title"),
+    [
+        ({"condition": "normal"}, "From major leakage to normal."),
+        ({"condition": "normal", "unknown": True}, "From major leakage to no verdict."),
+        ({}, "Major leakage in both logs."),
+    ],
+)
+def test_the_heading_of_two_diagnoses_says_which_conditions_they_found(second: dict[str, Any], title: str) -> None:
+    first = result(2.0, 0.1, condition="major_leakage", unknown=False, probabilities={"major_leakage": 1.0}, notes=[])
+    first |= {"reasons": []}
+    page = compare_view(first, {**first, **second})
+    assert f"<h1>{title}</h1>" in page
+    assert '<p class="answer">No certain difference between the two logs.</p>' in page
+
+
 def test_a_comparison_leads_to_both_logs_back_and_the_other_way_round() -> None:
     one = {"file": "a.csv", "message": "so"}
     page = compare_view(one, {**one, "file": "b.csv"}, ("0" * 16, "1" * 16))
