@@ -107,7 +107,8 @@ def test_a_fault_that_has_a_name_comes_before_its_size() -> None:
 def test_what_may_follow_from_a_frozen_sensor_is_not_said_beside_it() -> None:
     froze = SensorCode.SENSOR_FROZE.note(channel="position_m", value=0.016, length_s=3.0, begin_s=3.0)
     follows = AgainstCode.UNEXPLAINED.note(percent=102.0, channel="velocity")
-    notes, reasons = [one.to_dict() for one in (follows, froze)], [str(follows), str(froze)]
+    notes: list[Any] = [one.to_dict() for one in (follows, froze)]
+    reasons: list[Any] = [str(follows), str(froze)]
     result = said_of("normal", unknown=True, notes=notes, reasons=reasons, not_told=[])
     assert sureness(result) == f"Do not rely on anything on this page: {froze}."
     assert believed(result) == f"no: {froze}; 1 more in --json, which may follow from this"
@@ -115,7 +116,7 @@ def test_what_may_follow_from_a_frozen_sensor_is_not_said_beside_it() -> None:
 
 
 def test_soft_oil_is_in_the_verdict_and_leaves_something_to_repair() -> None:
-    soft = {"notes": [AdviceCode.BLEED.note(percent=27.0, volume=1.5e-3).to_dict()]}
+    soft: dict[str, Any] = {"notes": [AdviceCode.BLEED.note(percent=27.0, volume=1.5e-3).to_dict()]}
     assert "softer than its limit; leakage and friction are normal" in verdict(said_of("normal", **soft))
     assert verdict(said_of("minor_leakage", **soft)).endswith("; its oil is softer than its limit.")
     assert what_to_do(said_of("normal", **soft)) == ["Log again."]
