@@ -61,6 +61,7 @@ def asked_of(
     *,
     loaded: bool,
     moving: bool,
+    worth: float = WORTH,
 ) -> tuple[tuple[Hypothesis, ...], tuple[Note, ...]]:
     """Return what a log is asked beside the plain form, given its likelier fit with volumes that swing, and its best.
 
@@ -80,6 +81,8 @@ def asked_of(
         Whether the log begins under load, and not at rest.
     moving : bool
         Whether the motor turns when it begins.
+    worth : float, optional
+        Gain in log-likelihood that slopes must promise where the plain form explains the log [dimensionless].
 
     Returns
     -------
@@ -108,7 +111,6 @@ def asked_of(
     shows_zero = best is swinging or homed_at_stop(log)
     if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
         zero = max(zero, promised(log, parameters, best.values, ENCODER_ZERO))
-    worth = worth_in(log)
     worn = delivery.gain > worth and abs(delivery.size) > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and abs(zero.size) > LEAST_ZERO
     plays = play_shows(swinging.play, sensed)
@@ -126,17 +128,26 @@ def asked_of(
     return (BEGUN, *asked) if lost or _possible([begun], swinging)[0].gain > WORTH else asked, remarks
 
 
-def worth_in(log: GreyBoxLog) -> float:
-    """Return what a hypothesis must gain in a log that the plain form explains: `WORTH` at each turn of a slow log.
+def worth_in(log: GreyBoxLog, left: float = 1.0) -> float:
+    """Return what a hypothesis must gain: `WORTH` at each turn of a slow log.
 
-    The motor passes turns alike, so what is strange is seen at each.
+    The motor passes turns alike, and what straight lines leave of one they leave of all: what a hypothesis gains there
+    it gains once. What is strange is seen at each. Noise that is read off a slow log holds some of what the actuator
+    does; where a hypothesis leaves less, it must gain as much of what it leaves.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log.
+    left : float
+        Mean squared normalised residual under the hypothesis [dimensionless].
 
     Returns
     -------
     float
         Gain in log-likelihood [dimensionless].
     """
-    return WORTH * log.passes
+    return WORTH * log.passes * (1.0 if log.course is None else min(left, 1.0))
 
 
 def _possible(promises: Sequence[Promise], fit: GreyBoxFit) -> Sequence[Promise]:

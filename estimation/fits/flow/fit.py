@@ -10,12 +10,14 @@ from estimation.fits.explaining.delivery import contradicted
 from estimation.fits.explaining.explain import WORTH, explain
 from estimation.fits.explaining.form_fit import DISCRETISED, FormFit, averaged, weights_of, with_structure
 from estimation.fits.explaining.left_open import share_lost, valves_unseen, wear_open
-from estimation.fits.explaining.objections import doubted, fit_explains_all, limits, objections
+from estimation.fits.explaining.objections import fit_explains_all, limits, objections
 from estimation.fits.explaining.speed_instead import speed_instead
 from estimation.fits.explaining.toothed import asked_for_teeth
 from estimation.fits.explaining.tried import Explanation
 from estimation.fits.explaining.uneven_loss import UnevenLoss, loss_note, uneven_loss
-from estimation.fits.flow.asked import ALWAYS_ASKED, MOST_ASKED, asked_of, near_starts, worth_in
+from estimation.fits.flow.answered import Answered, agreed, wanted_of
+from estimation.fits.flow.asked import ALWAYS_ASKED, MOST_ASKED, asked_of, near_starts
+from estimation.fits.flow.belief import hopeless_cost, play_explained, wanted_cost
 from estimation.fits.flow.log import homed_at_stop, without_strays
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer
@@ -29,7 +31,6 @@ from estimation.fits.greybox.work import Work, WorkSpentError
 from estimation.fits.hypotheses import (
     AIR_MIDWAY,
     BEGUN,
-    ENCODER_ZERO,
     HYPOTHESES,
     OFFSET,
     PLAY,
@@ -74,10 +75,6 @@ BY_MASS = 2.0
 """Weight of the balance by mass before a log is seen, that of each other being 1 [dimensionless]: oil is denser under
 pressure, but simulators and textbooks balance volumes."""
 
-LITTLE = 0.01
-"""Share of what the plain form leaves beside noise that the best hypothesis must take up before pairs are tried
-[fraction]."""
-
 
 def require_flow_channels(record: Record) -> None:
     """Refuse a record without the channels that the flow form needs.
@@ -106,8 +103,9 @@ def fit_flow(
     is asked what is strange about rig, oil or logger (`estimation.fits.explaining.explain`).
     Gross outliers are taken out, and what the pump delivered while its speed is missing is read off the pressure after.
     Where oil is so much stiffer than the rig file's that noise of position counts, a log is fitted anew from there. So
-    it is where what is strange leads to a lower valley of the plain form, or is an offset of speed. A fit is not to be
-    believed if the search for what is strange did more than it may (`estimation.fits.greybox.work`).
+    it is where what is strange leads to a lower valley of the plain form, or is an offset of speed. A slow log that
+    looks strange is asked with its turns read off the next samples too (`agreed`). A fit is not to be believed if the
+    search for what is strange did more than it may (`estimation.fits.greybox.work`).
 
     Parameters
     ----------
@@ -140,7 +138,28 @@ def fit_flow(
     if variances is None:
         record, variances = without_strays(record)
     logged = Logged(record, variances, uncertainties or {})
-    start, work = FitStart(parameters, bulk_modulus), Work()
+    work = Work()
+    answer = _answered(logged, FitStart(parameters, bulk_modulus), sensed, traits, work)
+    if answer.asked and answer.plain.turns_told and not answer.ended:
+        answer = agreed(answer, _answered(logged, replace(answer.plain.start, turns_read=True), sensed, traits, work))
+    plain, asked, open_ends, strange, ended = answer
+    if strange is not None:
+        return _explained_fit(plain, strange, sensed, traits)
+    loss = None
+    if len(asked) >= len(HYPOTHESES) and not ended:
+        try:
+            with work.counted():
+                loss = _uneven(plain, traits)
+        except WorkSpentError:
+            ended = True
+    if loss is not None:
+        return _losing_fit(plain, loss, sensed)
+    fit = _plain_fit(plain, sensed, open_ends, begun=BEGUN in asked)
+    return replace(fit, reasons=(*fit.reasons, EstimateCode.SEARCH_ENDED.note())) if ended else fit
+
+
+def _answered(logged: Logged, start: FitStart, sensed: ShownPlay, traits: LogTraits, work: Work) -> Answered:
+    """Return what a log says, fitted anew for as long as that leads elsewhere."""
     while True:
         plain = plain_fits(logged, start)
         if (stiff := stiffer(logged, plain)) is not None:
@@ -150,24 +169,20 @@ def fit_flow(
         try:
             with work.counted():
                 strange = _strange(plain, asked, traits) if asked else None
-                loss = _uneven(plain, traits) if strange is None and len(asked) >= len(HYPOTHESES) else None
         except WorkSpentError:
-            fit = _plain_fit(plain, sensed, open_ends, begun=BEGUN in asked)
-            return replace(fit, reasons=(*fit.reasons, EstimateCode.SEARCH_ENDED.note()))
-        if strange is None:
-            if loss is not None:
-                return _losing_fit(plain, loss, sensed)
-            return _plain_fit(plain, sensed, open_ends, begun=BEGUN in asked)
-        if (elsewhere := _elsewhere(plain, strange) or quieter(plain, strange.fit)) is None:
-            return _explained_fit(plain, strange, sensed, traits)
+            return Answered(plain, asked, open_ends, None, ended=True)
+        elsewhere = strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))
+        if elsewhere is None:
+            return Answered(plain, asked, open_ends, strange)
         start = elsewhere
 
 
 def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequence[Hypothesis], Sequence[Note]]:
     """Return what a log is asked beside the plain form, and notes on what it leaves open."""
     loaded, moving = traits.loaded, traits.moving
+    worth = wanted_of(plain)
     asked, open_ends = asked_of(
-        plain.log, plain.start.parameters, plain.swinging, plain.best, sensed, loaded=loaded, moving=moving
+        plain.log, plain.start.parameters, plain.swinging, plain.best, sensed, loaded=loaded, moving=moving, worth=worth
     )
     if traits.speed_held and not plain.explains(plain.swinging):
         return (), open_ends
@@ -190,14 +205,20 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
         explains,
         asked=asked,
         paired=any(one not in (*ALWAYS_ASKED, PLAY) for one in asked),
-        hopeless=_hopeless(plain.swinging, asked),
+        hopeless=hopeless_cost(plain.swinging, asked),
         by_mass=balances_mass(plain.swinging.model),
-        useful=_wanted((asked[0].name,), plain, traits) if alone else np.inf,
+        useful=_wanted((asked[0].name,), plain, traits, 0.0) if alone else np.inf,
     )
     if strange is None:
         return None
-    lower = strange.fit.cost < _wanted(strange.names, plain, traits)
-    return strange if lower and _known(strange.names, strange.fit) and explains(strange.fit) else None
+    lower = strange.fit.cost < _wanted(strange.names, plain, traits, strange.fit.chi_square[0])
+    return strange if lower and play_explained(strange.names, strange.fit) and explains(strange.fit) else None
+
+
+def _wanted(names: Sequence[str], plain: PlainFits, traits: LogTraits, left: float) -> float:
+    """Return the cost below which hypotheses that leave ``left`` are believed rather than the plain form."""
+    homed, late = homed_at_stop(plain.log), traits.filtered
+    return wanted_cost(names, plain.best, plain.swinging, homed=homed, late=late, worth=wanted_of(plain, left))
 
 
 def _uneven(plain: PlainFits, traits: LogTraits) -> UnevenLoss | None:
@@ -305,37 +326,3 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
         turning=plain.turning,
         correlation=correlation,
     )
-
-
-def _hopeless(swinging: GreyBoxFit, asked: Sequence[Hypothesis]) -> float:
-    """Return the cost from which the best of all hypotheses takes up so little that no two of them explain a log.
-
-    What they all leave alone is then no actuator's: bursts of a few samples that a cable picks up, or a noise that
-    varies.
-    """
-    if len(asked) < len(HYPOTHESES):
-        return np.inf
-    left = swinging.cost * (1.0 - 1.0 / max(swinging.chi_square[0], 1.0))
-    return swinging.cost - max(WORTH, LITTLE * left)
-
-
-def _wanted(names: Sequence[str], plain: PlainFits, traits: LogTraits) -> float:
-    """Return the cost below which what is strange is believed rather than the plain form.
-
-    No actuator holds its chambers' volumes. So the zero of an encoder that may have been homed at a stop need explain a
-    log no better than held volumes do, and the lag of a filter no better than none. How a play is crossed is not known:
-    with a second hypothesis it may explain a log that has neither.
-    """
-    best, worth = plain.best, worth_in(plain.log) if plain.explains(plain.best) else WORTH
-    if PLAY.name in names and len(names) > 1:
-        return -np.inf
-    if tuple(names) == (PRESSURE_LATE.name,) and traits.filtered:
-        return best.cost + WORTH
-    if tuple(names) == (ENCODER_ZERO.name,) and homed_at_stop(plain.log):
-        return min(best.cost + WORTH, plain.swinging.cost - worth)
-    return best.cost - worth
-
-
-def _known(names: Sequence[str], fit: GreyBoxFit) -> bool:
-    """Return whether a play's fit leaves no more than the sensors' noise: what is left is how the piston crosses it."""
-    return PLAY.name not in names or not doubted(fit)

@@ -13,6 +13,7 @@ from estimation.fits.explaining.toothed import toothed
 from estimation.fits.flow.log import carried, flow_log
 from estimation.fits.flow.search import balanced, flow_starts
 from estimation.fits.flow.swept import swept_evenly
+from estimation.fits.flow.turns_read import with_turns_read
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play import ShownPlay, play_untaken
@@ -72,6 +73,8 @@ class FitStart:
         Values of the plain form's unknowns from which searches begin as well, see `lower_valley` [SI].
     stiffest : float
         Bulk modulus that counts at most in what noise of motor speed leaves, see `quieter` [Pa].
+    turns_read : bool
+        Whether what a slow log's turns pump is read off the samples after them, see `with_turns_read`.
     """
 
     parameters: EhaParameters
@@ -79,6 +82,7 @@ class FitStart:
     speed_offset: float = 0.0
     valley: Mapping[str, float] | None = None
     stiffest: float = np.inf
+    turns_read: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +120,12 @@ class PlainFits:
     teeth: tuple[Note, ...]
     teeth_left: tuple[Note, ...]
     turning: Turning
+
+    @property
+    def turns_told(self) -> bool:
+        """Whether what a slow log's turns pump can be read off the samples after them, and is not yet."""
+        log = self.unturned
+        return not self.start.turns_read and with_turns_read(log, self.start.parameters) is not log
 
     @property
     def best(self) -> GreyBoxFit:
@@ -177,6 +187,8 @@ def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
     """
     parameters = start.parameters
     log = logged.seen_at(parameters)
+    if start.turns_read:
+        log = with_turns_read(log, parameters)
     starts = flow_starts(parameters, max(start.bulk_modulus, LEAST_GUESS * parameters.bulk_modulus))
     explains = partial(fit_explains, noisy=log.passes_on)
     largest, _ = limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))

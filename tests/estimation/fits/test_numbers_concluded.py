@@ -16,7 +16,8 @@ from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_star
 from estimation.fits.flow import asked as asking
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import plain as plain_flow
-from estimation.fits.flow.fit import _wanted, fit_flow
+from estimation.fits.flow.belief import wanted_cost
+from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import homed_at_stop
 from estimation.fits.flow.traits import LogTraits
 from estimation.fits.greybox.descent import Point
@@ -126,7 +127,7 @@ def conclusions_of_the_flow_form() -> dict[str, Any]:
     names = {"zero": ("encoder_zero",), "lag": ("pressure_late",), "play": ("position_play",), "two": ("volume", "air")}
     best, swinging = plain(100.0, HELD_FLOW_FORM), plain(105.0)
     told["wanted"] = {
-        f"{name}, homed: {homed}, late: {late}": _wanted(each, best, swinging, homed=homed, late=late)
+        f"{name}, homed: {homed}, late: {late}": wanted_cost(each, best, swinging, homed=homed, late=late)
         for name, each in names.items()
         for homed in (False, True)
         for late in (False, True)

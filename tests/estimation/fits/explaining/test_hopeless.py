@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from estimation.fits.explaining import explain
-from estimation.fits.flow.fit import _hopeless, fit_flow  # pyright: ignore[reportPrivateUsage]
+from estimation.fits.flow.belief import hopeless_cost
+from estimation.fits.flow.fit import fit_flow
 from estimation.fits.hypotheses import HYPOTHESES
 from tests.estimation.fits.short_logs import PAPER, PRESSURE, log, made_fit
 
@@ -23,5 +24,5 @@ def test_noise_that_varies_is_asked_for_no_pair(monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(("chi", "cost"), [(2.0, 9_950.0), (1.01, 9_990.0), (0.9, 9_990.0)])
 def test_pairs_are_tried_where_the_best_of_all_takes_a_hundredth_of_what_is_left(chi: float, cost: float) -> None:
     plain = made_fit(1e4, 2e8, 1e5, chi=chi)
-    assert _hopeless(plain, HYPOTHESES) == pytest.approx(cost)
-    assert _hopeless(plain, HYPOTHESES[:3]) == np.inf  # the others are tried in pairs alone
+    assert hopeless_cost(plain, HYPOTHESES) == pytest.approx(cost)
+    assert hopeless_cost(plain, HYPOTHESES[:3]) == np.inf  # the others are tried in pairs alone

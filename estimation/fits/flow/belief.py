@@ -1,0 +1,77 @@
+"""From which cost on hypotheses about a log are hopeless, and below which they are believed."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from estimation.fits.explaining.explain import WORTH
+from estimation.fits.explaining.objections import doubted
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.hypotheses import ENCODER_ZERO, HYPOTHESES, PLAY, PRESSURE_LATE, Hypothesis
+
+LITTLE = 0.01
+"""Share of what the plain form leaves beside noise that the best hypothesis must take up before pairs are tried
+[fraction]."""
+
+
+def hopeless_cost(swinging: GreyBoxFit, asked: Sequence[Hypothesis]) -> float:
+    """Return the cost from which the best of all hypotheses gains so little that no two of them explain a log.
+
+    What they all leave alone is then no actuator's: bursts of a few samples that a cable picks up, or a noise that
+    varies.
+
+    Parameters
+    ----------
+    swinging : GreyBoxFit
+        The plain form's fit with volumes that swing.
+    asked : sequence of Hypothesis
+        What the log was asked; infinite unless all were.
+    """
+    if len(asked) < len(HYPOTHESES):
+        return np.inf
+    left = swinging.cost * (1.0 - 1.0 / max(swinging.chi_square[0], 1.0))
+    return swinging.cost - max(WORTH, LITTLE * left)
+
+
+def wanted_cost(
+    names: Sequence[str], best: GreyBoxFit, swinging: GreyBoxFit, *, homed: bool, late: bool, worth: float = WORTH
+) -> float:
+    """Return the cost below which hypotheses are believed rather than the plain form.
+
+    No actuator holds its chambers' volumes. So the zero of an encoder that may have been homed at a stop need explain a
+    log no better than held volumes do, and the lag of a filter no better than none. How a play is crossed is not known:
+    with a second hypothesis it may explain a log that has neither.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The hypotheses.
+    best, swinging : GreyBoxFit
+        The plain form's best fit, and that with volumes that swing.
+    homed : bool
+        Whether the encoder may have been homed at a stop.
+    late : bool
+        Whether the pressure was filtered.
+    worth : float
+        What they must gain in log-likelihood [dimensionless].
+    """
+    if PLAY.name in names and len(names) > 1:
+        return -np.inf
+    if tuple(names) == (PRESSURE_LATE.name,) and late:
+        return best.cost + WORTH
+    if tuple(names) == (ENCODER_ZERO.name,) and homed:
+        return min(best.cost + WORTH, swinging.cost - worth)
+    return best.cost - worth
+
+
+def play_explained(names: Sequence[str], fit: GreyBoxFit) -> bool:
+    """Return whether a play's fit leaves no more than the sensors' noise: what is left is how the piston crosses it.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The hypotheses.
+    fit : GreyBoxFit
+        The fit under them.
+    """
+    return PLAY.name not in names or not doubted(fit)

@@ -1,0 +1,118 @@
+"""`with_turns_read(log, parameters)`: a slow log whose turns deliver what the samples after each of them say.
+
+A command comes at an unknown time between two samples. A motor of first order is short of its new speed by a share
+there, and by the same fraction of that share a sample later. So the samples after a turn tell when the command came,
+and how much oil the pump delivered beside what straight lines say.
+"""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.fits.greybox.course import OWN_NOISE, SLOW
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.models.flow import FLOW_FORM
+from plant.eha.model import EhaParameters
+
+SHORT = 0.05
+"""Share of its whole rise by which a turn may depart from a motor of first order [fraction]; judged."""
+
+KNOWN = 3.0
+"""How many deviations of itself what a motor is still short of after a sample must be: in a log so slow that nothing is
+left by then, no sample tells when a command came [dimensionless]."""
+
+SETTLING = 8
+"""Samples after a turn over which it is followed [count]."""
+
+
+def with_turns_read(log: GreyBoxLog, parameters: EhaParameters) -> GreyBoxLog:
+    """Return a slow log whose turns are read off the samples after them; the same one where they tell nothing.
+
+    The volume is put where the piston is: swept by that much less, oil is compressed by as much. On motor speed at the
+    samples half of it would come a sample too late.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    """
+    if log.sample_time < SLOW or log.gaps.size:
+        return log
+    speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
+    beside = turned_beside(log.drives[:, speed], log.sample_time, log.drive_std[0])
+    if not np.any(beside):
+        return log
+    drives = log.drives.copy()
+    drives[:, position] -= parameters.pump_displacement / parameters.piston_area * np.cumsum(beside)
+    return replace(log, drives=drives)
+
+
+def turned_beside(speed: Array, sample_time: float, noise: float) -> Array:
+    """Return by how much further a motor turns up to each sample than the straight line from the one before says.
+
+    With lag ``l``, a command comes ``-l ln(R)`` before a sample at which the motor is short by share ``R`` of its rise.
+
+    Parameters
+    ----------
+    speed : ndarray, shape (n,)
+        At the samples [rad/s].
+    sample_time : float
+        Between them [s].
+    noise : float
+        Standard deviation of the sensor's noise [rad/s].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        0 where it is not known [rad].
+
+    Examples
+    --------
+    A lag of half a sample, and a command 0.3 samples after the first one:
+
+    >>> speed = np.array([0.0] * 4 + [float(100.0 - 100.0 * np.exp(-2.0 * (k + 0.7))) for k in range(5)] + [100.0] * 4)
+    >>> beside = turned_beside(speed, 1.0, 1e-3)
+    >>> bool(abs(np.trapezoid(speed[:9]) + beside[:9].sum() - 100.0 * (4.7 - 0.5)) < 0.01)
+    True
+    """
+    rise, loud = np.diff(speed, prepend=speed[0]), OWN_NOISE * 2.0**0.5 * noise
+    turns = [k for k in np.flatnonzero(np.abs(rise) > 2.0 * loud).tolist() if _begins(rise, k, loud)]
+    beside, left = np.zeros_like(speed), _left(rise, turns, loud)
+    if left == 0.0:
+        return beside
+    lag = -sample_time / np.log(left)
+    for k in turns:
+        whole = rise[k] + rise[k + 1] / (1.0 - left)
+        if abs(rise[k + 2] - left * rise[k + 1]) > loud + SHORT * abs(whole):
+            continue  # another command came
+        short = float(np.clip(1.0 - rise[k] / whole, left, 1.0))
+        beside[k] += whole * (-lag * (np.log(short) + 1.0 - short) - 0.5 * sample_time * (1.0 - short))
+        for j in range(k + 1, min(len(speed), k + SETTLING)):
+            if abs(rise[j] - whole * short * (1.0 - left)) > loud + SHORT * abs(whole) * short:
+                break
+            beside[j] += whole * short * (0.5 * sample_time * (1.0 + left) - lag * (1.0 - left))
+            short *= left
+    return beside
+
+
+def _begins(rise: Array, k: int, loud: float) -> bool:
+    """Return whether a motor that was steady turns in the time up to sample ``k``, and is followed for three more."""
+    return 1 <= k < len(rise) - 3 and abs(rise[k - 1]) < loud
+
+
+def _left(rise: Array, turns: Iterable[int], loud: float) -> float:
+    """Return which fraction of what it is short of a motor is still short of a sample later; 0 where that is unknown.
+
+    Turns count after which it falls by the same fraction twice.
+    """
+    power = product = 0.0
+    for k in turns:
+        first, second, third = rise[k + 1 : k + 4].tolist()
+        if abs(second) < abs(first) and abs(third * first - second**2) <= (loud + SHORT * abs(first)) * abs(first):
+            power, product = power + first**2, product + first * second
+    deviation = loud / OWN_NOISE
+    return product / power if product > KNOWN * deviation * power**0.5 else 0.0
