@@ -17,15 +17,16 @@ STRETCH = 0.05
 """Stretch over which the two are compared [s]: several times the longest lag of a usual filter; noise of velocity adds
 up to little over it."""
 
-LEAST_LATE = 2e-3
+LEAST_LATE = 1e-3
 """Least lateness of which a log is asked [s]; judged."""
 
-EXPLAINED = 0.8
-"""Share of how far the two are apart that one lateness must explain [fraction]; judged."""
+EXPLAINED = 0.5
+"""Share of how far the two are apart that one lateness must explain [fraction]; judged: the rest may be noise that a
+filter has made alike. What goes with velocity itself, as a wrong gain, explains none."""
 
-MATTERS = 0.05
-"""Share of the velocity's root mean square that lateness must make of a difference, to matter [fraction]: from there on
-the diagnosis says that two sensors disagree."""
+MATTERS, BLOCK = 0.04, 0.01
+"""Share of the velocity's root mean square that lateness must make of a difference, to matter [fraction], and means
+over how long differ so [s]: noise adds to it, and from 0.05 on the diagnosis says that two sensors disagree."""
 
 LEAST_STRETCHES = 20
 """Stretches that must hold both channels [count]."""
@@ -42,18 +43,40 @@ def without_late_velocity(record: Record) -> tuple[Record, tuple[Note, ...]]:
     if POSITION not in record or VELOCITY not in record:
         return record, ()
     apart, change = _compared(record[POSITION], record[VELOCITY], record.sample_time)
-    squares = float(change @ change)
-    if len(change) < LEAST_STRETCHES or squares == 0.0:
+    late = _lateness(apart, change)
+    if late < LEAST_LATE:
         return record, ()
-    late = float(apart @ change) / squares
     left = apart - late * change
     size = float(np.sqrt(np.nanmean(record[VELOCITY] ** 2)))
-    differs = late * float(np.sqrt(squares / len(change))) / STRETCH
+    differs = late * _fastest(record[VELOCITY], record.sample_time)
     explained = 1.0 - float(left @ left) / max(float(apart @ apart), float(np.finfo(float).tiny))
-    if late < LEAST_LATE or explained < EXPLAINED or differs < MATTERS * size:
+    if explained < EXPLAINED or differs < MATTERS * size:
         return record, ()
     note = SensorCode.VELOCITY_LATE.note(channel=VELOCITY, late_ms=1e3 * late)
     return record.replace(**{VELOCITY: None}), (note,)
+
+
+def velocity_lateness(record: Record) -> float:
+    """Return by how much velocity comes after what position gains [s]; 0 where too little of both is there.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with position and velocity.
+    """
+    return _lateness(*_compared(record[POSITION], record[VELOCITY], record.sample_time))
+
+
+def _lateness(apart: Array, change: Array) -> float:
+    squares = float(change @ change)
+    return float(apart @ change) / squares if len(change) >= LEAST_STRETCHES and squares > 0.0 else 0.0
+
+
+def _fastest(velocity: Array, sample_time: float) -> float:
+    """Return the rate at which velocity changes over `BLOCK`, root mean square [m/s^2]."""
+    rows = max(1, round(BLOCK / sample_time))
+    change = velocity[rows:] - velocity[:-rows]
+    return float(np.sqrt(np.nanmean(change**2))) / (rows * sample_time)
 
 
 def _compared(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array]:

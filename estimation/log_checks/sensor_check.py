@@ -14,6 +14,7 @@ from estimation.log_checks.filtered import independent_rows
 from estimation.log_checks.frozen_encoder import jumped, missed_motion
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.order import median
+from estimation.log_checks.velocity_strays import strays_unusually
 from estimation.notes import SensorCode
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -186,9 +187,7 @@ def _says_frozen(channel: str, stretch: slice, record: Record) -> Note:
 
 def _frozen_position(record: Record, p: EhaParameters) -> Note | None:
     """Compare a still encoder with what the other sensors say moved meanwhile; a stuck piston's is still too."""
-    if POSITION not in record:
-        return None
-    stretch = _longest_hold(record[POSITION], record.sample_time)
+    stretch = _longest_hold(record[POSITION], record.sample_time) if POSITION in record else None
     if stretch is None:
         return None
     slid, rests = shows_motion(record, stretch)
@@ -201,7 +200,7 @@ def shows_motion(record: Record, stretch: slice) -> tuple[bool, bool]:
     """Return whether measured velocity shows motion over a stretch, and whether a live sensor shows rest.
 
     Velocity may be differentiated from the encoder over a window, so the ends of the stretch do not count, and a
-    velocity that is still too says nothing.
+    velocity that is still too says nothing. Nor does one that strays from position no further than elsewhere.
 
     Parameters
     ----------
@@ -227,8 +226,9 @@ def shows_motion(record: Record, stretch: slice) -> tuple[bool, bool]:
     step = 0.5 * (stretch.stop - stretch.start) * record.sample_time / len(velocity)
     travelled = np.cumsum(velocity) * step
     allowed = 6.0 * noise * step * (alike * len(velocity)) ** 0.5
-    slid = bool(np.ptp(travelled) > max(allowed, UNDELIVERED * _quantum(record[POSITION])))
-    return slid, not slid and noise > 0.0
+    if np.ptp(travelled) <= max(allowed, UNDELIVERED * _quantum(record[POSITION])):
+        return False, noise > 0.0
+    return strays_unusually(record, slice(stretch.start + quarter, stretch.stop - quarter)), False
 
 
 def _quantum(values: Array) -> float:

@@ -10,7 +10,8 @@ from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.class_regions import how_near
 from faults.diagnosis.circuits.open_classes import circuits_left_open
-from faults.diagnosis.circuits.out_of_model import reasons_against, sensors_disagree
+from faults.diagnosis.circuits.out_of_model import reasons_against
+from faults.diagnosis.circuits.two_sensors import sensors_disagree
 from faults.diagnosis.evidence import weigh
 from faults.diagnosis.not_told import what_is_not_told
 from faults.diagnosis.severity import healthy_severities, limits_of, severities

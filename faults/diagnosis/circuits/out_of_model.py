@@ -1,8 +1,8 @@
 """Is the log one that the nine conditions can explain? Else the verdict is "unknown", with what speaks against.
 
-A log is looked at from five sides: do its sensors work, do position and velocity agree, does any circuit follow it,
-does the circuit that does lie in or between the conditions' regions, and would a sensor's bias or another pump explain
-it better. The limits leave room for rigs that no circuit describes to the last digit.
+A log is looked at from three sides: does any circuit follow it, does the circuit that does lie in or between the
+conditions' regions, and would a sensor's bias or another pump explain it better. The limits leave room for rigs that no
+circuit describes to the last digit.
 """
 
 import math
@@ -13,11 +13,10 @@ import numpy as np
 
 from estimation.eha.rig_share import SOFT
 from estimation.fits.greybox.averaged import samples_a_block
-from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, severity
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.beside import beside_note
-from faults.diagnosis.circuits.blocks import Blocks, blocks_of
+from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.circuits.class_fit import LASTING, SEALS, STEP, WEAK, PointFit, fit_freely
 from faults.diagnosis.circuits.class_regions import ClassFits
@@ -26,9 +25,7 @@ from faults.diagnosis.circuits.not_shown import FRICTION_LAW, not_shown
 from faults.diagnosis.circuits.region_scores import region_scores
 from faults.diagnosis.circuits.yielding import UNEXPLAINED, follows, yielding_velocity
 from faults.notes import AgainstCode
-from plant.arrays import Array
 from plant.eha.circuit_parameters import CircuitParameters
-from plant.log.record import Record
 from plant.notes import Note
 
 EARLIER = 0.1
@@ -75,12 +72,6 @@ BIAS_GAIN = 4.0
 piston that creeps one step promises offsets that are not there; plain training log 9749 gains 2.7, unlike chambers and
 loads on the rod 13 to 57."""
 
-AGREEMENT = 0.05
-"""Share by which velocity and the slope of position may differ, root mean square [dimensionless]."""
-
-BREAK = 3.0
-"""Standard deviations of its noise by which velocity may differ from the slope of position in any case."""
-
 
 def reasons_against(blocks: Blocks, fits: ClassFits, region: float, actuator: Actuator) -> list[Note]:
     """Return what speaks against a log being in any of the nine conditions.
@@ -103,59 +94,6 @@ def reasons_against(blocks: Blocks, fits: ClassFits, region: float, actuator: Ac
     """
     left = [] if sticks_and_slips(blocks, fits.best, actuator) else unexplained(blocks, fits, actuator)
     return [*left, *_biases(blocks, fits, actuator), *_outside(blocks, fits, region, actuator)]
-
-
-def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
-    """Compare a velocity sensor with the encoder, over the blocks.
-
-    Parameters
-    ----------
-    record : Record
-        The log.
-    blocks : Blocks
-        The same in blocks.
-
-    Returns
-    -------
-    tuple of Note
-        One where they differ by more than their noise and `AGREEMENT`.
-    """
-    if "velocity_m_s" not in record or "position_m" not in record:
-        return ()
-    other = blocks_of(record.replace(position_m=None))
-    apart = (_by_trapezia(record, other) - blocks.velocity)[blocks.first :]
-    there = np.isfinite(apart)
-    size = float(np.sqrt(np.nanmean(blocks.velocity**2)))
-    noise = BREAK * float(np.hypot(blocks.noise[0], other.noise[0]))
-    allowed = max(AGREEMENT * size, float(np.hypot(noise, _between_samples(record, other))))
-    differs = float(np.sqrt(np.mean(apart[there] ** 2))) if np.any(there) else 0.0
-    return () if differs <= allowed else (SensorCode.SENSORS_DISAGREE.note(difference_m_s=differs),)
-
-
-def _by_trapezia(record: Record, blocks: Blocks) -> Array:
-    """Return the mean velocity over each block by the trapezoidal rule [m/s], as the slope of position has it.
-
-    Means of samples are half a sample early: 5 % of velocity where that doubles within a block.
-    """
-    pooled = round(blocks.sample_time / record.sample_time) * blocks.block
-    rows = record["velocity_m_s"][: len(blocks.velocity) * pooled + 1 : pooled]
-    late = np.diff(rows) / (2.0 * blocks.block)
-    return blocks.velocity + np.nan_to_num(np.pad(late, (0, len(blocks.velocity) - len(late))))
-
-
-def _between_samples(record: Record, blocks: Blocks) -> float:
-    """Return how far the means of sampled velocities are off those of velocity itself, root mean square [m/s].
-
-    Between two samples velocity changes at a moment that no sample tells, so that a sample stands for too much or too
-    little of it: by a share of the change that is even between 0 and 1. Changes that are noise count there already.
-    """
-    rows = round(blocks.block * blocks.sample_time / record.sample_time)
-    steps = np.diff(record["velocity_m_s"])
-    steps = steps[np.isfinite(steps)]
-    if not len(steps):  # a channel slower than the rows: no two of its samples are neighbours
-        return 0.0
-    changes = float(np.mean(steps**2)) - 2.0 * rows * float(blocks.noise[0]) ** 2
-    return (max(changes, 0.0) / (3.0 * rows)) ** 0.5
 
 
 def unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:

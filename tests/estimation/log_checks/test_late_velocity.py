@@ -55,6 +55,22 @@ def test_a_late_velocity_is_told_and_not_used(how: str) -> None:
     assert note.data["late_ms"] == pytest.approx(8.0, rel=0.15)
 
 
+def test_a_velocity_that_wanders_behind_its_filter_is_late_all_the_same() -> None:
+    """Seven tenths of what the two differ by is lateness, the rest noise that the filter made alike."""
+    wanders = lagged(3.5e-3 * np.random.default_rng(3).standard_normal(len(RECORD)), 8e-3)
+    _, (note,) = without_late_velocity(RECORD.replace(**{VELOCITY: LATE["lag"] + wanders}))
+    assert note.data["late_ms"] == pytest.approx(8.0, rel=0.25)
+
+
+def test_a_lateness_that_means_over_a_block_show_is_told_under_fast_binary_noise() -> None:
+    """Over 50 ms velocity changes slowly, and lateness makes less of it than a sensor may be off by."""
+    turns = np.repeat(np.random.default_rng(6).choice([-0.02, 0.02], 200), 30)
+    velocity = lagged(turns, 4e-3)
+    position = 1e-3 * np.cumsum(velocity)
+    late = Record(1e-3, {POSITION: position, VELOCITY: lagged(velocity, 1.5e-3)})
+    assert [note.code for note in without_late_velocity(late)[1]] == [SensorCode.VELOCITY_LATE]
+
+
 def test_a_velocity_on_time_stays() -> None:
     assert without_late_velocity(RECORD) == (RECORD, ())
 

@@ -19,7 +19,8 @@ from faults.diagnosis.changes.split import likeliest_split
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
 from faults.diagnosis.circuits.circuit_runs import coordinates_of
 from faults.diagnosis.circuits.class_regions import fit_classes, how_near
-from faults.diagnosis.circuits.out_of_model import reasons_against, sensors_disagree
+from faults.diagnosis.circuits.out_of_model import reasons_against
+from faults.diagnosis.circuits.two_sensors import sensors_disagree
 from faults.diagnosis.evidence import Scoreboard, bounded, friction_left_open, weigh
 from faults.diagnosis.innovation_bank import innovation_scores
 from faults.diagnosis.models_verdict import margin, models_verdict

@@ -10,7 +10,7 @@ import pytest
 from estimation.eha.rig_share import SOFT
 from faults.conditions import CONDITIONS, severity
 from faults.diagnosis.circuits.actuator import actuator_of
-from faults.diagnosis.circuits.blocks import Blocks, blocks_of
+from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted
 from faults.diagnosis.circuits.class_fit import PointFit, scales_of
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
@@ -19,13 +19,11 @@ from faults.diagnosis.circuits.out_of_model import (
     LEAST_BIAS,
     STICKS,
     reasons_against,
-    sensors_disagree,
 )
 from faults.diagnosis.circuits.region_scores import region_scores
 from faults.diagnosis.circuits.yielding import UNEXPLAINED, YIELDING
 from faults.notes import AgainstCode
 from plant.eha.model import EhaParameters
-from plant.log.record import Record
 from plant.notes import Note
 
 RIG = EhaParameters()
@@ -270,78 +268,3 @@ def test_without_pressure_a_pump_that_moves_less_is_left_to_the_search_for_fault
 def test_a_motor_that_never_turned_biases_nothing() -> None:
     log = replace(healthy(), speed=np.zeros_like(healthy().speed))
     assert not {AgainstCode.SPEED_BIAS, AgainstCode.PUMP_OFF} & set(reasons(log, ACTUATOR.conditions[0]))
-
-
-def with_two_sensors(gain: float, noise: float) -> Record:
-    """Return a log whose velocity sensor reads more than the encoder's slope says."""
-    time = 1e-3 * np.arange(3001)
-    rng = np.random.default_rng(3)
-    velocity = 0.05 * np.sin(2.0 * np.pi * time)
-    position = 0.05 / (2.0 * np.pi) * (1.0 - np.cos(2.0 * np.pi * time))
-    channels = {
-        "motor_speed_rad_s": 100.0 * np.sin(2.0 * np.pi * time),
-        "position_m": position,
-        "velocity_m_s": gain * velocity + rng.normal(0.0, noise, len(time)),
-    }
-    return Record(1e-3, channels)
-
-
-@pytest.mark.parametrize(("gain", "differs"), [(1.0, False), (1.03, False), (1.08, True), (0.9, True), (-1.0, True)])
-def test_velocity_and_the_encoders_slope_may_differ_by_five_percent(gain: float, differs: bool) -> None:
-    record = with_two_sensors(gain, 1e-6)
-    assert bool(sensors_disagree(record, blocks_of(record))) == differs
-
-
-@pytest.mark.parametrize(("gain", "noise", "differs"), [(1.0, 0.05, False), (1.2, 1e-3, True)])
-def test_noise_of_a_velocity_sensor_excuses_what_it_can_make_and_no_more(
-    gain: float, noise: float, differs: bool
-) -> None:
-    record = with_two_sensors(gain, noise)
-    assert bool(sensors_disagree(record, blocks_of(record))) == differs
-
-
-def test_one_sensor_alone_contradicts_none() -> None:
-    record = with_two_sensors(2.0, 1e-6).replace(position_m=None)
-    assert not sensors_disagree(record, blocks_of(record))
-
-
-def test_sensors_that_never_spoke_at_once_do_not_disagree() -> None:
-    record = with_two_sensors(2.0, 1e-6)
-    early = np.where(np.arange(len(record)) < 60, record["velocity_m_s"], np.nan)
-    apart = record.replace(velocity_m_s=early)
-    assert not sensors_disagree(apart, blocks_of(apart))
-
-
-def test_a_velocity_that_is_slower_than_the_rows_is_excused_by_its_noise_too() -> None:
-    record = with_two_sensors(1.0, 0.05)
-    slow = record.replace(velocity_m_s=np.where(np.arange(len(record)) % 2, np.nan, record["velocity_m_s"]))
-    assert not sensors_disagree(slow, blocks_of(slow))
-
-
-@pytest.mark.parametrize("rows", [1, 20])
-def test_a_coarse_log_of_fast_motion_accuses_no_sensor(rows: int) -> None:
-    """Velocity that changes between two samples is not seen there, but moves the piston."""
-    rng, time = np.random.default_rng(2), 1e-3 * np.arange(12_001)
-    steps = 0.04 * np.repeat(rng.choice([-1.0, 1.0], 1 + len(time) // 150), 150)[: len(time)]
-    velocity = np.convolve(steps, 0.1 * np.exp(-0.1 * np.arange(100)))[: len(time)]  # 10 ms late
-    position = np.concatenate(([0.0], np.cumsum(velocity[:-1]) * 1e-3))
-    channels = {"motor_speed_rad_s": 2e3 * velocity, "position_m": position, "velocity_m_s": velocity}
-    record = Record(rows * 1e-3, {name: values[::rows] for name, values in channels.items()})
-    assert not sensors_disagree(record, blocks_of(record))
-    wrong = record.replace(velocity_m_s=-record["velocity_m_s"])
-    assert sensors_disagree(wrong, blocks_of(wrong))
-
-
-def test_a_velocity_that_doubles_within_a_block_accuses_no_sensor() -> None:
-    """Means of samples are half a sample early: a sound sensor was 6 % off the encoder at 20 Hz."""
-    time = 1e-3 * np.arange(3001)
-    turned = 2.0 * np.pi * 20.0 * time
-    channels = {
-        "motor_speed_rad_s": 100.0 * np.cos(turned),
-        "position_m": 0.05 / (40.0 * np.pi) * np.sin(turned),
-        "velocity_m_s": 0.05 * np.cos(turned),
-    }
-    record = Record(1e-3, channels)
-    assert not sensors_disagree(record, blocks_of(record))
-    wrong = record.replace(velocity_m_s=1.08 * record["velocity_m_s"])
-    assert sensors_disagree(wrong, blocks_of(wrong))

@@ -1,0 +1,86 @@
+"""Do a velocity sensor and the encoder tell one motion? Where they do not, one of the two is wrong."""
+
+import numpy as np
+
+from estimation.notes import SensorCode
+from faults.diagnosis.circuits.blocks import FEWEST, Blocks, blocks_of
+from plant.arrays import Array
+from plant.log.record import Record
+from plant.notes import Note
+
+AGREEMENT = 0.05
+"""Share by which velocity and the slope of position may differ, root mean square [dimensionless]."""
+
+BREAK = 3.0
+"""Standard deviations of its noise by which velocity may differ from the slope of position in any case."""
+
+ALIKE = 1.5
+"""Times the noise of filtered channels by which the two may differ [dimensionless]: between blocks two apart such noise
+leaves nearly all of itself, a sensor that is wrong for longer leaves less."""
+
+
+def sensors_disagree(record: Record, blocks: Blocks) -> tuple[Note, ...]:
+    """Compare a velocity sensor with the encoder, over the blocks.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    blocks : Blocks
+        The same in blocks.
+
+    Returns
+    -------
+    tuple of Note
+        One where they differ by more than their noise and `AGREEMENT`.
+    """
+    if "velocity_m_s" not in record or "position_m" not in record:
+        return ()
+    other = blocks_of(record.replace(position_m=None))
+    apart = (_by_trapezia(record, other) - blocks.velocity)[blocks.first :]
+    there = np.isfinite(apart)
+    size = float(np.sqrt(np.nanmean(blocks.velocity**2)))
+    noise = BREAK * float(np.hypot(blocks.noise[0], other.noise[0]))
+    sampled = float(np.hypot(noise, _between_samples(record, other)))
+    filtered = _filtered_noise(apart[there], blocks.velocity[blocks.first :][there])
+    allowed = max(AGREEMENT * size, sampled, ALIKE * filtered)
+    differs = float(np.sqrt(np.mean(apart[there] ** 2))) if np.any(there) else 0.0
+    return () if differs <= allowed else (SensorCode.SENSORS_DISAGREE.note(difference_m_s=differs),)
+
+
+def _filtered_noise(apart: Array, velocity: Array) -> float:
+    """Return the noise of two sensors of one motion in what they differ by, however it was filtered [m/s].
+
+    What goes with velocity or its change, as a wrong gain or a lag does, is no noise.
+    """
+    if len(apart) < FEWEST:
+        return 0.0
+    motion = np.column_stack([velocity, np.gradient(velocity)])
+    left = apart - motion @ np.linalg.lstsq(motion, apart, rcond=None)[0]
+    return float(np.sqrt(0.5 * np.mean((left[2:] - left[:-2]) ** 2)))
+
+
+def _by_trapezia(record: Record, blocks: Blocks) -> Array:
+    """Return the mean velocity over each block by the trapezoidal rule [m/s], as the slope of position has it.
+
+    Means of samples are half a sample early: 5 % of velocity where that doubles within a block.
+    """
+    pooled = round(blocks.sample_time / record.sample_time) * blocks.block
+    rows = record["velocity_m_s"][: len(blocks.velocity) * pooled + 1 : pooled]
+    late = np.diff(rows) / (2.0 * blocks.block)
+    return blocks.velocity + np.nan_to_num(np.pad(late, (0, len(blocks.velocity) - len(late))))
+
+
+def _between_samples(record: Record, blocks: Blocks) -> float:
+    """Return how far the means of sampled velocities are off those of velocity itself, root mean square [m/s].
+
+    Between two samples velocity changes at a moment that no sample tells, so that a sample stands for too much or too
+    little of it: by a share of the change that is even between 0 and 1. Changes that are noise count there already.
+    """
+    rows = round(blocks.block * blocks.sample_time / record.sample_time)
+    steps = np.diff(record["velocity_m_s"])
+    steps = steps[np.isfinite(steps)]
+    if not len(steps):  # a channel slower than the rows: no two of its samples are neighbours
+        return 0.0
+    changes = float(np.mean(steps**2)) - 2.0 * rows * float(blocks.noise[0]) ** 2
+    return (max(changes, 0.0) / (3.0 * rows)) ** 0.5

@@ -1,0 +1,52 @@
+"""A velocity that was filtered runs on behind a piston that stops and wanders as it rests: no frozen encoder."""
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.sensor_check import shows_motion
+from estimation.log_checks.velocity_strays import strays_unusually
+from plant.arrays import Array
+from plant.log.record import Record
+
+DT = 1e-3
+ROWS = np.arange(8000)
+MOVING: Array = 0.05 * np.sin(np.pi * np.minimum(ROWS % 500, 380) / 380.0) * (-1.0) ** (ROWS // 500)
+RESTS, INNER, SLIDES = slice(380, 500), slice(410, 470), slice(3050, 3300)
+
+
+def filtered(values: Array, lag: float, order: int) -> Array:
+    """Return values behind so many first-order lags [s] in a row."""
+    for _ in range(order):
+        out, state = np.empty_like(values), values[0]
+        for i, value in enumerate(values):
+            state += (value - state) * DT / lag
+            out[i] = state
+        values = out
+    return values
+
+
+def log(lag: float, order: int) -> Record:
+    rng = np.random.default_rng(4)
+    velocity = filtered(MOVING + 1e-3 * rng.standard_normal(len(MOVING)), lag, order)
+    return Record(DT, {"position_m": 1e-6 * np.round(1e6 * DT * np.cumsum(MOVING)), "velocity_m_s": velocity})
+
+
+@pytest.mark.parametrize(("lag", "order"), [(8e-3, 1), (3e-3, 1), (4e-3, 2), (3e-3, 4)])
+def test_a_piston_that_rests_behind_a_filtered_velocity_does_not_move(lag: float, order: int) -> None:
+    record = log(lag, order)
+    assert not strays_unusually(record, INNER)
+    assert not shows_motion(record, RESTS)[0]
+
+
+@pytest.mark.parametrize(("lag", "order"), [(8e-3, 1), (3e-3, 4)])
+@pytest.mark.parametrize("stop", [3300, 8000])
+def test_an_encoder_that_freezes_beside_a_filtered_velocity_misses_motion(lag: float, order: int, stop: int) -> None:
+    record, hold = log(lag, order), slice(SLIDES.start, stop)
+    position = record["position_m"].copy()
+    position[hold] = position[hold.start]
+    assert shows_motion(record.replace(position_m=position), hold) == (True, False)
+
+
+def test_where_position_moves_nowhere_else_velocity_is_believed() -> None:
+    record = log(3e-3, 1)
+    assert strays_unusually(record.replace(position_m=np.zeros(len(record))), SLIDES)

@@ -1,0 +1,94 @@
+"""Velocity and the slope of position tell one motion, to their noise and a twentieth; else one sensor is wrong."""
+
+import numpy as np
+import pytest
+
+from faults.diagnosis.circuits.blocks import blocks_of
+from faults.diagnosis.circuits.two_sensors import sensors_disagree
+from plant.log.record import Record
+
+
+def with_two_sensors(gain: float, noise: float) -> Record:
+    """Return a log whose velocity sensor reads more than the encoder's slope says."""
+    time = 1e-3 * np.arange(3001)
+    rng = np.random.default_rng(3)
+    velocity = 0.05 * np.sin(2.0 * np.pi * time)
+    position = 0.05 / (2.0 * np.pi) * (1.0 - np.cos(2.0 * np.pi * time))
+    channels = {
+        "motor_speed_rad_s": 100.0 * np.sin(2.0 * np.pi * time),
+        "position_m": position,
+        "velocity_m_s": gain * velocity + rng.normal(0.0, noise, len(time)),
+    }
+    return Record(1e-3, channels)
+
+
+@pytest.mark.parametrize(("gain", "differs"), [(1.0, False), (1.03, False), (1.08, True), (0.9, True), (-1.0, True)])
+def test_velocity_and_the_encoders_slope_may_differ_by_five_percent(gain: float, differs: bool) -> None:
+    record = with_two_sensors(gain, 1e-6)
+    assert bool(sensors_disagree(record, blocks_of(record))) == differs
+
+
+@pytest.mark.parametrize(("gain", "noise", "differs"), [(1.0, 0.05, False), (1.2, 1e-3, True)])
+def test_noise_of_a_velocity_sensor_excuses_what_it_can_make_and_no_more(
+    gain: float, noise: float, differs: bool
+) -> None:
+    record = with_two_sensors(gain, noise)
+    assert bool(sensors_disagree(record, blocks_of(record))) == differs
+
+
+@pytest.mark.parametrize(("gain", "differs"), [(1.0, False), (0.7, True)])
+def test_noise_that_a_filter_made_alike_accuses_no_sensor(gain: float, differs: bool) -> None:
+    """Its steps from sample to sample are small, and show a tenth of what is left of it in a block."""
+    noise = 0.02 * np.random.default_rng(8).standard_normal(3020)
+    for _ in range(4):
+        noise = np.convolve(noise, np.full(6, 1.0 / 6.0), "same")
+    record = with_two_sensors(gain, 1e-6)
+    wandering = record.replace(velocity_m_s=record["velocity_m_s"] + noise[: len(record)])
+    assert bool(sensors_disagree(wandering, blocks_of(wandering))) == differs
+
+
+def test_one_sensor_alone_contradicts_none() -> None:
+    record = with_two_sensors(2.0, 1e-6).replace(position_m=None)
+    assert not sensors_disagree(record, blocks_of(record))
+
+
+def test_sensors_that_never_spoke_at_once_do_not_disagree() -> None:
+    record = with_two_sensors(2.0, 1e-6)
+    early = np.where(np.arange(len(record)) < 60, record["velocity_m_s"], np.nan)
+    apart = record.replace(velocity_m_s=early)
+    assert not sensors_disagree(apart, blocks_of(apart))
+
+
+def test_a_velocity_that_is_slower_than_the_rows_is_excused_by_its_noise_too() -> None:
+    record = with_two_sensors(1.0, 0.05)
+    slow = record.replace(velocity_m_s=np.where(np.arange(len(record)) % 2, np.nan, record["velocity_m_s"]))
+    assert not sensors_disagree(slow, blocks_of(slow))
+
+
+@pytest.mark.parametrize("rows", [1, 20])
+def test_a_coarse_log_of_fast_motion_accuses_no_sensor(rows: int) -> None:
+    """Velocity that changes between two samples is not seen there, but moves the piston."""
+    rng, time = np.random.default_rng(2), 1e-3 * np.arange(12_001)
+    steps = 0.04 * np.repeat(rng.choice([-1.0, 1.0], 1 + len(time) // 150), 150)[: len(time)]
+    velocity = np.convolve(steps, 0.1 * np.exp(-0.1 * np.arange(100)))[: len(time)]  # 10 ms late
+    position = np.concatenate(([0.0], np.cumsum(velocity[:-1]) * 1e-3))
+    channels = {"motor_speed_rad_s": 2e3 * velocity, "position_m": position, "velocity_m_s": velocity}
+    record = Record(rows * 1e-3, {name: values[::rows] for name, values in channels.items()})
+    assert not sensors_disagree(record, blocks_of(record))
+    wrong = record.replace(velocity_m_s=-record["velocity_m_s"])
+    assert sensors_disagree(wrong, blocks_of(wrong))
+
+
+def test_a_velocity_that_doubles_within_a_block_accuses_no_sensor() -> None:
+    """Means of samples are half a sample early: a sound sensor was 6 % off the encoder at 20 Hz."""
+    time = 1e-3 * np.arange(3001)
+    turned = 2.0 * np.pi * 20.0 * time
+    channels = {
+        "motor_speed_rad_s": 100.0 * np.cos(turned),
+        "position_m": 0.05 / (40.0 * np.pi) * np.sin(turned),
+        "velocity_m_s": 0.05 * np.cos(turned),
+    }
+    record = Record(1e-3, channels)
+    assert not sensors_disagree(record, blocks_of(record))
+    wrong = record.replace(velocity_m_s=1.08 * record["velocity_m_s"])
+    assert sensors_disagree(wrong, blocks_of(wrong))
