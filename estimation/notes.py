@@ -74,6 +74,7 @@ class ChannelCode(Code):
         "the sign of {channel} is wrong: its correlation with {against} is {correlation:.2f}; give the column "
         "with a minus before its unit (NAME:-UNIT under [columns] in the rig file, or --columns CHANNEL=NAME:-UNIT)"
     )
+    SPEED_UNSIGNED = "{channel} is never negative, but the piston goes both ways alike: log the speed with its sign"
     CHANNELS_SWAPPED = (
         "{channel} and {other} are swapped: the slope of the second is the first (correlation {correlation:.2f}); "
         "correct the names of the columns (under [columns] in the rig file, or --columns CHANNEL=NAME)"
@@ -87,8 +88,7 @@ class ChannelCode(Code):
         "changes within the log; cut the log there, and read each part by itself"
     )
     NOTHING_CHANGES = (
-        "{channel}: no value changes from the first row to the last although the motor turns, so the log shows "
-        "nothing: the logger repeats one row, or no sensor is connected"
+        "{channel}: no value changes although the motor turns: the logger repeats one row, or no sensor is connected"
     )
 
 

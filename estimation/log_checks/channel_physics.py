@@ -49,6 +49,10 @@ SURE, FOLLOWS, OPPOSED = 0.9, 0.6, -0.3
 """Correlations of one motion measured twice, of a piston with its pump, and with one that counts the other way: what
 yields and slides never goes against its drive, neither in the long run nor from block to block."""
 
+BOTH_WAYS = 0.6
+"""Least ratio of what a piston does in its two directions where speed is found to lack its sign: of its ways, its mean
+velocities, and what is pumped meanwhile [fraction]; judged."""
+
 FARTHEST = 3.0
 """Times the pumped flow that no piston moves, whatever is wrong in the rig file [dimensionless]."""
 
@@ -121,7 +125,8 @@ def channel_mistakes(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     if balance is not None and balance.explained < EXPLAINED:
         balance = None
     units = tuple(_or_of_time(one, record.sample_time) for one in _pump_units(record, long, p, balance))
-    return _reversed(record, middle, long, balance) or units or _pressure_units(middle, p, balance)
+    unsigned = _unsigned(record, middle, balance)
+    return unsigned or _reversed(record, middle, long, balance) or units or _pressure_units(middle, p, balance)
 
 
 def _repeats_one_row(record: Record) -> bool:
@@ -231,6 +236,24 @@ def _reversed(
     else:
         return ()
     return (ChannelCode.CHANNEL_REVERSED.note(channel=channel, against=against, correlation=together),)
+
+
+def _unsigned(record: Record, middle: ChannelBlocks, balance: FlowBalance | None) -> tuple[Note, ...]:
+    """Return a note where a piston goes both ways, as fast and for as much oil, while speed is never negative.
+
+    A load or a spring drives it back too, but against a pump that turns slowly, or so that leakage explains the flow.
+    """
+    piston, pumped = middle.piston, middle.pumped
+    if piston is None or pumped is None or balance is not None or np.nanmin(record[SPEED]) < 0.0:
+        return ()
+    ways = (piston > 0.0, piston < 0.0)
+    if not all(np.any(way) for way in ways):
+        return ()
+    size = np.abs(piston)
+    forth, back = (np.array([size[way].sum(), size[way].mean(), pumped[way].mean()]) for way in ways)
+    if np.any(np.minimum(forth, back) < BOTH_WAYS * np.maximum(forth, back)):
+        return ()
+    return (ChannelCode.SPEED_UNSIGNED.note(channel=SPEED),)
 
 
 def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: FlowBalance | None) -> tuple[Note, ...]:

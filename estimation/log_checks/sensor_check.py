@@ -202,13 +202,6 @@ def shows_motion(record: Record, stretch: slice) -> tuple[bool, bool]:
     Velocity may be differentiated from the encoder over a window, so the ends of the stretch do not count, and a
     velocity that is still too says nothing. Nor does one that strays from position no further than elsewhere.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-    stretch : slice
-        Its samples.
-
     Returns
     -------
     tuple of bool
@@ -226,9 +219,10 @@ def shows_motion(record: Record, stretch: slice) -> tuple[bool, bool]:
     step = 0.5 * (stretch.stop - stretch.start) * record.sample_time / len(velocity)
     travelled = np.cumsum(velocity) * step
     allowed = 6.0 * noise * step * (alike * len(velocity)) ** 0.5
-    if np.ptp(travelled) <= max(allowed, UNDELIVERED * _quantum(record[POSITION])):
+    resolved = UNDELIVERED * _quantum(record[POSITION])
+    if np.ptp(travelled) <= max(allowed, resolved):
         return False, noise > 0.0
-    return strays_unusually(record, slice(stretch.start + quarter, stretch.stop - quarter)), False
+    return strays_unusually(record, slice(stretch.start + quarter, stretch.stop - quarter), resolved), False
 
 
 def _quantum(values: Array) -> float:

@@ -20,7 +20,7 @@ LONGEST = 0.5
 """Window over which they are compared at most [s]: there are some elsewhere in a log that freezes for good."""
 
 
-def strays_unusually(record: Record, stretch: slice) -> bool:
+def strays_unusually(record: Record, stretch: slice, resolved: float) -> bool:
     """Return whether velocity leaves position further behind over a stretch than it does over as long a one elsewhere.
 
     Parameters
@@ -29,6 +29,8 @@ def strays_unusually(record: Record, stretch: slice) -> bool:
         The log, with position and velocity.
     stretch : slice
         Samples over which position stays.
+    resolved : float
+        How far position must go to tell where it moves [m]; where it does not, it may be as frozen.
 
     Returns
     -------
@@ -38,7 +40,7 @@ def strays_unusually(record: Record, stretch: slice) -> bool:
     position, velocity = bridged(record[POSITION]), bridged(record[VELOCITY])
     went = np.cumsum(velocity) * record.sample_time + velocity_lateness(record) * velocity
     rows = min(stretch.stop - stretch.start, round(LONGEST / record.sample_time))
-    moving = [one for one in _windows(0, len(went), rows) if np.ptp(position[one]) > 0.0]  # others may be as frozen
+    moving = [one for one in _windows(0, len(went), rows) if np.ptp(position[one]) > resolved]
     usual = sorted(float(np.ptp(went[one] - position[one])) for one in moving)
     here = max(float(np.ptp(went[one])) for one in _windows(stretch.start, stretch.stop, rows))
     return not usual or here > USUAL * usual[len(usual) // 4]

@@ -53,6 +53,10 @@ def swapped(log: Record) -> Record:
     return log.replace(**{POSITION: log[VELOCITY], VELOCITY: log[POSITION]})
 
 
+def unsigned(log: Record) -> Record:
+    return log.replace(**{SPEED: np.abs(log[SPEED])})
+
+
 @pytest.mark.parametrize("leakage", thinned([1.0, 8.0], [8.0]))
 @pytest.mark.parametrize("drive", list(DRIVES))
 @pytest.mark.parametrize(
@@ -101,6 +105,7 @@ def test_a_wrong_rig_file_accuses_no_channel(wrong: dict[str, float]) -> None:
         (scaled(PRESSURE, -1.0), ChannelCode.CHANNEL_REVERSED, PRESSURE),
         (scaled(VELOCITY, -1.0), ChannelCode.CHANNEL_REVERSED, VELOCITY),
         (scaled(POSITION, -1.0), ChannelCode.CHANNEL_REVERSED, POSITION),
+        (unsigned, ChannelCode.SPEED_UNSIGNED, SPEED),
         (swapped, ChannelCode.CHANNELS_SWAPPED, POSITION),
         (scaled(SPEED, RPM), ChannelCode.CHANNEL_UNIT, SPEED),
         (scaled(SPEED, 1.0 / RPM), ChannelCode.CHANNEL_UNIT, SPEED),
@@ -118,6 +123,16 @@ def test_a_mistake_is_named(
     for drive in ("steps", "prbs"):
         (said,) = channel_mistakes(mistake(run(condition, drive)), HEALTHY)
         assert (said.code, said.data["channel"]) == (code, channel)
+
+
+def test_a_pump_that_turns_one_way_while_a_load_swings_the_piston_through_a_leak_lacks_no_sign() -> None:
+    time, leakage = 1e-3 * np.arange(6000), 2e-11
+    speed, pressure = 40.0 + 10.0 * np.sin(3.0 * time), 1.1e6 + 1e6 * np.sin(9.0 * time)
+    velocity = (HEALTHY.pump_displacement * speed - leakage * pressure) / HEALTHY.piston_area
+    noise = 5e3 * np.random.default_rng(3).standard_normal(len(time))
+    channels = {SPEED: speed, POSITION: 1e-3 * np.cumsum(velocity), VELOCITY: velocity, PRESSURE: pressure + noise}
+    assert np.mean(velocity < 0.0) > 0.3
+    assert channel_mistakes(Record(1e-3, channels), HEALTHY) == ()
 
 
 @pytest.mark.parametrize("condition", ["normal", "minor_leakage", "minor_friction"])
