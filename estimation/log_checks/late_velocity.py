@@ -57,12 +57,17 @@ def without_late_velocity(record: Record) -> tuple[Record, tuple[Note, ...]]:
 
 
 def velocity_lateness(record: Record) -> float:
-    """Return by how much velocity comes after what position gains [s]; 0 where too little of both is there.
+    """Return by how much velocity comes after what position gains.
 
     Parameters
     ----------
     record : Record
         The log, with position and velocity.
+
+    Returns
+    -------
+    float
+        Lateness [s]; 0 where too little of both is there.
     """
     return _lateness(*_compared(record[POSITION], record[VELOCITY], record.sample_time))
 
