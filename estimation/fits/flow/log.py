@@ -9,6 +9,7 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.fits.explaining.faults_tried import usual_leakage
 from estimation.fits.explaining.form_fit import LONGEST_STEP
+from estimation.fits.flow.blurred import sharpened
 from estimation.fits.greybox.averaged import averaged, odd_block
 from estimation.fits.greybox.course import OWN_NOISE, SLOW
 from estimation.fits.greybox.log import GreyBoxLog, greybox_log
@@ -176,7 +177,7 @@ def flow_log(
         },
         within=WITHIN,
     )
-    log = averaged(log, LONGEST_STEP, _block(log, parameters))
+    log = sharpened(averaged(log, LONGEST_STEP, _block(log, parameters)), log, parameters)
     felt = log.noise[0].passed_on * parameters.bulk_modulus > FELT_NOISE * log.noise[0].variance ** 0.5
     return _noisy(log, parameters) if felt else log.taken_at(parameters.bulk_modulus)
 
