@@ -9,7 +9,7 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.fits.explaining.faults_tried import usual_leakage
 from estimation.fits.explaining.form_fit import LONGEST_STEP
-from estimation.fits.flow.blurred import sharpened
+from estimation.fits.flow.pumped import pumped_evenly
 from estimation.fits.greybox.averaged import averaged, odd_block
 from estimation.fits.greybox.course import OWN_NOISE, SLOW
 from estimation.fits.greybox.log import GreyBoxLog, greybox_log
@@ -177,7 +177,7 @@ def flow_log(
         },
         within=WITHIN,
     )
-    log = sharpened(averaged(log, LONGEST_STEP, _block(log, parameters)), log, parameters)
+    log = pumped_evenly(averaged(log, LONGEST_STEP, _block(log, parameters)), log, parameters)
     felt = log.noise[0].passed_on * parameters.bulk_modulus > FELT_NOISE * log.noise[0].variance ** 0.5
     return _noisy(log, parameters) if felt else log.taken_at(parameters.bulk_modulus)
 
@@ -187,11 +187,12 @@ def _noisy(log: GreyBoxLog, p: EhaParameters) -> GreyBoxLog:
 
     Position that is off by ``d`` compresses oil by ``b A d / V``, which leaks off in a time ``V / (b L)``. So means
     over ``T`` are off by ``A d / (L T)`` at most, whatever the oil's stiffness. Without that bound, oil as stiff as
-    steel explained any log of a leaky actuator.
+    steel explained any log of a leaky actuator. How the noise goes with stiffness below the bound matters as much: a
+    bound that was too sharp put bulk modulus of a rig that leaks empty in 0.7 ms 12 % low, 6 deviations.
     """
-    lost = (0.5 * log.sample_time * NOISY_BLOCK) ** 0.5 / p.chamber_volume
+    lost, samples = log.sample_time / p.chamber_volume, max(1, round(NOISY_BLOCK / log.sample_time))
     by = {"passed_over": ("chamber_volume", p.chamber_volume), "lost_by": ("leakage_coefficient", "case_leakage")}
-    return replace(log, noise=(replace(log.noise[0], **by, lost=lost),), block=NOISY_BLOCK)
+    return replace(log, noise=(replace(log.noise[0], **by, lost=lost, lost_over=samples),), block=NOISY_BLOCK)
 
 
 def carried(

@@ -1,0 +1,47 @@
+"""Straight lines between means of a fast log pump what its samples do."""
+
+import numpy as np
+import pytest
+
+from estimation.arrays import Array
+from estimation.fits.flow.log import flow_log
+from estimation.fits.greybox.averaged import block_means
+from plant.components.valves import pumped_flow
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+P, SAMPLE, BLOCK, FINE = EhaParameters(), 2e-4, 3, 20
+
+
+def turning(time: Array) -> Array:
+    return 60.0 * np.sin(2.0 * np.pi * 23.0 * time)
+
+
+def drives(sample_time: float) -> Array:
+    """Motor speed and position, as the flow form sees a piston at rest whose pressure sensor is noisy."""
+    still = dict.fromkeys(("position_m", "differential_pressure_pa"), np.zeros(3000))
+    record = Record(
+        sample_time, {"motor_speed_rad_s": turning(sample_time * np.arange(3000, dtype=np.float64)), **still}
+    )
+    return flow_log(record, P, {}, dict.fromkeys(record.channels, 1e10)).drives
+
+
+def pumped(speed: Array, sample_time: float, bias: float) -> Array:
+    flow = np.asarray(pumped_flow(speed, P.pump_displacement, bias * P.flow_bias))
+    return np.concatenate([[0.0], np.cumsum(0.5 * (flow[1:] + flow[:-1])) * sample_time])
+
+
+@pytest.mark.parametrize(("bias", "left"), [(1.0, 0.15), (6.0, 0.3)])
+def test_straight_lines_between_means_pump_and_sweep_what_the_motor_does(bias: float, left: float) -> None:
+    """The rig file knows the flow bias of a sound pump alone."""
+    means = drives(SAMPLE)
+    course = pumped(turning(SAMPLE / FINE * np.arange(3000 * FINE, dtype=np.float64)), SAMPLE / FINE, bias)[::FINE]
+    wanted = block_means(course[BLOCK // 2 + 1 :], BLOCK)
+    lines = np.interp(np.arange(3000 * FINE), BLOCK * FINE * np.arange(len(means)), means[:, 0])
+    straight = pumped(lines, SAMPLE / FINE, bias)[BLOCK * FINE :: BLOCK * FINE][: len(wanted)] - wanted
+    led = straight - P.piston_area * means[1:, 1]
+    assert np.std(led) < left * np.std(straight)
+
+
+def test_a_log_that_is_not_averaged_is_what_it_was() -> None:
+    assert np.all(drives(1e-3)[:, 1] == 0.0)
