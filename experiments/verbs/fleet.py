@@ -188,8 +188,8 @@ def _say_split(named: "Mapping[str, Named]") -> None:
     file, first = next(iter(known.items()))
     count = len({one.actuator for one in known.values()})
     note(
-        f"file names hold dates: {file} is taken for actuator {first.actuator}, {first.date}; {len(known)} file names give "
-        f"{count} actuator{'s' if count > 1 else ''}. If that is wrong, give --pattern or --names"
+        f"file names hold dates: {file} is taken for actuator {first.actuator}, {first.date}; {len(known)} file names "
+        f"give {count} actuator{'s' if count > 1 else ''}. If that is wrong, give --pattern or --names"
     )
 
 
