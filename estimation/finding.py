@@ -67,7 +67,7 @@ def positive_interval_95(value: float, std: float) -> tuple[float, float]:
 
 
 class Outcome(StrEnum):
-    """How a log fared; the words that JSON prints."""
+    """Outcome of a log; the words that JSON prints."""
 
     OK = "ok"
     NOT_OBSERVABLE = "not_observable"
@@ -141,7 +141,7 @@ class Quantity:
         return Quantity(value, unit, interval_95(value, std), std)
 
     def covers(self, truth: float) -> bool:
-        """Return whether the interval holds a value.
+        """Return whether the interval contains a value.
 
         Parameters
         ----------
@@ -201,7 +201,7 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """What a log says of its actuator, when the log ends.
+    """Finding about an actuator at the end of a log.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What checks, fits and filters of the gear-pump actuator may bring up."""
+"""Notes of checks, fits and filters of the gear-pump actuator."""
 
 from plant.notes import Code
 

@@ -1,4 +1,4 @@
-"""What a long search is trying, told to whoever listens; the search need not know who does."""
+"""Progress of a long search, reported to any listener; the search need not know who listens."""
 
 from collections.abc import Callable, Generator
 from contextlib import contextmanager

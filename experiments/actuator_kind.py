@@ -43,7 +43,7 @@ class Run:
 
 @dataclass(frozen=True, kw_only=True)
 class Simulation:
-    """What `hydrostate simulate` does.
+    """How `hydrostate simulate` runs a kind of actuator.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Simulation:
 
 @dataclass(frozen=True, kw_only=True)
 class LogVerb:
-    """What `hydrostate estimate` or `hydrostate diagnose` does with a log, and how what it finds is shown.
+    """How `hydrostate estimate` or `hydrostate diagnose` treats a log and shows its finding.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class LogVerb:
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """What `hydrostate identifiability` does.
+    """How `hydrostate identifiability` judges an experiment.
 
     Parameters
     ----------

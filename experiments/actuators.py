@@ -162,7 +162,7 @@ def read_own_rig(path: "Path", common: "ActuatorKind") -> "Rig[Any]":
 
 
 def offered(kind: "ActuatorKind", verb: str) -> Any:
-    """Return what a kind of actuator does for a verb.
+    """Return the function that a kind of actuator offers for a verb.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What to do about the cylinder of a piezo actuator, whatever pumps into it."""
+"""Advice on the cylinder of a piezo actuator, whatever its pump."""
 
 from plant.notes import Code
 

@@ -1,10 +1,10 @@
-"""What a diagnosis of the gear-pump actuator may bring up: against a class, what is not told, what to do next."""
+"""Notes of a diagnosis of the gear-pump actuator: against a class, on undetermined severities, on next steps."""
 
 from plant.notes import Code
 
 
 class AgainstCode(Code):
-    """What speaks against a log being in any of the nine conditions."""
+    """Reasons against all nine conditions."""
 
     UNEXPLAINED = "the circuit that fits best leaves {percent:.0f} % of the {channel} unexplained"
     NONE_FITS = (
@@ -107,7 +107,7 @@ class ClassCode(Code):
 
 
 class AdviceCode(Code):
-    """What to do or to measure next."""
+    """Advice on what to do or measure next."""
 
     CHECK_SENSOR = "check the sensor and the wiring of {channels}, then log again"
     MEND_COLUMNS = (

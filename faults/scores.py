@@ -1,4 +1,4 @@
-"""How good is a classifier? Confusion matrix and accuracy over labelled runs."""
+"""Quality of a classifier: confusion matrix and accuracy over labelled runs."""
 
 from collections.abc import Collection, Sequence
 

@@ -1,4 +1,4 @@
-"""What goes wrong at the door, as one family of exceptions whose message is written for the user."""
+"""Exceptions for invalid input: one family, whose messages are written for the user."""
 
 from collections.abc import Iterable, Sequence
 

@@ -1,4 +1,4 @@
-"""What runs for weeks, kept over a restart: arrays in one file that is there whole or not at all."""
+"""State of long runs, kept over a restart: arrays in one file that is there whole or not at all."""
 
 import io
 import zipfile

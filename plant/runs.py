@@ -1,4 +1,4 @@
-"""What simulated runs of every actuator share: sampling, a drive that is a series, finite states, white noise."""
+"""Common parts of all simulated runs: sampling, a drive that is a series, finite states, white noise."""
 
 from collections.abc import Mapping
 from math import ceil, isfinite
@@ -13,7 +13,7 @@ MOST_SAMPLES = 100_000_000
 
 
 def sample_count(duration: float, sample_time: float) -> int:
-    """Return how many samples a signal has: one every `sample_time` from zero, the end excluded.
+    """Return the number of samples of a signal: one every `sample_time` from zero, the end excluded.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def sample_count(duration: float, sample_time: float) -> int:
 
 
 def steps_a_sample(sample_time: float, longest_step: float) -> int:
-    """Return how many steps a sample takes.
+    """Return the number of steps in a sample.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def require_finite(states: Array, sample_time: float, plant: str) -> None:
 def with_noise(
     truth: Mapping[str, Array], deviations: Mapping[str, float], rng: np.random.Generator | None, *, keep_truth: bool
 ) -> dict[str, Array]:
-    """Return what sensors with white noise log; each channel has a stream of its own.
+    """Return the log of sensors with white noise; each channel has a random stream of its own.
 
     Parameters
     ----------

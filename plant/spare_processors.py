@@ -18,7 +18,7 @@ Found = TypeVar("Found")
 
 
 def spare_processors() -> int:
-    """Return how many processors this thread may take beside its own [count]."""
+    """Return the number of processors that this thread may take beside its own [count]."""
     if multiprocessing.parent_process() is not None or threading.current_thread() is not threading.main_thread():
         return 0
     allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

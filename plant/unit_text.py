@@ -1,4 +1,4 @@
-"""How a unit may be written in a header, an option or a rig file: names and small whole powers only.
+"""Grammar of units in a header, an option or a rig file: names and small whole powers only.
 
 A unit comes from a file that anybody may have written, and the library that converts units evaluates what it is given:
 ``m*9**9**9`` would keep it busy for ever. This grammar decides first.

@@ -217,7 +217,7 @@ estimate."""
 
 @cache
 def converts(unit: str, wanted: str) -> bool:
-    """Return whether a unit is known, and measures what another does."""
+    """Return whether a unit is known and measures the same quantity as another."""
     try:
         conversion_to(unit, wanted)
     except ValueError:
@@ -267,7 +267,7 @@ def conversion_to(unit: str, wanted: str) -> tuple[float, float]:
 
 
 def by_pint(unit: str, name: str, wanted: str) -> tuple[float, float]:
-    """Return what `conversion_to` returns, for any unit that Pint knows.
+    """Return the result of `conversion_to`, for any unit that Pint knows.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""What a log of the diaphragm motor tells: leakage and load, from electrodes and position."""
+"""Estimation for the diaphragm motor: leakage and load from a log of electrodes and position."""

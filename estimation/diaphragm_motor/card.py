@@ -1,4 +1,4 @@
-"""What the diaphragm motor's sensors can know of it: bulk modulus not, gas yes (the identifiability card)."""
+"""Identifiability card of the diaphragm motor's sensors: bulk modulus cannot be identified, gas can."""
 
 from dataclasses import replace
 from math import sqrt
@@ -19,7 +19,7 @@ LEAKAGE, LOAD = 2e-12, 10.0
 
 
 def flow_change(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float, factor: float) -> float:
-    """Return by how much the mean flow changes with bulk modulus.
+    """Return the change of mean flow with bulk modulus.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def flow_change(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: flo
 
 
 def motor_card(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Card:
-    """Return how well a run under a sine knows bulk modulus, gas, leakage and load, all unknown together.
+    """Return the identifiability of bulk modulus, gas, leakage and load under a sine, all unknown together.
 
     Cramér-Rao bounds with the tolerance to which a motor is the one modelled, and a prior of 100 % on each. The
     liquid's bulk modulus counts for no more than V_0/beta beside the diaphragm's compliance C_d, 400 times as large.

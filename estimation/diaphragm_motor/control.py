@@ -101,7 +101,7 @@ class ControlledRun:
     position: Array
 
     def settling(self, since: float, until: float, band: float = 0.05) -> float:
-        """Return how long after a change the true velocity stays within a band of what is wanted, until a time.
+        """Return the settling time of the true velocity into a band about the wanted one, between two times.
 
         Parameters
         ----------

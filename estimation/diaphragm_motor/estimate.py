@@ -35,7 +35,7 @@ PATTERN_BELOW = 1e-3
 
 @dataclass(frozen=True)
 class MotorEstimate:
-    """What a log says of the motor.
+    """Estimate from a log of the diaphragm motor.
 
     Parameters
     ----------

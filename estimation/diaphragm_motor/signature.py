@@ -1,4 +1,4 @@
-"""What a log of the diaphragm motor is compared by: tones of the seven electrodes and the rod's mean velocity.
+"""Signature of a diaphragm motor's log: tones of the seven electrodes and mean velocity of the rod.
 
 Under a steady sine the electrodes' fundamentals and second harmonics, and the mean velocity, are 29 numbers. They come
 from a log by least squares over whole cycles, with their covariance from what is left over, and from the plant by
@@ -275,7 +275,7 @@ def fitted_tones(values: Floats, angle: Floats, *, trend: int) -> tuple[Floats, 
 
 
 def whole_cycles(samples: int, sample_time: float, frequency: float) -> int:
-    """Return how many whole cycles there are.
+    """Return the number of whole cycles.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ PERSISTENCE = 3
 
 @dataclass(frozen=True)
 class HealthyMaps:
-    """What the pump delivers by the middle electrode's amplitude, at one drive.
+    """Maps of a healthy pump at one drive: flow and pressure by the middle electrode's amplitude.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def healthy_maps(p: DiaphragmMotorParameters, drive: Drive) -> HealthyMaps:
 
 @dataclass(frozen=True)
 class Block:
-    """What 20 cycles show.
+    """Measurements over a block of 20 cycles.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ def _updated(state: Floats, known: Floats, seen: Floats, design: Floats, noise: 
 
 
 def _tilts(block: Block, state: Floats, p: DiaphragmMotorParameters, maps: HealthyMaps) -> Floats:
-    """Return how far an electrode's gain and a map that are off by their tolerance tilt leakage and load."""
+    """Return the errors of leakage and load due to the tolerances of an electrode's gain and of a map."""
     off = GAIN_TOLERANCE * block.amplitude
     pressure, flow = float(maps.pressure(block.amplitude)), float(maps.flow(block.amplitude))
     slope_p, slope_q = (float(one.deriv()(block.amplitude)) for one in (maps.pressure, maps.flow))

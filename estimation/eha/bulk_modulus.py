@@ -9,15 +9,15 @@ import numpy as np
 
 from estimation.eha.another_rig import unless_another_rig
 from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
-from estimation.eha.named import NAMED
+from estimation.eha.named_methods import NAMED
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide, without_number
 from estimation.eha.rig_share import fitted_responses, scaled_responses, with_wear
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
-from estimation.fits.explaining.delivery import delivered
-from estimation.fits.explaining.form_fit import FormFit
 from estimation.fits.flow.fit import FLOW_CHANNELS, REPORTED, fit_flow, require_flow_channels
-from estimation.fits.flow.traits import LogTraits
+from estimation.fits.flow.log_traits import LogTraits
+from estimation.fits.hypothesis_search.form_fit import FormFit
+from estimation.fits.hypothesis_search.pump_delivery import delivered
 from estimation.fits.motion.fit import MOTION_CHANNELS, fit_motion
 from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED
 from estimation.log_checks.channel_physics import FARTHEST, RPM, TURNS
@@ -54,8 +54,8 @@ class EstimateOptions:
         errata E9), or ``"auto"``: flow or motion where their channels are logged, else pressure.
     method : str
         ``"least-squares"`` for the forms that can be fitted, flow and motion; a filter of
-        `estimation.filters.run.METHODS`; a method of `estimation.eha.named.NAMED`, which has a form of its own; or
-        ``"auto"``: least squares where the form allows, the log begins at rest, and nothing is asked for that only a
+        `estimation.filters.run.METHODS`; a method of `estimation.eha.named_methods.NAMED`, which has a form of its own;
+        or ``"auto"``: least squares where the form allows, the log begins at rest, and nothing is asked for that only a
         filter does, else what `estimation.eha.by_filter.chosen_method` says.
     start : float, optional
         First guess [Pa]; the actuator's own if not given.
@@ -146,7 +146,7 @@ def estimate_bulk_modulus(
 
 
 def left_out(log: CleanLog, found: BulkModulusEstimate) -> tuple[Note, ...]:
-    """Return what was left out of the channels that an estimate used.
+    """Return the notes on data left out of the channels that an estimate used.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Bulk modulus by a filter: what is known of leakage and friction is believed, or estimated along with it."""
+"""Bulk modulus by a filter; leakage and friction are given, or estimated with it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from estimation.eha.by_flow_filter import filter_flow
-from estimation.eha.named import NAMED, NamedMethod
+from estimation.eha.named_methods import NAMED, NamedMethod
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide
 from estimation.filters.iterated_smoother import LONGEST
 from estimation.filters.run import METHODS, Estimate, available_channels, run_filter
@@ -50,8 +50,8 @@ class FilterOptions:
     Parameters
     ----------
     method : str
-        A filter of `estimation.filters.run.METHODS`, a method of `estimation.eha.named.NAMED`, or ``"auto"``: see
-        `chosen_method`.
+        A filter of `estimation.filters.run.METHODS`, a method of `estimation.eha.named_methods.NAMED`, or ``"auto"``:
+        see `chosen_method`.
     states : tuple of str
         What is estimated beside bulk modulus: of `AUGMENTABLE`, or of `GROUPS`.
     tuned : bool

@@ -1,4 +1,4 @@
-"""A bank of chamber filters as one estimate: who is still heard, how the log so far is read again, what all say.
+"""A bank of chamber filters as one estimate: which filters count, replay of the log, and their mean.
 
 At every sample the mixture rests on what came before it alone (Alspach and Sorenson 1972, equations 26 to 33): a weight
 is that of its block's beginning. What is hopeless is dropped block by block; from `FIRST_LOOK` on the survivors read
@@ -60,7 +60,7 @@ class Member:
 
 
 class Reading(NamedTuple):
-    """What a bank makes of a log.
+    """Result of a filter bank on a log.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def run_bank(members: Sequence[Member], near: tuple[int, ...]) -> Reading:
 
 
 def _ends(samples: int, every: int, sample_time: float) -> list[int]:
-    """Return where blocks end: one past a sample that the track keeps, or at the end of the log."""
+    """Return the ends of blocks: one past a sample that the track keeps, or the end of the log."""
     times = list(BLOCKS)
     while times[-1] < samples * sample_time:
         times.append(GROWTH * times[-1])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from estimation.fits.explaining.tried import Explanation
+from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.models.wide_flow import GROWTH, grown_leakage
 from estimation.notes import RigCode
 from plant.arrays import Array
@@ -18,7 +18,7 @@ LEAST_GROWN = 1e-3
 
 
 def growth_note(found: Explanation, _: EhaParameters) -> Note:
-    """Return what a leakage that changes all along is called: drifting as oil warms, or growing.
+    """Return the note on a leakage that changes throughout a log: drifting as oil warms, or growing.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def changed_note(factor: float, last: float) -> Note:
 
 
 def step_note(found: Explanation, _: EhaParameters) -> Note:
-    """Return what a leakage that steps is called.
+    """Return the note on a leakage that steps.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""`estimate_log(record, rig) -> Finding`: what a log of the gear-pump actuator says of its oil and leakage."""
+"""`estimate_log(record, rig) -> Finding`: bulk modulus and leakage from a log of the gear-pump actuator."""
 
 from estimation.eha.bulk_modulus import DEFAULT_OPTIONS, FITTED, EstimateOptions, estimate_clean, left_out
-from estimation.eha.explained import notes_of
+from estimation.eha.explanation_notes import notes_of
 from estimation.eha.result import BulkModulusEstimate
 from estimation.eha.rig_share import another_oil
 from estimation.finding import Finding, Outcome, Quantity
@@ -79,7 +79,7 @@ def estimated(log: CleanLog, rig: Rig, options: EstimateOptions) -> tuple[CleanL
 
 
 def finding_of(log: CleanLog, found: BulkModulusEstimate, rig: Rig) -> Finding:
-    """Return what an estimate says, as a finding.
+    """Return an estimate as a finding.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def _others(found: BulkModulusEstimate) -> dict[str, Quantity]:
 
 
 def explained(found: BulkModulusEstimate, parameters: EhaParameters) -> tuple[Note, ...]:
-    """Return what is strange about rig, oil or logger and explains a log, and what a fit remarks beside its numbers.
+    """Return the notes on the explanation of a log by rig, oil or logger, and the remarks of its fit.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def explained(found: BulkModulusEstimate, parameters: EhaParameters) -> tuple[No
 
 
 def absences(found: BulkModulusEstimate) -> tuple[Note, ...]:
-    """Return what is lost where differential pressure is not used, nothing where it is.
+    """Return the note on what is lost without differential pressure; nothing if it is used.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def refused(found: BulkModulusEstimate) -> tuple[Note, ...]:
 
 
 def _moves_otherwise(found: BulkModulusEstimate) -> bool:
-    """Return whether the piston moves in another way than the model's, by much of its motion and not of the noise."""
+    """Return whether the piston moves unlike the model, by a large share of its motion, not only of the noise."""
     large = [note for note in found.gate.reasons if note.code == EstimateCode.POSITION_RESIDUALS_LARGE]
     share = max((float(note.data["motion_percent"]) for note in large), default=float("inf"))
     return found.outcome is Outcome.MISMATCH and share > 100.0 * LARGEST_SHARE

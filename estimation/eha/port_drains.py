@@ -4,16 +4,16 @@ from collections.abc import Callable
 from math import exp
 
 from estimation.finding import NORMAL_95
-from estimation.fits.explaining.faults_tried import usual_leakage
-from estimation.fits.explaining.tried import Explanation
 from estimation.fits.flow.log import DRAIN_START, PRESUMED_STD
+from estimation.fits.hypothesis_search.explanation import Explanation
+from estimation.fits.hypothesis_search.fault_guesses import leakage_guess
 from estimation.notes import RigCode
 from plant.eha.model import EhaParameters
 from plant.notes import Note
 
 
 def most_drained(p: EhaParameters) -> float:
-    """Return the most that the case of a sound pump drains of a port, before a log is seen.
+    """Return the largest case drain of a sound pump per port, before a log is seen.
 
     It is presumed a twentieth of the healthy leakage, and known to a factor of e: 97.5 % drain less than a third of it.
 
@@ -27,7 +27,7 @@ def most_drained(p: EhaParameters) -> float:
     >>> round(most_drained(EhaParameters(leakage_coefficient=1e-11)) * 1e12, 2)
     3.55
     """
-    return DRAIN_START * usual_leakage(p) * exp(NORMAL_95 * PRESUMED_STD)
+    return DRAIN_START * leakage_guess(p) * exp(NORMAL_95 * PRESUMED_STD)
 
 
 def drain_note(side: str) -> Callable[[Explanation, EhaParameters], Note]:

@@ -1,4 +1,4 @@
-"""What an estimate of bulk modulus is: a number with its interval and verdict, or the outcome that stands instead."""
+"""Estimate of bulk modulus: a number with its interval and verdict, or an outcome instead of a number."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,8 +7,8 @@ from types import MappingProxyType
 from estimation.eha.rig_share import Responses, rig_notes, with_total
 from estimation.filters.run import Estimate
 from estimation.finding import Gate, Outcome, Quantity, positive_interval_95
-from estimation.fits.explaining.tried import Explanation
-from estimation.fits.greybox.teeth import EVENLY, Turning
+from estimation.fits.greybox.pump_ripple import EVENLY, Turning
+from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.notes import EstimateCode
 from estimation.tuning.tuning import Tuning
 from plant.eha.doubts import Spread
@@ -58,7 +58,7 @@ class BulkModulusEstimate:
         What the log leaves open, and is nothing against the estimate.
     method : str
         How it was estimated: ``least-squares``, a filter of `estimation.filters.run.METHODS`, or a method of
-        `estimation.eha.named.NAMED`.
+        `estimation.eha.named_methods.NAMED`.
     turning : Turning
         Teeth of the pump and offset of the speed that were taken up.
     correlation : float
@@ -92,7 +92,7 @@ class BulkModulusEstimate:
 
     @property
     def rig_notes(self) -> tuple[Note, ...]:
-        """What is said where bulk modulus is known only as well as the rig."""
+        """Notes for a bulk modulus that is known only as well as the rig."""
         return rig_notes("bulk_modulus", self.quantity, self.responses.get("bulk_modulus", {}), self.spreads)
 
     def with_total(self, name: str, one: Quantity) -> Quantity:

@@ -1,4 +1,4 @@
-"""How a result depends on the rig file's entries, and the total interval that includes their uncertainty.
+"""Sensitivity of a result to the rig file's entries, and the total interval that includes their uncertainty.
 
 A response is the relative change of a quantity per relative change of a rig entry. The flow form's fit gives its own;
 everything else takes the laws of dimension below. They are exact in what they say of scale:
@@ -19,7 +19,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from estimation.finding import LARGE, NORMAL_95, Quantity
-from estimation.fits.explaining.form_fit import FormFit
+from estimation.fits.hypothesis_search.form_fit import FormFit
 from estimation.notes import EstimateCode, RigCode
 from plant.eha.doubts import PRESSURE_GAIN, Spread
 from plant.eha.model import EhaParameters
@@ -91,7 +91,7 @@ def scaled_responses(
 
 
 def _reaches(responses: Responses, spreads: Mapping[str, Spread]) -> dict[str, tuple[float, float]]:
-    """Return how far each entry moves a quantity down and up within its own 95 % [fraction of the quantity]."""
+    """Return the shift of a quantity down and up by each entry within its own 95 % [fraction of the quantity]."""
     found: dict[str, tuple[float, float]] = {}
     for entry, power in responses.items():
         down, up = spreads.get(entry, (0.0, 0.0))
@@ -140,7 +140,7 @@ def with_total(
 
 
 def _of_logarithm(value: float, ends: tuple[float, float]) -> bool:
-    """Return whether an interval is wide, and lies evenly about the logarithm of its value (`positive_interval_95`)."""
+    """Return whether an interval is wide, and symmetric in the logarithm of its value (`positive_interval_95`)."""
     return ends[0] < value * math.exp(-NORMAL_95 * LARGE) and math.isclose(ends[0] * ends[1], value**2, rel_tol=1e-9)
 
 
@@ -150,7 +150,7 @@ def _log_ratio(value: float, more: float) -> float:
 
 
 def wear_left_open(remarks: Sequence[Note]) -> float:
-    """Return how far below its displacement the pump may deliver, where a log does not tell wear from leakage.
+    """Return the uncertainty of pump delivery below displacement, if a log cannot separate wear from leakage.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def wear_left_open(remarks: Sequence[Note]) -> float:
 
 
 class OpenDelivery(NamedTuple):
-    """What a log says of the pump's delivery where it does not tell wear from leakage.
+    """Pump delivery from a log that cannot separate wear from leakage.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ class OpenDelivery(NamedTuple):
 
 
 def delivery_left_open(remarks: Sequence[Note]) -> OpenDelivery | None:
-    """Return what a log says of the pump's delivery, where it does not tell wear from leakage.
+    """Return the pump delivery from a log that cannot separate wear from leakage.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def _said_of_wear(remarks: Sequence[Note]) -> Mapping[str, Any] | None:
 
 
 def with_wear(spreads: Mapping[str, Spread], remarks: Sequence[Note]) -> Mapping[str, Spread]:
-    """Return how far each entry of a rig may be off, the pump's displacement downwards by wear that is left open.
+    """Return the uncertainties of rig entries, displacement's lower one widened by undetermined pump wear.
 
     Parameters
     ----------

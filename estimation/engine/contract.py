@@ -1,4 +1,4 @@
-"""What a filter is given, and what it returns: the contract of every method in `METHODS`.
+"""Input and output of a filter: the contract of every method in `METHODS`.
 
 A method is a function ``method(problem) -> Trace``. To add one, write such a function in a file of its own and give it
 a line in `estimation.filters.run.METHODS`; nothing else changes.

@@ -111,7 +111,7 @@ def _over_scale(z: Expression, old: Expression, new: Expression, state: StateVar
 
 
 def observed(model: ProcessModel, mean: Sequence[Expression], channels: Sequence[str]) -> list[Expression]:
-    """Return what the model predicts of each channel.
+    """Return the model's prediction of each channel.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def bounded(model: ProcessModel, mean: Sequence[Expression]) -> list[Expression]
 
 
 def projected(covariance: Covariance, H: Sequence[Expression]) -> tuple[list[Expression], Expression]:
-    """Return what a covariance says of a channel.
+    """Return the projection of a covariance on a channel: cross-covariance and variance.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ LANES = 32
 
 
 def _width(halves: Halves, lanes: int) -> int:
-    """Return how many filters a step takes: a vector of them, or two where roots would leave the processor waiting."""
+    """Return the number of filters in a step: one processor vector, or two if square roots would stall it."""
     waits = any(item.operation == "sqrt" for item in ordered(halves.predict.values()))
     return min(lanes, (2 if waits else 1) * native_width())
 

@@ -30,7 +30,7 @@ Step: TypeAlias = Callable[[int, float, int, int, int], None]
 
 
 class LanesKernel(Protocol):
-    """What the kernel of a filter has, for one log or for logs side by side.
+    """Interface of a filter's compiled kernel, for one log or for logs side by side.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Where a compiled filter keeps what: the names of everything that goes into it and from sample to sample."""
+"""Layout of a compiled filter: the names of its inputs and of the values carried from sample to sample."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ _NUMBERED = re.compile(r"[abykcdtw](?:0|[1-9]\d{0,3})")
 
 @dataclass(frozen=True)
 class Layout:
-    """Where a kernel keeps what.
+    """Layout of a kernel's carried values and constants.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Layout:
     channels: int
 
     def start(self, mean: Array, covariance: Array) -> Array:
-        """Return what is carried before the first sample.
+        """Return the carried values before the first sample.
 
         Parameters
         ----------
@@ -98,7 +98,7 @@ def upper_triangle(n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 @cache
 def layout(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> Layout:
-    """Return how the kernel of a rule on a model is laid out.
+    """Return the layout of the kernel of a rule on a model.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def counting_missing(update: Outputs) -> Outputs:
 
 
 def all_present(update: Outputs) -> Outputs:
-    """Return what an update computes where no sample is missing, to the same bits.
+    """Return the update for a sample without missing channels, bit-identical to the general one.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def all_present(update: Outputs) -> Outputs:
 
 
 def at_sample(predict: Outputs) -> Outputs:
-    """Return what a step of the model computes that begins at a sample, where sub-step ``j`` is 0; drives are finite.
+    """Return the model step that begins at a sample, where sub-step ``j`` is 0, for finite drives.
 
     Parameters
     ----------

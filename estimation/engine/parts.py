@@ -74,7 +74,7 @@ def function_source(
 
 
 def places(array: str, names: Iterable[str]) -> dict[str, str]:
-    """Return where each number stands in an array.
+    """Return the array element that holds each number.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def places(array: str, names: Iterable[str]) -> dict[str, str]:
 
 
 def data_places(model: ProcessModel, channels: tuple[str, ...]) -> dict[str, str]:
-    """Return where a step's drives and a sample's measurements are read from.
+    """Return the array elements that hold a step's drives and a sample's measurements.
 
     Returns
     -------

@@ -11,7 +11,7 @@ DEGREES = 4.0
 
 
 def inflation(robust: str, ratio: Expression) -> Expression:
-    """Return by how much a channel's noise is taken larger for an innovation that is too large to be noise.
+    """Return the inflation of a channel's noise variance for an innovation too large to be noise.
 
     Parameters
     ----------

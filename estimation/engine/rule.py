@@ -1,4 +1,4 @@
-"""What a filter is, as a rule: its two halves, what its user may set, and how outliers may count."""
+"""A filter as a rule: its two halves, its settings, and the weight of outliers."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

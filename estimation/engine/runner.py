@@ -15,7 +15,7 @@ from plant.compiled.native.load import NativeKernel
 
 
 def constant_row(problem: FilterProblem, settings: dict[str, float]) -> Array:
-    """Return what a kernel reads and never changes, in the order of `Layout.rows`.
+    """Return the constants of a kernel, in the order of `Layout.rows`.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def constant_row(problem: FilterProblem, settings: dict[str, float]) -> Array:
 
 
 def constant_rows(problems: Sequence[FilterProblem], settings: dict[str, float]) -> Array:
-    """Return what a kernel reads and never changes for filters side by side.
+    """Return the constants of a kernel for filters side by side.
 
     Parameters
     ----------

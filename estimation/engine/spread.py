@@ -69,6 +69,6 @@ def spread(outputs: Sequence[Expression], inputs: Sequence[Expression], covarian
 
 
 def _mixed(item: Expression, known: Sequence[Expression], units: Sequence[Expression]) -> dict[int, Expression]:
-    """Return what of the known a quantity is mixed of, and its slope by each, counted in a unit of its own."""
+    """Return the nonzero slopes of a quantity by the known ones, each scaled by a unit of its own."""
     slopes = eliminated_jacobian([item], known)[0]
     return {k: slope * unit for k, (slope, unit) in enumerate(zip(slopes, units, strict=True)) if slope is not ZERO}

@@ -1,4 +1,4 @@
-"""How far to trust a fit of own equations: covariance, parameters that logs do not determine, failed checks."""
+"""Reliability of a fit of own equations: covariance, parameters that logs do not determine, failed checks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -56,7 +56,7 @@ APART = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
-    """What is known of the unknowns' errors.
+    """Standard deviations and correlations of the unknowns, and which of them are not determined.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def covariance_of(problem: Problem, theta: Array) -> Covariance:
 
 
 def concluded(solution: Solution, given: Array) -> tuple[Finding, Covariance]:
-    """Return what a solution says.
+    """Return the finding of a solution, and its covariance.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def concluded(solution: Solution, given: Array) -> tuple[Finding, Covariance]:
 
 
 def fits_of(problem: Problem, theta: Array) -> list[float]:
-    """Return how well each output is followed.
+    """Return the fit of each output.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def _unit(problem: Problem, name: str) -> str:
 
 
 def _misfits(problem: Problem, theta: Array, residuals: Sequence[Array], given: Array) -> list[Note]:
-    """Return how the residuals differ from the noise of a sensor."""
+    """Return notes on residuals that differ from sensor noise."""
     notes: list[Note] = []
     slopes = np.split(problem.slopes(theta), np.cumsum([one.size for one in residuals])[:-1])
     for i, channel in enumerate(problem.equations.outputs):

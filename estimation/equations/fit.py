@@ -21,7 +21,7 @@ EXACT = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class EquationsFit:
-    """What a fit of own equations found.
+    """Result of a fit of own equations.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class EquationsFit:
         return {**dict(zip(self.equations.parameters, map(float, found), strict=False)), **self.equations.known}
 
     def predicted(self, record: Record, initial: Mapping[str, float] | None = None) -> Mapping[str, Array]:
-        """Return what the fitted equations give on another log.
+        """Return the prediction of the fitted equations on another log.
 
         Parameters
         ----------
@@ -140,7 +140,7 @@ def fit_equations(
 
 
 def predicted(fit: EquationsFit, record: Record, initial: Mapping[str, float]) -> Mapping[str, Array]:
-    """Return what fitted equations give on a log; see `EquationsFit.predicted`.
+    """Return the prediction of fitted equations on a log; see `EquationsFit.predicted`.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def predicted(fit: EquationsFit, record: Record, initial: Mapping[str, float]) -
 def simulated(
     equations: Equations, record: Record, values: Mapping[str, float], initial: Mapping[str, float]
 ) -> Mapping[str, Array]:
-    """Return what equations give with parameters that are said.
+    """Return the simulation of equations with given parameters.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from estimation.arrays import Array
 
 
 class EquationsKernel(Protocol):
-    """What the kernel of a model has.
+    """Interface of a model's compiled kernel.
 
     A point is a tuple with a row for each state: the state, and its derivatives by the unknowns.
 

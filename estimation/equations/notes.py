@@ -1,4 +1,4 @@
-"""What a fit of a user's own equations may bring up."""
+"""Notes of a fit of a user's own equations."""
 
 from plant.notes import Code
 

@@ -294,7 +294,7 @@ class Problem:
 
 
 def start_of(equations: Equations, name: str, part: Part) -> float:
-    """Return where the search for an initial state begins: what is given, else the first measured value, else zero.
+    """Return the first guess of an initial state: the given value, else the first measured one, else zero.
 
     Returns
     -------

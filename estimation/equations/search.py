@@ -53,7 +53,7 @@ ROUNDS = 6
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where a search ended.
+    """Result of a search.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def _whole(problem: Problem, theta: Array) -> Array | None:
 
 
 def _descended(problem: Problem, guesses: Sequence[Array]) -> list[Point]:
-    """Return where the better starts end, the best first."""
+    """Return the optima reached from the better starts, best first."""
     points = [problem.at(guess) for guess in guesses]
     able = [point.theta for point in points if np.isfinite(point.cost)]
     if not able:
@@ -201,13 +201,13 @@ def _descended(problem: Problem, guesses: Sequence[Array]) -> list[Point]:
 
 
 def _explained(problem: Problem, theta: Array, noise: Array) -> bool:
-    """Return whether the residuals are of the size that the measured outputs' own noise has."""
+    """Return whether the residuals are as small as the noise of the measured outputs."""
     errors = np.concatenate(problem.with_noise(noise).residuals(theta), axis=1)
     return bool(np.isfinite(errors).all() and np.sqrt(np.mean(errors**2, axis=1)).max() < ASTRAY)
 
 
 def _lengthened(problem: Problem, guess: Array) -> Point:
-    """Return where a search ends that is led along ever longer beginnings: an oscillation then stays in phase."""
+    """Return the end of a search along ever longer beginnings, which keeps an oscillation in phase."""
     theta = guess
     for share in LENGTHS:
         counts = [max(round(share * part.measured.shape[1]), FEWEST_AT_FIRST) for part in problem.parts]
@@ -257,7 +257,7 @@ def _shown(problem: Problem, theta: Array, typical: Array) -> Array:
 
 
 def _moved(problem: Problem, point: Point) -> float:
-    """Return by how much steps of half the length would move the solution, in standard deviations: ``|Q'e|``."""
+    """Return the shift of the solution under steps of half the length, in standard deviations: ``|Q'e|``."""
     finer = _whole(replace(problem, substeps=2 * problem.substeps), point.theta)
     coarse = _whole(problem, point.theta)
     if finer is None or coarse is None:

@@ -58,7 +58,7 @@ def traced(
     inputs: Any,
     parameters: Named,
 ) -> list[Expression]:
-    """Return what a user's function gives, as expressions.
+    """Return the outputs of a user's function as expressions.
 
     Parameters
     ----------

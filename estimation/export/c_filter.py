@@ -42,7 +42,7 @@ LARGE_PRODUCT = {"double": LARGE, "float": 1e15}
 
 @dataclass(frozen=True)
 class Numbers:
-    """What a filter starts from, as tables of C.
+    """Constants and initial belief of a filter, as tables of C.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def _shapes(problem: FilterProblem, written: RuleInC, bank: BankInC | None, mode
 
 
 def numbers_of(problem: FilterProblem, method: str) -> Array:
-    """Return what a filter is told and never changes.
+    """Return the constants of a filter.
 
     Parameters
     ----------

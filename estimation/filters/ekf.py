@@ -186,13 +186,13 @@ def _second_inverse(earlier: _Earlier, H: Sequence[Expression], r: Expression) -
 
 
 def _unit(row: Sequence[Expression]) -> Expression:
-    """Return what a channel shows of one unit of a state, if it shows that state alone; an update then counts in it."""
+    """Return the constant slope of a channel that shows one state alone, as the unit of its update; else one."""
     seen = [slope for slope in row if slope is not ZERO]
     return seen[0] if len(seen) == 1 and seen[0].operation == "constant" else ONE
 
 
 def _linearised(model: ProcessModel, point: Mean, mean: Mean, channels: Sequence[str], c: int) -> Expression:
-    """Return what the model, linearised about a point, predicts of a channel from a mean."""
+    """Return the prediction of a channel from a mean, by the model linearised about a point."""
     predicted = observed(model, point, channels)[c]
     row = jacobian([predicted], point)[0]
     if all(slope.operation == "constant" for slope in row):  # it is linear

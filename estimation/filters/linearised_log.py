@@ -1,4 +1,4 @@
-"""What the loops over a trajectory read, and a log that is linearised along it."""
+"""Input of the loops over a trajectory, and the log linearised along it."""
 
 from typing import NamedTuple
 

@@ -30,7 +30,7 @@ NEVER = 1 << 62
 
 @dataclass(frozen=True, eq=False)
 class CurrentBelief:
-    """What a filter believes after its last sample, in SI.
+    """Belief of a filter after its last sample, in SI.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class OnlineFilter:
         return np.ascontiguousarray(held, np.float64)
 
     def now(self) -> CurrentBelief:
-        """Return what is believed after the last sample."""
+        """Return the belief after the last sample."""
         (trace,) = read_off(self._places, [self.problem], self._work, self._logs, [empty_trace(self.problem)])
         values, slope = self.problem.model.to_si(trace.mean)
         deviations = np.sqrt(np.maximum(np.diag(trace.covariance), 0.0)) * slope

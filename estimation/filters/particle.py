@@ -135,7 +135,7 @@ def is_logged(sample: Array) -> bool:
 
 
 def predicted(weights: Array, seen: Array, r: float) -> tuple[float, float]:
-    """Return what the cloud predicts of a channel, and with which variance, the sensor's own included."""
+    """Return the mean and variance of a channel predicted by the cloud, the sensor's variance included."""
     middle, s = 0.0, r
     for i in range(weights.shape[0]):
         middle += weights[i] * seen[i]

@@ -238,7 +238,7 @@ def available_channels(model: ProcessModel, record: Record) -> tuple[str, ...]:
 
 
 def in_si(problem: FilterProblem, trace: Trace, start_time: float) -> Estimate:
-    """Return what a method found, in SI.
+    """Return the result of a method in SI.
 
     Parameters
     ----------

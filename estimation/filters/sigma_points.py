@@ -47,7 +47,7 @@ SMALLEST_PIVOT = 1e-14
 
 @dataclass(frozen=True)
 class Spread:
-    """How far out the points lie, and how much the shift of the mean counts.
+    """Spread of the sigma points: their distance, and the weight of the shift of the mean.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def root(P: Covariance, n: int) -> Matrix:
 
 
 def is_affine(item: Expression, mean: Sequence[Expression]) -> bool:
-    """Return whether an expression is a sum of multiples of states, and of what does not depend on them.
+    """Return whether an expression is affine in the states.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def is_affine(item: Expression, mean: Sequence[Expression]) -> bool:
 
 
 def all_affine(model: ProcessModel, channels: Sequence[str]) -> bool:
-    """Return whether a model sees every channel as a sum of multiples of its states.
+    """Return whether every channel that a model predicts is affine in its states.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What the sliding-mode filters share: an update by a share of the innovation, and a covariance that stays one.
+"""Common parts of the sliding-mode filters: an update by a share of the innovation, with a valid covariance.
 
 The published gains invert the observation matrix, ``K = C+ diag(share)``: all states measured, or the Moore-Penrose
 inverse, by which an unmeasured state never moves. Neither serves here, where acceleration or pressure and bulk modulus
@@ -23,7 +23,7 @@ from plant.compiled.expression import ONE, ZERO, Expression, jacobian, select, s
 
 @dataclass(frozen=True)
 class Innovation:
-    """What a sliding-mode filter decides by, for one channel.
+    """Innovation of one channel in a sliding-mode filter, with its variances.
 
     Parameters
     ----------

@@ -156,7 +156,7 @@ def backward(
 
 
 def is_moved(shift: Array) -> bool:
-    """Return whether a belief was moved to keep within its bounds."""
+    """Return whether a belief was shifted to stay within its bounds."""
     moved = False
     for i in range(shift.shape[0]):
         moved = moved or shift[i] != 0.0
@@ -172,7 +172,7 @@ def _adjoint_outputs(u: Sequence[Expression], U: Covariance) -> Outputs:
 
 
 def _filtered(model: ProcessModel, channels: Sequence[str], robust: str) -> Update:
-    """Return what the filter's update does."""
+    """Return the filter's update."""
     prior, _ = belief_symbols(model)
     return linearised_update(model, channels, prior, noise_symbols(channels), robust)
 
@@ -222,7 +222,7 @@ def back_update_expressions(model: ProcessModel, channels: Sequence[str], robust
 
 
 def hold_expressions(model: ProcessModel, channels: Sequence[str], robust: str) -> Outputs:
-    """Return by how much the filter's update was moved to keep within physical bounds.
+    """Return the shift that keeps the filter's update within physical bounds.
 
     Parameters
     ----------

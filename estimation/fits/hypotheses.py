@@ -1,7 +1,7 @@
-"""What may be strange about a rig, its oil or its logger, as hypotheses that a log accepts or not.
+"""Hypotheses about a rig, its oil and its logger that a log accepts or rejects.
 
 A log that the plain flow form explains is not asked. One that it does not is fitted under them by
-`estimation.fits.explaining.explain`.
+`estimation.fits.hypothesis_search.explain`.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from estimation.models.wide_flow import CROSSED
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Something that a rig, its oil or its logger may add to the plain flow form.
+    """An effect of rig, oil or logger that extends the plain flow form.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class Hypothesis:
     known: bool = False
 
     def told(self, value: float, std: float) -> bool:
-        """Return whether a log tells what is freed first, as far as the hypothesis needs it.
+        """Return whether a log determines the first freed unknown, as far as the hypothesis needs it.
 
         Parameters
         ----------

@@ -12,7 +12,7 @@ MOST_STEPS = 100
 
 
 def root_between(function: Callable[[float], float], low: float, high: float, tolerance: float) -> float:
-    """Return where a function is zero, between two ends at which its signs differ.
+    """Return the root of a function between two ends at which its signs differ.
 
     Parameters
     ----------

@@ -84,7 +84,7 @@ class Coefficient:
     high: float
 
     def covers(self, truth: float) -> bool:
-        """Return whether the interval holds a value.
+        """Return whether the interval contains a value.
 
         Parameters
         ----------

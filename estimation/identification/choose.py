@@ -122,7 +122,7 @@ def choose_model(
 def compare_structures(
     u: Signals, y: Signals, sample_time: float, form: dict[str, Any], structures: Sequence[str]
 ) -> "pd.DataFrame":
-    """Return how structures of one size do on the last third of a record, or of the experiments, fitted to the rest.
+    """Return the scores of structures of one size on the last third of the data, fitted to the rest.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def compare_structures(
 
 
 def held_back_percent(model: LinearModel, u: Array, y: Array) -> float | None:
-    """Return how a model of the same structure and size, fitted to two thirds of a log, follows the last third.
+    """Return the fit on the last third of a log, by a model of the same structure and size fitted to the rest.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def held_back_percent(model: LinearModel, u: Array, y: Array) -> float | None:
 
 
 def split_record(u: Signals, y: Signals) -> tuple[tuple[list[Array], list[Array]], tuple[list[Array], list[Array]]]:
-    """Return what is fitted and what is held back: the last third of the experiments, or of each of two or one.
+    """Return the data to fit and to hold back: the last third of the experiments, or of each of two or one.
 
     Parameters
     ----------

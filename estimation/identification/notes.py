@@ -1,4 +1,4 @@
-"""What identification may bring up."""
+"""Notes of identification."""
 
 from plant.notes import Code
 

@@ -99,7 +99,7 @@ def identify_by_reference(data: Sequence[Channels], drives: Sequence[Channels], 
 
 
 def _explained(drive: Channels) -> tuple[list[Array], Note]:
-    """Return what references explain of an input, log by log, with a note of how much that is."""
+    """Return the part of an input that references explain, log by log, with a note of its share."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LogWarning)
         stage = identify_channels(drive)

@@ -1,1 +1,1 @@
-"""What a log tells of its own sensors: noise, outliers, gaps, frozen or clipped channels."""
+"""Checks of a log's sensors: noise, outliers, gaps, frozen or clipped channels."""

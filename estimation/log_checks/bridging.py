@@ -1,4 +1,4 @@
-"""What a filter must not believe: a straight line in place of samples of its drives that are not there.
+"""Gaps in the drives of a filter: bridged by straight lines that the filter does not trust.
 
 Motor speed drives every process model, so where it was not logged it is not known what the pump delivered. Whatever
 volume a straight line leaves open enters the belief as process noise of the states that it moves, sample by sample, and

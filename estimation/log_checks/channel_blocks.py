@@ -103,7 +103,7 @@ def whole(record: Record, name: str) -> Array | None:
 
 
 def alike(y: Array | None, x: Array | None) -> tuple[float, float]:
-    """Return how two signals move together about their means: correlation, and ratio of sizes with its sign.
+    """Return the correlation of two signals, and their signed ratio of sizes.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def alike(y: Array | None, x: Array | None) -> tuple[float, float]:
 
 
 def power_of(pressure: Array | None, flow: Array | None, piston: Array | None) -> float:
-    """Return how pressure goes with the pumped flow, without what a constant load and a spring put on it.
+    """Return the correlation of pressure with pumped flow, without the effect of a constant load and a spring.
 
     What slides and leaks takes power, whatever the load; a load gives back what it took.
 
@@ -149,7 +149,7 @@ def power_of(pressure: Array | None, flow: Array | None, piston: Array | None) -
 
 
 def gone_together(piston: Array | None, pumped: Array | None) -> tuple[float, float]:
-    """Return how the piston's path and the pumped volume agree once their drift is taken off; slow motion counts most.
+    """Return the agreement of the piston's path with the pumped volume, both detrended; slow motion counts most.
 
     Parameters
     ----------

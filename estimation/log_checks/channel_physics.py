@@ -1,4 +1,4 @@
-"""Channels with a wrong sign, unit or name, told by what no actuator does; looked for before anything is fitted.
+"""Channels with a wrong sign, unit or name, found by physics before anything is fitted.
 
 Velocity is the slope of position. The piston goes where the pump sends it, and not farther than the pumped oil takes
 it, while leakage and friction may take any share. What is pumped moves the piston once, and compresses oil as pressure
@@ -130,7 +130,7 @@ def channel_mistakes(record: Record, p: EhaParameters) -> tuple[Note, ...]:
 
 
 def _repeats_one_row(record: Record) -> bool:
-    """Return whether nothing changes though the motor turns; where it stands, nothing need change."""
+    """Return whether nothing changes although the motor turns; at standstill nothing need change."""
     still = all(np.nanmax(record[name]) == np.nanmin(record[name]) for name in MEASURED if name in record)
     return still and SPEED in record and bool(np.nanmax(np.abs(record[SPEED])) > LIMITS[SPEED].least)
 
@@ -300,7 +300,7 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
 
 
 def _slides(record: Record, p: EhaParameters) -> bool:
-    """Return whether pressure is ever high enough to move a piston: one that sticks yields as its seals do."""
+    """Return whether pressure is ever high enough to move the piston; a stuck one only yields on its seals."""
     highest = float(np.nanmax(np.abs(record[PRESSURE]))) if PRESSURE in record else np.inf
     return highest * p.piston_area > HELD * p.friction_coulomb
 
@@ -310,7 +310,7 @@ def _too_fast(record: Record, p: EhaParameters) -> bool:
 
 
 def _resolved(record: Record, long: ChannelBlocks) -> bool:
-    """Return whether a position that hardly moves is finer than a stuck piston's could be."""
+    """Return whether the motion of a piston that hardly moves is well above the noise of its position."""
     if long.position is None:
         return False
     noise = position_variance(record[POSITION]) ** 0.5

@@ -67,7 +67,7 @@ class CleanLog:
         return any(note.code == SensorCode.SPEED_HELD for note in self.left_out)
 
     def objections_to(self, channels: tuple[str, ...]) -> tuple[Note, ...]:
-        """Return what speaks against the sensors of some channels.
+        """Return the objections to the sensors of some channels.
 
         Parameters
         ----------

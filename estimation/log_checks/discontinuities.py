@@ -125,7 +125,7 @@ def _longest(record: Record, steps: list[_Step]) -> tuple[Record, tuple[Note, ..
 
 
 def _steps_of_position(record: Record) -> list[_Step]:
-    """Return where position steps farther from where velocity takes it than elsewhere, and than it ever goes in a row.
+    """Return the steps of position that velocity does not explain, larger than its moves between rows elsewhere.
 
     Seals that grip stop a piston within a row; it strays by less than it goes.
     """
@@ -138,7 +138,7 @@ def _steps_of_position(record: Record) -> list[_Step]:
 
 
 def _steps_of_pressure(record: Record) -> list[_Step]:
-    """Return where pressure steps farther from what compresses the oil than elsewhere."""
+    """Return the steps of pressure that compression of the oil does not explain."""
     if PRESSURE not in record or SPEED not in record or record.sample_time > SLOWEST_PRESSURE:
         return []
     rows = _places(pressure_strays(record, noisy=True), STEP_OF_PRESSURE)
@@ -151,12 +151,12 @@ def _beside(row: int, places: list[int]) -> bool:
 
 
 def _driven(record: Record, row: int) -> bool:
-    """Return whether the motor jumps about a row, which may move pressure within it."""
+    """Return whether motor speed jumps near a row, which may move pressure within that row."""
     return any(_jumps(record[SPEED], one) for one in range(row - 2, row + 3))
 
 
 def _meets_stop(record: Record, row: int) -> bool:
-    """Return whether the piston stops for good about a row, as far out as it ever goes: it has met a stop.
+    """Return whether the piston meets an end stop near a row: it stops for good, as far out as it ever goes.
 
     What the pump delivers, or a load pulls, then goes into pressure at once.
     """
@@ -178,7 +178,7 @@ def _without(values: Array, rows: list[int]) -> Array:
 
 
 def pressure_strays(record: Record, *, noisy: bool = False) -> Array:
-    """Return what is left of the change of pressure from row to row beside what pump, piston and leakage explain.
+    """Return the changes of pressure from row to row that pump, piston and leakage do not explain.
 
     Valves and seals bend this line, so rows that stray far from it are left out before it is drawn again.
 
@@ -239,13 +239,13 @@ def _places(strayed: Array, least: float) -> list[int]:
 
 
 def _size(strayed: Array, k: int) -> float:
-    """Return how much higher a channel is behind a row than before, by the means of some rows on either side."""
+    """Return the size of a step at a row, by the means of some rows on either side."""
     course = np.cumsum(np.nan_to_num(strayed[k - NEAR : k + NEAR + 1]))
     return float(np.mean(course[NEAR:]) - np.mean(course[:NEAR]))
 
 
 def _held_before(record: Record, step: _Step) -> int:
-    """Return how many rows a position repeats before it jumps; 0 where it is none or no rest."""
+    """Return the number of rows for which a position rests before it jumps; 0 for no rest, or another channel."""
     if step.channel != POSITION:
         return 0
     before = record[POSITION][: step.row + 1]
@@ -267,7 +267,7 @@ def _also(record: Record, step: _Step, steps: list[_Step]) -> list[str]:
 
 
 def _jumps(values: Array, row: int) -> bool:
-    """Return whether a channel leaves the line on which it came and goes on, by far more than its noise."""
+    """Return whether a channel steps away from its trend at a row, by far more than its noise."""
     first = max(0, row - 3 * APART)
     around = values[first : row + 3 * APART + 2]
     steps = np.diff(around)

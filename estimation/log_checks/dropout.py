@@ -63,7 +63,7 @@ def without_dropouts(record: Record) -> tuple[Record, tuple[Note, ...]]:
 
 
 def _jumps(values: Array, at: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return whether a channel goes farther to some samples than it ever does from one to the next elsewhere."""
+    """Return whether a channel's steps to some samples exceed all of its steps elsewhere."""
     steps = np.abs(np.diff(values))
     there = steps[at - 1]
     steps[at - 1] = 0.0

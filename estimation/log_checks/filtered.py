@@ -121,7 +121,7 @@ def is_white(values: Array) -> bool:
 
 
 def is_white_when_slow(values: Array, speed: Array) -> bool:
-    """Return whether the noise of a channel is white while the motor turns slowly, and not at all speeds.
+    """Return whether the noise of a channel is white at low motor speed, but not over all speeds.
 
     A filter or an average is there at any speed. The teeth of a pump are slower than the bands while it turns slowly.
     A few windows show a filter less surely than all do, so they must also be nearer to white by `NEARER`.

@@ -1,4 +1,4 @@
-"""What a filter believes of a log before its first sample, and the noise that it is given by default."""
+"""Initial state, initial covariance and default noise of a filter."""
 
 from collections.abc import Mapping
 
@@ -83,7 +83,7 @@ def first_load(record: Record, variances: Mapping[str, float] | None = None) -> 
 
 
 def begins_in_motion(record: Record, share: float = TURNING) -> bool:
-    """Return whether the motor turns when a log begins: then its chambers need not stand at the accumulator's pressure.
+    """Return whether the motor turns when a log begins; its chambers may then be off the accumulator's pressure.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the pumped flow goes into: motion, leakage, flow bias and compression, by least squares over blocks of a log."""
+"""Balance of the pumped flow: motion, leakage, flow bias and compression, by least squares over blocks of a log."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -27,7 +27,7 @@ LEAST_SHARE = 1e-12
 
 
 class FlowBalance(NamedTuple):
-    """What the pumped flow goes into, by least squares: motion, leakage, flow bias and compression.
+    """Balance of the pumped flow by least squares: motion, leakage, flow bias and compression.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class FlowBalance(NamedTuple):
 
     @property
     def contradicts_rig(self) -> float:
-        """What the piston's flow would have to differ by, over what the balance leaves unexplained [dimensionless].
+        """Error of the piston's flow by the balance, over what the balance leaves unexplained [dimensionless].
 
         A piston that hardly moves under a pump that leaks it all lets motion stand for whatever the balance leaves out.
         """
@@ -62,7 +62,7 @@ class FlowBalance(NamedTuple):
 
 
 def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance | None:
-    """Return what the pumped flow goes into; None where pump, piston or pressure is not logged, or the pump rests.
+    """Return the balance of the pumped flow; None if pump, piston or pressure is not logged, or the pump rests.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Does a still encoder miss a motion? Judged by what the log itself says that leakage takes, not by a healthy one's."""
+"""Does a still encoder miss a motion? Judged by the leakage of the log itself, not by a healthy actuator's."""
 
 import numpy as np
 
@@ -29,7 +29,7 @@ JUMP, BEYOND_PUMP = 10.0, 5.0
 
 
 def jumped(record: Record, hold: slice, p: EhaParameters) -> bool:
-    """Return whether the encoder comes out of a hold with a jump that no piston makes.
+    """Return whether the encoder leaves a hold with a jump too fast for a piston.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def jumped(record: Record, hold: slice, p: EhaParameters) -> bool:
 
 
 def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
-    """Return whether the pump delivers more within a hold than leakage, compression and the relief valve take.
+    """Return whether pump delivery within a hold exceeds leakage, compression and relief flow.
 
     Leakage, flow bias and compressibility come from the rest of the log, in which the encoder tells where the oil goes.
     Without pressure, or with too little of a rest, leakage may have taken all.

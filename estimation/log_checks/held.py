@@ -83,20 +83,20 @@ def _said(record: Record, name: str, one: _Slow) -> dict[str, Any]:
 
 
 def _slow_speed(record: Record) -> _Slow | None:
-    """Return how motor speed is held, by motor or logger; nothing where it is not, or over rows of no fixed number."""
+    """Return the hold of motor speed, by motor or logger; None if it is not held over a fixed number of rows."""
     one = _repeated(record[SPEED]) if SPEED in record else None
     return one if one is not None and _only_at(record[SPEED], one) else None
 
 
 def _repeated(values: Array) -> _Slow | None:
-    """Return how the samples of a channel are repeated; nothing where they are not."""
+    """Return the hold of a channel that repeats its samples; None if it does not."""
     if (rows := held_rows(values)) == 1:
         return None
     return _Slow(rows, int(np.argmax(np.diff(values) != 0.0) + 1) % rows, bridged=False)
 
 
 def _slow(values: Array) -> _Slow | None:
-    """Return how a channel is held or bridged; nothing where it is sampled in every row."""
+    """Return the hold or bridging of a channel; None if it is sampled in every row."""
     if (repeated := _repeated(values)) is not None:
         return repeated
     if len(values) < LEAST_STEPS:
@@ -123,7 +123,7 @@ def _sampled(values: Array, one: _Slow) -> NDArray[np.bool_]:
 
 
 def _only_at(values: Array, one: _Slow) -> bool:
-    """Return whether a channel steps, or bends, in no other rows than those of the samples."""
+    """Return whether a channel steps, or bends, only in the rows of its samples."""
     moved = ~_straight(values) if one.bridged else np.diff(values) != 0.0
     at = np.flatnonzero(moved) + 1
     return bool(np.all(at % one.rows == one.first)) and not np.any(np.isnan(values))

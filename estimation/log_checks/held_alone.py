@@ -1,4 +1,4 @@
-"""A channel that stood still by itself: its logger had no new sample of it for a while, and then had.
+"""A channel that stood still alone: its logger had no new sample of it for a while.
 
 Where a channel is noisy on either side, it cannot repeat one value for long. That is left out as missing. A sensor that
 never comes back, or stands still for long, is accused instead (`sensor_check`).
@@ -77,7 +77,7 @@ def _held(values: Array) -> BoolArray:
 
 
 def is_noisy(values: Array, least: float) -> bool:
-    """Return whether a stretch shows noise of its own in nearly every row.
+    """Return whether nearly every row of a stretch shows noise.
 
     Parameters
     ----------

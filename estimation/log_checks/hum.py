@@ -94,7 +94,7 @@ def _window(length: int) -> Array:
 
 
 def _alone(frequencies: Array, lines: Array, place: int) -> bool:
-    """Return whether a line has no others near it, and is no harmonic of what the drive repeats.
+    """Return whether a spectral line has no others near it, and is no harmonic of a periodic drive.
 
     Harmonics come in rows, every one or every other: a line of a slow drive has others of its row near it. Only those
     of a fast one stand as far apart as tones of the mains.

@@ -85,7 +85,7 @@ def _fastest(velocity: Array, sample_time: float) -> float:
 
 
 def _compared(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array]:
-    """Return by how much position gains more than velocity says, and what velocity changes, over each stretch."""
+    """Return the excess of position's gain over integrated velocity, and velocity's change, for each stretch."""
     rows = max(1, round(STRETCH / sample_time))
     swept = np.concatenate([[0.0], np.cumsum(0.5 * sample_time * (velocity[1:] + velocity[:-1]))])
     ends = np.arange(0, len(position), rows)

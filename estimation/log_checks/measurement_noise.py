@@ -122,7 +122,7 @@ def _step(values: Array) -> float:
 
 
 def is_coarse(values: Array, variance: float) -> bool:
-    """Return whether the steps of a channel's converter are so coarse that its noise does not average them out.
+    """Return whether a channel's quantisation is too coarse for its noise to average out.
 
     What a signal that rests between two steps reads is then off by the same share of a step in each sample.
 

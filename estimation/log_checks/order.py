@@ -1,4 +1,4 @@
-"""Order statistics of samples that are all there, as NumPy gives them, but quicker."""
+"""Order statistics of complete samples: NumPy's values, faster."""
 
 from math import floor
 

@@ -52,7 +52,7 @@ def without_position_beyond_range(record: Record) -> tuple[Record, tuple[Note, .
 
 
 def _ends_there(record: Record, level: float) -> bool:
-    """Return whether position stays at a level although the piston moves on, and comes back from it without a jump."""
+    """Return whether position stays at a level while the piston moves on, and leaves it without a jump."""
     values = record[POSITION]
     starts, lengths = holds(values)
     there = (values[starts] == level) & (lengths >= LEAST_RUN)

@@ -1,4 +1,4 @@
-"""How far apart samples may be: models take steps of 0.1 ms, so a fit to a slow log would hardly end."""
+"""Largest sample time: models take steps of 0.1 ms, so a fit to a slower log would hardly end."""
 
 from plant.errors import LogError
 
@@ -11,7 +11,7 @@ ROUNDING = 1e-6
 
 
 def too_far_apart(sample_time: float, slowest: float) -> str:
-    """Return what is wrong with samples that are too far apart.
+    """Return the message about samples that are too far apart.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Sensors that have stopped telling the truth: frozen, dead, or at the end of their range.
+"""Sensors that cannot be trusted: frozen, dead, or at the end of their range.
 
 A filter believes a frozen encoder like any other, and an innocent chi-square follows: constant samples agree with each
 other. So a log is looked at before it is believed. What is at a stop of the sensor's range is censored, not measured,
@@ -89,7 +89,7 @@ def sensor_objections(record: Record, parameters: EhaParameters) -> tuple[Note, 
 
 
 def holds(values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return where runs of one repeated value begin, and how long they are; missing samples end a run.
+    """Return the starts and lengths of runs of one repeated value; missing samples end a run.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ def without_saturated(record: Record, parameters: EhaParameters) -> tuple[Record
 
 
 def _is_difference(record: Record) -> bool:
-    """Return whether the differential pressure is that of the two chambers' sensors, and no sensor's own."""
+    """Return whether differential pressure is only the difference of the two chambers' sensors."""
     if any(channel not in record for channel in PRESSURES):
         return False
     difference = record[CHAMBERS[0]] - record[CHAMBERS[1]]
@@ -312,7 +312,7 @@ def _clipping_levels(values: Array, p: EhaParameters, *, both: bool) -> list[flo
 
 
 def _is_clipped(seen: Array, level: float, p: EhaParameters) -> bool:
-    """Return whether a channel without gaps repeats its extreme value as only the end of a sensor's range does."""
+    """Return whether a channel without gaps repeats its extreme value as at the end of a sensor's range."""
     depth = np.abs(seen - level)
     count = np.count_nonzero(depth == 0.0)
     if not LEAST_RUN <= count < len(seen):
@@ -340,5 +340,5 @@ def _is_clipped(seen: Array, level: float, p: EhaParameters) -> bool:
 
 
 def _moves(depth: Array, far: float) -> bool:
-    """Return whether a channel comes from, or goes, farther away; the log may begin or end before it does."""
+    """Return whether a channel comes from, or goes, farther away; True if the log shows too little of it."""
     return len(depth) < LEAST_RUN or float(np.max(depth)) > far

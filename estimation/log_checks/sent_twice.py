@@ -136,25 +136,25 @@ def _widened(keys: NDArray[np.uint64], first: int, behind: int, lag: int) -> tup
 
 
 def _goes_back(rows: Array, first: int, behind: int) -> bool:
-    """Return whether a channel steps at the beginning of a copy as it does nowhere near."""
+    """Return whether a channel steps at the start of a copy by far more than within it."""
     usual = np.median(np.abs(np.diff(rows[:, first:behind], axis=1)), axis=1)
     return bool(np.any(np.abs(rows[:, first] - rows[:, first - 1]) > JUMP * usual))
 
 
 def _has_noise(rows: Array, least: Array) -> bool:
-    """Return whether two channels of a copy are noisy."""
+    """Return whether at least two channels of a copy are noisy."""
     return sum(is_noisy(one, size) for one, size in zip(rows, least.tolist(), strict=True)) >= 2
 
 
 def _never_by_chance(rows: Array, least: Array) -> bool:
-    """Return whether a copy is long enough, and a column of it is noisy in steps that are fine."""
+    """Return whether a copy is too long, and a channel of it too noisy, for a repetition by chance."""
     n = rows.shape[1]
     noisy = (is_noisy(one, size) and np.unique(one).size >= DISTINCT * n for one, size in zip(rows, least, strict=True))
     return n >= FEWEST_ANY and any(noisy)
 
 
 def _time_passed(values: Array, first: IntArray, behind: IntArray) -> float:
-    """Return by how much likelier a channel makes it that time went on while copies were written [log-likelihood]."""
+    """Return the evidence of a channel that time went on while copies were written [log-likelihood]."""
     inner = behind < len(values)
     first, behind = first[inner], behind[inner]
     out = 0.0

@@ -16,7 +16,7 @@ logger that repeats other channels too it need be more than as much worse."""
 
 
 def was_repeated(record: Record, *, others: bool) -> bool:
-    """Return whether a speed that moves in some rows alone was repeated by its logger, and not held by the motor.
+    """Return whether a speed that changes only in some rows was repeated by its logger, not held by the motor.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def was_repeated(record: Record, *, others: bool) -> bool:
 
 
 def _left(known: Array, turned: Array, rise: Array) -> float:
-    """Return what pump, piston and leakage leave of the pressure's rise, as a sum of squares [Pa squared]."""
+    """Return the residual of the pressure's rise after pump, piston and leakage, a sum of squares [Pa squared]."""
     pumped = np.column_stack([known, turned, np.sign(turned) * known[:, -1]])  # all that it turns, less what slips
     pumped /= np.maximum(np.max(np.abs(pumped), axis=0), np.finfo(np.float64).tiny)
     return float(np.sum((rise - pumped @ np.linalg.lstsq(pumped, rise)[0]) ** 2))

@@ -1,4 +1,4 @@
-"""`told_once(record) -> Record`: what an encoder repeats while the piston rests counts once, and not in every row.
+"""`told_once(record) -> Record`: a reading that an encoder repeats at rest counts once, not in every row.
 
 An encoder rounds. While the piston moves, what it is off by changes from row to row and cancels over each of its steps.
 While it rests, all rows are off by the same, and a filter that takes them for samples of their own believes their mean.

@@ -68,7 +68,7 @@ def _noise(values: Array, size: int, count: int) -> Array:
 
 
 def _ratio(noise: Array, k: int) -> float:
-    """Return by how many times noise is larger behind a block; 1 where it is not known."""
+    """Return the ratio of noise from a block on to that before it; 1 if unknown."""
     before, behind = noise[:k][np.isfinite(noise[:k])], noise[k:][np.isfinite(noise[k:])]
     return float(np.median(behind) / np.median(before)) if len(before) and len(behind) else 1.0
 

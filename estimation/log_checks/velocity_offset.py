@@ -59,7 +59,7 @@ def without_velocity_offset(record: Record) -> tuple[Record, tuple[Note, ...]]:
 
 
 def _compared(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array]:
-    """Return what position gains a second, and mean velocity, over each part that holds enough of both [m/s]."""
+    """Return the mean rate of position, and mean velocity, for each part with enough samples of both [m/s]."""
     gained: list[float] = []
     means: list[float] = []
     there = np.isfinite(position) & np.isfinite(velocity)

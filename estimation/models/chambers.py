@@ -177,7 +177,7 @@ def chamber_belief(
     states: Sequence[StateVariable] = STATES,
     stds: Mapping[str, float] = STDS,
 ) -> Gaussian:
-    """Return what a chamber filter believes before the first sample.
+    """Return the prior belief of a chamber filter.
 
     Parameters
     ----------

@@ -123,7 +123,7 @@ def pressure_step(
 def volume_left_open(
     p: EhaParameters, unknown: Mapping[str, Array], sample_time: float
 ) -> tuple[Array, Mapping[str, float]]:
-    """Return what gaps in the drives leave open of the volume in the chambers, and how far each state moves with it.
+    """Return the variance of chamber volume due to gaps in the drives, and the shift of each state with it.
 
     Pressures are moved as if the piston stood still, position and velocity as if the oil were rigid, acceleration by
     the force of that pressure: all as far as they may.

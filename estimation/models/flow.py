@@ -23,7 +23,7 @@ from plant.eha.model import piston_areas
 
 
 class Delivery(NamedTuple):
-    """What acts on the chambers from outside them.
+    """External inputs of the chambers: pump flow, and the piston's velocity and position.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def chamber_rates(
     cracks: tuple[Scalar, Scalar] = (0.0, 0.0),
     bend: Scalar = 0.0,
 ) -> tuple[Scalar, Scalar]:
-    """Return how fast the chamber pressures change (equations 5.1 to 5.4 with errata E2, E8 and E17).
+    """Return the rates of change of the chamber pressures (equations 5.1 to 5.4 with errata E2, E8 and E17).
 
     Each chamber holds ``2 V_0``, on average of the two, and the volume that the piston sweeps, so that the two together
     are the lumped plant's ``V_0`` (errata E2).
@@ -125,7 +125,7 @@ def chamber_rates(
 
 
 def leaked_flow(dp: Scalar, leakage: Scalar, p: SimpleNamespace) -> Scalar:
-    """Return what goes from chamber to chamber past the piston and through the relief valve.
+    """Return the cross-chamber flow: piston leakage and relief valve.
 
     Parameters
     ----------

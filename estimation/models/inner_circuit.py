@@ -1,4 +1,4 @@
-"""What the inner circuit feeds into the chambers: make-up valves, orifices once they are wide open, less the drains."""
+"""Flow from the inner circuit into the chambers: make-up valves, orifices when wide open, less the drains."""
 
 from types import SimpleNamespace
 
@@ -15,7 +15,7 @@ def inner_flows(
     cracks: tuple[Scalar, Scalar] = (0.0, 0.0),
     bend: Scalar = 0.0,
 ) -> tuple[Scalar, Scalar]:
-    """Return what the inner circuit feeds into each chamber through its make-up valve, less the drain.
+    """Return the flow from the inner circuit into each chamber: make-up valve less drain.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def inner_flows(
 
 
 def narrowed(drop: Scalar, conductance: Scalar, bend: Scalar) -> Scalar:
-    """Return what a make-up valve lets through a pascal, which falls with the root of a large drop, as an orifice's.
+    """Return the conductance of a make-up valve, which falls with the root of a large drop, as an orifice's.
 
     Parameters
     ----------

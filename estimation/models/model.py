@@ -101,7 +101,7 @@ class ProcessModel:
     opening: Opening | None = field(default=None, kw_only=True)
 
     def substeps(self, sample_time: float) -> int:
-        """Return how many steps of the model a sample needs.
+        """Return the number of model steps that a sample needs.
 
         Parameters
         ----------
@@ -172,7 +172,7 @@ class ProcessModel:
 
     @property
     def noise_units(self) -> Array:
-        """What the filter's process-noise densities are counted in, shape (n,) [SI squared; 1 of a logarithm]."""
+        """Units of the filter's process-noise densities, shape (n,) [SI squared; 1 of a logarithm]."""
         return np.array([1.0 if state.logarithmic else state.scale**2 for state in self.states])
 
     def noise_densities(self, noise: Mapping[str, float] | None) -> Array:

@@ -85,7 +85,7 @@ class WideFlowParameters(FlowParameters):
 
 
 def _air(elapsed: Scalar, p: SimpleNamespace) -> Scalar:
-    """Return how soft entrained air makes the oil now: ``a`` of ``a/p^2`` [Pa]."""
+    """Return the present softness of the oil due to entrained air: ``a`` of ``a/p^2`` [Pa]."""
     return p.air_softness * minimum(maximum((elapsed - p.air_onset) / p.air_width, 0.0), 1.0)
 
 
@@ -157,7 +157,7 @@ def _rates(
 
 
 def _sides(courses: Any, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
-    """Return where in its encoder's play the piston is at the start and end of a step, from -1 to 1."""
+    """Return the piston's position within its encoder's play at the start and end of a step, from -1 to 1."""
     late, by_pressure, at_once, sprung = courses
     start, end = (
         late[i] + p.play_by_pressure * by_pressure[i] + p.play_at_once * at_once[i] + p.play_sprung * sprung[i]
@@ -241,7 +241,7 @@ def turbulent_leakage(dp: Scalar, share: Scalar) -> Scalar:
 
 
 def compressed(squeezed: Scalar, share: Scalar) -> Scalar:
-    """Return what a pump delivers over its displacement, as the volume at its outlet: it fills at its inlet's pressure.
+    """Return a pump's delivery at outlet pressure, over its displacement: it fills at its inlet's pressure.
 
     A pump that delivers all that it draws loses the compression of that oil (a share of 1), and that of the oil that
     stays in its teeth (more). A share of 0 counts its displacement at the outlet (Ivantysyn and Ivantysynova,

@@ -109,7 +109,7 @@ def fit_stack_loop(voltage: Array, displacement: Array, *, from_rest: bool = Tru
 def loop_bounds(
     parameters: PiezoStackParameters, voltage: Array, noise: float, *, from_rest: bool = True
 ) -> Mapping[str, float]:
-    """Return how well a loop could tell what `fit_stack_loop` fits: Cramér-Rao bounds, all unknown together.
+    """Return Cramér-Rao bounds of what `fit_stack_loop` fits to a loop, all unknown together.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ REGIONS = np.array([[1.0, 1.0, 1.0, 1.0], [-1.0, 1.0, -1.0, 1.0], [-1.0, -1.0, 1
 
 @dataclass(frozen=True)
 class PrintedFit:
-    """What the printed procedure gives.
+    """Result of the printed procedure.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What is wrong inside a piezo-stack actuator, from what its bench logs: output error by least squares.
+"""Faults inside a piezo-stack actuator from a log of its bench: output error by least squares.
 
 The drive is known, so the whole run is simulated and fitted to every channel at once, each weighed by its noise. The
 run must begin at rest at the bias pressure.
@@ -24,7 +24,7 @@ from plant.piezo_stack.run import BENCH_SENSORS, StackSensors, checked_voltage
 
 @dataclass(frozen=True)
 class StackEstimate:
-    """What a log says of the actuator.
+    """Estimate from a log of the piezo-stack actuator.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def stack_bounds(
     channels: Collection[str] = STACK_CHANNELS,
     sensors: StackSensors = BENCH_SENSORS,
 ) -> Mapping[str, float]:
-    """Return how well an experiment could know each quantity: Cramér-Rao bounds, all unknown together.
+    """Return Cramér-Rao bounds of an experiment on each quantity, all unknown together.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What may be wrong inside a piezo-stack actuator, as scaled unknowns of a fit, and where the fit begins."""
+"""Possible faults inside a piezo-stack actuator, as scaled unknowns of a fit, and the start of that fit."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass

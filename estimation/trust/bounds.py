@@ -1,4 +1,4 @@
-"""How well could anyone do? The posterior Cramér-Rao bound of every state along a drive."""
+"""Limit of any estimator: the posterior Cramér-Rao bound of every state along a drive."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -306,7 +306,7 @@ def bulk_modulus_bound(
 
 
 def at_bulk_modulus(parameters: EhaParameters, bulk_modulus: float) -> EhaParameters:
-    """Return what a process model knows of the actuator, at another bulk modulus.
+    """Return the actuator's parameters for a process model, at another bulk modulus.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ MOST_PAIRS = 3
 
 @dataclass(frozen=True, eq=False)
 class Card:
-    """What a drive and its sensors would tell.
+    """Identifiability card: what a drive and its sensors would determine.
 
     Parameters
     ----------

@@ -108,7 +108,7 @@ def consistency_gate(estimate: Estimate, state: str, record: Record | None = Non
 
 
 def wander(estimate: Estimate, state: str) -> float:
-    """Return how far a constant state moves between stretches of a log, squared, over what its variance allows.
+    """Return the squared moves of a constant state between stretches of a log, over what its variance allows.
 
     The estimate of a constant is a martingale under its own model: each stretch moves it with the variance by which
     the stretch reduces its own. Only what comes after settling counts.

@@ -1,4 +1,4 @@
-"""What could be learnt, before any experiment: the identifiability card of a sensor set and a drive.
+"""Identifiability before any experiment: the card of a sensor set and a drive.
 
 The bound of every unknown is the posterior Cramér-Rao bound along a noiseless run of the lumped plant, with the
 sensors' noise, from nothing known but the order of magnitude (`estimation.trust.bounds`). Parameters that are taken as
@@ -173,7 +173,7 @@ def _speed_noise(p: EhaParameters, sensors: Sensors, sample_time: float) -> Mapp
 
 
 def _sizes(p: EhaParameters) -> Array:
-    """Return what makes a covariance relative; linear friction, which may be near 0, to the whole friction force."""
+    """Return the sizes that a covariance is relative to; for linear friction, which may be near 0, all friction."""
     values = [abs(float(getattr(p, name))) for name in (*UNKNOWN, *TAKEN_AS_KNOWN)]
     values[UNKNOWN.index("friction_linear")] = _linear_size(p)
     return np.array([1.0, 1.0, 1.0, *values])

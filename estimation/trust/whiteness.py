@@ -1,4 +1,4 @@
-"""What a filter's innovations say of its model: how white they are, against each other and against the drive.
+"""Whiteness of a filter's innovations as a test of its model: alone, against each other, against the drive.
 
 With 1e5 samples every test of whiteness rejects every model, so significance is not the question. What counts is by how
 much an interval is too narrow. A parameter is learnt where the drive has its power; innovations that hold r times the
@@ -42,7 +42,7 @@ OFTEN = 1e-3
 
 @dataclass(frozen=True)
 class Whiteness:
-    """How white the innovations of one channel are.
+    """Whiteness of the innovations of one channel.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def _spectra(values: Array, length: int) -> Array:
 
 
 def _band(drive: Array) -> int:
-    """Return how many frequencies count, from 0 on; a tenth of them where nothing is driven."""
+    """Return the number of frequencies that count, from 0 on; a tenth of them without a drive."""
     total = np.cumsum(drive)
     if not total[-1] > 0.0:
         return max(2, len(drive) // 10)
@@ -166,7 +166,7 @@ def _quantisation(values: Array) -> float:
 
 
 def quantum(values: Array) -> float:
-    """Return what a channel resolves: its smallest step, where it often repeats itself.
+    """Return the resolution of a channel: its smallest step, if it often repeats itself.
 
     Parameters
     ----------

@@ -68,7 +68,7 @@ class Coordinate:
 
 @dataclass(frozen=True, eq=False)
 class Maximum:
-    """Where the likelihood is greatest.
+    """Maximum of the likelihood.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ class _Search:
         self._points: dict[bytes, _Point] = {}
 
     def gain(self, u: Array) -> float:
-        """Return what a full scoring step from here would gain."""
+        """Return the predicted gain of a full scoring step from here."""
         point = self.point(u)
         return 0.5 * float(point.slope @ np.linalg.solve(point.curvature, point.slope))
 

@@ -1,4 +1,4 @@
-"""How a filter's innovations move with what was assumed: exact derivatives, carried along by the filter itself.
+"""Sensitivity of a filter's innovations to its assumptions: exact derivatives, propagated by the filter itself.
 
 Predict and update are functions of belief, parameters, process noise and sensor noise. Moving all of these along a
 direction by a symbol and differentiating by it gives the belief's own derivative one step later, covariance included;

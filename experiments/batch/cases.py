@@ -44,7 +44,7 @@ SERIES_COST = 4e-7
 
 @dataclass(frozen=True)
 class Task:
-    """What a worker is given: some series with their cases."""
+    """Work for one worker: some series with their cases."""
 
     rig: Rig[Any]
     groups: tuple[Group, ...]
@@ -202,7 +202,7 @@ def plan_study(study: Study, folder: Path) -> Plan:
 
 
 def _count(runs: Runs) -> int:
-    """Return how many series runs are at most, before any is listed."""
+    """Return an upper bound on the number of series, before any is listed."""
     named = len(runs.conditions) if runs.conditions is not None else 0 if runs.severities else len(CONDITIONS)
     each = prod(max(1, len(some)) for some in (runs.plants, runs.drives, runs.sensors))
     return each * (named + len(runs.severities)) * runs.seed_count
@@ -251,7 +251,7 @@ def _works(methods: tuple[Method, ...], starts: tuple[float, ...]) -> tuple[Work
 
 
 def _content(series: Series) -> list[Any]:
-    """Return what identifies a series; the folder of a log is not part of it."""
+    """Return the identity of a series; the folder of a log is not part of it."""
     if isinstance(series, Log):
         return ["log", series.file, series.content, series.columns]
     return ["simulated", *(getattr(series, one.name) for one in fields(series))]
@@ -262,7 +262,7 @@ def _numbers(rig: Rig[Any]) -> list[Any]:
 
 
 def _motion(series: Series) -> Series | None:
-    """Return what all series with one motion have in common; logs have nothing."""
+    """Return the key that series of one motion share; logs have none."""
     return replace(series, condition=None, seed=0, sensors="") if isinstance(series, Simulated) else None
 
 

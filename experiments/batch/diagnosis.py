@@ -89,7 +89,7 @@ def _why_unknown(found: Finding) -> str:
 
 
 def _severities(found: Finding) -> dict[str, Any]:
-    """Return how bad it is, each severity that the log tells, with that of the healthy actuator and its limit."""
+    """Return the severities that the log determines, each with its healthy value and its limit."""
     healthy, limits = found.healthy, found.evidence.diagnosis.limits
     unseen = not_determined([note.code for note in found.not_told])
     return {

@@ -1,4 +1,4 @@
-"""Where a store keeps its files: a local folder, or any place that fsspec reaches; a file is there whole or not."""
+"""Folder of a store: local, or any place that fsspec reaches; files are written whole or not at all."""
 
 import os
 import re

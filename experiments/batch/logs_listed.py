@@ -80,7 +80,7 @@ def _log(path: Path, folder: Path, columns: tuple[tuple[str, str], ...], rigs: M
 
 
 def _identity(path: str) -> object:
-    """Return what two names of one file share."""
+    """Return the identity of a file, whatever its name."""
     try:
         found = Path(path).stat()
     except OSError:

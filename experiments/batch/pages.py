@@ -54,12 +54,12 @@ def _log(row: Row) -> Cell:
 
 
 def _state(name: Any) -> Cell:
-    """Return how far a log is towards a limit, as a fleet tells it."""
+    """Return how near a log is to a limit, in the fleet's words."""
     return Cell(MISSING) if pd.isna(name) else Cell(STATES[name], f"fleet-{name}")
 
 
 def _times(margin: float | None) -> Cell:
-    """Return how many times as probable something is, its digits up to `MOST_TIMES`."""
+    """Return a ratio of probabilities in digits, up to `MOST_TIMES`."""
     if margin is None or not margin > MOST_TIMES:
         return right(number(margin, 3))
     return right(f"over {MOST_TIMES:.0f}")
@@ -187,7 +187,7 @@ def _without_repetition(logs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _classes_in_words(classes: pd.DataFrame) -> str:
-    """Return how many logs have which class, in one line."""
+    """Return the number of logs per class, in one line."""
     counts = zip(classes["class"], classes["logs"], strict=True)
     return ", ".join(f"{'no class' if name == 'none' else in_words(name)} in {count}" for name, count in counts)
 
@@ -221,7 +221,7 @@ class _Several:
 
 
 def _told_once(name: str, rows: Sequence[Mapping[Any, Any]]) -> Any:
-    """Return what rows say in a column: once, or after each verb where they differ."""
+    """Return the text of a column: once, or per verb if verbs differ."""
     told = {row["verb"]: row[name] for row in rows if not pd.isna(row[name])}
     distinct = list(dict.fromkeys(told.values()))
     if name == "verb":

@@ -106,7 +106,7 @@ class PartStore:
             self.folder.write(f"{PARTS}/{digest}.parquet", part)
 
     def manifest(self) -> Mapping[str, Any] | None:
-        """Return what was last written of the study, None where nothing was.
+        """Return the last written manifest of the study; None if there is none.
 
         Raises
         ------
@@ -262,5 +262,5 @@ def _failed(table: pa.Table) -> "pa.ChunkedArray[Any]":
 
 
 def _firsts(places: Sequence[int]) -> list[int]:
-    """Return where each number stands first in a sorted list."""
+    """Return the first place of each number in a sorted list."""
     return [i for i, place in enumerate(places) if i == 0 or place != places[i - 1]]

@@ -141,7 +141,7 @@ class Rows:
         return pa.table(columns, schema=SCHEMA)
 
     def _in_words(self, place: int) -> str:
-        """Return what a case's series is called in a sentence: the log's file, or what was simulated."""
+        """Return the name of a case's series for a sentence: the log's file, or the simulated run."""
         series = self._series[self._series_of[place]]
         if series.get("file"):
             return str(series["file"])
@@ -150,7 +150,7 @@ class Rows:
 
 
 def error_percent(value: float | None, truth: float | None) -> float | None:
-    """Return how far a value is off [%].
+    """Return the error of a value [%].
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ ENDINGS = (signal.SIGINT, signal.SIGTERM)
 
 @dataclass(frozen=True, kw_only=True)
 class RunSettings:
-    """Where the cases of a study run, which of them, and when they stop.
+    """Settings of a run: workers, selected cases, and when to stop.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def _shown(total: int, before: int) -> "Generator[Callable[[int, Part], None]]":
 
 
 def in_sentences(failures: "Sequence[Failure]") -> list[str]:
-    """Return what is said of cases that failed: a log that failed for one reason is named once, with all its verbs.
+    """Return a sentence per failure: a log that failed for one reason is named once, with all its verbs.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def in_sentences(failures: "Sequence[Failure]") -> list[str]:
 
 
 class Pace:
-    """How fast cases are done, and how long the rest will take."""
+    """Pace of a run: cases per second, and the time left."""
 
     def __init__(self, total: int, before: int) -> None:
         self.total, self.done, self._before, self._begin = total, before, before, time.monotonic()

@@ -32,7 +32,7 @@ OnPart = Callable[[int, Part], None]
 
 @dataclass
 class Tally:
-    """How far a batch has come.
+    """Progress of a batch.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def _halves(task: Task) -> list[Task]:
 
 
 def manifest_of(plan: Plan, source: str) -> Mapping[str, Any]:
-    """Return what it takes to run a study again.
+    """Return the manifest that reproduces a study.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What a case is made of: a series, simulated or logged, and what is done with it."""
+"""Cases of a study: a series, simulated or logged, and the method applied to it."""
 
 import hashlib
 from dataclasses import dataclass

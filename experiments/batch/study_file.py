@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
-from estimation.eha.named import NAMED
+from estimation.eha.named_methods import NAMED
 from estimation.filters.run import METHODS
 from estimation.log_checks.first_belief import START_STD
 from estimation.models.eha_forms import FORMS
@@ -59,7 +59,7 @@ def _known(names: Sequence[str], known: Sequence[str]) -> None:
 
 
 class Method(_Table):
-    """What is done with a log or a simulated series.
+    """Method applied to a log or a simulated series.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ class Runs(_Table):
 
     @property
     def seed_count(self) -> int:
-        """How many seeds there are [count]."""
+        """Number of seeds [count]."""
         return self.seeds if isinstance(self.seeds, int) else len(self.seeds)
 
     @property

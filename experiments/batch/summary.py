@@ -1,4 +1,4 @@
-"""What a store says, as tables: computed from its rows alone."""
+"""Summary tables of a store, computed from its rows alone."""
 
 from collections.abc import Callable, Mapping
 from typing import cast
@@ -88,7 +88,7 @@ def _outcome_table(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def bulk_modulus_table(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return how far estimates lie from a truth that is known.
+    """Return the errors of estimates against the known truth.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def _each(frame: pd.DataFrame, by: list[str], entries: Callable[[pd.DataFrame], 
 
 
 def _diagnosis_table(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return how often the class is right, where it is known.
+    """Return the share of right classes, where the true class is known.
 
     One row a method and condition: counts, share that is right [%], and the ratio of the best probability to
     the runner-up's, at the median [dimensionless].

@@ -208,7 +208,7 @@ def _truth(series: Simulated, healthy: EhaParameters) -> tuple[Record, EhaParame
 
 @lru_cache(maxsize=2)
 def _motion(series: Simulated, healthy: EhaParameters) -> tuple[Record, EhaParameters]:
-    """Return what truly moves, kept for the seeds and sensors that share it."""
+    """Return the true motion, cached for the seeds and sensors that share it."""
     parameters = severity(series.leakage_severity, series.friction_severity, healthy)
     speed = make_drive(series.drive, series.duration_s, series.sample_time_s, parameters, _stream(series, "drive"))
     return simulate(PLANTS[series.plant], speed, series.sample_time_s, parameters), parameters
@@ -307,7 +307,7 @@ def _first_problem(record: Record, parameters: EhaParameters, work: Work, sensor
 
 
 def _sentences(said: Iterable[object]) -> str | None:
-    """Return what was said of a log in one text, each sentence once."""
+    """Return the notes on a log as one text, each sentence once."""
     return spelt("; ".join(dict.fromkeys(map(str, said)))) or None
 
 

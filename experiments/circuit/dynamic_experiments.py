@@ -204,5 +204,5 @@ def bulk_modulus_on_circuit(
 
 
 def _believed(p: CircuitParameters) -> EhaParameters:
-    """Return what the forms know of the circuit: the lumped actuator."""
+    """Return the lumped actuator that the forms use for the circuit."""
     return EhaParameters(**{field.name: getattr(p, field.name) for field in fields(EhaParameters)})

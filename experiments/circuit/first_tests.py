@@ -91,7 +91,7 @@ def first_tests(rig: CircuitParameters, seed: int, levels_v: Iterable[float] = L
 
 
 def break_frequency(response: pd.DataFrame) -> float:
-    """Return where a response's gain has fallen 3 dB below that at its lowest frequency [Hz].
+    """Return the frequency at which the gain is 3 dB below that at the lowest frequency [Hz].
 
     Returns
     -------
@@ -149,7 +149,7 @@ def dead_zone(p: CircuitParameters, rng: np.random.Generator, highest_v: float =
 
 
 def dead_time(p: CircuitParameters, from_v: float, to_v: float, rng: np.random.Generator) -> float:
-    """Return how long after a step the encoder leaves its line by five counts.
+    """Return the time after a step at which the encoder leaves its line by five counts.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ SAMPLE_TIME = 1e-3
 def modelled_chambers(
     rig: CircuitParameters, seed: int, duration: float, conditions: Sequence[str] = tuple(CONDITIONS)
 ) -> Rows:
-    """Return what `hydrostate estimate --method chamber-ekf` finds on nine steps, the condition unknown.
+    """Return the results of `hydrostate estimate --method chamber-ekf` on nine steps, the condition unknown.
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ FRICTION_SWEEP = Sweep(
 
 
 def throttle_curve(rig: CircuitParameters, sweep: Sweep) -> pd.DataFrame:
-    """Return what settles over a sweep of one throttle at 4 V of motor: Figures 3 and 4.
+    """Return the steady values over a sweep of one throttle at 4 V of motor voltage: Figures 3 and 4.
 
     Returns
     -------

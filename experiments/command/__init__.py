@@ -1,1 +1,1 @@
-"""What the verbs of the command `hydrostate` share: options, output, and what happens to each of several logs."""
+"""Shared parts of the verbs of `hydrostate`: options, output, and the treatment of several logs."""

@@ -153,7 +153,7 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
 
 
 def _untold(rig: "Path | None", plant: str) -> str:
-    """Return what to do where nothing was told of the actuator."""
+    """Return advice for a log without a rig file."""
     if rig is not None:
         return UNFILLED.format(rig=rig)
     return ASSUMED.format(plant="" if plant == DEFAULT else f" --plant {plant}")

@@ -111,7 +111,7 @@ def overheard() -> Generator[list[LogWarning]]:
 
 
 def _level_of_the_reader() -> int:
-    """Return how many calls lie between a warning here and the line that asked for the log."""
+    """Return the number of calls between a warning here and the line that asked for the log."""
     frame, level = inspect.currentframe(), 0
     while frame is not None and (OURS.match(frame.f_code.co_filename) or frame.f_code.co_filename == CONTEXTS):
         frame, level = frame.f_back, level + 1
@@ -119,7 +119,7 @@ def _level_of_the_reader() -> int:
 
 
 def noted(source: str, read: Callable[[], T]) -> T:
-    """Return what is read; what the reader should know of it goes to standard error.
+    """Return the log that is read; remarks on it go to standard error.
 
     Parameters
     ----------

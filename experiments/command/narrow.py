@@ -74,7 +74,7 @@ def _columns(shown: "Table") -> list[tuple[list[str], bool]]:
 
 
 def _least(cells: list[str], whole: bool) -> int:
-    """Return how narrow a column may be [characters]."""
+    """Return the least width of a column [characters]."""
     if whole:
         return max(map(_width, cells))
     return max((min(_width(word), MOST_WORD) for cell in cells for word in cell.split()), default=0)

@@ -100,7 +100,7 @@ def require_place(option: str, path: Path | None, ending: str = "", logs: Iterab
 
 
 def page_place(report: Path | None) -> Path | None:
-    """Return where the page of ``--report`` goes, with the ending ``.html`` whatever is given.
+    """Return the path of the page of ``--report``, with the ending ``.html`` whatever is given.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def with_page_ending(what: str, page: Path) -> Path:
 
 
 def pages_sentence(written: Sequence[Path]) -> str:
-    """Return where pages went.
+    """Return a sentence that names the files of the pages.
 
     Parameters
     ----------

@@ -37,6 +37,6 @@ def hide_bool(parameters: Iterable[Any]) -> None:
 
 
 def _no_type(ctx: Any) -> str:
-    """Return what stands behind an argument's name, which says enough."""
+    """Return an empty type for an argument whose name says enough."""
     del ctx
     return ""

@@ -1,4 +1,4 @@
-"""What the verbs that run a study share: the option for its folder, and how they end."""
+"""Shared parts of the verbs that run a study: the option for its folder, and their exit."""
 
 from pathlib import Path
 from time import perf_counter

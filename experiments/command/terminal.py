@@ -1,4 +1,4 @@
-"""What reaches the terminal: results on standard output, all else on standard error, and no traceback."""
+"""Output to the terminal: results on standard output, all else on standard error, and no traceback."""
 
 import io
 import logging
@@ -136,7 +136,7 @@ def table(*headings: str, title: str | None = None) -> "Table":
 
 
 def short_names(results: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return what a narrow table calls the logs: their names, with folders only where names alone are not told apart.
+    """Return short names of logs for a narrow table, with folders only if file names are ambiguous.
 
     Parameters
     ----------
@@ -293,7 +293,7 @@ def emit_nothing_more() -> None:
 
 
 def _usage_sentence(error: Exception) -> str | None:
-    """Return what the parser says of wrong arguments, empty where it has shown the help, None for other errors."""
+    """Return the parser's sentence on wrong arguments; empty after help was shown; None for other errors."""
     message = getattr(error, "format_message", None)
     if message is None:
         return None

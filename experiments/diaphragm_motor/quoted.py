@@ -1,4 +1,4 @@
-"""What the diaphragm-motor paper's text claims of its motor, beside the plant: what holds and what does not."""
+"""Claims in the text of the diaphragm-motor paper, compared with the plant."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -41,7 +41,7 @@ def straightness(x: pd.Series, y: pd.Series) -> float:
 
 
 def load_straightness(loads: pd.DataFrame, share: float) -> Mapping[float, float]:
-    """Return how straight velocity falls with load, below a share of the blocking force.
+    """Return the linearity of velocity over load, below a share of the blocking force.
 
     Parameters
     ----------

@@ -174,7 +174,7 @@ def reversal(p: DiaphragmMotorParameters) -> pd.DataFrame:
 
 @tabled
 def sensitivities(p: DiaphragmMotorParameters) -> Rows:
-    """Return by how much peak flow and its frequency answer to each part, and to gas (errata M22).
+    """Return the sensitivity of peak flow and its frequency to each part, and to gas (errata M22).
 
     Returns
     -------
@@ -192,7 +192,7 @@ def sensitivities(p: DiaphragmMotorParameters) -> Rows:
 
 
 def _peak(p: DiaphragmMotorParameters) -> tuple[float, float]:
-    """Return where the pump's flow peaks [Hz], by a parabola, and the flow [m^3/s]; frequencies are tried uphill."""
+    """Return the frequency of the pump's peak flow [Hz], by a parabola, and that flow [m^3/s]; searched uphill."""
     frequencies = np.arange(380.0, 581.0, 20.0)
 
     @cache
@@ -276,7 +276,7 @@ def dry_modes() -> pd.DataFrame:
 
 
 def bent_plate() -> pd.DataFrame:
-    """Return how the dry diaphragm bends along a radius, in place of Figure 42 (Table 1).
+    """Return the deflection of the dry diaphragm along a radius, in place of Figure 42 (Table 1).
 
     Returns
     -------

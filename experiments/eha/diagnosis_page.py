@@ -80,7 +80,7 @@ def _beside(result: Mapping[str, Any]) -> list[str]:
 
 
 def fit_charts(found: "Finding", stem: str) -> Charts:
-    """Return what was measured beside what the fitted circuit does, and what is left, in means over 10 ms.
+    """Return charts of measurement, fitted circuit and residual, in means over 10 ms.
 
     Parameters
     ----------

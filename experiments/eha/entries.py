@@ -52,7 +52,7 @@ NO_CLASS = frozenset({"models_alike", "models_diverged"})
 
 
 def estimate_entries(found: "Finding") -> dict[str, Any]:
-    """Return what `estimate` says of a log.
+    """Return the entries of `estimate` for a log.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def estimate_entries(found: "Finding") -> dict[str, Any]:
 
 
 def diagnosis_entries(found: "Finding") -> dict[str, Any]:
-    """Return what `diagnose` says of a log.
+    """Return the entries of `diagnose` for a log.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def estimate_message(found: "Finding") -> str:
 
 
 def costs(results: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return what absent channels or an unknown rig cost, each sentence with the number of logs that it is true of.
+    """Return sentences on the cost of absent channels or an unknown rig, each with its number of logs.
 
     Parameters
     ----------

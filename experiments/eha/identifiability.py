@@ -1,4 +1,4 @@
-"""What an experiment on the gear-pump actuator would tell, before it is made."""
+"""Identifiability of an experiment on the gear-pump actuator, before it is made."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -119,7 +119,7 @@ def checked_experiment(options: Mapping[str, Any]) -> dict[str, str]:
 
 
 def within_limits(options: Mapping[str, Any], look: Callable[[str], T]) -> dict[str, T]:
-    """Return what `look` says of one drive, or of each drive within the actuator's limits.
+    """Return the result of `look` for one drive, or for each drive within the actuator's limits.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def driven(
 
 
 def experiment_entries(found: "Finding") -> dict[str, Any]:
-    """Return what an experiment would tell, for JSON.
+    """Return the identifiability of an experiment, for JSON.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ def _ranking(results: Sequence[Result]) -> "Iterable[RenderableType]":
 
 
 def title_of(result: Result, what: str) -> str:
-    """Return what stands above a table of an experiment."""
+    """Return the title of an experiment's table."""
     condition = f"condition {result['condition']}, " if "condition" in result else ""
     sensors = ", ".join(result["sensors"])
     return f"{what}, {result['seconds']:g} s at {result['rate_hz']:g} Hz, {sensors}, {condition}rig {result['rig']}"

@@ -65,7 +65,7 @@ def _how(options: Options) -> "EstimateOptions":
     """Check the options, and return them as the estimate takes them."""
     from estimation.eha.bulk_modulus import FITTED, LEAST_SQUARES, EstimateOptions
     from estimation.eha.by_filter import GROUPS
-    from estimation.eha.named import NAMED
+    from estimation.eha.named_methods import NAMED
     from estimation.filters.run import METHODS, ROBUST
     from estimation.models.augment import AUGMENTABLE
     from estimation.models.eha_forms import FORMS

@@ -67,7 +67,7 @@ OUTSIDE: Mapping[str, str] = {
 
 
 def verdict(result: Mapping[str, Any]) -> str:
-    """Return what is wrong in one sentence.
+    """Return the verdict in one sentence.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def _outside(result: Mapping[str, Any]) -> list[str]:
 
 
 def _named(result: Mapping[str, Any]) -> list[str]:
-    """Return what is wrong though it is none of the nine conditions: faults by name, else a size between theirs."""
+    """Return the fault outside the nine conditions: by name, else as a size between theirs."""
     found = _outside(result)
     words = {"leakage": "leaks more inside", "friction": "has more friction"}
     raised = [words[name] for name in _raised(result)] if not found else []
@@ -150,7 +150,7 @@ def _named(result: Mapping[str, Any]) -> list[str]:
 
 
 def _raised(result: Mapping[str, Any]) -> dict[str, float]:
-    """Return what is raised to another size than minor or major: 1 is minor, 2 is major [dimensionless]."""
+    """Return the loss whose size is neither minor nor major: 1 is minor, 2 is major [dimensionless]."""
     sizes = [one["data"] for one in result["notes"] if one["code"] in SIZED]
     return {name: data[name] for data in sizes for name in ("leakage", "friction") if data[name] > 0.0}
 
@@ -167,7 +167,7 @@ def of_another_size(result: Mapping[str, Any]) -> bool:
 
 
 def sureness(result: Mapping[str, Any]) -> str:
-    """Return how sure the verdict is, what the fault costs, and since when it is there.
+    """Return the confidence of the verdict, the cost of the fault, and its onset.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def causes(result: Mapping[str, Any]) -> list[str]:
 
 
 def how_sure(result: Mapping[str, Any]) -> str:
-    """Return how sure the verdict is, in one sentence.
+    """Return the confidence of the verdict, in one sentence.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a terminal shows of logs of the gear-pump actuator."""
+"""Terminal output for logs of the gear-pump actuator."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence

@@ -112,7 +112,7 @@ def equally_likely(result: Mapping[str, Any]) -> list[str]:
 
 
 def _what_is_told(conditions: Sequence[str], shares: Mapping[str, float]) -> list[str]:
-    """Return what equally likely conditions share, with its probability, and what they leave open."""
+    """Return the fault that equally likely conditions share, its probability, and the open part."""
     from faults.conditions import CONDITIONS  # here, since an estimate needs nothing of it
 
     levels = {axis: [getattr(CONDITIONS[one], axis) for one in conditions] for axis in ("leakage", "friction")}
@@ -284,7 +284,7 @@ def margin_word(margin: float) -> str:
 
 
 def models_sentence(result: Mapping[str, Any]) -> str:
-    """Return what nine nominal models alone say of a log, in one sentence.
+    """Return the verdict of the nine nominal models alone, in one sentence.
 
     Parameters
     ----------

@@ -150,7 +150,7 @@ def _untold(row: ActuatorRow) -> str:
 
 
 def _apart(outlooks: Sequence[Outlook]) -> str:
-    """Return how far apart logs usually are, in words; empty where dates do not say."""
+    """Return the usual time between logs, in words; empty if dates are missing."""
     days = next((one.days_apart for one in outlooks if one.days_apart is not None), None)
     if days is None:
         return ""

@@ -36,7 +36,7 @@ class ActuatorRow:
 
     @cached_property
     def outlook(self) -> Outlook | None:
-        """How the worst severity of the last log develops; None for a few logs."""
+        """Outlook of the worst severity of the last log; None for a few logs."""
         if self.last.worst is None or len(self.logs) < FEWEST:
             return None
         return outlook_of(self.logs, self.last.worst.name, self.maintained)

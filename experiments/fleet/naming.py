@@ -241,7 +241,7 @@ def _stem(name: str) -> str:
 
 
 def _by_date(path: str) -> Named:
-    """Return what the name of one file and of its folder says."""
+    """Return actuator and date from the name of a file and of its folder."""
     *_, folder, name = path.split("/")
     stem = year_first(_stem(name))
     dates = list(re.finditer(rf"(?<![0-9]){STAMP.pattern}(?![0-9])", stem))
@@ -264,7 +264,7 @@ def _require_a_date(found: dict[str, Named]) -> dict[str, Named]:
 
 
 def _named(actuator: str, date: str, source: str) -> Named:
-    """Return what is known of a log; one bad date must not cost the fleet its page."""
+    """Return actuator and date of a log; one bad date must not cost the fleet its page."""
     try:
         return Named(actuator, year_first(date), place_of(date, source) if date else None)
     except HydrostateError as error:

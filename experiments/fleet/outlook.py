@@ -1,4 +1,4 @@
-"""How an actuator's severities develop over its logs: level, growth, and when a limit is reached."""
+"""Outlook of an actuator's severities over its logs: level, growth, and the time to a limit."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -37,12 +37,12 @@ class Outlook:
 
     @cached_property
     def course(self) -> list[Trend]:
-        """What was known after each log."""
+        """Belief after each log."""
         return list(trends(self.series))
 
     @property
     def trend(self) -> Trend:
-        """What is known after the last log."""
+        """Belief after the last log."""
         return self.course[-1]
 
     @cached_property
@@ -157,7 +157,7 @@ def span_of(low: float, high: float, horizon: float = HORIZON) -> str:
 
 
 def outlook_of(logs: Sequence[LogRow], name: str, maintained: Sequence[float] = ()) -> Outlook | None:
-    """Return how a severity develops.
+    """Return the outlook of a severity.
 
     Parameters
     ----------

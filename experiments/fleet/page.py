@@ -150,7 +150,7 @@ def _past(log: LogRow) -> bool:
 
 
 def title_of(rows: Sequence[ActuatorRow]) -> str:
-    """Return how many of those actuators are sick whose logs could be read.
+    """Return a title with the number of sick actuators, among those with readable logs.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def title_of(rows: Sequence[ActuatorRow]) -> str:
 
 
 def rig_hint(rows: Sequence[ActuatorRow], *, served: bool = False) -> str:
-    """Return what to do where many actuators have no verdict; empty where few have none.
+    """Return advice if many actuators have no verdict; else empty.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def untold_since(row: ActuatorRow) -> str:
 
 
 def found_in(log: LogRow) -> str:
-    """Return what was found in a log, or why nothing was, without the folder that the log was in."""
+    """Return the finding of a log or the reason for none, without the log's folder."""
     levels = [level_in_words(name, size) for name, size in log.between.items() if size > 0.0]
     if levels:
         return "; ".join(levels) + (IF_RIGHT if log.beside else "")

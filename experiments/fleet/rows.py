@@ -49,7 +49,7 @@ class Amount:
 
     @property
     def share(self) -> float:
-        """How far it is from healthy to the limit [fraction]: 1 at the limit, more beyond."""
+        """Share of the way from healthy to the limit [fraction]: 1 at the limit, more beyond."""
         return (self.value - self.healthy) / (self.limit - self.healthy)
 
     @property
@@ -59,7 +59,7 @@ class Amount:
 
     @property
     def state(self) -> str:
-        """Where value and interval lie to the limit, one of `STATES`."""
+        """Position of value and interval relative to the limit, one of `STATES`."""
         sign = math.copysign(1.0, self.limit - self.healthy)
         limit, value = sign * self.limit, sign * self.value
         low, high = sorted((sign * self.low, sign * self.high))

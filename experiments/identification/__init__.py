@@ -1,1 +1,1 @@
-"""What `hydrostate identify` makes of logs: models between channels of a bench, or between any columns."""
+"""The verb `hydrostate identify`: models between channels of a bench, or between any columns."""

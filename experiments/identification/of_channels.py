@@ -162,7 +162,7 @@ def _form(fit: ChannelFit) -> dict[str, Any]:
 
 
 def _judged(model: "LinearModel", u: "Array", y: "Array", log: Path, figure: Path | None) -> dict[str, Any]:
-    """Return what the data say of the model: tests of its residual, and the gain's interval; draw both if wanted."""
+    """Return the residual tests of the model and the gain's interval; draw both if wanted."""
     from estimation.finding import interval_95
     from estimation.identification.fit.profile_interval import dc_gain_interval
     from estimation.identification.fit.validate import validate

@@ -119,7 +119,7 @@ def _page(result: Result, found: "Identified", data: "Channels") -> str:
 
 
 def _together(records: "Sequence[Record]", fit: ColumnFit, outputs: Sequence[str]) -> "dict[str, Identified]":
-    """Return what is identified of some outputs, by their names."""
+    """Return the identified models of some outputs, by name."""
     from estimation.identification.two_stage import identify_columns as fit_columns
 
     form = {"order": fit.order, "delay": fit.delay, "n_numerator": fit.numerator, "structure": fit.structure}

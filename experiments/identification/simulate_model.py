@@ -118,7 +118,7 @@ def record_of(log: Path, wanted: Sequence[str], sample_time: float | None, *, as
 
 
 def quality_of(model: "FreeRunModel", data: "Channels") -> dict[str, Any]:
-    """Return how well a model follows its outputs, by the names of the JSON contract.
+    """Return the fit of a model to its outputs, by the names of the JSON contract.
 
     Warns
     -----

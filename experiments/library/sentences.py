@@ -1,4 +1,4 @@
-"""What the library's report says: why its models are output error, of which order, and what the test's clock costs."""
+"""Sentences of the library's report: why output error, which order, and the cost of the test's clock."""
 
 import pandas as pd
 

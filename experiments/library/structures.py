@@ -39,7 +39,7 @@ MADE_FOR, ONE_TEST = "binary, made for 25 Hz", "multisine, 0.5 to 50 Hz"
 def structure_table(
     rig: CircuitParameters, models: Mapping[str, LinearModel], seed: int, duration: float = DURATION
 ) -> Rows:
-    """Return how ARX, ARMAX, output error and Box-Jenkins do in each condition on passes held back.
+    """Return the errors of ARX, ARMAX, output error and Box-Jenkins on held-back passes, per condition.
 
     Each has the order of the library's model, so that none is judged by poles that the data do not determine.
 
@@ -155,7 +155,7 @@ def order_and_bandwidth(
 
 
 def clock_table(model: LinearModel, limits: Limits, seed: int, *, duration: float = 20.0) -> pd.DataFrame:
-    """Return what a test's clock makes of the accuracy at 25 Hz and elsewhere, by predicted covariance.
+    """Return the effect of a test's clock on accuracy at 25 Hz and elsewhere, by predicted covariance.
 
     Parameters
     ----------

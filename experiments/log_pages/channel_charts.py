@@ -40,7 +40,7 @@ def channel_charts(record: "Record", found: "Finding", stem: str) -> Charts:
 
 
 def label_of(name: str) -> str:
-    """Return what an axis in SI is labelled; a column of any other log keeps its name.
+    """Return the label of an axis in SI; a column of any other log keeps its name.
 
     Examples
     --------

@@ -107,7 +107,7 @@ def _beyond(title: str, message: str) -> str:
 
 
 def _shortened(message: str, against: Sequence[str]) -> str:
-    """Return what a page opens with: of several reasons the first, since all stand below."""
+    """Return the opening sentence of a page: the first of several reasons, since all are listed below."""
     more = len(against) - 1
     if more < 1:
         return message

@@ -59,7 +59,7 @@ class MeasuredCurve:
 
     @cached_property
     def begins(self) -> IntArray:
-        """Where each stretch begins, `PER_DECADE` a decade, shape (s,)."""
+        """Start of each stretch, `PER_DECADE` per decade, shape (s,)."""
         cells = np.floor(PER_DECADE * np.log10(self.frequency))
         return np.flatnonzero(np.diff(cells, prepend=-np.inf))
 
@@ -143,7 +143,7 @@ def _ends(values: Array, low: float, high: float) -> tuple[float, float]:
 
 
 def step_charts(view: IdentifiedView, stem: str) -> Charts:
-    """Return what a step of each input makes of the output, with its 95 % interval where a covariance tells it.
+    """Return charts of the step response to each input, with a 95 % interval if a covariance is known.
 
     A step is as high as half the input's range, in round numbers.
     """
@@ -192,7 +192,7 @@ def step_of(values: Array) -> float:
 
 
 def _count(view: IdentifiedView) -> int:
-    """Return how many samples of a step response are shown."""
+    """Return the number of samples of a step response to show."""
     moduli = [float(np.max(np.abs(np.roots(f)), initial=0.0)) for _, f in view.transfers]
     slowest = max(moduli, default=1.0)
     lasting = TIME_CONSTANTS / -np.log(slowest) if 0.0 < slowest < 1.0 else np.inf

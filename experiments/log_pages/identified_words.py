@@ -1,4 +1,4 @@
-"""What a page says of an identified model in sentences: how good it is, what it may be used for, and what not."""
+"""Sentences on an identified model: its quality, and what it may and may not be used for."""
 
 import math
 
@@ -82,7 +82,7 @@ def _why_not(view: IdentifiedView) -> str:
 
 
 def answer_of(view: IdentifiedView) -> str:
-    """Return what the verdict's number means, and how large the error is."""
+    """Return the meaning of the verdict's number, and the size of the error."""
     inputs = ", ".join(one.name for one in view.inputs)
     said = f"The model runs free from {inputs}: it never sees the measured output. "
     said += "A fit of 100 % is perfect; 0 % is no better than the mean. "
@@ -194,7 +194,7 @@ def _of_gain(view: IdentifiedView) -> list[str]:
 
 
 def _of_residual(view: IdentifiedView) -> list[str]:
-    """Return what the plant's structure must not be concluded from, if an input is left in the residual."""
+    """Return the warning against conclusions on the plant's structure, if the residual contains an input."""
     cross = view.cross_correlation_p
     if cross is None or cross >= LEVEL:
         return []
@@ -205,7 +205,7 @@ def _of_residual(view: IdentifiedView) -> list[str]:
 
 
 def tests_of(view: IdentifiedView) -> str:
-    """Return what the tests of the residual say, as sentences; empty where none was made."""
+    """Return the results of the residual tests, as sentences; empty if none was made."""
     white, cross = view.whiteness_p, view.cross_correlation_p
     said: list[str] = []
     if white is not None and white < LEVEL:

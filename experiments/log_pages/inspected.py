@@ -1,4 +1,4 @@
-"""What a strange log holds, as entries of the JSON contract: tables, columns, likely channels, and if it reads so."""
+"""Contents of an unknown log, as entries of the JSON contract: tables, columns, likely channels, readability."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ PLOTTED = 24
 def looked_into(
     log: Path, plant: str | None, sample_time: float | None = None, beside: Sequence[Path] = ()
 ) -> "tuple[dict[str, Any], list[TableFacts]]":
-    """Return what a log holds, as entries of the JSON contract, and its tables.
+    """Return the contents of a log, as entries of the JSON contract, and its tables.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a terminal shows of findings, whatever the actuator."""
+"""Terminal output of findings, for any actuator."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import ceil, floor, isfinite, log10

@@ -1,4 +1,4 @@
-"""How the report of `hydrostate motor-paper` shows its tables."""
+"""Columns of the tables in the report of `hydrostate motor-paper`."""
 
 from collections.abc import Mapping
 

@@ -43,7 +43,7 @@ def hysteresis_loops(p: HysteresisParameters) -> Frames:
 
 @tabled
 def hysteresis_table(loops: pd.DataFrame) -> Rows:
-    """Return what each loop amounts to.
+    """Return the characteristics of each loop.
 
     Parameters
     ----------

@@ -100,7 +100,7 @@ def _under(p: VibrationParameters, pid: Pid, reference: np.ndarray, noise: np.nd
 
 @tabled
 def loop_table(runs: pd.DataFrame) -> Rows:
-    """Return what each controller makes of the step.
+    """Return the step response of each controller, in figures.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def loop_table(runs: pd.DataFrame) -> Rows:
 
 
 def relay_table(p: VibrationParameters) -> pd.DataFrame:
-    """Return what a relay in the loop finds, beside the model's own answer.
+    """Return the results of a relay test, beside the model's own values.
 
     Returns
     -------

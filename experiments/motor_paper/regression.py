@@ -141,7 +141,7 @@ def limits_table() -> pd.DataFrame:
 
 @stacked
 def residual_table() -> Frames:
-    """Return what the residual, line-fit and probability plots of Figures 10 to 16 show, in every reading.
+    """Return the figures behind the residual, line-fit and probability plots of Figures 10 to 16, per reading.
 
     Returns
     -------
@@ -198,7 +198,7 @@ def predictive_r_square(found: Any) -> float:
 
 
 def decisions() -> pd.DataFrame:
-    """Return what Table 3's five rules say of each reading.
+    """Return the results of Table 3's five rules for each reading.
 
     Returns
     -------

@@ -95,7 +95,7 @@ def sensing_predictions(points: pd.DataFrame) -> Frames:
 
 @tabled
 def sensing_regressions(points: pd.DataFrame) -> Rows:
-    """Return how well velocity is explained by each set of sensing voltages.
+    """Return the regressions of velocity on each set of sensing voltages.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def sensing_regressions(points: pd.DataFrame) -> Rows:
 
 @tabled
 def sensing_faults(p: DiaphragmMotorParameters, points: pd.DataFrame) -> Rows:
-    """Return what each regression, fitted to the healthy motor, says of a faulty one at 200 V and 10 N, without noise.
+    """Return the predictions of each healthy regression for a faulty motor at 200 V and 10 N, without noise.
 
     Parameters
     ----------

@@ -82,7 +82,7 @@ def efficiency_readings() -> pd.DataFrame:
 
 
 def table_2() -> pd.DataFrame:
-    """Return what Table 2's rows imply, in the physical reading.
+    """Return the implications of Table 2's rows, in the physical reading.
 
     Returns
     -------

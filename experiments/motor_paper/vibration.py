@@ -135,7 +135,7 @@ def response_rows(name: str, model: Any) -> pd.DataFrame:
 
 @tabled
 def tuning_table(p: VibrationParameters) -> Rows:
-    """Return what stiffness and damping do to the first mode, as section 5.1.1 tunes them.
+    """Return the effect of stiffness and damping on the first mode, as section 5.1.1 tunes them.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ class Experiment(NamedTuple):
 
     @property
     def method(self) -> str:
-        """How the form is filtered: the published one with the published noise."""
+        """Filter of the form: the published one with the published noise."""
         return "published-ekf" if self.form == "acceleration" else "auto"
 
     def record(self, p: EhaParameters, settings: StudySettings, rng: np.random.Generator) -> Record:
@@ -110,7 +110,7 @@ def bulk_modulus_study(
 
 
 def estimate_entries(found: BulkModulusEstimate, truth: float) -> dict[str, object]:
-    """Return what was estimated as entries of a table's row.
+    """Return an estimate as entries of a table's row.
 
     Parameters
     ----------

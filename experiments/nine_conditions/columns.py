@@ -1,4 +1,4 @@
-"""How the report shows the study's tables: which columns a reader sees, in which units and words."""
+"""Columns of the study's tables in the report, with units and words."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -75,7 +75,7 @@ def _estimates(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def _filterpy_by_experiment(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return what filterpy's filter and ours end at, one row a condition and one column an experiment."""
+    """Return the final values of filterpy's filter and ours, one row per condition, one column per experiment."""
     rows: dict[str, dict[str, object]] = {}
     for key, found in by_experiment(frame):
         for entry in found.to_dict("records"):

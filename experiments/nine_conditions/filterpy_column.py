@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from estimation.eha.named import NAMED
+from estimation.eha.named_methods import NAMED
 from estimation.filters.run import METHODS, Estimate, available_channels, run_filter
 from estimation.log_checks.first_belief import START_STD, first_belief
 from estimation.log_checks.measurement_noise import measurement_variances
@@ -61,7 +61,7 @@ def filterpy_study(rig: EhaParameters, settings: StudySettings, track: Track = u
 
 
 def compared(ours: Estimate, theirs: Estimate) -> Mapping[str, object]:
-    """Return how two filters' tracks of bulk modulus compare.
+    """Return the comparison of two filters' tracks of bulk modulus.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def compared(ours: Estimate, theirs: Estimate) -> Mapping[str, object]:
 
 
 def verdict_counts(frame: pd.DataFrame) -> Mapping[str, int]:
-    """Return how many runs are equal, differ, or fail.
+    """Return the number of runs that are equal, differ, or fail.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a study's tables amount to: which experiment recovered bulk modulus where, and which classes were found."""
+"""Findings from a study's tables: where bulk modulus was recovered, and which classes were found."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ WANTED_PERCENT: Mapping[Experiment, float] = {
 
 @dataclass(frozen=True)
 class Recovery:
-    """How one experiment fared over all conditions and first guesses.
+    """Result of one experiment over all conditions and first guesses.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Recovery:
 
 @dataclass(frozen=True)
 class ClassAccuracy:
-    """How one bank of models classified.
+    """Accuracy of one bank of models as a classifier.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from estimation.eha.named import NAMED, PUBLISHED_TIME
+from estimation.eha.named_methods import NAMED, PUBLISHED_TIME
 from estimation.filters.run import METHODS, run_filter
 from estimation.log_checks.first_belief import START_STD, first_belief
 from estimation.models.eha_forms import BULK_MODULUS, PRINTED_FORM

@@ -1,4 +1,4 @@
-"""How large a nine-condition study is."""
+"""Size of a nine-condition study."""
 
 from dataclasses import dataclass
 

@@ -211,7 +211,7 @@ def order_table(record: Record, rng: np.random.Generator) -> pd.DataFrame:
 
 @tabled
 def filtering_table(rng: np.random.Generator, duration: float) -> Rows:
-    """Return what zero-phase filtering of the output alone does to a fit, on a plant whose poles are known.
+    """Return the effect of zero-phase filtering of the output alone on a fit, for a plant with known poles.
 
     Section 4 filters the output only. The plant here is a strictly proper 30 Hz resonance with damping 0.6, driven as
     in section 4 with 5 % noise (errata E15).

@@ -1,4 +1,4 @@
-"""What a plain log is made of, drawn at random, and the course of any."""
+"""Random draws of a plain log, and of the course of a change."""
 
 import numpy as np
 

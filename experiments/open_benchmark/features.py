@@ -66,7 +66,7 @@ def random_kernels(count: int, samples: int, rng: np.random.Generator) -> list[t
 
 
 def kernel_features(series: Array, kernels: list[tuple[Array, Array, int, float]]) -> Array:
-    """Return how often each kernel's response is positive, and its most.
+    """Return the share of positive responses of each kernel, and its maximum.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the pump delivers and where oil leaks, drains, is relieved and made up."""
+"""Flows of the open benchmark's actuator: pump, leakage, drain, relief and make-up."""
 
 import math
 
@@ -20,7 +20,7 @@ def orifice_flow(drop: float, coefficient: float) -> float:
 
 
 def check_flow(chamber: float, other: float, supply: float, valve: tuple[float, float, float, float]) -> float:
-    """Return what a check valve lets into its chamber [m^3/s]; one with a pilot opens for the other chamber as well.
+    """Return the flow of a check valve into its chamber [m^3/s]; a piloted one opens for the other chamber too.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def pump_flow(speed: float, angle: float, m: Machine) -> float:
 
 
 def filling(pressure: float, air: float, m: Machine) -> float:
-    """Return how full a pump's teeth get, boiling oil being partly vapour [fraction].
+    """Return the filling of a pump's teeth; boiling oil is partly vapour [fraction].
 
     Parameters
     ----------

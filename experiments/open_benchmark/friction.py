@@ -31,7 +31,7 @@ def stretched(stretch: Array, moved: float, m: Machine, out: Array) -> None:
 
 
 def steady_friction(speed: float, viscosity: float, m: Machine) -> tuple[float, float]:
-    """Return what the blocks and what the oil film carry in steady sliding [N], together a_1 v^2 + a_2 v + a_3.
+    """Return the forces of blocks and oil film in steady sliding [N]; their sum is a_1 v^2 + a_2 v + a_3.
 
     Where a_2 is negative (errata E12) the blocks carry the fall, down to half of a_3.
 

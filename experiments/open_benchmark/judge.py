@@ -1,4 +1,4 @@
-"""What a verdict on one log is worth, against its truth: definitions of silent errors, coverage and false unknowns."""
+"""Judgement of a verdict against the truth: definitions of silent errors, coverage and false unknowns."""
 
 import re
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ Entries = Mapping[str, Any]
 
 
 def judge_bulk_modulus(said: Entries, truth: Entries) -> dict[str, Any]:
-    """Return what an estimate is worth; the truth of bulk modulus may be a range, and its nearer end counts.
+    """Return the judgement of an estimate; the true bulk modulus may be a range, whose nearer end counts.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def judge_bulk_modulus(said: Entries, truth: Entries) -> dict[str, Any]:
 
 
 def judge_class(said: Entries, truth: Entries) -> dict[str, Any]:
-    """Return what a diagnosis is worth.
+    """Return the judgement of a diagnosis.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a kind of log is: what is strange in it, how it is drawn, and what a good tool says of it."""
+"""Kind of a log: its peculiarity, its random draw, and the expected answer."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -106,7 +106,7 @@ def drawn_pairs(split: str, count: int) -> list[str]:
 
 
 def seed_of(kind: str, split: str, index: int) -> list[int]:
-    """Return what seeds a log: no two of kind, split and index share it.
+    """Return the seed of a log, unique to kind, split and index.
 
     Examples
     --------

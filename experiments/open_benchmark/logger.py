@@ -20,7 +20,7 @@ PLAIN = (SPEED, POSITION, VELOCITY, DIFFERENCE)
 
 @dataclass(frozen=True)
 class Sensor:
-    """What one channel does to its quantity, in the channel's own unit.
+    """Sensor of one channel: its errors, in the channel's own unit.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class Sensor:
     hum_frequency: float = 50.0
 
     def read(self, time: Array, fine: Array, values: Array, rng: np.random.Generator) -> Array:
-        """Return what is logged.
+        """Return the logged channels.
 
         Parameters
         ----------
@@ -93,7 +93,7 @@ class Sensor:
         return logged[rows - rows % self.hold]
 
     def _hum(self, time: Array) -> Array:
-        """Return what the mains add to a channel."""
+        """Return the mains hum in a channel."""
         phase = 2.0 * np.pi * self.hum_frequency * time
         return self.hum * (np.sin(phase + 1.0) + 0.2 * np.sin(3.0 * phase))
 
@@ -121,7 +121,7 @@ def _averaged(values: Array, rows: int) -> Array:
 
 
 def _followed(values: Array, play: float) -> Array:
-    """Return what follows values with play, which starts in the middle of it."""
+    """Return the output of a play that starts in its middle."""
     out, at = np.empty_like(values), float(values[0])
     for k, value in enumerate(values.tolist()):
         at = min(max(at, value - 0.5 * play), value + 0.5 * play)

@@ -49,7 +49,7 @@ def pair_of(first: Kind, second: Kind) -> Kind:
 
 
 def _both(first: Kind, second: Kind, setup: Setup, rng: np.random.Generator) -> Setup:
-    """Return what both kinds make of a plain log; one that draws another machine comes first, to keep the other."""
+    """Return a plain log with the changes of both kinds; a kind that draws another machine comes first."""
     for kind in (second, first) if second.draws_anew else (first, second):
         setup = kind.draw(setup, rng)
     return setup
@@ -85,7 +85,7 @@ def _accepted(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
 
 @cache
 def touched(kind: Kind) -> frozenset[str]:
-    """Return what a kind changes of a plain log, by where it stands; its own drives are among it.
+    """Return the parts of a plain log that a kind changes, its own drives included.
 
     Parameters
     ----------

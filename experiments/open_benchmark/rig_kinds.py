@@ -23,12 +23,12 @@ SINGLE_ROD = 0.7
 
 
 def _scaled(**factors: float) -> Draw:
-    """Return how a machine differs from the rig file, by field."""
+    """Return the differences of a machine from the rig file, by field."""
     return lambda setup, _: setup.with_machine(**{n: k * getattr(setup.machine, n) for n, k in factors.items()})
 
 
 def _factor(low: float, high: float, *names: str) -> Draw:
-    """Return how a machine differs from the rig file by one drawn factor, evenly in its logarithm."""
+    """Return the difference of a machine from the rig file by one factor, log-uniformly drawn."""
 
     def draw(setup: Setup, rng: np.random.Generator) -> Setup:
         factor = float(np.exp(rng.uniform(np.log(low), np.log(high))))

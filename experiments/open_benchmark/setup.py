@@ -11,7 +11,7 @@ from plant.eha.model import EhaParameters
 
 @dataclass(frozen=True)
 class Change:
-    """What changes over a log, each from nothing.
+    """Changes over a log, each from zero.
 
     Parameters
     ----------

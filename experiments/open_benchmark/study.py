@@ -36,7 +36,7 @@ SERIES = (8.0, 4e-3)
 
 @dataclass(frozen=True)
 class BaselineSettings:
-    """How much is learnt and judged.
+    """Size of the training and test sets.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def by_rmse(judged: Iterable[Path]) -> Names:
 
 
 def right_shares(judged: Sequence[Path], said: Names) -> dict[str, float]:
-    """Return how often a method that never says "unknown" is right [%], by set.
+    """Return the accuracy of a method that never says "unknown" [%], by set.
 
     Parameters
     ----------

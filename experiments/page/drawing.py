@@ -1,4 +1,4 @@
-"""What several figures draw alike."""
+"""Drawing functions that several figures share."""
 
 from collections.abc import Hashable, Iterable, Iterator, Sequence
 from typing import Any, TypeAlias

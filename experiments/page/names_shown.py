@@ -14,7 +14,7 @@ SHOWN: Mapping[str, str] = {
 
 
 def quantity_name(name: str) -> str:
-    """Return what a table calls a quantity.
+    """Return the name of a quantity in a table.
 
     Examples
     --------

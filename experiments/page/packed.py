@@ -83,5 +83,5 @@ def ends_of_stretches(values: Array, most: int) -> Array:
 
 
 def stretch_length(count: int, most: int) -> int:
-    """Return how many samples make a stretch of `ends_of_stretches`; 1 where all are kept."""
+    """Return the number of samples in a stretch of `ends_of_stretches`; 1 if all are kept."""
     return 1 if count <= most else -(-count // (most // 2))

@@ -1,4 +1,4 @@
-"""What a chart shows: curves of one unit over an x axis, and lines across them."""
+"""Panels of a chart: curves of one unit over an x axis, and lines across them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -68,7 +68,7 @@ def render_page(
 
 @cache
 def _templates() -> Environment:
-    """Return what reads templates, and compiles each once however many pages it is filled in for."""
+    """Return the template environment, which compiles each template once for all pages."""
     environment = Environment(
         loader=PackageLoader("experiments", ""),
         autoescape=True,

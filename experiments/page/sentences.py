@@ -49,7 +49,7 @@ def whole_dates(said: str) -> Markup:
 
 
 def left_unread(result: Mapping[str, Any]) -> list[str]:
-    """Return what to do about columns that were not used though they may be needed, as sentences.
+    """Return advice on unused columns that may be needed, as sentences.
 
     Parameters
     ----------

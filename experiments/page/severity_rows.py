@@ -49,7 +49,7 @@ class SeverityRow:
     last: float
 
     def place(self, value: float) -> float:
-        """Return where a value stands on the bar.
+        """Return the place of a value on the bar.
 
         Parameters
         ----------

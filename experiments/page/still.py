@@ -151,7 +151,7 @@ def _panel(
 
 
 def _place(at: float, axis: str, log: bool) -> float:
-    """Return where a mark stands on its axis."""
+    """Return the place of a mark on its axis."""
     return math.log10(at) if log and axis == "x" else at
 
 

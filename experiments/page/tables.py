@@ -45,7 +45,7 @@ UNITS: Mapping[str, tuple[str, float]] = {
 
 @dataclass(frozen=True)
 class Column:
-    """How one column of a data frame is shown.
+    """Display of one column of a data frame.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What we find where the gear-pump paper's text claims something, by the key of ``claims.csv``."""
+"""Our figures beside the claims of the gear-pump paper's text, by the key of ``claims.csv``."""
 
 from collections.abc import Mapping
 from inspect import signature
@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.constants import psi
 
-from estimation.eha.named import PRINTED_Q, PRINTED_R, PUBLISHED_TIME
+from estimation.eha.named_methods import PRINTED_Q, PRINTED_R, PUBLISHED_TIME
 from estimation.finding import NORMAL_95, interval_95
 from estimation.identification.signals.preprocess import zero_phase_filter
 from experiments.circuit.first_tests import WITHIN_DOUBTS
@@ -32,7 +32,7 @@ RIG = EhaParameters()
 
 
 def eha_ours(found: Evidence) -> Mapping[str, Ours]:
-    """Return what stands beside each claim of the gear-pump paper.
+    """Return our figure beside each claim of the gear-pump paper.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def _modelled_chambers(estimates: pd.DataFrame) -> Mapping[str, Ours]:
 
 
 def settled_by_condition(estimates: pd.DataFrame) -> Mapping[str, Ours]:
-    """Return where a filter settles in each condition, with its 95 % interval, gate and coverage.
+    """Return the final value of a filter in each condition, with its 95 % interval, gate and coverage.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def settled_by_condition(estimates: pd.DataFrame) -> Mapping[str, Ours]:
 
 
 def printed_by_condition(estimates: pd.DataFrame) -> Mapping[str, Ours]:
-    """Return how far the filter with equation 7.3 as printed ends from the truth.
+    """Return the final error of the filter with equation 7.3 as printed.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What we find where the diaphragm-motor paper's text claims something, by the key of ``claims.csv``."""
+"""Our figures beside the claims of the diaphragm-motor paper's text, by the key of ``claims.csv``."""
 
 from collections.abc import Mapping
 
@@ -21,7 +21,7 @@ OPTIMA = (0.01378, 0.004562, 0.003384)
 
 
 def motor_ours(found: Evidence) -> Mapping[str, Ours]:
-    """Return what stands beside each claim of the diaphragm-motor paper.
+    """Return our figure beside each claim of the diaphragm-motor paper.
 
     Parameters
     ----------

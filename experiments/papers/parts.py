@@ -42,7 +42,7 @@ Evidence: TypeAlias = Mapping[str, Tables]
 
 @dataclass(frozen=True)
 class PapersSettings:
-    """How large the studies are that the rows are read from.
+    """Size of the studies that the rows are read from.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def read_tables(folder: Path) -> Tables:
 
 
 def sources_digest() -> str:
-    """Return what tells one state of the packages' sources from another; this folder, which only reads, is left out."""
+    """Return a digest of the packages' sources, without this folder, which only reads."""
     digest = hashlib.sha256()
     for path in _sources():
         digest.update(path.read_bytes())

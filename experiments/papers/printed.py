@@ -1,4 +1,4 @@
-"""What the text of the three papers claims, and every figure: ``claims.csv`` and ``figures.csv``."""
+"""Claims in the text of the three papers, and their figures: ``claims.csv`` and ``figures.csv``."""
 
 from collections.abc import Mapping
 from importlib.resources import files

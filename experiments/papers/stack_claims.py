@@ -1,4 +1,4 @@
-"""What we find where the piezo-stack paper's text claims something, by the key of ``claims.csv``."""
+"""Our figures beside the claims of the piezo-stack paper's text, by the key of ``claims.csv``."""
 
 from collections.abc import Mapping
 
@@ -13,7 +13,7 @@ from plant.units import LITRE_PER_MINUTE
 
 
 def stack_ours(found: Tables) -> Mapping[str, Ours]:
-    """Return what stands beside each claim of the piezo-stack paper.
+    """Return our figure beside each claim of the piezo-stack paper.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def stack_ours(found: Tables) -> Mapping[str, Ours]:
 
 
 def figures_ours(found: Tables) -> Mapping[str, Ours]:
-    """Return what stands beside each claim about a curve of Figures 10 to 14.
+    """Return our figure beside each claim about a curve of Figures 10 to 14.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ def papers_study(parts: Path) -> Study[PapersSettings]:
 
 @tabled
 def verdict_counts(rows: pd.DataFrame) -> Rows:
-    """Return how many rows of each paper have which verdict.
+    """Return the number of rows per verdict, for each paper.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def _limits(row: Row) -> str:
 
 
 def _tolerance(accept: str) -> str:
-    """Return what a row accepts in a reader's words, with ranges in few digits."""
+    """Return the tolerance of a row in words, with ranges in few digits."""
     if accept == "digits":
         return "half a unit of the last digit"
     words = accept.split()

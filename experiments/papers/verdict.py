@@ -58,7 +58,7 @@ TONES: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Ours:
-    """What we find.
+    """Our result beside a claim.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def excluded(row: Row) -> str:
 
 
 def drawn_as(drawing: bool, difference: str, verdicts: Sequence[str]) -> Drawn:
-    """Return how a figure of a paper is drawn.
+    """Return the function that draws a figure of a paper.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a bench's sensors can tell of a piezo-stack actuator, before anything is measured."""
+"""Identifiability of a piezo-stack actuator from a bench's sensors, before anything is measured."""
 
 from estimation.piezo_stack.estimate import stack_bounds
 from estimation.piezo_stack.finding import SMALLEST_FAULT

@@ -102,7 +102,7 @@ def sweep(p: PiezoStackParameters, points: Sequence[OperatingPoint]) -> Iterator
 
 
 def rows_of(cases: Sequence[tuple[PiezoStackParameters, OperatingPoint]]) -> Iterator[dict[str, float]]:
-    """Return what actuators give at operating points, as `sweep` does; runs of one length take one kernel together.
+    """Return the outputs of actuators at operating points, as `sweep` does; runs of one length share a kernel.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ STEP = 0.05
 
 
 def sensitivities(p: PiezoStackParameters, load: float = 10.0) -> pd.DataFrame:
-    """Return by how much the flow at 275 Hz answers to each part, up and down.
+    """Return the sensitivity of the flow at 275 Hz to each part, up and down.
 
     Parameters
     ----------

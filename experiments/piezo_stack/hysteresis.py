@@ -33,7 +33,7 @@ SMALL, LARGE = 5.0, 100.0
 
 @tabled
 def hysteresis_table(p: PiezoStackParameters, seed: int) -> Rows:
-    """Return what the printed procedure and the fit make of one closed loop of 100 V.
+    """Return the results of the printed procedure and of the fit for one closed loop of 100 V.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def hysteresis_table(p: PiezoStackParameters, seed: int) -> Rows:
 
 @tabled
 def loop_card(p: PiezoStackParameters) -> Rows:
-    """Return what no estimate from a slow loop of 100 V can beat, by how the loop was run and how often sampled.
+    """Return the Cramér-Rao bounds for a slow loop of 100 V, by its course and sample rate.
 
     Returns
     -------

@@ -88,12 +88,12 @@ def _told(actuators: Sequence[PiezoStackParameters]) -> Array:
 
 
 def _misfits(actuators: Sequence[PiezoStackParameters]) -> Array:
-    """Return how far each actuator is off Figures 11 and 13, over the error allowed: shape (actuators, 4)."""
+    """Return the error of each actuator against Figures 11 and 13, over the error allowed, shape (actuators, 4)."""
     return (_told(actuators) - WANTED) / ALLOWED
 
 
 def _summit(curves: Array) -> Array:
-    """Return where a parabola through the flows has its top, no farther than the sweep reaches [Hz]."""
+    """Return the top of a parabola through the flows, within the sweep [Hz]."""
     frequencies = np.array(PEAK_FREQUENCIES)
     square, slope, _ = np.polyfit(frequencies - PEAK, curves.T, 2)
     reach = frequencies[-1] - PEAK
@@ -139,7 +139,7 @@ def calibrated(start: PiezoStackParameters, turns: int = TURNS) -> PiezoStackPar
 def figure_12_left_out(
     rig: PiezoStackParameters, seed: int, starts: int, turns: int = TURNS, track: Track = untracked
 ) -> Rows:
-    """Return what parameters that were calibrated without Figure 12 say of it.
+    """Return the prediction of Figure 12 by parameters that were calibrated without it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How far a printed number is from what was rounded to it."""
+"""Rounding error of a printed number."""
 
 import re
 

@@ -1,1 +1,1 @@
-"""What a Python user holds: a log, what it says, relations between channels, equations and features of their own."""
+"""Objects of the Python interface: log, answers, relations between channels, own equations and features."""

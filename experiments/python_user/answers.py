@@ -1,4 +1,4 @@
-"""What a log says, in the hands of a Python user: it prints and draws itself, and turns into tables."""
+"""Answers of a log in Python: they print and draw themselves, and turn into tables."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
@@ -95,7 +95,7 @@ class Named(dict[str, Any]):
 
 
 class Answer(Shown):
-    """What a log says, ready to be printed, drawn and passed on.
+    """Answer of a log, to be printed, drawn and passed on.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class Answer(Shown):
 
     @property
     def condition(self) -> str | None:
-        """What is wrong: ``"unknown"`` where something speaks against them all, None where none was asked for."""
+        """Condition of the log: ``"unknown"`` if all are contradicted, None if none was asked for."""
         return "unknown" if self.finding.unknown else self.finding.condition
 
     @property
@@ -162,7 +162,7 @@ class Answer(Shown):
         return f"<p>{escape(str(self._entries['message']))}</p>{table}<ul>{notes}</ul>"
 
     def compare(self, other: "Answer") -> "pd.DataFrame":
-        """Return what is higher or lower in another answer, a row a quantity.
+        """Return the differences to another answer, one row per quantity.
 
         Returns
         -------

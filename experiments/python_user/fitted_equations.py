@@ -1,4 +1,4 @@
-"""What a fit of own equations found, in the hands of a Python user, and the logs that such a fit takes."""
+"""Result of a fit of own equations in Python, and the logs that such a fit takes."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ _FIVE = "{:.5g}".format
 
 
 class FittedGreyBox(Shown):
-    """What a fit of own equations found."""
+    """Result of a fit of own equations."""
 
     def __init__(self, fit: "EquationsFit", records: "Sequence[Record]") -> None:
         self.fit, self._records = fit, tuple(records)
@@ -50,7 +50,7 @@ class FittedGreyBox(Shown):
 
     @property
     def fit_percent(self) -> Mapping[str, float]:
-        """How well each output is followed: 100 is perfect, 0 as good as its mean."""
+        """Fit of each output: 100 is perfect, 0 is as good as its mean."""
         return self.fit.fit_percent
 
     @property
@@ -117,7 +117,7 @@ class FittedGreyBox(Shown):
         )
 
     def simulate(self, log: Any, initial: Mapping[str, float] | None = None) -> "pd.DataFrame":
-        """Return what the fitted equations give on a log.
+        """Return the outputs of the fitted equations on a log.
 
         Parameters
         ----------

@@ -296,7 +296,7 @@ class Log(Shown):
         return Answer(found, entries, words.screen, partial(words.page, found, entries), self._name)
 
     def _found(self, chosen: "LogVerb", record: "Record", rig: "Rig[Any]", prepared: Any) -> "Finding":
-        """Return what a verb finds, with what another verb of this log has left for it."""
+        """Return the finding of a verb, with results that another verb of this log has cached."""
         if chosen.run_beside is None:
             return chosen.run(record, rig, prepared)
         if self._kept[0] is not record:

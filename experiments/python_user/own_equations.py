@@ -126,7 +126,7 @@ class GreyBox(Shown):
     def simulate(
         self, log: Any, values: Mapping[str, float] | None = None, initial: Mapping[str, float] | None = None
     ) -> "pd.DataFrame":
-        """Return what the equations give with parameters that are said.
+        """Return the outputs of the equations for given parameters.
 
         Parameters
         ----------

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def page_path(path: "str | Path") -> Path:
-    """Return where a page goes, with the ending ``.html``.
+    """Return the path of a page, with the ending ``.html``.
 
     Raises
     ------

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What was read of a log.
+    """A log as it was read.
 
     Parameters
     ----------

@@ -105,7 +105,7 @@ class Relation(Shown):
         return runs[0] if len(runs) == 1 else np.column_stack(runs)
 
     def validate(self, log: Any) -> "pd.DataFrame":
-        """Return how well each output of another log is followed.
+        """Return the fit of each output of another log.
 
         Parameters
         ----------
@@ -179,7 +179,7 @@ class Relation(Shown):
         save_models(self.models, path)
 
     def to_frame(self) -> "pd.DataFrame":
-        """Return what the models are worth as a table.
+        """Return the quality of the models as a table.
 
         Returns
         -------

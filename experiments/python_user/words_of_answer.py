@@ -1,4 +1,4 @@
-"""How an answer is shown. It is looked up by the names of actuator and verb, so that answers can be pickled."""
+"""Display of an answer, looked up by the names of actuator and verb, so that answers can be pickled."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Words:
-    """What the page and the screen of an answer need beside the answer.
+    """Extra data for the page and the screen of an answer.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Words:
         return offered(actuator(self.plant), self.verb)
 
     def screen(self, rows: Sequence[Mapping[str, Any]]) -> "Iterable[RenderableType]":
-        """Return what a terminal shows of entries."""
+        """Return the terminal output for entries."""
         return self._chosen().screen(rows, self.options)
 
     def page(self, found: "Finding", entries: Mapping[str, Any], title: str) -> str:

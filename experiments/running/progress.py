@@ -1,4 +1,4 @@
-"""How far a study has come: what shows it, and what does not."""
+"""Progress of a study, with and without a display."""
 
 from collections.abc import Callable, Iterable
 from typing import Protocol, TypeVar

@@ -36,7 +36,7 @@ class Seeded:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a study found.
+    """Result of a study.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def write_result(study: Study[Settings], settings: Settings, found: Found, out: 
 
 
 def manifest_of(study: Study[Settings], settings: Settings) -> Mapping[str, Any]:
-    """Return what it takes to run a study again."""
+    """Return the manifest that reproduces a study."""
     return {
         "study": study.name,
         "settings": asdict(settings),

@@ -1,4 +1,4 @@
-"""What the server answers, as its OpenAPI says it."""
+"""Answers of the server, as its OpenAPI describes them."""
 
 from typing import Any, Literal
 

@@ -62,7 +62,7 @@ _CONTROLS = re.compile(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff\u202a-\u202e\u2066-\u2
 
 
 def why(*more: int, page: bool = False) -> dict[int | str, dict[str, Any]]:
-    """Return how a request may be refused, for OpenAPI; that of a page is refused as JSON too, but to a browser."""
+    """Return the refusals of a request, for OpenAPI; a page is refused as JSON too, except to a browser."""
     schema = {"$ref": "#/components/schemas/Refusal"}
     kinds = {"application/json": {"schema": schema}, "text/html": {"schema": {"type": "string"}}}
     said: dict[str, Any] = {"content": kinds} if page else {"model": Refusal}
@@ -251,7 +251,7 @@ def _offer_state(app: FastAPI, service: Service) -> None:
 def _offer_comparison(app: FastAPI, service: Service) -> None:
     @app.get("/api/compare", responses=why(404, 409, 422), tags=["logs"])
     def compare(first: LogId, second: LogId) -> Comparison:
-        """Return what differs between two logs, second less first."""
+        """Return the differences between two logs, second minus first."""
         pair = [service.result(one) for one in (first, second)]
         logs = [log_of(service.known(one), service.jobs) for one in (first, second)]
         return Comparison.model_validate({"first": logs[0], "second": logs[1], "differences": compared(*pair)})

@@ -22,7 +22,7 @@ LATE = b"HTTP/1.1 408 Request Timeout\r\ncontent-length: 0\r\nconnection: close\
 
 
 def most_connections() -> int:
-    """Return how many connections are held at once [count]; each may need a file beside itself."""
+    """Return the largest number of open connections [count]; each may need a file beside itself."""
     allowed, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return MOST_CONNECTIONS if allowed < 0 else min(MOST_CONNECTIONS, max(allowed // 2 - 32, 8))
 

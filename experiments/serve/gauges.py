@@ -28,7 +28,7 @@ EVERY = 0.25
 
 
 class Gauges(WatchEvents):
-    """What a watch tells, and what its channels read meanwhile.
+    """Events of a watch, and the latest readings of its channels.
 
     Parameters
     ----------

@@ -110,7 +110,7 @@ class Jobs:
             future.cancel()
 
     def phase(self, identity: str) -> str | None:
-        """Return where the work on a log is, None while it waits."""
+        """Return the phase of the work on a log; None while it waits."""
         with suppress(OSError):
             return phase_file(self._settings, identity).read_text(encoding="utf-8") or None
         return None
@@ -195,12 +195,12 @@ def _why_expired(code: int, most: int) -> str:
 
 
 def log_file(settings: Settings, identity: str) -> Path:
-    """Return where a log is kept; formats are told by content, so that its name needs no suffix."""
+    """Return the path of a stored log; its format is detected by content, so its name needs no suffix."""
     return settings.logs / identity
 
 
 def page_file(settings: Settings, identity: str) -> Path:
-    """Return where the page of a log is kept."""
+    """Return the path of a log's page."""
     return settings.pages / f"{identity}.html"
 
 

@@ -66,7 +66,7 @@ class RefusedError(Exception):
 
     @property
     def headers(self) -> dict[str, str]:
-        """What the client should know beside it: when to come again."""
+        """Headers of the answer: when to try again."""
         return {"Retry-After": RETRY[1].decode()} if self.status == 429 else {}
 
 
@@ -205,7 +205,7 @@ class _Exchange:
 
 
 class FreeSpace:
-    """How much the folder of a server may still take.
+    """Space left in the folder of a server.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ class FreeSpace:
         self.uploads = 0
 
     def left(self) -> int:
-        """Return how many bytes may still come; looked at anew every few seconds."""
+        """Return the number of bytes that may still come; refreshed every few seconds."""
         if time.monotonic() - self._looked > IDLE:
             folders = (self._settings.logs, self._settings.pages, self._settings.work)
             self._taken = sum(_size(entry) for folder in folders for entry in os.scandir(folder))

@@ -67,7 +67,7 @@ class Stream:
 
     @property
     def state(self) -> dict[str, Any]:
-        """What it does: ``state``, ``message``, and the last gauges."""
+        """State of the live view: ``state``, ``message``, and the last gauges."""
         with self._lock:
             last = self._gauges[-1] if self._gauges else None
             return {"name": self.name, "state": self._state, "message": self._said, "gauges": last}

@@ -1,4 +1,4 @@
-"""What a monitor asks a server for, in the text format of Prometheus."""
+"""Metrics of a server, in the text format of Prometheus."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What a person sees where the server shows no page: a refusal in a sentence, in light or in dark."""
+"""Refusals as a person sees them: a page with one sentence, in light or dark."""
 
 import hashlib
 import html

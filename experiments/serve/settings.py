@@ -1,4 +1,4 @@
-"""What a server is told: where it keeps things, whom it answers, and how much it takes."""
+"""Settings of a server: its folder, whom it answers, and its limits."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

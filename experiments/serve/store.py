@@ -1,4 +1,4 @@
-"""What a server knows of logs and alarms, in SQLite: written ahead, so that a kill loses nothing that was finished."""
+"""Store of a server for logs and alarms, in SQLite with a write-ahead log: a kill loses no finished result."""
 
 import json
 import os
@@ -41,7 +41,7 @@ UNFINISHED, DONE, FAILED, INTERRUPTED = "unfinished", "done", "failed", "interru
 
 @dataclass(frozen=True)
 class StoredLog:
-    """What is known of a log.
+    """A log in the store, with its state.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class Store:
         return found
 
     def get(self, identity: str) -> StoredLog | None:
-        """Return what is known of a log, None where there is none of that identity."""
+        """Return a stored log; None if there is none of that identity."""
         rows = self._asked("SELECT * FROM kept WHERE id = ?", identity)
         return StoredLog(*rows[0]) if rows else None
 
@@ -157,7 +157,7 @@ class Store:
         return [StoredLog(*row) for row in rows]
 
     def counts(self) -> dict[str, int]:
-        """Return how many logs are in each state."""
+        """Return the number of logs in each state."""
         return {str(state): int(count) for state, count in self._asked("SELECT state, COUNT(*) FROM logs GROUP BY 1")}
 
     def tried(self, identity: str) -> None:

@@ -1,4 +1,4 @@
-"""What the commands on streams print: a JSON object a line, the last of which says how the stream ended."""
+"""Output of the commands on streams: one JSON object per line; the last one says how the stream ended."""
 
 import json
 import signal
@@ -14,7 +14,7 @@ from plant.errors import HydrostateError
 
 
 class EventSource(Protocol):
-    """What tells of a stream."""
+    """Source of a stream's events."""
 
     def end(self, outcome: str, message: str) -> None:
         """Tell that the stream has ended, and how."""

@@ -1,4 +1,4 @@
-"""What `hydrostate filter` does with a stream: rows to samples, samples to a filter, and what it believes to lines."""
+"""The verb `hydrostate filter`: rows to samples, samples to a filter, and its estimates to lines."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -119,7 +119,7 @@ class Filtering:
             yield last, np.concatenate(first), after_gap
 
     def _wanted(self, stream: "CsvStream") -> int:
-        """Return how many rows a filter begins from."""
+        """Return the number of rows from which a filter starts."""
         return 1 if self.like is not None else max(round(LEARNING / stream.sample_time), FEWEST)
 
     def _ready(self, stream: "CsvStream", rows: "NDArray[np.float64]", last: float, gap: bool) -> "OnlineFilter":

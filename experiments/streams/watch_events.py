@@ -1,4 +1,4 @@
-"""What a watch tells, as entries of the JSON contract: start, ready, alarm, change, end."""
+"""Events of a watch, as entries of the JSON contract: start, ready, alarm, change, end."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -95,7 +95,7 @@ class WatchEvents:
         self._came = time.monotonic()
 
     def nearness(self) -> dict[str, dict[str, float]]:
-        """Return how near each balance is to an alarm.
+        """Return the nearness of each balance to an alarm.
 
         Returns
         -------

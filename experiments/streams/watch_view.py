@@ -86,7 +86,7 @@ def drawn(told: Watched) -> "Group":
 
 
 def _reading(channel: str, value: float | None) -> tuple[str, str, str]:
-    """Return what a channel is called, what it reads and in which unit, as the server's live view has them."""
+    """Return name, reading and unit of a channel, as in the server's live view."""
     ending = next((one for one in UNITS if channel.endswith(one)), "")
     unit, factor = UNITS.get(ending, ("", 1.0))
     words = channel.removesuffix(ending).replace("_", " ")

@@ -1,4 +1,4 @@
-"""What `hydrostate watch` does with a stream: rows to samples, and samples to a watch."""
+"""The verb `hydrostate watch`: rows to samples, and samples to a watch."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace

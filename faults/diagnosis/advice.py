@@ -1,4 +1,4 @@
-"""What to do or to measure next, computed from what a log holds and from what it left open."""
+"""Advice on what to do or measure next, from the contents of a log and its open questions."""
 
 from collections.abc import Iterable, Mapping
 
@@ -35,7 +35,7 @@ HELD = 0.02
 
 
 def speeds_held(record: Record) -> int:
-    """Return how many different motor speeds a log holds, regardless of the direction.
+    """Return the number of different motor speeds in a log, regardless of direction.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def advice_for(
     not_told: Iterable[Note],
     channels: Iterable[str],
 ) -> tuple[Note, ...]:
-    """Return what to do or to measure next.
+    """Return advice on what to do or measure next.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def advice_for(
 def oil_advice(
     severity: Mapping[str, Quantity], healthy: Mapping[str, float], limits: Mapping[str, float], volume: float
 ) -> tuple[Note, ...]:
-    """Return what to do about oil that is softer than its limit, whatever the condition.
+    """Return advice on oil that is softer than its limit, whatever the condition.
 
     A log determines bulk modulus over volume alone, so a volume that the rig file gives too small looks alike.
 
@@ -141,7 +141,7 @@ def oil_advice(
 
 
 def volume_advice(strange: Iterable[Note], healthy: EhaParameters, written: EhaParameters) -> tuple[Note, ...]:
-    """Return which chamber volume the rig file should have, where it contradicts the log.
+    """Return advice on the chamber volume of the rig file, if it contradicts the log.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def volume_advice(strange: Iterable[Note], healthy: EhaParameters, written: EhaP
 
 
 def _mended(doubts: list[Note]) -> tuple[Note, ...]:
-    """Return what to mend before the next log: the sensors that are accused, else rig file and units."""
+    """Return what to repair before the next log: the suspected sensors, else rig file and units."""
     if any(note.code == ChannelCode.NOTHING_CHANGES for note in doubts):
         return (AdviceCode.CHECK_LOGGER.note(),)
     if any(isinstance(note.code, ChannelCode) for note in doubts):

@@ -13,7 +13,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Calibration:
-    """What was fitted, with and without pressure.
+    """Fitted calibration, with and without pressure.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the fitted circuit and the banks say of a log, as `faults.diagnosis.diagnose` makes it and others change it."""
+"""Verdict of the fitted circuit and the filter banks on a log, as `faults.diagnosis.diagnose` builds it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from plant.notes import Note
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What the fitted circuit and the banks say of a log, when the log ends.
+    """Verdict of the fitted circuit and the filter banks at the end of a log.
 
     Parameters
     ----------

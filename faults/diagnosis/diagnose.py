@@ -14,7 +14,7 @@ import numpy as np
 
 from estimation.eha.bulk_modulus import EstimateOptions
 from estimation.eha.estimate import estimated, explained, finding_of, refused
-from estimation.eha.explained import OUTSIDE, at_pump_speed, rig_set_right, set_right
+from estimation.eha.explanation_notes import OUTSIDE, at_pump_speed, rig_set_right, set_right
 from estimation.eha.result import BulkModulusEstimate
 from estimation.eha.rig_share import SOFT, scaled_responses, with_total
 from estimation.finding import Finding, Outcome, Quantity
@@ -55,7 +55,7 @@ HEALTHY = ("leakage_coefficient", "flow_bias", "friction_quadratic", "friction_l
 
 @dataclass(frozen=True, eq=False)
 class EhaEvidence:
-    """What the engines say of a log, behind a finding.
+    """Results of the engines behind a finding.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ class _Case(NamedTuple):
 
     @property
     def doubts(self) -> tuple[Note, ...]:
-        """What speaks against all nine conditions before a circuit is fitted."""
+        """Reasons against all nine conditions before a circuit is fitted."""
         outside = (note for note in self.strange if note.code in OUTSIDE)
         return (*refused(self.estimate), *outside, *self.log.objections)
 
@@ -239,7 +239,7 @@ def _begun(log: CleanLog, parameters: EhaParameters) -> _Plain:
 
 
 def _scores_of(log: CleanLog, parameters: EhaParameters) -> Scores:
-    """Return how the nine nominal models follow a log, or its beginning where a channel is mistaken."""
+    """Return the errors of the nine nominal models on a log, or on its beginning if a channel is wrong."""
     record = log.record.slice(0, round(LONGEST / log.record.sample_time) + 1) if log.mistakes else log.record
     return score_mathematical(record, mathematical_bank(parameters))
 
@@ -249,7 +249,7 @@ def _of_clean(log: CleanLog, parameters: EhaParameters) -> Diagnosis:
 
 
 def _judged(log: CleanLog, parameters: EhaParameters, case: _Case, plain: _Plain) -> Loaded:
-    """Return a diagnosis with what the balance of flows says of the pump."""
+    """Return a diagnosis with the pump delivery that the balance of flow gives."""
     found = _diagnosed(log, parameters, case.estimate, plain)
     told = whatever_the_pump_delivers(found.diagnosis, actuator_of(found.parameters), case.estimate, case.strange)
     return found._replace(diagnosis=told)
@@ -294,7 +294,7 @@ def _another_oil(estimate: BulkModulusEstimate, healthy: EhaParameters) -> Note 
 def _severities(
     diagnosis: Diagnosis, estimate: BulkModulusEstimate, healthy: EhaParameters, rig: Rig, *, pressure: bool
 ) -> Mapping[str, Quantity]:
-    """Return how bad it is, with the bulk modulus that was estimated, and what is not known of the rig.
+    """Return the severities, with the estimated bulk modulus and the uncertainty of the rig.
 
     Without pressure, where the check refuses the fit of motion, the circuit's own bulk modulus stays.
     """
@@ -309,7 +309,7 @@ def _severities(
 
 
 def _without_class(found: Finding, log: CleanLog, scores: Scores, against: tuple[Note, ...]) -> Finding:
-    """Return what is said where no circuit was fitted: the nearest model's name, and what speaks against it."""
+    """Return the verdict without a fitted circuit: the nearest model's name, and the reasons against it."""
     return replace(
         found,
         condition=ranked(scores)[0][0],

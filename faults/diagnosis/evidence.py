@@ -36,7 +36,7 @@ SAMPLES = 20.0
 
 @dataclass(frozen=True, eq=False)
 class Scoreboard:
-    """What the evidences say of a log.
+    """Scores of the evidences on a log.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class Scoreboard:
 
 
 def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel] | None = None) -> Scoreboard:
-    """Return what the evidences say of a log, of the condition in which it ends.
+    """Return the scores of the evidences for the condition at the end of a log.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def weigh(record: Record, actuator: Actuator, library: Mapping[str, LinearModel]
 
 
 def models_scores(fits: ClassFits) -> Array:
-    """Return how well the nominal circuit of each condition explains a log.
+    """Return the score of each condition's nominal circuit on a log.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def models_scores(fits: ClassFits) -> Array:
 
 
 def within_reach(scores: Array, apart: Array) -> Array:
-    """Return what nominal circuits say of the conditions, as far as the log tells one from the other.
+    """Return the scores of nominal circuits, as far as the log separates the conditions.
 
     They differ from the actuator in all that is fitted besides. What that leaves of a log is taken for friction or
     leakage, where the log tells nothing of these.
@@ -167,7 +167,7 @@ def within_reach(scores: Array, apart: Array) -> Array:
 
 
 def friction_left_open(scores: Array, blocks: Blocks, actuator: Actuator) -> Array:
-    """Score the friction levels that would hold the piston alike: a stuck piston tells none from the other.
+    """Score the friction levels that hold the piston equally: a stuck piston cannot separate them.
 
     Parameters
     ----------

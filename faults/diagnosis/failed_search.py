@@ -1,4 +1,4 @@
-"""What speaks against a log before circuits are fitted, and whether the fitted circuit takes it back.
+"""Objections to a log before circuits are fitted, and whether the fitted circuit removes them.
 
 Without pressure a log is refused if the fit of motion leaves much of the motion. Its search may have failed, though: a
 circuit that follows the log has values for all that the motion form leaves open, and with these it follows the log too.
@@ -43,7 +43,7 @@ LEAST_DRAIN = 1e-3
 def doubts_after(
     doubts: Sequence[Note], estimate: BulkModulusEstimate, log: CleanLog, healthy: EhaParameters, board: Scoreboard
 ) -> tuple[Note, ...]:
-    """Return what still speaks against a log once a circuit is fitted.
+    """Return the objections to a log that remain after a circuit is fitted.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Nine filters on one log, one a condition: how likely each found its innovations."""
+"""Nine filters on one log, one per condition: the likelihood of their innovations."""
 
 from dataclasses import replace
 

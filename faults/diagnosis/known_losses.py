@@ -1,4 +1,4 @@
-"""`by_the_balance(diagnosis, estimate, record, p)`: severities by the balances of flows and of forces.
+"""`by_the_balance(diagnosis, estimate, record, p)`: severities from the balances of flow and force.
 
 A fitted circuit tells leakage with the whole motion: where its seals yield otherwise than real ones do, it makes up for
 that by leakage. The balance of flows knows pump, piston and pressure, and nothing of friction. Where it explains a log,
@@ -26,7 +26,7 @@ LOSSES = ("leakage_coefficient", "flow_bias")
 
 
 def by_the_balance(diagnosis: Diagnosis, estimate: BulkModulusEstimate, record: Record, p: EhaParameters) -> Diagnosis:
-    """Return a diagnosis whose severities have what the balances of flows and of forces tell.
+    """Return a diagnosis with severities from the balances of flow and force.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the errors of nine nominal models alone say of a log: an outcome, a ranking, and whether any of them fits."""
+"""Verdict by the errors of nine nominal models alone: outcome, ranking, and whether any model fits."""
 
 import math
 from typing import NamedTuple
@@ -19,7 +19,7 @@ POOR_FIT = 0.5
 
 
 class ModelsVerdict(NamedTuple):
-    """What the nine models say.
+    """Verdict of the nine models.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def ranked(scores: Scores) -> list[tuple[str, float]]:
 
 
 def margin(scores: Scores) -> float:
-    """Return how many times larger the runner-up's error is than the best.
+    """Return the ratio of the runner-up's error to the best.
 
     Parameters
     ----------

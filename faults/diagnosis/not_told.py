@@ -1,4 +1,4 @@
-"""What a log does not tell of how bad it is: notes, and the severities of which it says nothing."""
+"""Severities that a log does not determine: notes, and which they are."""
 
 from collections.abc import Collection, Mapping
 from math import inf, nan
@@ -47,7 +47,7 @@ def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure
 
 
 def not_determined(codes: Collection[object]) -> frozenset[str]:
-    """Return the severities of which a log says nothing: their values are those of a first belief.
+    """Return the severities that a log does not determine; their values are the prior's.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def _velocity_lost(speed: Quantity) -> list[Note]:
 
 
 def extent(one: Quantity) -> float:
-    """Return how far apart the ends of a severity's interval are [its unit]; infinite where it has none."""
+    """Return the width of a severity's interval [its unit]; infinite if it has none."""
     return inf if one.ci95 is None else one.ci95[1] - one.ci95[0]
 
 

@@ -1,4 +1,4 @@
-"""How bad is it? A fitted circuit in the units of a shop, each number with a 95 % interval."""
+"""Severities of a fitted circuit in workshop units, each with a 95 % interval."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -229,7 +229,7 @@ def _normal_draws(coordinates: int) -> Array:
 
 
 def _unresolved(actuator: Actuator) -> Mapping[str, float]:
-    """Return what no fit resolves of friction, by severity: no logarithm begins at zero (`LEAST_FORCE`).
+    """Return the friction below the resolution of a fit, by severity: no logarithm begins at zero (`LEAST_FORCE`).
 
     It is nothing where the healthy friction has more than that at rest, at rated velocity and in the part between.
     """
@@ -265,7 +265,7 @@ def healthy_severities(actuator: Actuator) -> Mapping[str, float]:
 
 @lru_cache(maxsize=16)
 def limits_of(actuator: Actuator) -> Mapping[str, float]:
-    """Return where an actuator stops being sound, until its owner says otherwise; kept for the next log.
+    """Return the default limits beyond which an actuator is not sound; cached for the next log.
 
     Parameters
     ----------

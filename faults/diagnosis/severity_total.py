@@ -1,4 +1,4 @@
-"""What severities owe to the rig file: total intervals, by laws of scale that hold in the steady state.
+"""Total intervals of severities: the effect of the rig file's uncertainty, by steady-state scaling laws.
 
 At rated speed the pumped flow that does not move the piston leaks, so leakage answers an error of displacement or area
 by pumped flow over leakage; the velocity that is lost answers it one to one. Friction is area times pressure, and the
@@ -77,7 +77,7 @@ def _holding(ends: tuple[float, float] | None, one: Quantity) -> Quantity:
 
 
 def _laws(lost: float, actuator: Actuator, *, pressure: bool) -> Mapping[str, Responses]:
-    """Return how severities respond to errors of the rig file, each as a share of its whole (`_whole`) or of itself."""
+    """Return the response of severities to errors of the rig file, as a share of the whole (`_whole`) or of itself."""
     healthy = actuator.circuit
     swept = healthy.piston_area * actuator.rated * (1.0 - lost / 100.0)
     pumped = healthy.rated_flow

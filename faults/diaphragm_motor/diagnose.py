@@ -93,7 +93,7 @@ class Match:
 
 @dataclass(frozen=True)
 class MotorDiagnosis:
-    """What is wrong with the motor.
+    """Diagnosis of the motor.
 
     Parameters
     ----------
@@ -229,7 +229,7 @@ def diagnose_signature(seen: Signature, healthy: DiaphragmMotorParameters) -> Mo
 def separations(
     healthy: DiaphragmMotorParameters, frequency: float, peak_to_peak: float, sizes: Mapping[str, float]
 ) -> Mapping[str, Mapping[str, float]]:
-    """Return how far faults are from the nearest point of every other curve: below `TOLD_APART` they look alike.
+    """Return the distance of faults to the nearest point of every other curve: below `TOLD_APART` they look alike.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def _operating_point(seen: Signature) -> tuple[float, float]:
 
 
 def _calibrated(seen: Signature, calibration: Signature, healthy: DiaphragmMotorParameters) -> Signature:
-    """Return what a log would show on the model's own motor: fundamentals by ratio, all else by difference."""
+    """Return a log converted to the model's own motor: fundamentals by ratio, all else by difference."""
     was, drive = calibration.drive, seen.drive
     if (
         abs(was.frequency / drive.frequency - 1.0) > SAME_DRIVE

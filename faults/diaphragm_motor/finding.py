@@ -28,7 +28,7 @@ class MotorFaultCode(Code):
 
 
 class MotorAdviceCode(Code):
-    """What to do about a fault of the diaphragm motor."""
+    """Advice on a fault of the diaphragm motor."""
 
     CLEAN_VALVE = "clean valve {place} and its seat; replace the valve if it still leaks"
     FREE_VALVE = "clean valve {place} and its port"
@@ -92,7 +92,7 @@ def motor_fault_finding(
 
 
 def severity_of(match: Match) -> Quantity:
-    """Return how bad a fault is.
+    """Return the severity of a fault.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ def mathematical_bank(rig: EhaParameters) -> Mapping[str, EhaParameters]:
 
 
 def predict_run(record: Record, parameters: EhaParameters) -> Mapping[str, Array]:
-    """Return what the lumped model does from rest under a record's drive.
+    """Return the run of the lumped model from rest under a record's drive.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def predict_run(record: Record, parameters: EhaParameters) -> Mapping[str, Array
 
 
 def predict_runs(record: Record, bank: Mapping[str, EhaParameters]) -> Mapping[str, Mapping[str, Array]]:
-    """Return what each lumped model of a bank does from rest under a record's drive, several side by side.
+    """Return the runs of a bank of lumped models from rest under a record's drive, side by side.
 
     Parameters
     ----------

@@ -130,7 +130,7 @@ def overdetermined(equations: set[str]) -> set[str]:
 
 @dataclass(frozen=True, eq=False)
 class Distances:
-    """How far apart the conditions are after an experiment.
+    """Distances between conditions after an experiment.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def condition_distances(
     channels: Sequence[str] = SENSED,
     sensors: Sensors = BENCH,
 ) -> Distances:
-    """Return how far apart the nine conditions are under a drive, each being a class of actuators and not one.
+    """Return the distances between the nine conditions under a drive, each a class of actuators.
 
     The noiseless run of one condition is explained as well as another's model can, its bulk modulus, leakage, bias and
     friction moved within `SPREAD` (linearised); half the weighted sum of what is left and of the moves is the
@@ -243,6 +243,6 @@ def condition_distances(
 
 
 def _slope(seen: Callable[[EhaParameters], Array], model: EhaParameters, run: Array, moved: str) -> Array:
-    """Return by how much the weighed channels change for one standard deviation of a parameter."""
+    """Return the change of the weighted channels per standard deviation of a parameter."""
     changed = replace(model, **{moved: getattr(model, moved) * (1.0 + STEP)})
     return (seen(changed) - run) * (SPREAD[moved] / STEP)

@@ -174,7 +174,7 @@ def drifted_relief(base: CircuitParameters, factor: float) -> CircuitParameters:
 
 
 def _seals(load: float) -> tuple[float, float]:
-    """Return what goes with throttle B's load in a_2 and a_3, over the healthy values, between Table 4's rows."""
+    """Return a_2 and a_3 over their healthy values for a load of throttle B, between Table 4's rows."""
     levels = [FRICTION_TABLE[level] for level in LEVELS]
     loads = [level.friction_quadratic - levels[0].friction_quadratic for level in levels]
     linear, coulomb = (

@@ -21,7 +21,7 @@ SPREADS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.2, 0.4)
 
 @dataclass(frozen=True)
 class Calibration:
-    """How scores become probabilities.
+    """Calibration of scores to probabilities.
 
     Parameters
     ----------

@@ -124,7 +124,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
         return self.calibration_.probabilities(self._learnt.scores(x), self._merged)
 
     def likeness(self, X: Any) -> Array:
-        """Return how like the known classes runs are: the share of known runs that lie at least as far from them.
+        """Return the likeness of runs to the known classes: the share of known runs at least as far from them.
 
         The known runs were held back for that (conformal anomaly detection, Laxhammar and Falkman 2015), so of runs of
         known classes a share of at most ``s`` has a likeness of ``s`` or less, where new runs come as the old ones did.

@@ -11,7 +11,7 @@ from estimation.arrays import Array, IntArray
 
 @dataclass(frozen=True, eq=False)
 class Discriminant:
-    """What was learnt of the classes: one normal distribution each, all of one covariance.
+    """Learned classes: one normal distribution each, with a common covariance.
 
     Parameters
     ----------

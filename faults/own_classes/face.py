@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 class ClassifierWithoutScikitLearn:
-    """What stands in place of `Classifier` where scikit-learn is not installed.
+    """Placeholder of `Classifier` if scikit-learn is not installed.
 
     Raises
     ------

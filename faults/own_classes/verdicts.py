@@ -1,4 +1,4 @@
-"""What was found of runs that had no part in the learning: right and wrong, how probable, and how far from all."""
+"""Verdicts on held-back runs: right or wrong, probability, and distance from all classes."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from faults.own_classes import calibration
 
 @dataclass(frozen=True, eq=False)
 class Verdicts:
-    """What was found of runs that had no part in the learning.
+    """Verdicts on held-back runs.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Verdicts:
         return calibration.log_loss(self.probabilities, self.true)
 
     def reliability(self, bins: int = 10) -> pd.DataFrame:
-        """Return how often verdicts of some probability were right.
+        """Return the share of right verdicts per probability.
 
         Parameters
         ----------

@@ -78,7 +78,7 @@ class StackFaultCode(Code):
 
 
 class StackAdviceCode(Code):
-    """What to do about a fault of the piezo-stack actuator."""
+    """Advice on a fault of the piezo-stack actuator."""
 
     BLEED_OIL = "bleed the oil, then find where air gets in"
     LOOK_AT_CHAMBER = "inspect the joints and the membrane of the pump chamber"
@@ -175,7 +175,7 @@ def _level(found: StackEstimate, name: str, healthy: float, levels: Mapping[str,
 
 
 def _fault(name: str, found: StackEstimate, healthy: PiezoStackParameters) -> Note | None:
-    """Return what a quantity says of a fault; None where it says nothing, or not for sure."""
+    """Return the fault that a quantity shows; None if it shows none, or not for sure."""
     value, sure = found.values[name], SURE * found.deviations[name]
     base = 1.0 if name == "polarisation" else float(getattr(healthy, name))
     reed, _, part = name.partition("_reed_")

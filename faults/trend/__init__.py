@@ -1,1 +1,1 @@
-"""How severities of one actuator develop from log to log, and when a limit is crossed."""
+"""Trend of one actuator's severities from log to log, and forecast of when a limit is crossed."""

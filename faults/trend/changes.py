@@ -1,4 +1,4 @@
-"""Where a series of logs jumps: a repair that nobody wrote down, another pump, a seal that burst."""
+"""Jumps in a series of logs: an unrecorded repair, another pump, a burst seal."""
 
 from collections.abc import Collection, Iterator
 

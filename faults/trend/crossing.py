@@ -95,7 +95,7 @@ def crossing(belief: Belief, grid: Settings, rng: np.random.Generator, limit: fl
 
 
 def _paced(stride: float, grid: Settings, chosen: Index) -> tuple[Array, Array]:
-    """Return how slopes move on, shape (2, draws), and how two normal numbers bend them, shape (3, draws)."""
+    """Return the transition of slopes, shape (2, draws), and the factor of their noise, shape (3, draws)."""
     moves, noises = np.empty((len(grid.pace), 2)), np.empty((len(grid.pace), 3))
     for pace, own in grid.by_pace:
         moves[own], covariance = exponential_growth(stride, pace)

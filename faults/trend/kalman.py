@@ -124,7 +124,7 @@ def settings() -> Settings:
 
 @dataclass(frozen=True, eq=False)
 class Belief:
-    """What is believed after a log under each setting.
+    """Belief after a log, under each setting.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class Belief:
 
 
 def first_belief(grid: Settings) -> Belief:
-    """Return what is believed before the first log."""
+    """Return the prior belief, before the first log."""
     count = len(grid.slope)
     covariance = np.zeros((count, 3, 3))
     covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 2, 2] = LEVEL**2, grid.slope**2, grid.curvature**2
@@ -156,7 +156,7 @@ def first_belief(grid: Settings) -> Belief:
 
 
 def beliefs(times: Array, values: Array, stds: Array, grid: Settings) -> list[Belief]:
-    """Return what is believed before the first log, and after each.
+    """Return the belief before the first log, and after each log.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def beliefs(times: Array, values: Array, stds: Array, grid: Settings) -> list[Be
 
 
 def predict(now: Belief, step: float, grid: Settings) -> Belief:
-    """Return what is believed of a later time.
+    """Return the belief at a later time.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def _step(step: float, paces: tuple[float, ...]) -> tuple[Array, Array, Array]:
 
 
 def exponential_growth(step: float, pace: float) -> tuple[Array, Array]:
-    """Return how a growing slope of 1 moves level and slope, and the covariance that unit white noise on it adds.
+    """Return the transition of level and slope under a growing slope, and the covariance of unit white noise on it.
 
     Parameters
     ----------
@@ -253,7 +253,7 @@ def evidence_of(belief: Belief, grid: Settings) -> float:
 
 
 def growth_evidence(belief: Belief, grid: Settings) -> float:
-    """Return how much more probable the logs are with a slope than without.
+    """Return the odds of the logs with a slope against none.
 
     Without a slope the ratio has mean 1 at any time, so it ever exceeds 1/a with a probability of a at most (Ville,
     Étude critique de la notion de collectif, 1939).

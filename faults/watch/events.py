@@ -1,4 +1,4 @@
-"""What a watch tells: that it is ready, an alarm with the time of the change, and what has changed."""
+"""Events of a watch: ready, an alarm with the time of the change, and what has changed."""
 
 from dataclasses import dataclass
 
@@ -57,7 +57,7 @@ class Alarm:
 
 @dataclass(frozen=True)
 class Change:
-    """What changed with an alarm, judged by samples after it.
+    """Change behind an alarm, judged by samples after it.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ Event = Ready | Alarm | Change
 
 
 def change_time(scores: Array) -> tuple[int, tuple[int, int]]:
-    """Return how many blocks ago the scores' mean rose, by the generalised likelihood ratio.
+    """Return the number of blocks since the scores' mean rose, by the generalised likelihood ratio.
 
     Scores before the change have mean 0 and deviation 1; after it the mean is unknown (Willsky and Jones, IEEE
     Transactions on Automatic Control 21, 1976, page 108).

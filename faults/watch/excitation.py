@@ -1,4 +1,4 @@
-"""How hard a drive excites a block: scores are compared with those of blocks that were excited alike.
+"""Excitation of a block by the drive: scores are compared with those of similarly excited blocks.
 
 What a balance leaves depends on the drive: after a reversal it leaves more than in steady motion. Blocks fall into
 classes by how much speed changed in them and in the block before, in octaves. Each class has a usual log NIS of its
@@ -31,7 +31,7 @@ def excitation_octave(change: float) -> int:
 
 
 def standardise(value: float, memory: float, judged: bool, usual: Array) -> float:
-    """Return how far a log NIS lies above the usual of its class, and let it move the usual.
+    """Return the excess of a log NIS over the usual of its class, and update the usual.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ scores counted."""
 
 
 class Memory(NamedTuple):
-    """What a watch remembers, a row a balance; scores are dimensionless, gains in shares of the ratings.
+    """Memory of a watch, one row per balance; scores are dimensionless, gains in shares of the ratings.
 
     Parameters
     ----------

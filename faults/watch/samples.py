@@ -49,7 +49,7 @@ def watched_samples(channels: Mapping[str, Array], sample_time: float, travelled
 
 
 def missing_channels(channels: Sequence[str]) -> str:
-    """Return what a watch lacks, as a sentence; empty where nothing is missing."""
+    """Return a sentence on the channels that a watch lacks; empty if none is missing."""
     motion = any(name in channels for name in ("position_m", "velocity_m_s"))
     if "motor_speed_rad_s" in channels and motion:
         return ""

@@ -283,7 +283,7 @@ def local_derivatives(item: Expression) -> Sequence[Expression]:
 
 
 def slopes_of(item: Expression) -> Sequence[tuple[Expression, Expression]]:
-    """Return what a node's derivatives are by, each with the derivative."""
+    """Return the derivatives of a node, each with the expression that it is taken by."""
     if item.slopes or not item.arguments:
         return item.slopes
     return tuple(zip(item.arguments, local_derivatives(item), strict=True))

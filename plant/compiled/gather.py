@@ -117,7 +117,7 @@ class _Gathering:
         return a * b if a is ONE or b is ONE else self._twin("*", a, b, a * b)
 
     def _twin(self, operation: str, a: Expression, b: Expression, result: Expression) -> Expression:
-        """Return what the operation made of b and a, if it was met before."""
+        """Return the result of the same operation on b and a, if it was met before."""
         twin = self._twins.get((operation, id(b), id(a)))
         return self._twins.setdefault((operation, id(a), id(b)), result) if twin is None else twin
 

@@ -1,4 +1,4 @@
-"""What a model tells of its own arithmetic: derivatives that it knows, waypoints of a covariance, what comes late.
+"""Hints of a model on its own arithmetic: known derivatives, waypoints of a covariance, late values.
 
 None changes a value. A number is handed through as it is, and so is whatever is no expression.
 """
@@ -72,7 +72,7 @@ def waypoint(x: Scalar) -> Scalar:
 
 
 def is_waypoint(item: Expression) -> bool:
-    """Return whether a covariance is carried through a node."""
+    """Return whether a node is a waypoint of a covariance."""
     if len(item.slopes) != 1 or item.slopes[0][1] is not ONE:
         return False
     itself = item.slopes[0][0]

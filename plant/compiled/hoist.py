@@ -41,7 +41,7 @@ def hoisted(
     rewritten: dict[int, Expression] = {}
 
     def needed(item: Expression) -> Expression:
-        """Return what stands for an operand of a varying node, or for an output."""
+        """Return the replacement of an operand of a varying node, or of an output."""
         if id(item) not in rewritten:
             if item.operation == "constant":
                 rewritten[id(item)] = item

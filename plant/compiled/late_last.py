@@ -133,5 +133,5 @@ class _LateLast:
 
 
 def _kind(item: Expression) -> str:
-    """Return what operands of one kind can be joined with."""
+    """Return the operator that joins an expression's operands: ``+``, ``*`` or none."""
     return "+" if item.operation in SUMS else "*" if item.operation == "*" else ""

@@ -99,12 +99,12 @@ def operations_source(lines: Mapping[str, str], slots: Mapping[str, Slot], width
 
 
 def leaf(item: Expression) -> str:
-    """Return how a symbol or a constant is spelt."""
+    """Return the source text of a symbol or a constant."""
     return str(item.value) if item.operation == "symbol" else repr(item.value)
 
 
 def spelt(item: Expression, names: Mapping[int, str]) -> str:
-    """Return how an operation is spelt.
+    """Return the source text of an operation.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ def make_up_flow(
     opening_pressure: Scalar,
     pilot_share: Scalar,
 ) -> Scalar:
-    """Return what the inner circuit feeds into a chamber through its make-up valve, less what a pilot lets back.
+    """Return the make-up flow from the inner circuit into a chamber, less the back flow that a pilot permits.
 
     A single rod displaces more oil on one side than on the other; what is over leaves through the low side's valve,
     which the pressure of the other side holds open. Source: Rahmfeld and Ivantysynova, *Displacement controlled linear

@@ -42,7 +42,7 @@ def chamber_compliance(
 def centre_deflection(
     voltage: Scalar, pressure: Scalar, deflection_a_volt: Scalar, deflection_a_pascal: Scalar
 ) -> Scalar:
-    """Return how far a diaphragm's centre bends into its chamber under voltage and pressure (equation 16, errata M16).
+    """Return the deflection of a diaphragm's centre by voltage and pressure (equation 16, errata M16).
 
     Parameters
     ----------

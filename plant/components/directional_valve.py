@@ -31,7 +31,7 @@ def fed_pressure(spool: Scalar, side_a: Scalar, side_b: Scalar) -> Scalar:
 
 
 def tank_openings(spool: Scalar) -> tuple[Scalar, Scalar]:
-    """Return how wide the lands from side A and side B to tank stand (section 5.1).
+    """Return the openings of the lands from side A and side B to tank (section 5.1).
 
     Parameters
     ----------

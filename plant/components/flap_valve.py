@@ -10,7 +10,7 @@ from plant.components.friction import velocity_under_friction
 def opening_target(
     drop: Scalar, leak: Scalar, lift: Scalar, cracking_pressure: Scalar, opening_range: Scalar
 ) -> Scalar:
-    """Return how far a flap would stand open if the pressure drop lasted (errata M22: the paper gives no valve law).
+    """Return the steady-state opening of a flap at a pressure drop (errata M22: the paper gives no valve law).
 
     Parameters
     ----------

@@ -64,7 +64,7 @@ class PlateParameters:
 
 
 class PlateCoefficients(NamedTuple):
-    """What a diaphragm gives its chamber.
+    """Coefficients of a diaphragm: volume and centre deflection by pressure and voltage.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ class _Bent(NamedTuple):
 
 
 def _bent(p: PlateParameters, pressure: float, volts: float) -> _Bent:
-    """Return how the plate bends under pressure on the ceramic's side and voltage."""
+    """Return the bending of the plate under pressure on the ceramic's side and voltage."""
     covered, bare = _regions(p)
     nu, b, a = p.poisson_ratio, p.ceramic_radius, p.clamp_radius
     inner, inner_load, inner_volt = _shares(covered, nu, b, pressure)
@@ -187,7 +187,7 @@ def _volume(p: PlateParameters, bent: _Bent) -> float:
 
 
 def plate_deflection(p: PlateParameters, pressure: float, volts: float, radii: Array) -> Array:
-    """Return how far the plate bends along a radius, by composite thin-plate theory (Table 1, errata M14).
+    """Return the deflection of the plate along a radius, by composite thin-plate theory (Table 1, errata M14).
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def plate_deflection(p: PlateParameters, pressure: float, volts: float, radii: A
 
 
 def plate_coefficients(p: PlateParameters) -> PlateCoefficients:
-    """Return what a diaphragm gives its chamber, by composite thin-plate theory (Table 1, errata M14).
+    """Return the coefficients of a diaphragm, by composite thin-plate theory (Table 1, errata M14).
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What a steady run of the diaphragm motor shows: mean flow, velocity, and each electrode's tone (section 7)."""
+"""Steady operation of the diaphragm motor: mean flow, velocity, and each electrode's tone (section 7)."""
 
 from dataclasses import dataclass, replace
 from math import ceil, pi

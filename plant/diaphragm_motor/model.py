@@ -281,7 +281,7 @@ def at_rest(p: Any) -> Array:
 
 
 def deflections(states: Array, voltage: Array, p: Any) -> Array:
-    """Return how far the diaphragms' centres bend into their chambers (equation 16, errata M16).
+    """Return the deflections of the diaphragms' centres into their chambers (equation 16, errata M16).
 
     Parameters
     ----------

@@ -170,7 +170,7 @@ def run_motor(
 
 
 def electrode_voltages(bent: Array, parameters: DiaphragmMotorParameters, sample_time: float) -> Array:
-    """Return what the electrodes read, from rest: a gain and the leak of charge (equation 15, errata M15).
+    """Return the electrode voltages of a run from rest: gain and charge leakage (equation 15, errata M15).
 
     Parameters
     ----------

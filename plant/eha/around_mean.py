@@ -7,7 +7,7 @@ from plant.eha.steady_state import steady_state
 
 
 def break_frequency_about(speed: float, p: EhaValues) -> float:
-    """Return where the gain from motor speed to velocity is 3 dB down, about the steady state of a speed.
+    """Return the -3 dB frequency from motor speed to velocity, about the steady state of a speed.
 
     Equations 5.8 to 5.10, linearised: the slope of quadratic friction, a_2 + 2 a_1 v, damps a spring of oil on a mass.
 

@@ -125,7 +125,7 @@ def circuit_pressures(position: Scalar, oil: tuple[Scalar, Scalar, Scalar], p: C
 
 
 def circuit_flows(speed: Scalar, densities: tuple[Scalar, Scalar], pressures: Pressures, p: CircuitValues) -> OilFlows:
-    """Return where the oil goes: equations 5.1 to 5.4 with errata E8 and E17, make-up, drain, relief and bypass.
+    """Return the oil flows: equations 5.1 to 5.4 with errata E8 and E17, make-up, drain, relief and bypass.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ def circuit_derivative(state: CircuitState, command: Scalar, p: CircuitValues) -
 
 
 def observe_circuit(state: CircuitState, p: CircuitValues) -> Mapping[str, Scalar]:
-    """Return what a bench could measure, beside the motor's speed.
+    """Return the measurable channels, except motor speed.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def circuit_step_rate(p: SimpleNamespace) -> float:
 
 
 def circuit_scales(p: SimpleNamespace | CircuitParameters) -> NDArray[np.float64]:
-    """Return by how much an error in each state matters as much as in the others, for error-controlled solvers.
+    """Return the error scale of each state, for error-controlled solvers.
 
     Oil counts most: a stuck piston shakes on its seals with what a small error in pressure puts into them.
 
@@ -297,7 +297,7 @@ _DAMPING_A_STEP = 1.5
 
 
 def circuit_breaches(states: NDArray[np.float64]) -> Mapping[str, NDArray[np.bool_]]:
-    """Return where the run left what the model describes, by reason.
+    """Return the samples at which a run left the model's validity, by reason.
 
     Parameters
     ----------

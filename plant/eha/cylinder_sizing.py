@@ -112,7 +112,7 @@ def buckling_rod(force: float, stroke: float) -> float:
 
 
 def cylinder_circuit(duty: Duty, bore: float, rod: float) -> CylinderCircuit:
-    """Return what a cylinder of given diameters needs and gives, even if it is too small for its duty (section 5.1).
+    """Return the circuit of a cylinder of given diameters, even if it is too small for its duty (section 5.1).
 
     Parameters
     ----------

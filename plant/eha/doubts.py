@@ -1,4 +1,4 @@
-"""How well the entries of a gear-pump actuator's rig are known where its rig file does not say.
+"""Default uncertainties of a gear-pump actuator's rig entries, where its rig file gives none.
 
 Nobody hands over a rig file with error bars, and bulk modulus is known no better than the volume that it is counted
 over. Each entry below is what one would bet on a figure from a catalogue, and on one that was measured on the bench.
@@ -14,7 +14,7 @@ PRESSURE_GAIN = "pressure_gain"
 
 
 class Spread(NamedTuple):
-    """How far an entry may be off, either way.
+    """Uncertainty of an entry, downwards and upwards.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True)
 class Doubt:
-    """What is not known of an entry, unless a rig file says so.
+    """Default uncertainty of an entry, where a rig file gives none.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ DOUBTS: Mapping[str, Doubt] = {
 
 
 def spreads_of(doubts: Mapping[str, Doubt], given: Mapping[str, float], measured: Collection[str]) -> dict[str, Spread]:
-    """Return how far each entry may be off.
+    """Return the uncertainty of each entry.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def spreads_of(doubts: Mapping[str, Doubt], given: Mapping[str, float], measured
 
 
 def doubts_of(parameters: Any) -> Mapping[str, Doubt]:
-    """Return what is not known of an actuator's entries unless said; nothing is of another kind than the gear-pump one.
+    """Return the default uncertainties of an actuator's entries; none for kinds other than the gear-pump one.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a drive signal must respect: the motor's speed, the piston's stroke."""
+"""Limits of a drive signal: the motor's speed, the piston's stroke."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -93,7 +93,7 @@ class EhaParameters:
 
     @property
     def rated_flow(self) -> float:
-        """What the pump displaces at that speed [m^3/s]."""
+        """Displaced flow of the pump at rated speed [m^3/s]."""
         return self.pump_displacement * self.rated_speed
 
 

@@ -101,7 +101,7 @@ class Rig(Generic[P]):
 
     @property
     def spreads(self) -> Mapping[str, Spread]:
-        """How far each entry may be off: what the file says of it, or what is doubted of any such figure."""
+        """Uncertainty of each entry: that of the rig file, else the default of such a figure."""
         return spreads_of(doubts_of(self.parameters), self.uncertainties, self.measured)
 
 
@@ -184,7 +184,7 @@ def _pairs_of(parameter_class: type[Any]) -> Mapping[str, str]:
 
 
 def _unpaired(given: Mapping[str, Any], pairs: Mapping[str, str]) -> dict[str, Any]:
-    """Return what a file gives, with pairs of numbers, of sides A and B, as their mean and relative difference."""
+    """Return a file's values, with pairs for sides A and B as their mean and relative difference."""
     values = dict(given)
     for name, difference in pairs.items():
         pair = given.get(name)

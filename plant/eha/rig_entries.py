@@ -1,4 +1,4 @@
-"""What a rig file may hold, checked by pydantic, which only a rig file that is read needs."""
+"""Schema of a rig file, checked by pydantic, which is needed only where a rig file is read."""
 
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
@@ -13,7 +13,7 @@ Strict = Annotated[float, Field(strict=True)]
 
 
 class RigEntries(BaseModel):
-    """What a rig file may hold.
+    """Schema of a rig file.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from plant.errors import RigError
 
 
 class Limits(NamedTuple):
-    """What an entry of a rig file may be.
+    """Limits of an entry of a rig file, with its unit and an example.
 
     Parameters
     ----------

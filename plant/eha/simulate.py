@@ -93,7 +93,7 @@ class Plant:
     control: ErrorControl | None = None
 
     def channels(self, states: Array, rows: Array) -> Mapping[str, Array]:
-        """Return what a bench could measure; a motor speed among it replaces the command.
+        """Return the measurable channels; a motor speed among them replaces the command.
 
         Parameters
         ----------
@@ -295,7 +295,7 @@ def _record(
     rng: np.random.Generator | None,
     keep_truth: bool,
 ) -> Record:
-    """Return what the sensors log of a run."""
+    """Return the sensors' log of a run."""
     _require_sound(plant, states, sample_time)
     metadata = {"plant": plant.name, "parameters": asdict(parameters)}
     channels = {"motor_speed_rad_s": speed, **plant.channels(states, rows)}
@@ -315,7 +315,7 @@ LOGGED = ("motor_speed_rad_s", "position_m", "velocity_m_s", "differential_press
 
 
 def _measured_beside(truth: Record, sensors: Sensors, rng: np.random.Generator) -> Mapping[str, Array]:
-    """Return what is logged beyond `LOGGED`: the voltage as commanded, and each chamber's transducer."""
+    """Return the channels beyond `LOGGED`: the commanded voltage, and each chamber's pressure transducer."""
     beside = {name: truth[name] for name in truth if name == "motor_voltage_v"}
     chambers = [name for name in truth if name in ("pressure_a_pa", "pressure_b_pa")]
     if sensors.pressure:

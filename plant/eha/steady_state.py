@@ -1,4 +1,4 @@
-"""Where the actuator settles under a constant motor speed: equations 5.7, 5.8 and 5.11."""
+"""Steady state of the actuator under a constant motor speed: equations 5.7, 5.8 and 5.11."""
 
 from typing import Any
 

@@ -33,7 +33,7 @@ ARGUMENTS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class PlantGraphs:
-    """What a plant in C computes.
+    """Expression graphs of a plant in C.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class PlantGraphs:
 
 
 def substeps_of(plant: Plant, sample_time: float, row: Array) -> int:
-    """Return how many fixed steps a sample takes.
+    """Return the number of fixed steps in a sample.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Described:
-    """What a model description says.
+    """Contents of a model description.
 
     Parameters
     ----------

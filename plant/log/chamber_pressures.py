@@ -9,7 +9,7 @@ PRESSURE, CHAMBERS = "differential_pressure_pa", ("pressure_a_pa", "pressure_b_p
 
 
 def tells_difference(channels: Collection[str]) -> bool:
-    """Return whether a log tells the differential pressure: by a channel of its own, or by both chambers'.
+    """Return whether a log has differential pressure: as a channel of its own, or as both chambers' pressures.
 
     Examples
     --------

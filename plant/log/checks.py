@@ -1,4 +1,4 @@
-"""What a log must satisfy to be trusted: a clock, few enough gaps, finite numbers. Says what it mended."""
+"""Checks that a log must pass to be trusted: clock, gaps, finite numbers. Repairs are reported."""
 
 from collections.abc import Collection, Iterable
 
@@ -102,7 +102,7 @@ def alternatives(wanted: str) -> list[str]:
 
 
 def lacking(required: Iterable[str], names: Collection[str]) -> list[str]:
-    """Return what is wanted of a log and not there.
+    """Return the required channels that a log lacks.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ def know_channels(units: Mapping[str, str]) -> None:
 
 
 def unit_ending(unit: str) -> str:
-    """Return how the name of a channel in a unit ends.
+    """Return the ending of a channel's name for a unit.
 
     Returns
     -------

@@ -89,7 +89,7 @@ def read_record(
 
 
 def source_of(log: str | Path | Table | tuple[Table, ...]) -> str:
-    """Return what messages call a log."""
+    """Return the name of a log in messages."""
     first = log[0] if isinstance(log, tuple) else log
     return first.source if isinstance(first, Table) else str(first)
 

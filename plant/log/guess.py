@@ -101,7 +101,7 @@ class Guess:
 
 
 def points_by_name(heading: Heading, channel: str) -> float | None:
-    """Return what name and unit of a column say for its being a channel.
+    """Return the log-odds that a column is a channel, by its name and unit.
 
     Parameters
     ----------

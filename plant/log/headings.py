@@ -1,4 +1,4 @@
-"""What a log calls a column: its name, and the unit that stands in brackets, in a row of units or in an attribute."""
+"""Heading of a column: its name, and its unit in brackets, in a row of units or in an attribute."""
 
 import re
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ _NO_UNIT = ("", "-", "--", "[-]", "[]", "1", "n/a", "none")
 
 @dataclass(frozen=True)
 class Heading:
-    """What a column is called.
+    """Heading of a column.
 
     Parameters
     ----------
@@ -59,12 +59,12 @@ def _split(name: str) -> tuple[str, str | None]:
 
 
 def unit_or_none(text: str) -> str | None:
-    """Return what a file says as a unit, None where it says that there is none."""
+    """Return the unit that a file gives; None if it says that there is none."""
     return None if text.strip().lower() in _NO_UNIT else text.strip()
 
 
 def is_unit(text: str) -> bool:
-    """Return whether a text is spelt as a unit is, and names one that a bench uses.
+    """Return whether a text is a unit, spelt as such, that a bench uses.
 
     Examples
     --------
@@ -110,7 +110,7 @@ def cleaned(names: Sequence["str | Heading"]) -> list[Heading]:
 
 
 def is_unit_row(row: Sequence[str]) -> bool:
-    """Return whether cells are units, or say that there is none; the first may say that the others are units.
+    """Return whether cells are units or say that there is none; the first may announce the others as units.
 
     Examples
     --------

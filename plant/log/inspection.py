@@ -1,4 +1,4 @@
-"""What a log file holds, before anything is made of it: columns with range and gaps, and the clock of its rows."""
+"""Contents of a log file as it is: columns with range and gaps, and the clock of its rows."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ class ColumnFacts:
 
     @property
     def missing(self) -> int:
-        """How many cells say nothing."""
+        """Number of cells without a value."""
         if self.values is None:
             return 0
         empty = np.isnat(self.values) if self.values.dtype.kind == "M" else ~np.isfinite(self.values)
@@ -99,7 +99,7 @@ class TableFacts:
 
 
 def inspect_table(table: Table) -> TableFacts:
-    """Return what a table holds.
+    """Return the facts of a table: its rows and columns.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def _unit_of_dates(values: Array) -> str | None:
 
 
 def clock_facts(stamps: Any) -> ClockFacts | None:
-    """Return what the stamps of a log are like.
+    """Return the facts of a log's time stamps.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ class LostInStream:
         self._known = self._together = 0
 
     def is_lost(self, value: float) -> bool:
-        """Return whether the next sample stands for a lost one; NaN does not.
+        """Return whether the next sample is a mark of a lost value; NaN is not.
 
         Parameters
         ----------

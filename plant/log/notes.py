@@ -1,4 +1,4 @@
-"""What reading a log may bring up: what was mended at the door, and what looks like a slip of units."""
+"""Notes of reading a log: repairs, and suspected slips of units."""
 
 from plant.notes import Code
 

@@ -1,4 +1,4 @@
-"""What in a log looks like a slip of units, for actuators between a desk model and an excavator."""
+"""Suspected slips of units in a log, for actuators between a desk model and an excavator."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from plant.notes import Note
 
 @dataclass(frozen=True)
 class Plausible:
-    """Where the largest magnitude of a channel (of a position, the span) is usually found.
+    """Usual range of the largest magnitude of a channel (of a position, the span).
 
     Parameters
     ----------

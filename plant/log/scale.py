@@ -53,7 +53,7 @@ def conversion_of(unit: str, wanted: str, logged: str | None = None) -> tuple[fl
 
 
 def _factor(name: str, wanted: str, logged: str | None) -> float:
-    """Return what a unit is worth, or a unit divided by the one in which the column is logged."""
+    """Return the factor of a unit, or of a unit divided by the one in which the column is logged."""
     top, slash, under = name.rpartition("/")
     try:
         factor, offset = conversion_to(name, wanted)

@@ -25,7 +25,7 @@ Chosen = Sequence[tuple[Table, tuple[Column, ...]]]
 
 @dataclass(frozen=True, eq=False)
 class LogTables:
-    """What is in the tables of a log.
+    """Merged contents of the tables of a log.
 
     Parameters
     ----------

@@ -103,7 +103,7 @@ class Pid:
 
 @dataclass(frozen=True)
 class PidMemory:
-    """What a PID controller remembers.
+    """Memory of a PID controller.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a run of the piezo-stack actuator shows: flow as a bench infers it, stages of a cycle, Reynolds number."""
+"""Results of a piezo-stack run: flow as a bench infers it, stages of a cycle, Reynolds number."""
 
 import numpy as np
 from numpy.typing import NDArray

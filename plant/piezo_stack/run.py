@@ -131,7 +131,7 @@ def checked_voltage(voltage: Array) -> Array:
 
 
 def stack_channels(states: Array, parameters: StackValues) -> Mapping[str, Array]:
-    """Return what the bench's sensors see: displacement, force below the stack (equation 2), rod, chamber pressure.
+    """Return the bench's channels: displacement, force below the stack (equation 2), rod, chamber pressure.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""What a bench would have measured: noise, quantisation, rate, and sensors that fail."""
+"""Measurement of a run by a bench: noise, quantisation, rate, and sensors that fail."""

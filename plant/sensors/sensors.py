@@ -41,7 +41,7 @@ def require_not_negative(sensors: Any) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Sensors:
-    """What the sensors do to the truth; the defaults are those of the reference bench.
+    """Sensors of a bench: noise and quantisation; the defaults are those of the reference bench.
 
     Noise is white and Gaussian and given by its standard deviation; it is added before quantisation.
 
@@ -101,7 +101,7 @@ SENSORS: Mapping[str, Sensors] = {"bench": BENCH, "rig": RIG, "paper": PAPER, "i
 
 
 def measure(truth: Record, sensors: Sensors, rng: np.random.Generator, keep_truth: bool = False) -> Record:
-    """Return what the sensors log of a true run.
+    """Return the sensors' log of a true run.
 
     Each channel has a stream of its own, spawned from the generator, so that changing or switching off one
     sensor leaves the noise of the others as it was.

@@ -27,7 +27,7 @@ the mean of a curve over the sample time about it."""
 
 @dataclass(frozen=True)
 class ErrorControl:
-    """What error-controlled steps need of a plant.
+    """Functions of a plant that error-controlled steps need.
 
     Parameters
     ----------

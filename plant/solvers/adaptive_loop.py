@@ -17,7 +17,7 @@ NEARLY = 0.999999
 
 
 class ControlledKernel(SideBySide, Protocol):
-    """What the kernel of error-controlled steps has.
+    """Interface of the kernel of error-controlled steps.
 
     In memory stand, `LANES` numbers each: the states, the new states of a step, rates, old states and their rates, the
     states between, weights of the errors, the error, five numbers that all runs share (drive at a step's start and
@@ -175,7 +175,7 @@ def along(
 
 
 def growth(error: float) -> float:
-    """Return by how much the next step is longer, for a scheme of third order.
+    """Return the growth factor of the next step, for a scheme of third order.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def _largest(kernel: ControlledKernel, work: Array, place: int, lost: int) -> fl
 
 
 def _unknown(kernel: ControlledKernel, work: Array, place: int) -> int:
-    """Return how many of the errors at a place are not numbers."""
+    """Return the number of errors at a place that are NaN."""
     count = 0
     for lane in range(kernel.LANES):
         if work[place + lane] != work[place + lane]:

@@ -9,7 +9,7 @@ from plant.solvers.fixed_step_loops import Operation, SideBySide, lay
 
 
 class ShowingKernel(SideBySide, Protocol):
-    """What the kernel of block means has.
+    """Interface of the kernel of block means.
 
     In memory stand, `LANES` numbers each, the states, what is shown of them, the parameters, and what `settle_at` makes
     of those.

@@ -9,7 +9,7 @@ ROUNDEST = 100.0
 
 
 def smooth(drive: Array, parameters: Array, begin: int, bend: float, bulge: float) -> tuple[int, float, float, float]:
-    """Return how far the drive follows one parabola from a sample on, and that parabola.
+    """Return the last sample up to which the drive follows one parabola, and that parabola.
 
     Parameters
     ----------

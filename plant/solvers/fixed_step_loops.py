@@ -19,7 +19,7 @@ Advance: TypeAlias = Callable[[Any, int], Any]
 
 
 class RunKernel(Protocol):
-    """What the kernel of one run has.
+    """Interface of the kernel of one run.
 
     In memory stand the states at the last sample, the step's length, the parameters, and what `settle_at` makes of
     the two; from step to step the state is a tuple.
@@ -46,7 +46,7 @@ class RunKernel(Protocol):
 
 
 class SideBySide(Protocol):
-    """What every kernel of runs side by side has.
+    """Common interface of the kernels of runs side by side.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class SideBySide(Protocol):
 
 
 class LanesKernel(SideBySide, Protocol):
-    """What the kernel of fixed steps side by side has.
+    """Interface of the kernel of fixed steps side by side.
 
     In memory stand, `LANES` numbers each, the states, the drive at the last sample and its rise in a step, the step's
     length, the parameters, and what `settle_at` makes of them.

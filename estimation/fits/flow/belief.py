@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimation.fits.explaining.explain import WORTH
-from estimation.fits.explaining.objections import doubted
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.hypotheses import ENCODER_ZERO, HYPOTHESES, PLAY, PRESSURE_LATE, Hypothesis
+from estimation.fits.hypothesis_search.explain import WORTH
+from estimation.fits.hypothesis_search.fit_objections import doubted
 
 LITTLE = 0.01
 """Share of what the plain form leaves beside noise that the best hypothesis must take up before pairs are tried
@@ -65,7 +65,7 @@ def wanted_cost(
 
 
 def play_explained(names: Sequence[str], fit: GreyBoxFit) -> bool:
-    """Return whether a play's fit leaves no more than the sensors' noise: what is left is how the piston crosses it.
+    """Return whether a fit has no play, or one whose crossing by the piston leaves only sensor noise.
 
     Parameters
     ----------

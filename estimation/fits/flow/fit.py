@@ -6,28 +6,19 @@ from functools import partial
 
 import numpy as np
 
-from estimation.fits.explaining.delivery import contradicted
-from estimation.fits.explaining.explain import WORTH, explain
-from estimation.fits.explaining.form_fit import DISCRETISED, FormFit, averaged, weights_of, with_structure
-from estimation.fits.explaining.left_open import share_lost, valves_unseen, wear_open
-from estimation.fits.explaining.objections import fit_explains_all, limits, objections
-from estimation.fits.explaining.speed_instead import speed_instead
-from estimation.fits.explaining.toothed import asked_for_teeth
-from estimation.fits.explaining.tried import Explanation
-from estimation.fits.explaining.uneven_loss import UnevenLoss, loss_note, uneven_loss
-from estimation.fits.flow.answered import Answered, agreed, wanted_of
-from estimation.fits.flow.asked import ALWAYS_ASKED, MOST_ASKED, asked_of, near_starts
+from estimation.fits.flow.agreement import Answered, agreed, wanted_of
+from estimation.fits.flow.asked_hypotheses import ALWAYS_ASKED, MOST_ASKED, hypotheses_asked, near_starts
 from estimation.fits.flow.belief import hopeless_cost, play_explained, wanted_cost
 from estimation.fits.flow.log import homed_at_stop, without_strays
+from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
+from estimation.fits.flow.other_minimum import lower_minimum
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer
 from estimation.fits.flow.search import MAKEUP_TRIED
-from estimation.fits.flow.traits import AT_REST, LogTraits
-from estimation.fits.flow.valley import lower_valley
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
-from estimation.fits.greybox.small_teeth import with_small_teeth
-from estimation.fits.greybox.work import Work, WorkSpentError
+from estimation.fits.greybox.small_pump_ripple import with_small_ripple
+from estimation.fits.greybox.work_limit import Work, WorkSpentError
 from estimation.fits.hypotheses import (
     AIR_MIDWAY,
     BEGUN,
@@ -37,6 +28,15 @@ from estimation.fits.hypotheses import (
     PRESSURE_LATE,
     Hypothesis,
 )
+from estimation.fits.hypothesis_search.explain import WORTH, explain
+from estimation.fits.hypothesis_search.explanation import Explanation
+from estimation.fits.hypothesis_search.fit_objections import fit_explains_all, limits, objections
+from estimation.fits.hypothesis_search.form_fit import DISCRETISED, FormFit, averaged, weights_of, with_structure
+from estimation.fits.hypothesis_search.not_excluded import open_wear_note, share_lost, unseen_valve_note
+from estimation.fits.hypothesis_search.pump_delivery import contradicted
+from estimation.fits.hypothesis_search.pump_ripple_fits import asked_for_ripple
+from estimation.fits.hypothesis_search.speed_offset import speed_offset_instead
+from estimation.fits.hypothesis_search.varying_loss import VaryingLoss, loss_note, varying_loss
 from estimation.models.completed_flow import CRACKS, balances_mass
 from estimation.models.flow import HELD_FLOW_FORM
 from estimation.notes import EstimateCode
@@ -99,13 +99,13 @@ def fit_flow(
 ) -> FormFit:
     """Fit the flow form to a log, balanced by volume, by mass, and by volume in held chambers, and weigh the three.
 
-    What a pump's teeth deliver is taken up first (`estimation.fits.explaining.toothed`). A log that it does not explain
-    is asked what is strange about rig, oil or logger (`estimation.fits.explaining.explain`).
+    The pump's flow ripple is taken up first (`estimation.fits.hypothesis_search.pump_ripple_fits`). A log that the
+    plain form does not explain is tested for effects of rig, oil and logger (`explain`).
     Gross outliers are taken out, and what the pump delivered while its speed is missing is read off the pressure after.
     Where oil is so much stiffer than the rig file's that noise of position counts, a log is fitted anew from there. So
     it is where what is strange leads to a lower valley of the plain form, or is an offset of speed. A slow log that
     looks strange is asked with its turns read off the next samples too (`agreed`). A fit is not to be believed if the
-    search for what is strange did more than it may (`estimation.fits.greybox.work`).
+    search for what is strange did more than it may (`estimation.fits.greybox.work_limit`).
 
     Parameters
     ----------
@@ -178,10 +178,10 @@ def _answered(logged: Logged, start: FitStart, sensed: ShownPlay, traits: LogTra
 
 
 def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequence[Hypothesis], Sequence[Note]]:
-    """Return what a log is asked beside the plain form, and notes on what it leaves open."""
+    """Return the hypotheses to test on a log beside the plain form, and notes on what it leaves open."""
     loaded, moving = traits.loaded, traits.moving
     worth = wanted_of(plain)
-    asked, open_ends = asked_of(
+    asked, open_ends = hypotheses_asked(
         plain.log, plain.start.parameters, plain.swinging, plain.best, sensed, loaded=loaded, moving=moving, worth=worth
     )
     if traits.speed_held and not plain.explains(plain.swinging):
@@ -192,14 +192,14 @@ def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequ
 
 
 def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> Explanation | None:
-    """Return what is strange about a log, if it is believed rather than the plain form."""
+    """Return the explanation of a log by hypotheses, if it is believed rather than the plain form."""
     explains = _told_by(plain, begun=BEGUN in asked)
     near = near_starts(plain.swinging, plain.starts, explains, in_motion=traits.loaded or traits.moving)
     if plain.best is not plain.swinging and explains(plain.best):
         near = [plain.best.values, *near]
     alone = len(asked) == 1 and asked[0] in ALWAYS_ASKED  # it has no rival
     strange = explain(
-        asked_for_teeth(plain.log),
+        asked_for_ripple(plain.log),
         plain.start.parameters,
         near,
         explains,
@@ -221,7 +221,7 @@ def _wanted(names: Sequence[str], plain: PlainFits, traits: LogTraits, left: flo
     return wanted_cost(names, plain.best, plain.swinging, homed=homed, late=late, worth=wanted_of(plain, left))
 
 
-def _uneven(plain: PlainFits, traits: LogTraits) -> UnevenLoss | None:
+def _uneven(plain: PlainFits, traits: LogTraits) -> VaryingLoss | None:
     """Return the loss that goes with what is measured and explains a log that nothing else does."""
     log, best = plain.log, plain.best
     if plain.explains(best) or log.gaps.size or log.passes_on or traits.loaded or len(log.drives) > MOST_ASKED:
@@ -229,11 +229,11 @@ def _uneven(plain: PlainFits, traits: LogTraits) -> UnevenLoss | None:
     usual = [start for start in plain.starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
     starts = [plain.swinging.values, *usual]
     largest, _ = limits(log.passes_on, best.seen)
-    return uneven_loss(log, plain.start.parameters, starts, plain.explains, best.cost, largest)
+    return varying_loss(log, plain.start.parameters, starts, plain.explains, best.cost, largest)
 
 
-def _losing_fit(plain: PlainFits, loss: UnevenLoss, sensed: ShownPlay) -> FormFit:
-    """Return what a log says that a loss explains which goes with what is measured."""
+def _losing_fit(plain: PlainFits, loss: VaryingLoss, sensed: ShownPlay) -> FormFit:
+    """Return the result of a log that a varying loss explains."""
     one = loss.fit
     untaken, open_play = plain.play_untaken(one.play, sensed)
     value, std = one.values["bulk_modulus"], one.std["bulk_modulus"]
@@ -252,7 +252,7 @@ def _losing_fit(plain: PlainFits, loss: UnevenLoss, sensed: ShownPlay) -> FormFi
 
 
 def _told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:
-    """Return what says whether a fit explains the log, given whether it is asked how it begins.
+    """Return the test of whether a fit explains the log, stricter if its initial conditions are asked for.
 
     That has so many valleys that one is believed only where sensors' noise is all that it leaves. An offset of a log
     that begins at rest is no such beginning.
@@ -266,12 +266,12 @@ def _elsewhere(plain: PlainFits, strange: Explanation) -> FitStart | None:
     start, cost = plain.start, strange.fit.cost
     displacement = start.parameters.pump_displacement
     if not start.speed_offset and (
-        turned := speed_instead(plain.unturned, plain.fitted, strange.values, displacement, cost - WORTH)
+        turned := speed_offset_instead(plain.unturned, plain.fitted, strange.values, displacement, cost - WORTH)
     ):
         return replace(start, speed_offset=turned, valley=None)
     if start.valley is not None:
         return None
-    lower = lower_valley(plain.log, start.parameters, plain.swinging, strange.values, cost + WORTH)
+    lower = lower_minimum(plain.log, start.parameters, plain.swinging, strange.values, cost + WORTH)
     return None if lower is None else replace(start, valley=lower)
 
 
@@ -291,25 +291,25 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
     most = share_lost(plain.log, one.values, plain.start.parameters.pump_displacement, strange.names)
     found, correlation = with_lumped(strange.values, [one], np.ones(1), plain.start.parameters)
     return FormFit(
-        parameters=with_structure(with_small_teeth(found, one.small_teeth), left),
+        parameters=with_structure(with_small_ripple(found, one.small_teeth), left),
         bound=bound,
         chi_square=one.chi_square[0],
         reasons=(*shown, *contradicted(strange, plain.start.parameters)),
         rig_slopes=with_lumped_slopes(one.rig_slopes),
         explanation=strange,
-        remarks=(*plain.teeth, *wear_open(strange.delivery_open, most), *open_play),
+        remarks=(*plain.teeth, *open_wear_note(strange.delivery_open, most), *open_play),
         turning=plain.turning,
         correlation=correlation,
     )
 
 
 def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *, begun: bool) -> FormFit:
-    """Return what a log says that is believed to have nothing strange about it."""
+    """Return the result of a log that the plain form is believed to explain."""
     best = plain.best
     beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in plain.fits]
     weights = weights_of(plain.fits, SURER * plain.log.passes, beforehand)
     found, correlation = with_lumped(averaged(plain.fits, weights), plain.fits, weights, plain.start.parameters)
-    found = with_small_teeth(found, best.small_teeth)
+    found = with_small_ripple(found, best.small_teeth)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     untaken, open_play = plain.play_untaken(plain.swinging.play, sensed)
     reasons = (*objections(best, plain.log.passes_on), *play_left(plain.swinging.play, sensed)) or plain.teeth_left
@@ -322,7 +322,7 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
         chi_square=best.chi_square[0],
         reasons=reasons,
         rig_slopes=with_lumped_slopes(best.rig_slopes),
-        remarks=(*plain.teeth, *open_ends, *valves_unseen(best), *open_play),
+        remarks=(*plain.teeth, *open_ends, *unseen_valve_note(best), *open_play),
         turning=plain.turning,
         correlation=correlation,
     )

@@ -1,4 +1,4 @@
-"""`flow_log(record, parameters, ...)`: a log as the flow form sees it, with what its sensors' noise does to the fit."""
+"""`flow_log(record, parameters, ...)`: a log for the flow form, with the effect of its sensors' noise on the fit."""
 
 import math
 from collections.abc import Mapping
@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.fits.explaining.faults_tried import usual_leakage
-from estimation.fits.explaining.form_fit import LONGEST_STEP
 from estimation.fits.flow.pumped import pumped_evenly
-from estimation.fits.greybox.averaged import averaged, odd_block
-from estimation.fits.greybox.course import OWN_NOISE, SLOW
+from estimation.fits.greybox.block_averages import averaged, odd_block
+from estimation.fits.greybox.intersample_doubt import OWN_NOISE, SLOW
+from estimation.fits.greybox.intersample_speed import straightened
 from estimation.fits.greybox.log import GreyBoxLog, greybox_log
-from estimation.fits.greybox.speed_course import straightened
+from estimation.fits.hypothesis_search.fault_guesses import leakage_guess
+from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
 from estimation.log_checks.bridging import bridged, within_gaps
 from estimation.log_checks.dropout import LONG_GAP, without_pauses
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance, struck_variance
@@ -68,7 +68,7 @@ ms, 50 um of noise put bulk modulus of leaky actuators up to 4 % low, with 5 ms 
 
 
 def without_strays(record: Record) -> tuple[Record, Mapping[str, float]]:
-    """Return the channels of the flow form without gross outliers, and their variances.
+    """Return the flow form's channels without gross outliers, and their variances.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def without_strays(record: Record) -> tuple[Record, Mapping[str, float]]:
 
 
 def speed_gaps(record: Record, parameters: EhaParameters, noise: float) -> Array:
-    """Return where missing motor speeds leave the pumped volume open by more than the pressure can overlook.
+    """Return the gaps of motor speed in which the unknown pumped volume matters to the pressure.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def speed_gaps(record: Record, parameters: EhaParameters, noise: float) -> Array
 def flow_log(
     record: Record, parameters: EhaParameters, uncertainties: Mapping[str, float], variances: Mapping[str, float]
 ) -> GreyBoxLog:
-    """Return a log as the flow form sees it.
+    """Return a log for the flow form.
 
     Position is both an input and noisy: what it is off by compresses the oil in the model alone. Where that is felt
     beside the pressure sensor's own noise, the output's noise has a part that is proportional to bulk modulus, and the
@@ -170,7 +170,7 @@ def flow_log(
         measured=np.where(within_gaps(record["position_m"])[:, None], np.nan, log.measured),
         gaps=open_gaps,
         presumed={
-            "case_leakage": (DRAIN_START * usual_leakage(parameters), PRESUMED_STD),
+            "case_leakage": (DRAIN_START * leakage_guess(parameters), PRESUMED_STD),
             "makeup_opening": (OPENING_START, PRESUMED_STD),
             "speed_lead": (0.0, MOST_LEAD * record.sample_time / dict(FLOW_FORM.linear)["speed_lead"]),
             **dict.fromkeys((*CRACKS, BEND), (0.0, 1.0)),
@@ -198,7 +198,7 @@ def _noisy(log: GreyBoxLog, p: EhaParameters) -> GreyBoxLog:
 def carried(
     log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float], stiffest: float = np.inf
 ) -> GreyBoxLog:
-    """Return a log with what noise of motor speed leaves in the chambers, as a random walk of pressure.
+    """Return a log in which noise of motor speed adds a random walk to the pressure.
 
     What a noisy speed is off by is oil that the model pumps, and it stays until it has leaked off. To squares of the
     residuals a softer oil and a larger leakage then look better than the true ones, for they keep less of it.
@@ -243,7 +243,7 @@ def homed_at_stop(log: GreyBoxLog) -> bool:
 
 
 def outruns_pump(log: GreyBoxLog, p: EhaParameters) -> bool:
-    """Return whether the piston moves faster than all that the pump delivers would move it, as one that a load pulls.
+    """Return whether the piston moves faster than the full pump flow would move it, as under a pulling load.
 
     Parameters
     ----------

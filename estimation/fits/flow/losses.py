@@ -1,4 +1,4 @@
-"""`losses(fits, weights)`: lumped leakage coefficient and flow bias of a log, with what is known of the two together.
+"""`losses(fits, weights)`: lumped leakage coefficient and flow bias of a log, with their covariance.
 
 The form knows two leaks: from chamber to chamber, and a drain of each port to the inner circuit. Equation 5.8 knows
 one, and Table 3 gives it: what flows across, and half of a port's drain (errata E17). A log often tells it far better
@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from estimation.fits.explaining.form_fit import DISCRETISED
 from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.hypothesis_search.form_fit import DISCRETISED
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
@@ -67,7 +67,7 @@ def _of(fit: GreyBoxFit) -> tuple[Array, Array]:
 def with_lumped(
     found: Mapping[str, tuple[float, float]], fits: Sequence[GreyBoxFit], weights: Array, p: EhaParameters
 ) -> tuple[dict[str, tuple[float, float]], float]:
-    """Return what was found, its leakage coefficient the lumped one, and the correlation of that with the flow bias.
+    """Return the result with the lumped leakage coefficient, and the correlation of that with the flow bias.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def with_lumped(
 
 
 def with_lumped_slopes(slopes: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, float]]:
-    """Return how what was found answers the rig, the leakage coefficient being the lumped one.
+    """Return the response of the result to the rig's parameters, for the lumped leakage coefficient.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`plain_fits(logged, start) -> PlainFits`: the plain flow form's fits of a log, before it is asked what is strange."""
+"""`plain_fits(logged, start) -> PlainFits`: fits of the plain flow form to a log, before any hypothesis is tested."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -7,9 +7,6 @@ from operator import attrgetter
 
 import numpy as np
 
-from estimation.fits.explaining.between_samples import with_course
-from estimation.fits.explaining.objections import fit_explains, limits
-from estimation.fits.explaining.toothed import toothed
 from estimation.fits.flow.log import carried, flow_log
 from estimation.fits.flow.search import balanced, flow_starts
 from estimation.fits.flow.swept import swept_evenly
@@ -17,7 +14,10 @@ from estimation.fits.flow.turns_read import with_turns_read
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play import ShownPlay, play_untaken
-from estimation.fits.greybox.teeth import Turning
+from estimation.fits.greybox.pump_ripple import Turning
+from estimation.fits.hypothesis_search.between_samples import with_course
+from estimation.fits.hypothesis_search.fit_objections import fit_explains, limits
+from estimation.fits.hypothesis_search.pump_ripple_fits import with_pump_ripple
 from estimation.models.flow import HELD_FLOW_FORM
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -36,7 +36,7 @@ _cost = attrgetter("cost")
 
 @dataclass(frozen=True, eq=False)
 class Logged:
-    """A log without gross outliers, and what is known of it.
+    """A log without gross outliers, with its noise and traits.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Logged:
 
 @dataclass(frozen=True, eq=False)
 class FitStart:
-    """Where the searches of a fit begin.
+    """Starts of the searches of a fit.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class FitStart:
     speed_offset : float
         First guess of how much the logged speed exceeds the shaft's [rad/s].
     valley : Mapping[str, float], optional
-        Values of the plain form's unknowns from which searches begin as well, see `lower_valley` [SI].
+        Values of the plain form's unknowns from which searches begin as well, see `lower_minimum` [SI].
     stiffest : float
         Bulk modulus that counts at most in what noise of motor speed leaves, see `quieter` [Pa].
     turns_read : bool
@@ -156,7 +156,7 @@ class PlainFits:
         return softness * bulk_modulus
 
     def play_untaken(self, shown: ShownPlay, sensed: ShownPlay) -> tuple[float, tuple[Note, ...]]:
-        """Return what a play leaves open that no fit took up; see `estimation.fits.greybox.play.play_untaken`.
+        """Return the doubt due to a play that no fit took up; see `estimation.fits.greybox.play.play_untaken`.
 
         Parameters
         ----------
@@ -194,7 +194,7 @@ def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
     largest, _ = limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))
     fitted = partial(balanced, parameters=parameters, starts=starts, valley=start.valley, stiffest=start.stiffest)
     unturned = with_course(log, fitted, parameters)
-    log, fits, teeth, left = toothed(unturned, fitted, explains, largest, start.speed_offset)
+    log, fits, teeth, left = with_pump_ripple(unturned, fitted, explains, largest, start.speed_offset)
     turning = Turning(log.teeth, log.speed_offset)
     found = _swinging(fits).values
     log = swept_evenly(carried(log, parameters, found, start.stiffest), parameters, found)
@@ -202,7 +202,7 @@ def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
 
 
 def stiffer(logged: Logged, plain: PlainFits) -> EhaParameters | None:
-    """Return the actuator with the stiff oil that was found, where noise of position counts there but did not yet.
+    """Return the actuator with the stiff oil that was found, if noise of position starts to matter there.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def stiffer(logged: Logged, plain: PlainFits) -> EhaParameters | None:
 
 
 def quieter(plain: PlainFits, strange: GreyBoxFit) -> FitStart | None:
-    """Return from where to fit a log anew that was judged by noise of a far stiffer oil than explains it.
+    """Return the start of a second fit, if the noise was judged at a far stiffer oil than the one that fits.
 
     What noise of motor speed leaves in the chambers grows with the oil's stiffness. Where the plain form ends in a
     wrong valley, as at 100 GPa, it is so large that an offset of 4 bar which is not there explains the log, and a wrong

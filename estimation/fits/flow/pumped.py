@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.fits.greybox.averaged import block_means
+from estimation.fits.greybox.block_averages import block_means
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.models.flow import FLOW_FORM
 from plant.components.valves import pumped_flow
@@ -28,7 +28,7 @@ def pumped_evenly(means: GreyBoxLog, log: GreyBoxLog, p: EhaParameters) -> GreyB
     Parameters
     ----------
     means : GreyBoxLog
-        The log, averaged by `estimation.fits.greybox.averaged.averaged`.
+        The log, averaged by `estimation.fits.greybox.block_averages.averaged`.
     log : GreyBoxLog
         The log before.
     p : EhaParameters

@@ -12,11 +12,9 @@ from math import ceil, prod
 import numpy as np
 
 from estimation.arrays import IntArray
-from estimation.fits.explaining.faults_tried import FAULTS_TRIED, usual_bias, usual_leakage, worse
-from estimation.fits.explaining.wide_problem import flow_bounds
 from estimation.fits.flow.log import DRAIN_START, OPENING_START, carried, outruns_pump
+from estimation.fits.flow.other_minimum import FINISHING, Found, completed_form, from_minimum
 from estimation.fits.flow.swept import swept_evenly
-from estimation.fits.flow.valley import FINISHING, Found, completed_form, from_valley
 from estimation.fits.greybox.descent import Point, descend, remembered
 from estimation.fits.greybox.driven import driven_samples
 from estimation.fits.greybox.fit import NEAR_ENOUGH, GreyBoxFit, Search, concluded, explained, roughly
@@ -24,7 +22,14 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.greybox.side_by_side import LANES
-from estimation.fits.greybox.sparing import sparing_steps, with_steps
+from estimation.fits.greybox.spared_steps import sparing_steps, with_steps
+from estimation.fits.hypothesis_search.fault_guesses import (
+    FAULTS_TRIED,
+    faulty_coefficient,
+    flow_bias_guess,
+    leakage_guess,
+)
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
@@ -67,7 +72,7 @@ RIVAL = 2.0 * UNLIKELY
 
 @dataclass(frozen=True, eq=False)
 class _Rough:
-    """Where one balance fits best with long model steps, and the bounds of its search."""
+    """Optimum of one balance with long model steps, and the bounds of its search."""
 
     problem: Problem
     point: Point
@@ -79,7 +84,7 @@ class _Rough:
 
 
 def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
-    """Return where searches for the flow form's unknowns begin.
+    """Return the starts of searches for the flow form's unknowns.
 
     Parameters
     ----------
@@ -93,13 +98,13 @@ def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]
     list of dict
         Values of the unknowns [SI]; those of the healthy actuator at the first guess come first.
     """
-    leakage, bias = usual_leakage(p), usual_bias(p)
+    leakage, bias = leakage_guess(p), flow_bias_guess(p)
     moduli = sorted({bulk_modulus, p.bulk_modulus})
     return [
         {
             "bulk_modulus": modulus,
-            "leakage_coefficient": worse(p, "leakage_coefficient", leakage, leaking),
-            "flow_bias": worse(p, "flow_bias", bias, biased),
+            "leakage_coefficient": faulty_coefficient(p, "leakage_coefficient", leakage, leaking),
+            "flow_bias": faulty_coefficient(p, "flow_bias", bias, biased),
             "makeup_conductance": makeup,
             "makeup_opening": OPENING_START,
             "case_leakage": DRAIN_START * leakage,
@@ -131,7 +136,7 @@ def balanced(
     starts : sequence of Mapping[str, float]
         Where searches begin, see `flow_starts` [SI].
     valley : Mapping[str, float], optional
-        A place in a lower valley, see `lower_valley`, where searches with short model steps begin as well [SI].
+        A place in a lower valley, see `lower_minimum`, where searches with short model steps begin as well [SI].
     stiffest : float
         Bulk modulus that counts at most in what noise of motor speed leaves [Pa].
 
@@ -154,7 +159,7 @@ def balanced(
     wanted = min(done, key=_cost)[1].cost
     done += each(lambda one: _finished(one, log, steps, wanted, bent=bent), behind)
     if valley is not None:
-        done = each(lambda one: min(one, from_valley(one[0].model, log, valley, bent=bent), key=_cost), done)
+        done = each(lambda one: min(one, from_minimum(one[0].model, log, valley, bent=bent), key=_cost), done)
     while sparing := [one for one in _told_of(done) if one[0].log.steps is not log.steps]:
         done = each(lambda one, ending=sparing: _ended(one, log) if one in ending else one, done)
     best, swinging = _told_of(done)
@@ -169,7 +174,7 @@ def balanced(
 
 
 def _finished(one: _Rough, log: GreyBoxLog, steps: IntArray, wanted: float = np.inf, *, bent: bool) -> Found:
-    """Return where short model steps lead; what they alone explain is completed as well, for long ones have errors.
+    """Return the optimum with short model steps; a form that needs them to explain its log is completed as well.
 
     Steps are short where the log says so (``steps``).
 
@@ -186,7 +191,7 @@ def _finished(one: _Rough, log: GreyBoxLog, steps: IntArray, wanted: float = np.
 
 
 def _ended(one: Found, log: GreyBoxLog) -> Found:
-    """Return where the last steps of a search lead with short model steps throughout."""
+    """Return the end of a search whose last steps use short model steps throughout."""
     problem, point, bounds = one
     ending = with_steps(problem, log.steps)
     evaluations = FINISHING if explained(problem, point) else 1
@@ -207,7 +212,7 @@ def _held(problem: Problem) -> bool:
 
 
 def _plain(one: _Rough) -> bool:
-    """Return whether a form explains a log so far that the last digits matter.
+    """Return whether a form explains a log so well that the last digits matter.
 
     Elsewhere valves that crack would take up what is strange and hide it: an encoder that was homed at the end stop,
     or a worn pump. Held chambers are the lumped plant's, which has no such valves.
@@ -226,7 +231,7 @@ def _completed(one: _Rough, log: GreyBoxLog, *, bent: bool) -> tuple[Problem, Ar
 
 
 def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]) -> list[_Rough]:
-    """Return where the balances fit best with long model steps.
+    """Return the optima of the balances with long model steps.
 
     A single rod may pump up both chambers, beyond what a balance of volumes follows. If none explains its log, that by
     mass leads, and counts if it comes far lower.
@@ -244,7 +249,7 @@ def _rough(log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[
 def _led(
     forms: Sequence[GreyBoxModel], log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]
 ) -> list[_Rough]:
-    """Return where the balances fit best with long model steps, each searched from where the first one ended."""
+    """Return the optima of the balances with long model steps, each searched from that of the first."""
     afar = log.taken_at(parameters.bulk_modulus)
     begun = FreedProblem.of(forms[0], afar.beginning(_search(afar).screened).coarsened())
     guess, near = _guess(begun, afar, parameters, starts)
@@ -264,7 +269,7 @@ def _led(
 def _others(
     forms: Sequence[GreyBoxModel], log: GreyBoxLog, afar: GreyBoxLog, first: _Rough, *, alone: bool = False
 ) -> list[_Rough]:
-    """Return where other forms lead from where the first one ended, as far as they may count beside it."""
+    """Return the optima of other forms, searched from that of the first, as far as they may count beside it."""
     wanted = first.point.cost + RIVAL
     return each(lambda form: _searched(form, log, afar, [first.values], alone=alone, wanted=wanted), forms)
 
@@ -276,7 +281,7 @@ def _explains(one: _Rough) -> bool:
 def _guess(
     problem: FreedProblem, log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]
 ) -> tuple[Mapping[str, float], bool]:
-    """Return where the likeliest of many guesses about the first start leads, and whether that explains the log.
+    """Return the optimum from the most likely guess about the first start, and whether it explains the log.
 
     Of the log its beginning is looked at, which the problem holds.
     """
@@ -294,7 +299,7 @@ def _guesses_about(around: Mapping[str, float], model: GreyBoxModel, p: EhaParam
     places = [model.unknowns.index(name) for name in GUESSED]
 
     def times(name: str, factor: float) -> float:
-        return factor * around[name] if name == "bulk_modulus" else worse(p, name, around[name], factor)
+        return factor * around[name] if name == "bulk_modulus" else faulty_coefficient(p, name, around[name], factor)
 
     tried = [
         [model.theta({**around, name: times(name, factor)})[place] for factor in factors]

@@ -1,4 +1,4 @@
-"""`swept_evenly(log, ...)`: positions whose straight lines between samples leak as the piston's own course does.
+"""`swept_evenly(log, ...)`: positions whose straight lines sweep the volume that the piston does.
 
 See decision 313.
 """

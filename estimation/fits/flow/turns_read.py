@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.fits.greybox.course import OWN_NOISE, SLOW
+from estimation.fits.greybox.intersample_doubt import OWN_NOISE, SLOW
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.models.flow import FLOW_FORM
 from plant.eha.model import EhaParameters

@@ -1,1 +1,1 @@
-"""Output-error fits of grey-box models: a log, kernels that predict it, the problem, its descent, and what is left."""
+"""Output-error fits of grey-box models: log, compiled prediction, least-squares problem, descent, residual tests."""

@@ -1,4 +1,4 @@
-"""What white noise alone leaves in a fit's residuals by chance: in a short log more than in a long one."""
+"""Limits of residual statistics under white noise alone: wider in a short log than in a long one."""
 
 LARGEST_CHI_SQUARE = 1.2
 """Mean squared normalised residual above which the model is said to leave something out [dimensionless]."""
@@ -37,7 +37,7 @@ def largest_chi_square(samples: float, least: float = LARGEST_CHI_SQUARE) -> flo
 
 
 def alike_by_chance(samples: float) -> float:
-    """Return the correlation of neighbouring residuals that one log of a thousand exceeds by chance.
+    """Return the lag-one correlation of white residuals that one log in a thousand exceeds by chance.
 
     Parameters
     ----------

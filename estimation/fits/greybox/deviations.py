@@ -1,16 +1,16 @@
-"""How surely a solution is known: what its slopes tell of the unknowns that are felt, and their covariance."""
+"""Covariance of a solution, from the slopes of the unknowns that have an effect."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.fits.greybox.course import opened, vanished
 from estimation.fits.greybox.covariance import automatic_lags, least_squares_covariance
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.drive_noise import drive_covariance
+from estimation.fits.greybox.intersample_doubt import opened, vanished
 from estimation.fits.greybox.problem import Problem
-from estimation.fits.greybox.within_bounds import bounded
+from estimation.fits.greybox.sign_constraints import sign_constrained_covariance
 from plant.arrays import Array
 
 NOISE_DOUBT = 0.2
@@ -20,7 +20,7 @@ some percent, and it is white in theory alone [fraction]."""
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """What the slopes at a solution tell of the unknowns that are felt.
+    """Information of the slopes at a solution, for the unknowns that have an effect.
 
     Behind these stand, in the last three, the turns of a slow log's motor that the fit has put to nothing.
 
@@ -54,7 +54,7 @@ class Information:
         return self.errors.ravel()
 
     def response(self, shift: Array) -> Array:
-        """Return by how much the unknowns move if the residuals change, to first order.
+        """Return the shift of the unknowns under a change of the residuals, to first order.
 
         Parameters
         ----------
@@ -85,7 +85,7 @@ def believed(problem: Problem) -> Array:
 def information(
     problem: Problem, theta: Array, errors: Array, slopes: Array, felt: NDArray[np.intp], *, warned: bool
 ) -> Information:
-    """Return what the slopes at a solution tell of the unknowns that are felt.
+    """Return the information of the slopes at a solution, for the unknowns that have an effect.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def covariance_of(
     disturbed: bool,
     undisturbed: Array | None,
 ) -> Array:
-    """Return the covariance of the unknowns that are felt: by noise of the outputs, and of the drives if wanted.
+    """Return the covariance of the unknowns that have an effect: by noise of the outputs, and of the drives if wanted.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def covariance_of(
     told : Information
         What the slopes tell there.
     least : ndarray, shape (unknowns,), or None
-        Lowest coordinates of its search, see `estimation.fits.greybox.within_bounds` [dimensionless].
+        Lowest coordinates of its search, see `estimation.fits.greybox.sign_constraints` [dimensionless].
     disturbed : bool
         Whether the drives' noise counts.
     undisturbed : ndarray, shape (outputs, blocks), or None
@@ -146,7 +146,9 @@ def covariance_of(
     """
     theta, felt, slopes, bread, spread = point.theta, told.felt, told.slopes, told.bread, told.spread
     tilt = bread[:, : len(felt)] @ problem.untilted(theta, told.errors)[felt]
-    kept = spread if least is None else bounded(problem, point, least, felt, told.fitted_bread, spread)
+    kept = (
+        spread if least is None else sign_constrained_covariance(problem, point, least, felt, told.fitted_bread, spread)
+    )
     covariance = kept + NOISE_DOUBT**2 * np.outer(tilt, tilt)
     covariance = covariance + (drive_covariance(problem, theta, bread, slopes, undisturbed) if disturbed else 0.0)
     if problem.log.course is not None and disturbed:  # a window's estimate of few turns is poor

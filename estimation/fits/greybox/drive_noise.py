@@ -1,4 +1,4 @@
-"""`drive_covariance(problem, theta, ...)`: what noise of the driving channels adds to the covariance of a fit.
+"""`drive_covariance(problem, theta, ...)`: the covariance that noise of the driving channels adds to a fit.
 
 It is measured once and acts on all later outputs, so that it is seen by drawing it.
 """

@@ -1,4 +1,4 @@
-"""`driven_samples(...)`: how long a beginning of a log has to be for starts of a search to be compared on it."""
+"""`driven_samples(...)`: length of the beginning of a log that suffices to compare starts of a search."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Output-error fit of a grey-box model: several starts, exact sensitivities, and how far to believe what comes out.
+"""Output-error fit of a grey-box model: several starts, exact sensitivities, residual tests and covariance.
 
 The variance of an estimate has three parts, told apart: noise of the outputs, noise of the driving channels, and how
 well the rig's own parameters are known. The last two are read off the fit's linear response to them.
@@ -18,10 +18,10 @@ from estimation.fits.greybox.lateness import changes_beside, lateness, left_by
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, shown_play
 from estimation.fits.greybox.problem import Problem, search_bounds
+from estimation.fits.greybox.pump_ripple import NO_OFFSET, ShownOffset, ShownRipple, shown_ripple
 from estimation.fits.greybox.rig_response import answers_by_rig
-from estimation.fits.greybox.small_teeth import NOT_MOVED, small_teeth
-from estimation.fits.greybox.sparing import with_steps
-from estimation.fits.greybox.teeth import NO_OFFSET, ShownOffset, ShownTeeth, shown_teeth
+from estimation.fits.greybox.small_pump_ripple import NOT_MOVED, small_pump_ripple
+from estimation.fits.greybox.spared_steps import with_steps
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.spare_processors import each
@@ -41,7 +41,7 @@ NEAR_ENOUGH = 0.01
 
 @dataclass(frozen=True, eq=False)
 class GreyBoxFit:
-    """What a fit found.
+    """Result of a grey-box fit.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class GreyBoxFit:
     play: ShownPlay = NO_PLAY
     slopes: Array = field(default_factory=lambda: np.empty((0, 0)))
     covariance: Array = field(default_factory=lambda: np.empty((0, 0)))
-    teeth: Mapping[int, ShownTeeth] = field(default_factory=dict[int, ShownTeeth])
+    teeth: Mapping[int, ShownRipple] = field(default_factory=dict[int, ShownRipple])
     speed_offset: ShownOffset = NO_OFFSET
     small_teeth: tuple[Mapping[str, float], Mapping[str, float]] = NOT_MOVED
     seen: float = np.inf
@@ -104,7 +104,7 @@ class GreyBoxFit:
 
 @dataclass(frozen=True)
 class Search:
-    """How the best of several starts is found.
+    """Options of the search for the best of several starts.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def roughly(
 
 
 def explained(problem: Problem, point: Point) -> bool:
-    """Return whether a point of the search leaves so little of a log that no better one is looked for.
+    """Return whether a point of the search explains a log so well that no better one is sought.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def concluded(
     warned: bool = True,
     steps: IntArray | None = None,
 ) -> GreyBoxFit:
-    """Return what a solution says, with its deviations.
+    """Return the result at a solution, with its standard deviations.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def concluded(
     point : Point
         Its solution.
     least : ndarray, shape (unknowns,), optional
-        Lowest coordinates of its search, see `estimation.fits.greybox.within_bounds` [dimensionless].
+        Lowest coordinates of its search, see `estimation.fits.greybox.sign_constraints` [dimensionless].
     disturbed : bool
         Whether the deviations hold the drives' noise too.
     asked : bool
@@ -276,7 +276,7 @@ def concluded(
     effects = np.einsum("ij,ij->j", all_slopes, all_slopes)
     felt = np.flatnonzero(effects > np.where(believed(problem) > 0.0, 0.0, LEAST_EFFECT**2))
     whole, rig, late = np.diag(np.full(len(theta), np.inf)), dict[str, Array](), dict[str, tuple[float, float]]()
-    play, teeth, offset = NO_PLAY, dict[int, ShownTeeth](), NO_OFFSET
+    play, teeth, offset = NO_PLAY, dict[int, ShownRipple](), NO_OFFSET
     used, names = int(np.count_nonzero(errors)), [model.unknowns[place] for place in felt]
     if len(felt) and used > len(theta):
         known_of = information(problem, theta, errors, all_slopes, felt, warned=warned)
@@ -287,7 +287,7 @@ def concluded(
         held, shifted = [one.count for one in problem.log.teeth], problem.log.speed_offset != 0.0
         counts = problem.log.counts if asked else held
         if (disturbed and counts) or shifted:
-            teeth, offset = shown_teeth(problem, theta, left_over, bread, slopes, counts)
+            teeth, offset = shown_ripple(problem, theta, left_over, bread, slopes, counts)
             opened = sum(teeth[count].opened for count in held if count in teeth)
             covariance = covariance + np.diag(opened + (offset.opened if shifted and not held else np.zeros(len(felt))))
         whole[np.ix_(felt, felt)] = covariance
@@ -312,7 +312,7 @@ def concluded(
         slopes=all_slopes,
         teeth=teeth,
         speed_offset=offset,
-        small_teeth=small_teeth(asked_of_teeth, names),
+        small_teeth=small_pump_ripple(asked_of_teeth, names),
         covariance=whole,
         cost=point.cost,
         chi_square=chi_square,

@@ -19,7 +19,7 @@ from estimation.fits.greybox.normal_loops import fill_differences
 from estimation.fits.greybox.problem import OUTLIER, Problem, weighed
 from estimation.fits.greybox.ridge import Ridge
 from estimation.fits.greybox.side_by_side import LANES, MANY, ResidualsRun, compile_side_by_side, side_by_side
-from estimation.fits.greybox.work import spend
+from estimation.fits.greybox.work_limit import spend
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names

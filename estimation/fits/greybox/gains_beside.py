@@ -1,4 +1,4 @@
-"""What each of several explanations gains beside the likeliest of them, to first order."""
+"""Gain of each of several explanations beside the most likely one, to first order."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -9,7 +9,7 @@ from estimation.arrays import Array
 
 
 def gains_beside(free: Array, along: Array, widths: Sequence[int], prices: Sequence[float]) -> list[float]:
-    """Return what explanations gain in log-likelihood once the likeliest is taken up (Rao's score statistic over two).
+    """Return the gain in log-likelihood of explanations beside the most likely one (half of Rao's score statistic).
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from plant.solvers.fixed_step_loops import Operation, lay, share
 
 
 class GapKernel(SideBySideKernel, Protocol):
-    """What the kernel of a model that bears gaps has beside that of one without.
+    """Kernel interface of a model that bears gaps, beyond that of one without.
 
     Behind all other numbers stand, `LANES` each, derivatives of the first `JUMPS` states by those that the last step
     began from, and those of each output by them.

@@ -49,7 +49,7 @@ def changes_beside(problem: Problem, theta: Array) -> tuple[Array | None, list[A
 
 
 def left_by(slopes: Array, bread: Array, told: NDArray[np.bool_]) -> Callable[[Array], Array]:
-    """Return what unknowns leave of a change of residuals: those alone that a log tells something of.
+    """Return the part of a change of residuals that the determined unknowns cannot absorb.
 
     Only what is known beforehand keeps the others from going far, and as slopes have it a lead of the motor may be less
     than none: it would take up most of a pressure that is late.
@@ -78,7 +78,7 @@ def left_by(slopes: Array, bread: Array, told: NDArray[np.bool_]) -> Callable[[A
 def lateness(
     timed: Sequence[str], changes: Sequence[Array], errors: Array, left: Callable[[Array], Array]
 ) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Yield by how much each driving channel that is asked seems late, and what it is worth (Rao's score statistic).
+    """Yield the apparent delay of each driving channel asked for, and its score statistic (Rao).
 
     Parameters
     ----------

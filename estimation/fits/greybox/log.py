@@ -1,4 +1,4 @@
-"""A log as a fit of a grey-box model sees it, with its noise."""
+"""A log for a fit of a grey-box model, with its noise."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from estimation.arrays import Array, IntArray
-from estimation.fits.greybox.noise_lost import kept_of_means
+from estimation.fits.greybox.leaked_noise import kept_of_means
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.greybox import GreyBoxModel
@@ -16,8 +16,8 @@ from plant.runs import steps_a_sample
 from plant.solvers.steps import Parameters, parameter_row
 
 if TYPE_CHECKING:
-    from estimation.fits.greybox.course import Course
-    from estimation.fits.greybox.teeth import Teeth
+    from estimation.fits.greybox.intersample_doubt import IntersampleDoubt
+    from estimation.fits.greybox.pump_ripple import Ripple
 
 BLOCK = 1e-3
 """Usual length over which residuals are averaged before they are squared [s]."""
@@ -58,7 +58,7 @@ class OutputNoise:
     lost_over: int = 1
 
     def passing(self, values: Mapping[str, float]) -> tuple[float, dict[str, float]]:
-        """Return what a driving channel's noise adds to the output, and how that goes with each unknown.
+        """Return the output noise due to a driving channel's noise, and its slope by each unknown.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class OutputNoise:
 
 @dataclass(frozen=True, eq=False)
 class GreyBoxLog:
-    """A log, as a fit sees it.
+    """A log for a grey-box fit.
 
     Parameters
     ----------
@@ -133,13 +133,13 @@ class GreyBoxLog:
     timed : tuple of str
         Driving channels of which a fit asks whether they come late.
     counts : tuple of int
-        Counts of a pump's teeth that a fit asks for, see `estimation.fits.greybox.teeth`.
+        Counts of a pump's teeth that a fit asks for, see `estimation.fits.greybox.pump_ripple`.
     teeth : tuple of Teeth
         Those whose delivery the drives hold; how large it is stays open.
     speed_offset : float
         What was subtracted from motor speed [rad/s]; where it is not 0, it stays open too.
-    course : Course, optional
-        What is open of the motor's course between the samples of a slow log, see `estimation.fits.greybox.course` [Pa].
+    course : IntersampleDoubt, optional
+        Doubt about the motor's speed between the samples of a slow log [Pa].
     stands_for : float
         How many residuals of a longer log each one stands for, by `FreedProblem` [count].
     """
@@ -158,9 +158,9 @@ class GreyBoxLog:
     block: float = BLOCK
     timed: tuple[str, ...] = ()
     counts: tuple[int, ...] = ()
-    teeth: tuple["Teeth", ...] = ()
+    teeth: tuple["Ripple", ...] = ()
     speed_offset: float = 0.0
-    course: "Course | None" = None
+    course: "IntersampleDoubt | None" = None
     stands_for: float = 1.0
 
     def beginning(self, samples: int) -> "GreyBoxLog":
@@ -210,14 +210,14 @@ class GreyBoxLog:
 
     @property
     def passes(self) -> float:
-        """How often a slow log's motor turns, 1 at the least and of any other log [count].
+        """Number of bends of a slow log's motor speed, at least 1; 1 for any other log [count].
 
         It passes each turn alike. So what one form gains on another at one turn, it gains at all, which says no more.
         """
         return 1.0 if self.course is None else self.course.passes(self.noise[0].variance)
 
     def walks(self, block: int) -> tuple[Array, Array, float]:
-        """Return what the random walk of each output gains after each block, what else is open, and what is kept.
+        """Return each output's random-walk variance per block, its other variance, and the share of its level kept.
 
         Parameters
         ----------
@@ -284,7 +284,7 @@ def greybox_log(
     variances: Mapping[str, float] | None = None,
     uncertainties: Mapping[str, float] | None = None,
 ) -> GreyBoxLog:
-    """Return a record as a fit of a model sees it.
+    """Return a record as the log of a grey-box fit.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ STRAIGHT = 1e-3
 
 
 class MisfitKernel(Protocol):
-    """What the kernel of a model has.
+    """Interface of a model's compiled kernel.
 
     A point is a tuple with a row for each state: the state, its derivatives by the unknowns, and in a model that bears
     gaps those by the states that the last step began from. What is observed has such a row for each output.

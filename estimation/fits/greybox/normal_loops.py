@@ -1,4 +1,4 @@
-"""What the normal equations of a fit are summed from, block by block, as plain loops that are compiled."""
+"""Plain loops that sum the normal equations of a fit block by block; they are compiled."""
 
 from estimation.arrays import Array
 from plant.compiled.native.loops import natively

@@ -1,4 +1,4 @@
-"""Play between the piston and its encoder: whether a fit's residuals, or a velocity sensor, show one."""
+"""Play between piston and encoder: tests on a fit's residuals and on a velocity sensor."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
@@ -27,7 +27,7 @@ FEWEST = 100
 
 
 class ShownPlay(NamedTuple):
-    """What a fit's residuals say of a play.
+    """Play as the residuals of a fit show it.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def shown_play(
 
 
 def play_shows(shown: ShownPlay, sensed: ShownPlay) -> bool:
-    """Return whether residuals or a velocity sensor show a play for which a log is asked."""
+    """Return whether residuals or a velocity sensor show a play that is worth a test."""
     return sensed.gain > PLAY_SENSED or (shown.gain > PLAY_SHOWN and shown.size > LEAST_PLAY)
 
 
@@ -167,7 +167,7 @@ def play_structure(moved: float, yields: float) -> float:
 
 
 def play_untaken(shown: ShownPlay, sensed: ShownPlay, yields: float) -> tuple[float, tuple[Note, ...]]:
-    """Return what a play leaves open that residuals or a velocity sensor may show and no fit took up: all that it does.
+    """Return the doubt due to a play that residuals or a velocity sensor may show and no fit took up.
 
     Parameters
     ----------

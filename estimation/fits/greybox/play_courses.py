@@ -1,4 +1,4 @@
-"""Where the piston may be in the play of its encoder.
+"""Possible courses of the piston within the play of its encoder.
 
 The encoder says at which end of its play it is while it moves. While it stands the piston may be anywhere in between:
 it turns and crosses, or springs back on its seals and comes again. So where it is has a few courses, of which a log
@@ -98,18 +98,18 @@ class Standings(NamedTuple):
 
     @property
     def length(self) -> IntArray:
-        """How long the encoder stands [samples]."""
+        """Time for which the encoder stands still [samples]."""
         return self.last - self.first
 
     @property
     def away(self) -> IntArray:
-        """How far the nearer movement is [samples]."""
+        """Distance to the nearer movement [samples]."""
         samples = np.arange(len(self.first))
         return np.minimum(samples - self.first, self.last - samples)
 
     @property
     def share(self) -> Array:
-        """How much of the time between the movements is over [fraction]."""
+        """Elapsed share of the time between the movements [fraction]."""
         samples = np.arange(len(self.first))
         return (samples - self.first) / np.maximum(self.length, 1)
 

@@ -26,7 +26,7 @@ UPWARD, DOWNWARD = np.log(1e3), 70.0
 def search_bounds(
     model: GreyBoxModel, guesses: Sequence[Array], limits: Mapping[str, tuple[float, float]]
 ) -> tuple[Array, Array]:
-    """Return how far the fitted coordinates may go.
+    """Return the bounds of the fitted coordinates.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Problem:
 
     @cached_property
     def blocks(self) -> int:
-        """How many blocks hold a sample, of all outputs together [count]."""
+        """Number of blocks that hold a sample, over all outputs [count]."""
         begins = np.arange(0, len(self.log.measured), self._block)
         return int(np.count_nonzero(np.logical_or.reduceat(np.isfinite(self.log.measured), begins, axis=0)))
 

@@ -53,7 +53,7 @@ class PlacedRidge(NamedTuple):
     ratio: float
 
     def steepness(self, theta: Array) -> float:
-        """Return how far the second logarithm goes along the ridge with the first [dimensionless].
+        """Return the step of the second logarithm along the ridge over that of the first [dimensionless].
 
         Parameters
         ----------

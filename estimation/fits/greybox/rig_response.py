@@ -1,4 +1,4 @@
-"""By how much what was fitted would differ if the rig's own parameters were others."""
+"""Response of a fit to changes of the rig's own parameters."""
 
 from collections.abc import Callable, Iterator
 
@@ -14,7 +14,7 @@ RIG_NUDGE = 1e-3
 
 
 def rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Array]) -> Iterator[tuple[str, Array]]:
-    """Yield by how much the unknowns would differ per relative change of each uncertain parameter of the rig.
+    """Yield the change of the unknowns per relative change of each uncertain parameter of the rig.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def rig_slopes(problem: Problem, theta: Array, response: Callable[[Array], Array
 
 
 def answers_by_rig(problem: Problem, theta: Array, known_of: Information) -> Iterator[tuple[str, Array]]:
-    """Yield how each unknown would differ per relative change of an uncertain parameter of the rig.
+    """Yield the change of each unknown per relative change of an uncertain parameter of the rig.
 
     Parameters
     ----------

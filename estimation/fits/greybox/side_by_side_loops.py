@@ -14,7 +14,7 @@ from plant.solvers.fixed_step_loops import Operation, SideBySide, lay, share
 
 
 class SideBySideKernel(SideBySide, Protocol):
-    """What the kernel of a model has.
+    """Interface of a model's compiled kernel.
 
     In memory stand, `LANES` numbers each, states, drives at the last sample, their rises in a step, outputs,
     the step's length, parameters, and what `settle_at` makes of them.

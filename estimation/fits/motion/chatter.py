@@ -1,4 +1,4 @@
-"""Bristles that are too stiff for the steps of the motion form: no search begins there, and no fit ends there in them.
+"""Bristles too stiff for the steps of the motion form: no search begins with one, and no fit ends with one.
 
 Piston and bristle then chatter, each step on the other side of rest. That is no motion of the model: the misfit has
 pits a few thousandths apart, and in which of them a descent ends hangs on the last digit of the noise.
@@ -67,5 +67,5 @@ def without_chatter(problem: FreedProblem, theta: Array) -> FreedProblem:
 
 
 def _over(log: GreyBoxLog, values: Mapping[str, float], names: tuple[str, ...]) -> float:
-    """Return by how many times a bristle is quicker than what the steps follow."""
+    """Return the ratio of a bristle's natural frequency to the highest that the steps follow."""
     return sqrt(values["bristle_stiffness"] / followed(log, names)["bristle_stiffness"][1])

@@ -6,17 +6,23 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.fits.explaining.faults_tried import FAULTS_TRIED, usual_bias, usual_leakage, worse
-from estimation.fits.explaining.form_fit import LONGEST_STEP, FormFit, weighed, with_structure
 from estimation.fits.flow.log import DRAIN_START
 from estimation.fits.flow.search import LEAD_START
-from estimation.fits.greybox.averaged import block_means, samples_a_block
+from estimation.fits.greybox.block_averages import block_means, samples_a_block
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
+from estimation.fits.hypothesis_search.fault_guesses import (
+    FAULTS_TRIED,
+    faulty_coefficient,
+    flow_bias_guess,
+    leakage_guess,
+)
+from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP, FormFit, weighed, with_structure
 from estimation.fits.motion.chatter import without_chatter
 from estimation.fits.motion.force_scale import Way, bulk_modulus, disagree, rescaled
+from estimation.fits.motion.noise_annealing import RETURNING
 from estimation.fits.motion.search import (
     ENOUGH,
     EXPLAINED,
@@ -33,7 +39,6 @@ from estimation.fits.motion.search import (
     likeliest,
     rough,
 )
-from estimation.fits.motion.settled import RETURNING
 from estimation.fits.motion.weakly_held import MOST_MOVED, far_too_weak, unseen
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
@@ -143,7 +148,7 @@ def fit_motion(
 
 
 def _concluded(ended: list[Ended], log: GreyBoxLog, *, sparing: bool) -> tuple[FormFit, bool]:
-    """Return what a log says from where its searches ended, and whether it was spared the search on other scales."""
+    """Return the result of a log's finished searches, and whether that on other scales was skipped."""
     fits, others, spared = _fitted(ended, sparing=sparing)
     best = min(fits, key=lambda fit: fit.cost)
     found = weighed(fits)
@@ -235,21 +240,21 @@ def _steps(drives: Array, sample_time: float) -> NDArray[np.int64]:
 
 def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
     healthy = EhaParameters()
-    leakage, bias = usual_leakage(p), usual_bias(p)
+    leakage, bias = leakage_guess(p), flow_bias_guess(p)
     quadratic = p.friction_quadratic or healthy.friction_quadratic
     coulomb = p.friction_coulomb or healthy.friction_coulomb
     return [
         {
             "bulk_modulus": bulk_modulus,
-            "leakage_coefficient": worse(p, "leakage_coefficient", leakage, leaking),
-            "flow_bias": worse(p, "flow_bias", bias, biased),
+            "leakage_coefficient": faulty_coefficient(p, "leakage_coefficient", leakage, leaking),
+            "flow_bias": faulty_coefficient(p, "flow_bias", bias, biased),
             "makeup_conductance": p.makeup_conductance or healthy.makeup_conductance,
             "case_leakage": DRAIN_START * leakage,
             "speed_lead": LEAD_START,
-            "friction_quadratic": worse(p, "friction_quadratic", quadratic, a1),
-            "friction_linear": worse(p, "friction_linear", p.friction_linear, a2),
-            "friction_coulomb": worse(p, "friction_coulomb", coulomb, a3),
-            "bristle_stiffness": worse(p, "friction_coulomb", coulomb, a3) / YIELDED,
+            "friction_quadratic": faulty_coefficient(p, "friction_quadratic", quadratic, a1),
+            "friction_linear": faulty_coefficient(p, "friction_linear", p.friction_linear, a2),
+            "friction_coulomb": faulty_coefficient(p, "friction_coulomb", coulomb, a3),
+            "bristle_stiffness": faulty_coefficient(p, "friction_coulomb", coulomb, a3) / YIELDED,
             "bristle_damping": DAMPING_START,
         }
         for leaking, biased in FAULTS_TRIED

@@ -1,4 +1,4 @@
-"""Whether a log without pressure holds the scale of forces, by leaving its optimum and looking for it anew."""
+"""Test whether a log without pressure determines the scale of forces: leave its optimum and search again."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -53,7 +53,7 @@ FALLING = ("leakage_coefficient", "makeup_conductance", "case_leakage")
 
 @dataclass(frozen=True)
 class Way:
-    """How a search comes down from a start.
+    """Options of a descent from a start.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def rescaled(problem: FreedProblem, best: Point, way: Way) -> tuple[Point, list[
 
 
 def disagree(moduli: Sequence[float]) -> bool:
-    """Return whether some bulk moduli lie farther apart than may be believed.
+    """Return whether bulk moduli lie too far apart to be believed.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`likeliest(searches) -> list[Ended]`: where searches for the motion form's unknowns end, on ever longer beginnings.
+"""`likeliest(searches) -> list[Ended]`: ends of searches for the motion form's unknowns, on ever longer beginnings.
 
 A start is brought near under larger noise, then searched on the first seconds; what explains those goes on to more of
 the log. Both structures of friction are searched in turn, so that neither is searched in vain where the other explains.
@@ -18,7 +18,7 @@ from estimation.fits.greybox.problem import search_bounds
 from estimation.fits.greybox.side_by_side import LANES
 from estimation.fits.motion.chatter import followed
 from estimation.fits.motion.force_scale import bulk_modulus
-from estimation.fits.motion.settled import RETURNING, settled
+from estimation.fits.motion.noise_annealing import RETURNING, annealed
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.motion import LINEAR, UNKNOWNS
 from plant.arrays import Array
@@ -81,7 +81,7 @@ SAME_COST, SAME_MODULUS = 0.02, 0.01
 
 @dataclass(eq=False)
 class Begun:
-    """What all searches of a log share.
+    """State that all searches of a log share.
 
     Parameters
     ----------
@@ -197,14 +197,14 @@ class MotionSearch:
             reached.append(near)
 
     def same_pit(self, one: Point, other: Point) -> bool:
-        """Return whether two points of the short beginning lie in the same pit."""
+        """Return whether two points of the short beginning lie in the same basin."""
         moved = abs(np.log(bulk_modulus(self.whole, one) / bulk_modulus(self.whole, other)))
         return abs(one.cost - other.cost) < SAME_COST * other.cost and bool(moved < SAME_MODULUS)
 
 
 @dataclass(frozen=True, eq=False)
 class Ended:
-    """Where a search ended.
+    """Result of a search.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ class Ended:
 
 
 def likeliest(searches: Sequence[MotionSearch]) -> list[Ended]:
-    """Return where each of several searches ended, in their order; all end where one explains the log.
+    """Return the results of several searches, in their order; all stop once one explains the log.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def likeliest(searches: Sequence[MotionSearch]) -> list[Ended]:
 
 
 class _Tries:
-    """What one search tried.
+    """Trials of one search.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ class _Tries:
         self._followed: list[tuple[Point, Point]] = []
 
     def carried_on(self, near: Array) -> Point | None:
-        """Return where a start leads on the first `SEARCHED` samples if it explains them.
+        """Return the optimum from a start on the first `SEARCHED` samples if it explains them.
 
         What explains the shorter beginning is followed once a pit, and once in all after `MOST_WORK`.
         """
@@ -281,7 +281,7 @@ class _Tries:
         return more if more.cost < wanted else None
 
     def ended(self) -> tuple[Point, bool]:
-        """Return where the search ends on the shorter beginning if no start explains the log; or what explains more.
+        """Return the optimum on the shorter beginning if no start explains the log, or a point that explains more.
 
         What nearly explains the beginning is settled: in which pit a descent ends hangs on rounding.
         """
@@ -293,7 +293,7 @@ class _Tries:
         promising, share = SLIGHT * wanted, SLIGHT_SHARE if self._begun.work > MOST_WORK else 0.0
         point = descend(at(short), self.best.theta, RETURNING, bounds, promising, least_share=share)
         if point.cost < HOPELESS * wanted:
-            point = settled(short, point, bounds, promising, SAME_COST * wanted, at)
+            point = annealed(short, point, bounds, promising, SAME_COST * wanted, at)
         found = self.carried_on(point.theta) if point.cost < wanted else None
         return (point, False) if found is None else (found, True)
 

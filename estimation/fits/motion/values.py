@@ -1,4 +1,4 @@
-"""`share_at(record, parameters, values) -> float`: what the motion form leaves of a motion at another model's values.
+"""`share_at(record, parameters, values) -> float`: residual of the motion form at another model's values.
 
 The search for the motion form's unknowns begins at the healthy actuator and a few faulty ones, and may end far from the
 log. Values that another model found say whether it did.
@@ -17,7 +17,7 @@ from plant.log.record import Record
 
 
 def share_at(record: Record, parameters: EhaParameters, values: Mapping[str, float], speed_variance: float) -> float:
-    """Return the share of the motion that the motion form leaves at given values of its unknowns.
+    """Return the residual of the motion form at given values, as a share of the motion.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether position holds bulk modulus so weakly that it will not be believed, at the end of a fit or on the way.
+"""Test whether position determines bulk modulus too weakly, at the end of a fit or during it.
 
 See decision 314.
 """
@@ -21,7 +21,7 @@ which is believed, less than 0.7. If the end is believed after all, the other sc
 
 
 def unseen(chi_square: float, samples: int) -> float:
-    """Return by how many deviations a misfit that no test of the residuals shows may move what is fitted.
+    """Return by how many standard deviations an undetected misfit may shift the result.
 
     The sum of n squared residuals has a standard deviation of ``sqrt(2 n)``. A misfit of that size does not show, and
     one that looks like the change of an unknown moves it by the root of that, in deviations. What a log holds firmly
@@ -49,7 +49,7 @@ def unseen(chi_square: float, samples: int) -> float:
 
 
 def far_too_weak(problem: FreedProblem, best: Point, whole: FreedProblem) -> bool:
-    """Return whether a log holds bulk modulus so weakly at an optimum that its end will hardly be believed.
+    """Return whether a log determines bulk modulus so weakly at an optimum that its end will hardly be believed.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How many samples pass before the output answers."""
+"""Dead time: the number of samples before the output responds."""
 
 from dataclasses import replace
 

@@ -27,7 +27,7 @@ PERIODS_OF_SLOWEST = 5.0
 
 @dataclass(frozen=True)
 class Limits:
-    """What a drive may do.
+    """Limits of a drive signal.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def multisine_for(frequencies_hz: Array, sample_time: float, limits: Limits, *, 
 
 
 def violations(model: LinearModel, u: Array, limits: Limits) -> list[str]:
-    """Return what a test would break, by simulating it on a model; nothing, if it may be run.
+    """Return the limits that a test would violate in a simulation; none if it may be run.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def rank_inputs(
     frequencies_hz: Array,
     limits: Limits,
 ) -> "pd.DataFrame":
-    """Return how accurate each test would make the response, best first.
+    """Return the accuracy of the response that each test would give, best first.
 
     Parameters
     ----------

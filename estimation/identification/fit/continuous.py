@@ -126,7 +126,7 @@ class _Problem:
         return held_input_model(values[:n_b], values[n_b : n_b + self.n_poles], max(float(late), 0.0), 1.0)
 
     def _at(self, values: Array) -> _At:
-        """Return what both the residual and the Jacobian take; of the last point it is kept, since a search asks twice.
+        """Return the common part of residual and Jacobian, cached for the last point, since a search asks twice.
 
         The derivative by the continuous values is left to `parts`: a residual alone is asked for more often.
         """

@@ -35,7 +35,7 @@ class NoEffectError(HydrostateError):
 
 @dataclass(frozen=True)
 class Task:
-    """What a fit is asked for.
+    """Specification of a fit.
 
     Parameters
     ----------

@@ -235,7 +235,7 @@ def jacobian_and_residual(structure: Structure, theta: Array, data: Experiments)
 
 
 def liveliest_section(data: Experiments) -> Experiments:
-    """Return where the input varies most over SCREENING_SAMPLES samples; everything, if there are no more.
+    """Return the section of about SCREENING_SAMPLES samples in which the input varies most; short records whole.
 
     Parameters
     ----------

@@ -100,7 +100,7 @@ def dc_gain_interval(
 
 
 def _crossing(excess: Callable[[float], float], gain: float, step: float) -> float:
-    """Return where the excess turns positive, going away from the fitted gain.
+    """Return the gain, away from the fitted one, at which the excess turns positive.
 
     By bisection: another basin may take over between two gains, so the excess is not smooth.
     """

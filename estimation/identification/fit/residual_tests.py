@@ -33,7 +33,7 @@ class ResidualTest:
     p_value: float
 
     def passed(self, level: float = 0.05) -> bool:
-        """Return whether the model survives.
+        """Return whether the model passes the test.
 
         Parameters
         ----------

@@ -14,7 +14,7 @@ from plant.errors import HydrostateError
 
 @dataclass(frozen=True)
 class Validation:
-    """How well a model simulates a log.
+    """Quality of a model's simulation of a log.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def estimate_initial_state(model: LinearModel, u: ArrayLike, y: ArrayLike) -> Ar
 def validate(
     model: LinearModel, u: ArrayLike, y: ArrayLike, *, fitted: bool = False, n_lags: int = DEFAULT_LAGS
 ) -> Validation:
-    """Return how well a model simulates a log, from the initial state that suits it best.
+    """Return the quality of a model's simulation of a log, from the best initial state.
 
     Parameters
     ----------

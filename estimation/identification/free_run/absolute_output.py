@@ -41,7 +41,7 @@ REFINED, ROUGH = 3, 1e-3
 
 @dataclass(frozen=True, eq=False)
 class AbsoluteFit:
-    """Where a fit has ended, in the data's scale, the output counted from the sensor's zero.
+    """Result of a fit, in the data's scale, with the output counted from the sensor's zero.
 
     Parameters
     ----------

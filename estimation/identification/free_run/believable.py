@@ -113,7 +113,7 @@ def _time_constant(one: Candidate, data: Channels) -> float:
 
 
 def _slow_note(taken: Candidate, data: Channels) -> Note:
-    """Return what is said of a model that integrates, or is slower than its inputs repeat themselves."""
+    """Return the note on a model that integrates, or is slower than the period of its inputs."""
     slowest = _time_constant(taken, data)
     if taken.fit.integrates or slowest > data.duration:
         return IdentificationCode.INTEGRATES.note(output=data.output)
@@ -123,7 +123,7 @@ def _slow_note(taken: Candidate, data: Channels) -> Note:
 
 
 def _carries_on(slow: Candidate, quick: Candidate, data: Channels) -> bool:
-    """Return whether a slow model leaves less than a quick one on blocks and halves together, and does not wander."""
+    """Return whether a slow model has no larger error on blocks and halves than a quick one, and does not wander."""
     if wanders(slow.fit, data):
         return False
     errors = [np.hypot(one.held_back, halves_error(one.fit, data)) for one in (slow, quick)]

@@ -1,4 +1,4 @@
-"""What is told of each candidate that was compared, by the names of the JSON contract."""
+"""Rows of the candidates that were compared, by the names of the JSON contract."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from estimation.identification.free_run.choose_polynomial import PolynomialCandi
 
 
 def linear_row(one: Candidate) -> dict[str, Any]:
-    """Return what is told of a linear candidate."""
+    """Return the row of a linear candidate."""
     form = one.form
     return {
         "structure": "output-error",
@@ -26,7 +26,7 @@ def linear_row(one: Candidate) -> dict[str, Any]:
 
 
 def hammerstein_row(one: HammersteinCandidate) -> dict[str, Any]:
-    """Return what is told of a candidate with a nonlinearity at its input."""
+    """Return the row of a candidate with a nonlinearity at its input."""
     form = one.fit.linear.form
     return {
         "structure": "hammerstein",
@@ -41,7 +41,7 @@ def hammerstein_row(one: HammersteinCandidate) -> dict[str, Any]:
 
 
 def polynomial_row(one: PolynomialCandidate) -> dict[str, Any]:
-    """Return what is told of a polynomial candidate."""
+    """Return the row of a polynomial candidate."""
     terms = one.fit.terms
     return {
         "structure": "narx",
@@ -55,7 +55,7 @@ def polynomial_row(one: PolynomialCandidate) -> dict[str, Any]:
 
 
 def absolute_row(one: AbsoluteCandidate) -> dict[str, Any]:
-    """Return what is told of a candidate whose output is measured without its sign."""
+    """Return the row of a candidate whose output is measured without its sign."""
     form = one.fit.linear.form
     return {
         "structure": "wiener",

@@ -55,7 +55,7 @@ class AbsoluteCandidate:
 
 
 def may_lack_sign(data: Channels, by: Scaling) -> bool:
-    """Return whether an output is never below zero and comes near it, as a size does that changes its sign.
+    """Return whether an output comes near zero but not below, like the absolute value of a signal.
 
     Parameters
     ----------

@@ -150,7 +150,7 @@ def _bic(fit: HammersteinFit, data: Channels) -> float:
 
 
 def _doubt(fit: HammersteinFit, data: Channels) -> str:
-    """Return whether a pole of the linear part, slower than a block that is held back, is not told from a zero."""
+    """Return a mark if a pole of the linear part, slower than a held-back block, cancels with a zero."""
     behind, _ = HammersteinProblem(fit.kind, fit.linear.form, data).behind_nonlinearity(fit.values, fit.starts)
     slow = np.exp(-(BLOCKS + 1.0) / data.longest)
     pairs = linear_model(fit.linear, behind, UNSCALED).cancellations

@@ -61,7 +61,7 @@ class Candidate:
         return self.fit.form
 
     def outlasts_block(self, data: Channels) -> bool:
-        """Return whether a time constant is longer than a block that is held back.
+        """Return whether a time constant is longer than a held-back block.
 
         What such a pole does in a block is pinned by the outputs on both sides, so blocks do not miss it where it
         follows the drift of one record.

@@ -82,7 +82,7 @@ class PolynomialCandidate:
 
     @property
     def price(self) -> float:
-        """What models are compared by: error on what was held back, and doubt elsewhere [dimensionless]."""
+        """Criterion for comparing models: error on held-back data, and doubt elsewhere [dimensionless]."""
         return float(np.hypot(self.held_back, self.spread))
 
 

@@ -63,7 +63,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Recipe:
-    """How a model of every product is fitted.
+    """Settings of a fit of a model with all products.
 
     Parameters
     ----------

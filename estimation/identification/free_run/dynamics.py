@@ -7,7 +7,7 @@ from estimation.arrays import Array
 
 
 class Dynamics(Protocol):
-    """What a structure must offer to be simulated, judged and saved."""
+    """Interface of a structure that can be simulated, judged and saved."""
 
     kind: ClassVar[str]
 
@@ -25,7 +25,7 @@ class Dynamics(Protocol):
         ...
 
     def unanswered(self, length: int) -> int:
-        """Return how many outputs at the start of a log of some length [samples] answer inputs from before it."""
+        """Return how many first outputs of a log of some length [samples] respond to inputs from before it."""
         ...
 
     def to_dict(self) -> dict[str, Any]:
@@ -37,7 +37,7 @@ class OutputErrorDynamics(ABC):
     """Dynamics whose noise is the output sensor's: what was measured before says nothing of the next sample."""
 
     def unanswered(self, length: int) -> int:
-        """Return how many outputs at the start of a log of some length [samples] answer inputs from before it.
+        """Return how many first outputs of a log of some length [samples] respond to inputs from before it.
 
         None do, unless a class says otherwise.
         """

@@ -8,7 +8,7 @@ from estimation.identification.search.jit import compiled
 
 @compiled
 def rubbed(total: float, before: float, rub: Array) -> tuple[float, float]:
-    """Return what friction leaves of an output, and which way it moves: 1 up, -1 down, 0 where friction holds it.
+    """Return an output under friction, and its direction: 1 up, -1 down, 0 where friction holds it.
 
     Parameters
     ----------

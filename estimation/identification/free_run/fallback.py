@@ -19,7 +19,7 @@ from estimation.identification.free_run.linear_dynamics import LinearDynamics
 
 @dataclass(frozen=True, eq=False)
 class Fallback:
-    """What tells whether a polynomial model is run, and what is run instead.
+    """Choice between a polynomial model and the linear one that is run instead.
 
     Parameters
     ----------

@@ -91,7 +91,7 @@ def channels_of(
 
 
 def channels_to_run(record: Record, inputs: Sequence[str], output: str, sample_time: float | None = None) -> Channels:
-    """Return what a model is run on: its inputs, and its output as far as the log has one.
+    """Return the channels that a model is run on: its inputs, and its output as far as the log has one.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def pieces(record: Record, inputs: Sequence[str]) -> list[Record]:
 
 
 def _unknown(values: Array) -> BoolArray:
-    """Return where an input is missing and no straight line stands for it: the worst `MOST_GAPS`, and both ends."""
+    """Return a mask of missing input that is not bridged: the worst `MOST_GAPS` gaps, and both ends."""
     missing = np.isnan(values)
     unknown = np.zeros(values.size, dtype=np.bool_)
     known = np.flatnonzero(~missing)

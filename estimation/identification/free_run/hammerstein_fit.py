@@ -26,7 +26,7 @@ NEAR = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class HammersteinFit:
-    """Where a fit has ended, in the data's scale.
+    """Result of a fit, in the data's scale.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class HammersteinProblem:
 
 
 def _answers(inputs: Array, b: Array, f: Array, delay: int) -> Array:
-    """Return what the linear model makes of each column, which stood at its first value before."""
+    """Return the response of the linear model to each column, held at its first value before."""
     rows = np.empty((inputs.shape[1], inputs.shape[0]))
     padded = np.concatenate([np.repeat(inputs[:1], delay + b.size, axis=0), inputs])
     for row, column in zip(rows, padded.T, strict=True):

@@ -83,7 +83,7 @@ def pooled(errors: Sequence[float]) -> float:
 
 
 def surely_better(errors: Sequence[float], others: Sequence[float]) -> bool:
-    """Return whether a model beats another on the same blocks by more than the blocks scatter: one standard error.
+    """Return whether a model beats another on the same blocks by more than one standard error.
 
     Parameters
     ----------

@@ -337,7 +337,7 @@ def _refitted(found: PolynomialCandidate, whole: Channels) -> PolynomialDynamics
 
 
 def _fallback(taken: PolynomialCandidate, linear: Candidate, part: Channels, whole: Channels) -> Fallback:
-    """Return what is run where inputs do not determine a polynomial model."""
+    """Return the fallback for inputs that do not determine a polynomial model."""
     others = tuple(LinearDynamics.of(refitted_linear(linear.fit, part.without(mask))) for mask in blocks(part, BLOCKS))
     parts = tuple(PolynomialDynamics.of(one) for one in taken.parts)
     share = part.n_samples / max(part.n_samples, section(whole, MOST_FITTED).n_samples)

@@ -82,7 +82,7 @@ def _widths(u: Array) -> list[Array]:
 
 
 def _acts(u: Array, values: Array) -> bool:
-    """Return whether a band is one, and samples lie beyond both its ends or it ends where they do."""
+    """Return whether a band has ordered ends, neither of them beyond the range of the samples."""
     low, high = values
     return bool(low <= high and low >= u.min() and high <= u.max())
 

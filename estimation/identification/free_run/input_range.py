@@ -89,7 +89,7 @@ def linear_instead(
 def doubts_about_inputs(
     model: FreeRunModel, data: Channels, judged: Sequence[tuple[float, float]] | None = None
 ) -> list[Note]:
-    """Return what a user must know of a run on these inputs.
+    """Return the notes on a run with these inputs.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ class LinearDynamics(OutputErrorDynamics):
         ]
 
     def unanswered(self, length: int) -> int:
-        """Return how many outputs at the start of a log of some length [samples] answer inputs from before it."""
+        """Return how many first outputs of a log of some length [samples] respond to inputs from before it."""
         return self.form.unanswered(length)
 
     def run(self, u: Array, y: Array) -> Array:

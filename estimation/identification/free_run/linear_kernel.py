@@ -63,7 +63,7 @@ def decay_rows(f: Array, rows: Array, levels: Array) -> None:
 
 
 def settles(coefficients: Array) -> bool:
-    """Return whether a denominator has all its roots inside the unit circle, and a sum that is positive.
+    """Return whether a denominator has all its roots inside the unit circle, and a positive sum.
 
     A run begins at rest: its level is divided by that sum, of which rounding may leave nothing beside roots near one.
 

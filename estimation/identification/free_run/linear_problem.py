@@ -34,7 +34,7 @@ def long_dead_time(length: int) -> int:
 
 
 def unanswered(dead_time: int, length: int) -> int:
-    """Return how many outputs at the start of a log are left out, since they answer inputs from before it.
+    """Return how many first outputs of a log are left out, because they respond to inputs from before it.
 
     Parameters
     ----------
@@ -81,13 +81,13 @@ class Form:
         return self.n_b + self.order + 1
 
     def unanswered(self, length: int) -> int:
-        """Return how many outputs at the start of a log of some length [samples] answer inputs from before it."""
+        """Return how many first outputs of a log of some length [samples] respond to inputs from before it."""
         return unanswered(max(self.delays), length)
 
 
 @dataclass(frozen=True, eq=False)
 class LinearFit:
-    """Where a linear fit has ended, in the data's scale.
+    """Result of a linear fit, in the data's scale.
 
     Parameters
     ----------

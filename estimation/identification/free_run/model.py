@@ -37,7 +37,7 @@ KINDS: Mapping[str, Any] = {
 
 @dataclass(frozen=True)
 class FreeRunQuality:
-    """How well a model follows an output.
+    """Quality of a model's free run and one-step prediction.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ class FreeRunModel:
         return self.scaling.y_mean + self.scaling.y_std * self.dynamics.one_step(inputs, outputs)
 
     def quality(self, u: Sequence[Array], y: Sequence[Array]) -> FreeRunQuality:
-        """Return how well the model follows logs; outputs that a long dead time leaves unanswered do not count.
+        """Return the quality of the model on logs, without the first outputs that a long dead time leaves undetermined.
 
         Parameters
         ----------
@@ -171,7 +171,7 @@ class FreeRunModel:
     def judged_quality(
         self, u: Sequence[Array], y: Sequence[Array]
     ) -> tuple[FreeRunQuality, list[tuple[float, float]]]:
-        """Return how well the model follows logs, and what tells whether a linear model stands in, from the same runs.
+        """Return the quality on logs, and the errors that decide whether a linear model stands in, from the same runs.
 
         Parameters
         ----------

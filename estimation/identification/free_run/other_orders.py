@@ -1,4 +1,4 @@
-"""What models do where the same inputs come in another order: whether they keep within bounds, and agree."""
+"""Behaviour of models under reordered inputs: whether they stay within bounds, and agree."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -47,7 +47,7 @@ def reordered(data: Channels, count: int = REORDERED) -> Iterator[Channels]:
 
 
 def is_wild(fit: PolynomialFit, data: Channels) -> bool:
-    """Return whether a model keeps leaving the range of its output where the same inputs come in another order.
+    """Return whether a model keeps leaving the range of its output under reordered inputs.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def is_wild(fit: PolynomialFit, data: Channels) -> bool:
 
 
 def wanders(fit: LinearFit, data: Channels) -> bool:
-    """Return whether a linear model runs far beyond what was measured where the same inputs come in another order.
+    """Return whether a linear model runs far beyond the measured output under reordered inputs.
 
     A slow pole with a large gain is held by the order that was measured, as by a sweep that rises, and by that alone.
 
@@ -92,7 +92,7 @@ def wanders(fit: LinearFit, data: Channels) -> bool:
 
 
 def disagreement(fits: Sequence[PolynomialFit], whole: PolynomialFit, data: Channels) -> float:
-    """Return how far fits that left out a block each run from that of all data, on the same inputs in other orders.
+    """Return the deviation of fits that left out one block each from that of all data, under reordered inputs.
 
     No output is measured there, so it tells nothing of what all of them miss alike; but what a block more or less
     changes on new inputs is not known.

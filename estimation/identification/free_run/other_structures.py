@@ -83,7 +83,7 @@ def _fitted(name: str, form: Form, data: Channels, by: Scaling) -> LinearModel:
 
 
 def _dynamics(model: LinearModel, data: Channels, by: Scaling) -> tuple[LinearDynamics, float]:
-    """Return what runs free of a fit, with the offset that suits the data best."""
+    """Return the free-run dynamics of a fit, with the offset that suits the data best."""
     if not model.is_stable:
         raise HydrostateError(
             f"the {model.structure} model of {data.output!r} is unstable and does not run free: use output-error"

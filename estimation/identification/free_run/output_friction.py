@@ -1,4 +1,4 @@
-"""Where a polynomial model of an output that rubs begins: a linear model, and dry friction that holds its output.
+"""Start of a polynomial model of an output with friction: a linear model whose output dry friction holds.
 
 A body that dry friction holds does not move until more than the friction pulls, and is then pulled by the difference.
 Of a velocity the implicit step of Euler is exact: what the other terms would give is brought nearer to rest by a level,

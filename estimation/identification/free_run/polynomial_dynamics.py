@@ -55,7 +55,7 @@ class PolynomialDynamics:
         return self.coefficients.size + self.friction.size
 
     def unanswered(self, length: int) -> int:
-        """Return how many outputs at the start of a log of some length [samples] answer inputs from before it."""
+        """Return how many first outputs of a log of some length [samples] respond to inputs from before it."""
         return unanswered(int(self.variables.lag.max(initial=0)), length)
 
     def run(self, u: Array, y: Array) -> Array:
@@ -166,7 +166,7 @@ class PolynomialDynamics:
         return best, cost
 
     def one_step(self, u: Array, y: Array) -> Array:
-        """Return what the measured past gives for the next output; NaN where some of it is missing.
+        """Return the one-step prediction from the measured past; NaN where some of it is missing.
 
         Parameters
         ----------

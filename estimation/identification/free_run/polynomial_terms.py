@@ -84,7 +84,7 @@ def without_term(fit: PolynomialFit, index: int, data: Channels) -> PolynomialFi
 
 
 def _gains_of(fit: PolynomialFit, pool: IntArray, data: Channels) -> Array | None:
-    """Return how much of the squared residual each product explains; None where the fit runs away."""
+    """Return the part of the squared residual that each product explains; None if the fit runs away."""
     count = fit.terms.shape[0]
     every = Runs(fit.variables, np.concatenate([fit.terms, pool]), data)
     equations = NormalEquations(every, Runs(fit.variables, fit.terms, data).ends)
@@ -98,7 +98,7 @@ def _gains_of(fit: PolynomialFit, pool: IntArray, data: Channels) -> Array | Non
 
 
 def _gains(own: Array, shared: Array, square: Array, right: Array, explained: Array) -> Array:
-    """Return how much of the squared residual each candidate explains beside what is there, in the linearised run.
+    """Return the part of the squared residual that each candidate explains beside present terms, linearised.
 
     Given are products of sensitivities: of the values that are there with each other and with the candidates, of the
     candidates with themselves, and of both with the residual.

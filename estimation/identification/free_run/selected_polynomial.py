@@ -39,7 +39,7 @@ DESCENDED = 3
 
 @dataclass(frozen=True)
 class Selection:
-    """How a model of few products is fitted.
+    """Settings of a fit of a model with few products.
 
     Parameters
     ----------

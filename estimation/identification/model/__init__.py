@@ -1,1 +1,1 @@
-"""What an identified model is, and what it says."""
+"""Identified models and their properties."""

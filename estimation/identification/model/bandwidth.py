@@ -1,4 +1,4 @@
-"""Where a response has fallen by 3 dB, and how surely."""
+"""Bandwidth: where a response has fallen by 3 dB, and its standard deviation."""
 
 from typing import TYPE_CHECKING
 

@@ -11,7 +11,7 @@ from plant.compiled.native.loops import natively
 
 
 def filtered(numerator: ArrayLike, denominator: ArrayLike, series: ArrayLike, state: ArrayLike | None = None) -> Array:
-    """Return what a transfer function makes of a series.
+    """Return the response of a transfer function to a series.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ NUDGE = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class StepResponse:
-    """What a unit step at time zero makes of an output that was at rest.
+    """Response of an output at rest to a unit step at time zero.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How coefficient uncertainty becomes that of poles, zeros, gain and frequency response: the delta method."""
+"""Delta method: uncertainty of poles, zeros, gain and frequency response from that of coefficients."""
 
 from dataclasses import dataclass
 

@@ -11,7 +11,7 @@ from estimation.identification.search.linear import least_squares
 
 @dataclass(frozen=True)
 class Structure:
-    """How many coefficients an output-error model has, and where.
+    """Numbers of coefficients of an output-error model, and its delay.
 
     Parameters
     ----------

@@ -55,12 +55,12 @@ class Experiments:
 
     @property
     def slices(self) -> list[slice]:
-        """Where each experiment stands."""
+        """Slice of each experiment."""
         return [slice(int(a), int(b)) for a, b in zip(self.bounds[:-1], self.bounds[1:], strict=True)]
 
     @property
     def longest(self) -> slice:
-        """Where the longest experiment stands."""
+        """Slice of the longest experiment."""
         return max(self.slices, key=lambda part: part.stop - part.start)
 
     def scaled(self) -> "Experiments":
@@ -98,7 +98,7 @@ class Experiments:
         return replace(self, u=self.u[early], y=self.y[late], used=self.used[late], bounds=bounds)
 
     def goes_on_behind(self, samples: int) -> bool:
-        """Return whether each experiment has outputs behind so many samples."""
+        """Return whether each experiment has outputs after so many samples."""
         return all(self.used[part][samples:].any() for part in self.slices)
 
     def measured(self) -> Array:

@@ -1,4 +1,4 @@
-"""How the plain loops of this package are compiled: one decorator, typed as if it were not there."""
+"""Compilation of this package's plain loops: one decorator, which type checkers see through."""
 
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar

@@ -93,7 +93,7 @@ def _raise_order(reflected: Array, row: Array, slopes: Array) -> None:
 def stable_step(
     theta: Array, gram: Array, gradient: Array, damping: float, place: slice, stretched: Array
 ) -> tuple[Array, float] | None:
-    """Return where a damped step leads that is taken in the reflection coefficients, so that it stays stable.
+    """Return the result of a damped step in the reflection coefficients, which keeps it stable.
 
     The coordinates are ``atanh`` of the coefficients: the bound is at infinity, and each step leaves a share of the
     distance to it.

@@ -1,4 +1,4 @@
-"""Where an output-error fit begins: at several denominators, since one start often ends in a local minimum.
+"""Starts of an output-error fit: several denominators, because one start often ends in a local minimum.
 
 From a random stable start Levenberg-Marquardt reaches the global minimum of a Table 6 model in 64 to 96 % of
 runs; the fourth of them at high noise has two basins side by side. The starts here are of three kinds:

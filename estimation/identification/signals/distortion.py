@@ -34,7 +34,7 @@ NEAR = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Distortion:
-    """What a periodic multisine tells of a plant.
+    """Response, noise and nonlinear distortion of a plant under a periodic multisine.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def _stray(excited: BoolArray, odd: BoolArray, power: Array, at: IntArray) -> Ar
 
 
 def _left(output: ComplexArray, inside: ComplexArray) -> ComplexArray:
-    """Return what a polynomial over neighbouring excited lines leaves; NaN where they are too few."""
+    """Return the residual of a polynomial over neighbouring excited lines; NaN where they are too few."""
     n, span = len(output), 2 * BESIDE + 1
     if n < span:
         return np.full(n, np.nan, dtype=np.complex128)

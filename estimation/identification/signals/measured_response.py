@@ -1,4 +1,4 @@
-"""What one log says of a plant's frequency response, by the method that its input allows."""
+"""Frequency response of a plant from one log, by the method that its input allows."""
 
 from dataclasses import dataclass
 from typing import Any

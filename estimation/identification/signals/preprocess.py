@@ -1,4 +1,4 @@
-"""What may be done to input and output before a fit: removing means, zero-phase filtering, resampling."""
+"""Preprocessing of input and output before a fit: removing means, zero-phase filtering, resampling."""
 
 import warnings
 from math import ceil

@@ -51,7 +51,7 @@ class StateCandidate:
         return pooled(self.held_back)
 
     def row(self) -> dict[str, Any]:
-        """Return what was compared, by the names of the JSON contract."""
+        """Return the row of this candidate, by the names of the JSON contract."""
         return {
             "structure": "state-space",
             "order": self.fit.size.n,

@@ -42,7 +42,7 @@ class StateSpaceDynamics(OutputErrorDynamics):
         return float(self.system.level[self.place])
 
     def unanswered(self, length: int) -> int:
-        """Return how many outputs at the start of a log of some length [samples] answer inputs from before it."""
+        """Return how many first outputs of a log of some length [samples] respond to inputs from before it."""
         return unanswered(max(self.system.delays), length)
 
     def run(self, u: Array, y: Array) -> Array:

@@ -19,7 +19,7 @@ from plant.errors import HydrostateError
 
 @dataclass(frozen=True)
 class Effort:
-    """How far a search goes.
+    """Effort limits of a search.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ DESCENDED = 2
 
 @dataclass(frozen=True, eq=False)
 class StateSpaceFit:
-    """Where a fit has ended, in the data's scale.
+    """Result of a fit, in the data's scale.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def _noise(problem: Problem, theta: Array) -> Array:
 
 
 def _whitener(problem: Problem, noise: Array) -> Array:
-    """Return what makes residuals uncorrelated; where samples are missing, of unit deviation alone."""
+    """Return the matrix that whitens residuals; where samples are missing, it only scales them."""
     if problem.used.all():
         return np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=np.float64)
     return np.asarray(np.diag(1.0 / np.sqrt(np.diag(noise))), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Where a state-space fit begins: subspaces of past and future, without iteration."""
+"""Starts of a state-space fit: subspaces of past and future, without iteration."""
 
 import numpy as np
 

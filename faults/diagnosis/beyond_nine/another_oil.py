@@ -1,4 +1,4 @@
-"""Without pressure, stiff oil is no fault: the conditions are compared around the oil that the fitted circuit has.
+"""Without pressure, stiff oil is no fault: conditions are compared around the oil of the fitted circuit.
 
 Where pressure is logged, bulk modulus is measured before a circuit is fitted. Soft oil holds air, which is a fault.
 """
@@ -16,7 +16,7 @@ from plant.eha.model import EhaParameters
 
 
 def whatever_the_oil(diagnosed: Diagnosed, parameters: EhaParameters) -> Loaded:
-    """Return a diagnosis, around stiffer oil than the rig file's where that alone speaks against all conditions.
+    """Return a diagnosis around stiffer oil than the rig file's, if stiffness alone contradicts all conditions.
 
     Oil that the log knows only roughly is not called stiff, but its circuit may lie beside the nine conditions for it.
 

@@ -1,4 +1,4 @@
-"""Classes of a log over which leakage drifts as with warming oil: where the rig file's oil stands is integrated out.
+"""Classes of a log whose leakage drifts as with warming oil: the reference oil state is integrated out.
 
 A rig file has the leakage of one oil temperature, which nobody says. Over a log that warms, the condition that holds at
 its end is another than at its beginning: twice a minor leakage is nearly a major one. Conditions are scored with the
@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.eha.explained import LEAKAGE_COURSE
+from estimation.eha.explanation_notes import LEAKAGE_COURSE
 from estimation.finding import Quantity
 from estimation.log_checks.clean import CleanLog
 from estimation.notes import RigCode
@@ -38,7 +38,7 @@ PLACED = {AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS}
 
 
 def over_drift(diagnosed: Callable[[CleanLog], Loaded], log: CleanLog, notes: Sequence[Note]) -> Loaded:
-    """Return a diagnosis whose classes are weighed over where in a drift of leakage the rig file's oil stands.
+    """Return a diagnosis whose classes are averaged over the point of the drift at which the rig file's oil lies.
 
     Each place counts alike before the log is seen, and by how well the nine conditions hold the log there. What speaks
     against all nine for where the circuit lies does so only where it does at every place.
@@ -140,7 +140,7 @@ def weighed(found: Sequence[Diagnosis], calibration: Calibration) -> Mapping[str
 
 
 def _evidence(board: Scoreboard, calibration: Calibration) -> float:
-    """Return how well the conditions together hold a log, with the weights of the evidences that know its drift."""
+    """Return the evidence of all conditions together, with the weights of the evidences that include the drift."""
     weights = calibration.weights(board.blocks.pressure is not None)
     best = {"parameters": float(np.max(board.fits.scores)), "models": float(np.max(models_scores(board.fits)))}
     below = np.sum([weights[name] * board.log_odds[name] for name in best], axis=0)

@@ -49,7 +49,7 @@ NAMES = tuple(LEAST)
 
 @dataclass(frozen=True, eq=False)
 class Loads:
-    """What holds a rod back beyond what a rig file says.
+    """Loads on the rod that the rig file does not have.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def _regressed(columns: Array, push: Array, centre: Array, doubt: Array) -> tupl
 
 
 def sliding_blocks(blocks: Blocks) -> NDArray[np.bool_]:
-    """Return where the piston has slid one way for long enough that friction is that of sliding.
+    """Return the blocks in which the piston has slid one way long enough for steady sliding friction.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def sliding_blocks(blocks: Blocks) -> NDArray[np.bool_]:
 
 
 def friction_believed(p: EhaParameters) -> tuple[Array, Array]:
-    """Return what is believed of friction before a log is seen, whatever the condition.
+    """Return the prior of friction, whatever the condition.
 
     Parameters
     ----------

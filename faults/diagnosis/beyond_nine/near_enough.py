@@ -1,4 +1,4 @@
-"""Without pressure: is a circuit beside the nine conditions, or only as far off as what it leaves of a log lasts.
+"""Without pressure: does a circuit lie outside the nine conditions by more than its own model error.
 
 Where pressure is logged, a model error that lasts is counted in how far a circuit may lie beside the nine
 (`class_regions.ClassFits.told`), as a balance of flows looks for other faults. Without, circuits with such faults are
@@ -20,7 +20,7 @@ BESIDE = (AgainstCode.OUTSIDE_CONDITIONS, AgainstCode.BETWEEN_CONDITIONS)
 
 
 def only_beside(against: Sequence[Note]) -> bool:
-    """Return whether nothing speaks against the nine but that the circuit lies beside them.
+    """Return whether the only objection to the nine is that the circuit lies outside them.
 
     Returns
     -------
@@ -31,7 +31,7 @@ def only_beside(against: Sequence[Note]) -> bool:
 
 
 def lies_beside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> bool:
-    """Return whether circuits lie beside the nine conditions by more than a model error that lasts.
+    """Return whether circuits lie outside the nine conditions by more than a lasting model error.
 
     Parameters
     ----------

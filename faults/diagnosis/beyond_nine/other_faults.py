@@ -87,7 +87,7 @@ what it should be, below which no piston slides, and each of `SETTINGS` stands f
 
 
 class Outside(NamedTuple):
-    """What is said of faults outside the nine conditions.
+    """Findings on faults outside the nine conditions.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def circuits_with_faults(
 
 
 def gains_of_others(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Mapping[str, float]:
-    """Return how much better other circuits explain a log, with pressure or without.
+    """Return the gain of other circuits in explaining a log, with or without pressure.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ def _with_each(blocks: Blocks, sound: Tried, runs: Array, behind: float = HOPELE
 
 
 def odds_of_wear(scores: Sequence[float], sound: float) -> float:
-    """Return how much likelier a log makes a well worn pump than a sound one, with what is presumed of wear.
+    """Return the odds of a well worn pump against a sound one, with the prior of wear.
 
     What is presumed of wear before a log is seen is that of `faults.diagnosis.beyond_nine.wear.summed_over_wear`.
 

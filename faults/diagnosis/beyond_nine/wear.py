@@ -1,4 +1,4 @@
-"""The balance of flows judges the pump, and where a log does not tell what it delivers, that is integrated out.
+"""Pump delivery from the balance of flow; integrated out if a log does not determine it.
 
 Where pressure is logged, the balance says what the pump delivers, or that the log does not tell
 (`estimation.fits.flow.fit`). It follows the oil to the sensors' noise, and a circuit follows the piston to a few
@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.eha.explained import WORN
+from estimation.eha.explanation_notes import WORN
 from estimation.eha.result import BulkModulusEstimate
 from estimation.eha.rig_share import delivery_left_open, wear_left_open
 from estimation.finding import NORMAL_95
@@ -45,7 +45,7 @@ UNLIKELY = math.log(1e-3)
 def whatever_the_pump_delivers(
     diagnosis: Diagnosis, actuator: Actuator, estimate: BulkModulusEstimate, strange: Sequence[Note] = ()
 ) -> Diagnosis:
-    """Return a diagnosis with what the balance of flows says of the pump.
+    """Return a diagnosis with the pump delivery that the balance of flow gives.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def whatever_the_pump_delivers(
 
 
 def chance_of_wear(said: Sequence[Note]) -> float:
-    """Return the probability that a pump delivers less than `WORN`, by what the balance of flows says of it.
+    """Return the probability that a pump delivers less than `WORN`, by the balance of flow.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def whatever_fault(diagnosis: Diagnosis, actuator: Actuator, calibration: Calibr
 
 
 def known_of_flow(estimate: BulkModulusEstimate) -> frozenset[AgainstCode]:
-    """Return what the balance of flows knows better than a circuit.
+    """Return the quantities that the balance of flow determines better than a circuit.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""What changed within a log, and when."""
+"""Changes within a log and their times."""

@@ -1,4 +1,4 @@
-"""How much likelier do two conditions make a log, one before a change and one after it, than one throughout.
+"""Odds of a change of condition: two conditions, one before and one after, against one throughout.
 
 Two circuits always explain more than one: they may differ within a condition, the time of the change is chosen, and so
 are the conditions. All three are priced, and what is left is the logarithm of a Bayes factor, with what is presumed
@@ -62,7 +62,7 @@ def believed(
 
 
 def gain_of(whole: ClassFits, parts: Sequence[Blocks], fits: Sequence[ClassFits]) -> float:
-    """Return what the circuits of both parts gain on one for all.
+    """Return the gain of two circuits, one for each part, over one circuit for all.
 
     Each part is compared by itself: noise or a model's error that changes with the motion is no other condition.
 
@@ -86,7 +86,7 @@ def gain_of(whole: ClassFits, parts: Sequence[Blocks], fits: Sequence[ClassFits]
 def odds_of_change(
     gain: float, parts: Sequence[ClassFits], whole: ClassFits, blocks: Blocks, actuator: Actuator
 ) -> float:
-    """Return how much likelier a change of condition is than none.
+    """Return the odds of a change of condition against none.
 
     Without one, one circuit is there from end to end, or it goes elsewhere within its condition: after a change the
     circuit is in any of the nine conditions alike. Likelihoods count in `LASTING` blocks, as the gain does, and there

@@ -1,4 +1,4 @@
-"""Where in a log one circuit most likely gave way to another, by the derivatives of a fit to all of it.
+"""Most likely change point between two circuits, from the derivatives of a fit to the whole log.
 
 They give what two circuits would explain more than one for every time of change at once (the generalised likelihood
 ratio, linearised: Basseville and Nikiforov, Detection of Abrupt Changes, 1993, section 2.4.3), and to first order the
@@ -40,7 +40,7 @@ class Split(NamedTuple):
 
 
 def likeliest_split(blocks: Blocks, fit: PointFit) -> Split | None:
-    """Return the block at which one circuit most likely gave way to another, if that explains much more.
+    """Return the most likely change block between two circuits, if a change explains much more.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Without pressure: does the oil warm or cool within a log? A circuit whose leakage drifts against one that stays.
+"""Without pressure: does the oil warm or cool within a log? A circuit with drifting leakage against a constant one.
 
 Where pressure is logged, the balance of flows finds a leakage that drifts (`estimation.eha.changing_leakage`). Without,
 the circuit that explains the log best gets an eighth unknown, how far leakage drifts. Viscous friction falls as leakage
@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.eha.changing_leakage import changed_note
-from estimation.eha.explained import LEAKAGE_COURSE
+from estimation.eha.explanation_notes import LEAKAGE_COURSE
 from estimation.log_checks.clean import CleanLog
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
@@ -168,7 +168,7 @@ def with_course(log: CleanLog, found: Drift) -> tuple[CleanLog, Note]:
 
 
 def _searched(blocks: Blocks, none: Drift, moved: float, step: Array, condition: str, actuator: Actuator) -> Drift:
-    """Return where a search ends that begins so far from a circuit without a drift."""
+    """Return the end of a search that starts from a circuit with a given drift."""
     found = none
     for _ in range(ROUNDS):
         there = drifting(blocks, found.logarithm + moved)
@@ -184,7 +184,7 @@ def _searched(blocks: Blocks, none: Drift, moved: float, step: Array, condition:
 
 
 def _step(blocks: Blocks, found: Drift, actuator: Actuator) -> tuple[float, float, Array]:
-    """Return what the next step of a drift promises to gain, the step, and that of the coordinates.
+    """Return the predicted gain of the next step of a drift, the step, and that of the coordinates.
 
     All are moved at once (Gauss and Newton's step); the promise is that of the drift alone.
     """

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.fits.flow.log import MOST_LEAD
-from estimation.fits.greybox.course import SLOW
-from estimation.fits.greybox.speed_course import steady_bend
+from estimation.fits.greybox.intersample_doubt import SLOW
+from estimation.fits.greybox.intersample_speed import steady_bend
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
@@ -109,7 +109,7 @@ def led(blocks: Blocks, lead: float) -> Blocks:
 
 
 def open_beside(fit: PointFit, blocks: Blocks, actuator: Actuator) -> tuple[Array, Array]:
-    """Return what is unknown beside the coordinates of a circuit: what is seldom known, and a slow log's lead.
+    """Return the nuisance unknowns of a circuit: seldom known parameters, and a slow log's lead.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def spread_with_pressure(
 
 
 def _step(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float:
-    """Return by how much the lead should grow, all coordinates being free beside it [s]."""
+    """Return the step of the lead, with all coordinates free beside it [s]."""
     slopes = np.concatenate([fit.slopes, _slope(blocks, fit, actuator)[None]])[:, blocks.first :]
     weighted = np.where(blocks.seen, slopes / fit.scales, 0.0).reshape(len(slopes), -1)
     left = np.where(blocks.seen, left_of(fit, blocks) / fit.scales, 0.0).ravel()
@@ -177,7 +177,7 @@ def _step(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float:
 
 
 def _slope(blocks: Blocks, fit: PointFit, actuator: Actuator) -> Array:
-    """Return how the outputs answer the lead over the sample time, shape (n, outputs)."""
+    """Return the derivative of the outputs by the lead over the sample time, shape (n, outputs)."""
     rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
     ahead = led(blocks, blocks.lead + NUDGE * blocks.sample_time * blocks.between)
     return np.asarray((predicted(ahead, rows)[0] - predicted(blocks, rows)[0]) / NUDGE, dtype=np.float64)

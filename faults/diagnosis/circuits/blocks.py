@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.arrays import IntArray
-from estimation.eha.explained import LEAKAGE_COURSE
+from estimation.eha.explanation_notes import LEAKAGE_COURSE
 from estimation.log_checks.bridging import bridged, filled
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.dropout import long_gaps
@@ -132,7 +132,7 @@ class Blocks:
 
     @cached_property
     def counts(self) -> NDArray[np.intp]:
-        """How many they are, shape (outputs,)."""
+        """Number of valid values, shape (outputs,)."""
         return np.sum(self.seen, axis=0)
 
     @cached_property
@@ -142,17 +142,17 @@ class Blocks:
 
     @property
     def travel(self) -> float:
-        """How far the piston moves to and fro [m]."""
+        """Total travel of the piston to and fro [m]."""
         return float(np.ptp(self._gone))
 
     @cached_property
     def reach(self) -> float:
-        """How far the piston goes from where the log begins [m], to either side."""
+        """Largest distance of the piston from its start [m], to either side."""
         return float(np.max(np.abs(self._gone), initial=0.0))
 
     @cached_property
     def _gone(self) -> Array:
-        """How far the piston went until each block [m], through gaps as fast as beside them."""
+        """Distance of the piston up to each block [m], gaps bridged at the neighbouring speed."""
         known = bridged(self.velocity) if np.any(np.isfinite(self.velocity)) else np.zeros(len(self.velocity))
         return np.cumsum(known) * self.block * self.sample_time
 
@@ -242,7 +242,7 @@ def blocks_of(record: Record) -> Blocks:
 
 
 def _samples_in_one(record: Record) -> int:
-    """Return how many samples are averaged before a circuit follows them."""
+    """Return the number of samples in a block."""
     pooled = max(1, round(RATE / record.sample_time))
     if pooled == 1 or len(record) < 2 * pooled:
         return pooled

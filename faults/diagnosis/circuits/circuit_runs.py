@@ -159,7 +159,7 @@ def _at_once(rig: CircuitParameters) -> Array:
 
 
 def predicted(blocks: Blocks, rows: Array) -> Array:
-    """Return what circuits do under the logged motor speed.
+    """Return the outputs of circuits under the logged motor speed.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def predicted(blocks: Blocks, rows: Array) -> Array:
 
 @lru_cache(maxsize=2)
 def _brought(blocks: Blocks, width: int) -> tuple[Array, Array]:
-    """Return what the circuit before a change shows up to it, and the states that it leaves, each of one circuit.
+    """Return outputs up to a change and the states at it, each of one circuit.
 
     All that are tried after it begin there, so it is run once.
     """
@@ -203,7 +203,7 @@ def _brought(blocks: Blocks, width: int) -> tuple[Array, Array]:
 
 
 def _run(blocks: Blocks, starts: Array, rows: Array, since: int = 0) -> Array:
-    """Return what circuits do from a sample on, in which they are at some states, shape (m, blocks, outputs)."""
+    """Return the outputs of circuits from given states at a sample on, shape (m, blocks, outputs)."""
     groups = circuit_groups(starts, blocks.speed[since:], rows, blocks.sample_time, **_allowed(blocks))
     found, first = list[Array](), 0
     for states in groups:
@@ -221,7 +221,7 @@ def _allowed(blocks: Blocks) -> dict[str, float]:
 
 
 def _in_steps(blocks: Blocks, course: Array, rows: Array) -> Array:
-    """Return what circuits do whose leakage drifts in small steps, shape (m, blocks, outputs).
+    """Return the outputs of circuits whose leakage drifts in small steps, shape (m, blocks, outputs).
 
     Rows of parameters for every sample take some 50 MB and five times as long.
     """
@@ -239,7 +239,7 @@ def _in_steps(blocks: Blocks, course: Array, rows: Array) -> Array:
 
 
 def _after(until: int | IntArray, before: Array, rows: Array, samples: int) -> Array:
-    """Return what circuits are at each sample if another one ran up to a sample, shape (samples, m, parameters)."""
+    """Return the parameters per sample if another circuit ran up to a sample, shape (samples, m, parameters)."""
     ends = np.broadcast_to(until, len(rows))
     first, last = int(np.min(ends)), int(np.max(ends))
     found = np.empty((samples, *rows.shape))

@@ -91,7 +91,7 @@ class PointFit:
 
 @lru_cache(maxsize=2)
 def nominal_runs(blocks: Blocks, actuator: Actuator) -> Array:
-    """Return what the nine nominal circuits do under a log's motor speed, kept for what is asked of the log next.
+    """Return the runs of the nine nominal circuits under a log's motor speed, cached for the log.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def scales_of(blocks: Blocks, fitted: Array) -> Array:
 
 
 def least_scales(blocks: Blocks) -> Array:
-    """Return what a model leaves of a log at the least.
+    """Return the least residuals of any model of a log.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def least_scales(blocks: Blocks) -> Array:
 
 
 def least_misfit(blocks: Blocks) -> float:
-    """Return what `misfit` is at the least: of a model that leaves the sensors' noise alone.
+    """Return the least value of `misfit`: of a model that leaves only the sensors' noise.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def fit_freely(
 
 
 def _most_gained(promised: float, reach: float, gain: float) -> float:
-    """Return what a step gains at its best length, on the parabola through a trial of it.
+    """Return the gain of a step at its best length, on the parabola through a trial.
 
     It begins with a slope of twice what the whole step promises, and has gained so much at a share ``reach`` of it.
     """

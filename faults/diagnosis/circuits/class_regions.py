@@ -1,4 +1,4 @@
-"""How well does each condition explain a log? Fitted circuits are laid beside the conditions' regions.
+"""Score of each condition: fitted circuits compared with the conditions' regions.
 
 In a condition leakage, flow bias, friction and bulk modulus differ from the nominal ones as actuators of one kind do, a
 Gaussian region; integrating the likelihood over it in closed form (Laplace's method: MacKay, Information Theory, 2003,
@@ -60,7 +60,7 @@ PRESSURE_SCALE = np.array([-1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
 
 @dataclass(frozen=True, eq=False)
 class ClassFits:
-    """What the circuit model says about a log.
+    """Fits of the circuit model to a log.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class ClassFits:
 
     @property
     def told(self) -> Array:
-        """What the log tells of the coordinates where a lasting model error is counted, shape (7, 7) [dimensionless].
+        """Information on the coordinates, lasting model error included, shape (7, 7) [dimensionless].
 
         By it a circuit is judged to lie between the conditions. Intervals have `spread`, which is narrower where a
         model error lasts: with it more such circuits are seen on the lumped plant, but one more plain log in 150 is
@@ -124,7 +124,7 @@ class ClassFits:
         return self.spread + doubt_of_bends(self.information, self.moved)
 
     def apart(self, actuator: Actuator) -> Array:
-        """Return how well the log tells each condition from each other one, see `told_apart`.
+        """Return the separation of each pair of conditions by the log, see `told_apart`.
 
         Parameters
         ----------
@@ -256,7 +256,7 @@ def spread_of(fit: PointFit, information: Array, blocks: Blocks, centre: Array) 
 
 
 def lasting_misfit(fitted: Array, blocks: Blocks) -> float:
-    """Return how far what a model leaves of a log over a tenth of a second exceeds white noise of the sensors.
+    """Return the excess of a model's residual over 0.1 s above white sensor noise.
 
     Parameters
     ----------
@@ -293,7 +293,7 @@ def is_stuck(blocks: Blocks, actuator: Actuator) -> bool:
 
 
 def believed_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) -> Array:
-    """Return what a fit may be believed to know: residuals beyond the sensors' noise are a model error that lasts.
+    """Return the credible information of a fit: residuals beyond the sensors' noise count as lasting model error.
 
     Without pressure nothing is believed of `PRESSURE_SCALE`: motion is the same at twice the pressure, with half the
     leakage and twice the friction and bulk modulus, but for the inertia, which is less than a model's error.
@@ -323,7 +323,7 @@ def believed_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) 
 
 
 def how_near(fits: ClassFits, blocks: Blocks, actuator: Actuator) -> float:
-    """Return how well the condition that is nearest to a log holds it.
+    """Return the score of the condition nearest to a log.
 
     Without pressure searches from several conditions end at circuits that follow a log nearly alike, some within a
     condition and some far from all. A log is outside only where each is, or explains so much less.

@@ -1,4 +1,4 @@
-"""How friction goes with speed differs from seal to seal: what a slow log leaves open of friction at rated speed.
+"""Friction varies with speed differently from seal to seal: the doubt about friction at rated speed in a slow log.
 
 A circuit's friction has three parts (at rest, quadratic, whole at rated velocity). That of real seals falls from rest
 on as oil is drawn under them (Stribeck), and rises by another power than one or two. Friction at rated velocity is read
@@ -38,7 +38,7 @@ FORCES = [at for at, name in enumerate(COORDINATES) if name.startswith("friction
 
 
 def bent_by(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
-    """Return how a fit gives way to bends of the law of friction that it does not know.
+    """Return the response of a fit to unknown bends of the friction law.
 
     A search lays the three parts through what friction was at the velocities reached. What a bend adds there moves them
     as it moves a regression. Nothing is concluded of the bend from what is left of the log: a piston that turns leaves
@@ -70,7 +70,7 @@ def bent_by(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
 
 
 def told_of_bent(information: Array, moved: Array) -> Array:
-    """Return what a log tells of a circuit whose law of friction may be bent.
+    """Return the information of a log on a circuit whose friction law may be bent.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def told_of_bent(information: Array, moved: Array) -> Array:
 
 
 def doubt_of_bends(information: Array, moved: Array) -> Array:
-    """Return what bends add to the covariance of a circuit's coordinates.
+    """Return the covariance that bends of the friction law add to a circuit's coordinates.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ class _Load:
 def load_for_offset(
     blocks: Blocks, actuator: Actuator, nearest: str, without: PointFit, offset: float, gain: float
 ) -> Note | None:
-    """Return what is said in place of an offset of motor speed where a load on the rod explains a log as well.
+    """Return the note that replaces an offset of motor speed if a load on the rod explains a log as well.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def load_for_offset(
 def _fitted(
     load: _Load, blocks: Blocks, actuator: Actuator, nearest: str, without: PointFit
 ) -> tuple[float, float, PointFit]:
-    """Return what log-likelihood gains under a load, its entry in the rig file [SI], and the circuit."""
+    """Return the gain in log-likelihood under a load, its entry in the rig file [SI], and the circuit."""
     rig = float(getattr(actuator.circuit, load.entry))
 
     def under(value: float) -> CircuitParameters:

@@ -1,4 +1,4 @@
-"""How far off may a fitted circuit be? The doubt of severities where pressure is logged.
+"""Model error of a fitted circuit: the doubt of severities when pressure is logged.
 
 A circuit that is fitted to a log has the rig's seals, make-up valves, mass and accumulator, and a judged share of its
 leakage in the pump. Where those are others, what is fitted gives way. So they are unknowns beside the fitted ones for
@@ -83,7 +83,7 @@ def distrust(fit: PointFit, blocks: Blocks) -> float:
 
 
 def spreads_of(actuator: Actuator) -> Array:
-    """Return how far off what is seldom known may be of an actuator.
+    """Return the prior deviations of an actuator's seldom known parameters.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def spreads_of(actuator: Actuator) -> Array:
 
 
 def seldom_known_slopes(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
-    """Return how the outputs answer `SELDOM_KNOWN` and the force on the rod, by one run of circuits side by side.
+    """Return the derivatives of the outputs by `SELDOM_KNOWN` and rod force, from one run of circuits side by side.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def lasting_power(left: Array) -> Array:
 
 
 def left_of(fit: PointFit, blocks: Blocks) -> Array:
-    """Return what a fit leaves of the blocks that count, shape (n, outputs) [m/s, Pa]; NaN where unknown."""
+    """Return the residuals of a fit on the blocks that count, shape (n, outputs) [m/s, Pa]; NaN where unknown."""
     return (blocks.outputs - fit.fitted)[blocks.first :]
 
 
@@ -239,7 +239,7 @@ def model_error(left: Array, blocks: Blocks) -> Array:
 
 
 def near_by(left: Array, seen: NDArray[np.bool_]) -> Array:
-    """Return how large residuals are about each block, in variance, over all of the log.
+    """Return the local variance of residuals around each block, over that of the whole log.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def near_by(left: Array, seen: NDArray[np.bool_]) -> Array:
 
 
 def taken_back(slopes: Array, seen: NDArray[np.bool_]) -> Array:
-    """Return by how much less a position's noise pulls at a fit than white noise of its velocity would.
+    """Return the reduction of a position's noise in a fit against white noise of its velocity.
 
     Mean velocity over a block is a difference of two positions. The error of the one between two blocks counts in both,
     with opposite signs: neighbours have a correlation of -1/2, and nothing of it lasts.

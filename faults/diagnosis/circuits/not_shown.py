@@ -1,4 +1,4 @@
-"""Which parts of a circuit a log says nothing of: their values are those of the belief before it.
+"""Parts of a circuit that a log does not determine; their values are the prior's.
 
 See decision 302.
 """

@@ -1,4 +1,4 @@
-"""Where a log leaves two classes open, its severities hold the circuits of both.
+"""If a log leaves two classes open, its severities cover the circuits of both.
 
 A log whose piston moves at a fifth of its rated velocity may be followed nearly as well by friction that rises with the
 velocity's square as by friction that does not. The fit that explains it best then says little of friction at rated

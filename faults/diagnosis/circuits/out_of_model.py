@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.eha.rig_share import SOFT
-from estimation.fits.greybox.averaged import samples_a_block
+from estimation.fits.greybox.block_averages import samples_a_block
 from faults.conditions import CONDITIONS, severity
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.beside import beside_note
@@ -74,7 +74,7 @@ loads on the rod 13 to 57."""
 
 
 def reasons_against(blocks: Blocks, fits: ClassFits, region: float, actuator: Actuator) -> list[Note]:
-    """Return what speaks against a log being in any of the nine conditions.
+    """Return the reasons against all nine conditions.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def sticks_and_slips(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
 
 
 def _left_longer(blocks: Blocks, fit: PointFit) -> float:
-    """Return what a circuit leaves of the mean velocity over `EARLIER`, root mean square [m/s]."""
+    """Return the residual of a circuit in mean velocity over `EARLIER`, root mean square [m/s]."""
     left = (blocks.velocity - fit.fitted[:, 0])[blocks.first :]
     together = samples_a_block(blocks.block * blocks.sample_time, EARLIER)
     parts = left[: len(left) // together * together].reshape(-1, together)

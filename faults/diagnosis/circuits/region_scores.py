@@ -1,4 +1,4 @@
-"""How well the nine conditions' regions hold a fitted circuit, and how far a log tells them apart.
+"""Scores of the nine conditions' regions for a fitted circuit, and how far a log separates them.
 
 A region is Gaussian in the logarithms of what is fitted, as actuators of one kind differ in them. So is a log's
 likelihood where it is narrow. Where it is wide, the forces of friction count: pressure is linear in them.
@@ -13,7 +13,7 @@ from plant.arrays import Array
 
 
 def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Array:
-    """Return how well each condition's region holds a fitted circuit: the log of the likelihood over the region.
+    """Return the score of each condition's region for a fitted circuit: the log of the likelihood over the region.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Arra
 
 
 def scores_in_forces(fit: PointFit, told: Array, actuator: Actuator) -> Array:
-    """Return how well each condition's region holds a fitted circuit, where friction counts as forces.
+    """Return the score of each condition's region for a fitted circuit, with friction as forces.
 
     Pressure is linear in the forces of friction and not in their logarithms: a quadratic part that a slow log tells to
     900 N more or less may be 100 N or 1900 N, and both lie one deviation off.
@@ -59,7 +59,7 @@ def scores_in_forces(fit: PointFit, told: Array, actuator: Actuator) -> Array:
 
 
 def told_apart(spread: Array, actuator: Actuator) -> Array:
-    """Return how well a log tells each condition from each other one, as an expected log-likelihood ratio.
+    """Return the separation of each pair of conditions by a log, as an expected log-likelihood ratio.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def told_apart(spread: Array, actuator: Actuator) -> Array:
 
 
 def apart_in_forces(fit: PointFit, spread: Array, actuator: Actuator) -> Array:
-    """Return how well a log tells each condition from each other one, where friction counts as forces.
+    """Return the separation of each pair of conditions by a log, with friction as forces.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def apart_in_forces(fit: PointFit, spread: Array, actuator: Actuator) -> Array:
 
 
 def _in_forces(fit: PointFit, actuator: Actuator) -> tuple[Array, Array]:
-    """Return how far a circuit is off each condition, and what a logarithm counts there; forces over the circuit's."""
+    """Return the offset of a circuit from each condition and the weight of a logarithm; forces over the circuit's."""
     off = fit.coordinates - actuator.conditions
     sizes = np.ones_like(off)
     sizes[:, FORCES] = np.exp(-off[:, FORCES])

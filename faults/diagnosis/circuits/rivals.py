@@ -1,4 +1,4 @@
-"""Rival circuits of one log: each level of friction is tried, and one is better only as far as the log can tell.
+"""Rival circuits of one log, one per level of friction, compared as far as the log can separate them.
 
 A piston that creeps on its seals, sticks and slips is followed by no circuit to the sensors' noise: when it breaks
 loose rests on the seals' law, which is known roughly. The misfit has many minima then, and a search that begins at
@@ -70,7 +70,7 @@ def creeps(blocks: Blocks, fit: PointFit) -> bool:
 
 
 def doubts_left(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[Note, ...]:
-    """Return what speaks against a log: no fit of motion where it begins in motion, leakage drifts, or a stop shows.
+    """Return the objections left beside a circuit; a failed motion fit is none if its form lacks what the log shows.
 
     The motion form knows none of these. A circuit, whose beginning does not count, says how the piston moves.
 
@@ -123,7 +123,7 @@ def other_friction(blocks: Blocks, actuator: Actuator, best: PointFit, condition
 
 
 def behind(fits: Sequence[PointFit], best: PointFit, blocks: Blocks) -> Array:
-    """Return how far each fit is behind the best: log-likelihood ratios that know how well any circuit follows the log.
+    """Return the log-likelihood ratio of each fit to the best, scaled by how well any circuit follows the log.
 
     Where the better of two follows the piston, the log is looked at once in `LASTING` blocks. Where it follows it
     roughly, a wrong model's error decides between the two, and of that a log gives `LOOKS` looks; an output that it
@@ -167,7 +167,7 @@ def _roughness(blocks: Blocks, scales: Array, noise: Array) -> Array:
 
 
 def between_fits(fits: Sequence[PointFit], best: PointFit, worse: Array) -> Array:
-    """Return what other ends of a search, which explain the log nearly as well, add to the doubt of the best.
+    """Return the covariance that near-equal other ends of a search add to the best.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ def _by_trapezia(record: Record, blocks: Blocks) -> Array:
 
 
 def _between_samples(record: Record, blocks: Blocks) -> float:
-    """Return how far the means of sampled velocities are off those of velocity itself, root mean square [m/s].
+    """Return the sampling error of block means of velocity, root mean square [m/s].
 
     Between two samples velocity changes at a moment that no sample tells, so that a sample stands for too much or too
     little of it: by a share of the change that is even between 0 and 1. Changes that are noise count there already.

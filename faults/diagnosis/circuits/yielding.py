@@ -1,4 +1,4 @@
-"""How much of a velocity a circuit may leave: of any, and of a piston that hardly moves and yields on its seals."""
+"""Largest residual velocity that a circuit may have, in general and for a piston that only yields on its seals."""
 
 import math
 

@@ -166,7 +166,7 @@ class _Writer:
 
 
 def operations_of(outputs: Mapping[str, Expression]) -> Counter[str]:
-    """Return how many operations a graph takes at most.
+    """Return the largest number of operations that a graph can take.
 
     Parameters
     ----------

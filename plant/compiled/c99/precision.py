@@ -27,7 +27,7 @@ class Precision:
     digits: int
 
     def literal(self, value: float) -> str:
-        """Return how C spells a number.
+        """Return the C literal of a number.
 
         Parameters
         ----------
@@ -47,7 +47,7 @@ class Precision:
         return (text if any(mark in text for mark in ".e") else f"{text}.0") + self.literal_suffix
 
     def function(self, name: str) -> str:
-        """Return how C spells a function of ``math.h``."""
+        """Return the C name of a function of ``math.h``."""
         return name + self.function_suffix
 
 

@@ -1,4 +1,4 @@
-"""What names of a translated loop stand for: numbers, and arrays whose shapes are known when C is written."""
+"""Meaning of names in a translated loop: numbers, and arrays whose shapes are known when C is written."""
 
 from dataclasses import dataclass
 from math import prod
@@ -71,7 +71,7 @@ Thing: TypeAlias = "Scalar | Block | Group"
 
 
 def kind_of(thing: Thing) -> object:
-    """Return what two things have in common that one translated function serves.
+    """Return the kind of a thing; one translated function serves all things of a kind.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def members(name: str, thing: Thing) -> list[tuple[str, "Scalar | Block"]]:
 
 
 def received(name: str, thing: Thing) -> Thing:
-    """Return what a thing is called inside the function that receives it.
+    """Return a thing under its name inside the function that receives it.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class Values:
         self.counted = Counter[str]()
 
     def thing(self, node: ast.expr) -> Thing:
-        """Return what an expression is."""
+        """Return the number, array or tuple that an expression stands for."""
         match node:
             case ast.Name(id=name) if name in self.names:
                 return self.names[name]

@@ -129,7 +129,7 @@ def view(scope: Scope, value: Held, items: Sequence[Held]) -> Held:
 
 
 def _ends(scope: Scope, length: str, item: Held) -> tuple[str, str]:
-    """Return where a slice begins and ends; it ends with its axis at the latest."""
+    """Return the begin and end of a slice; it ends with its axis at the latest."""
     begin, end = item.parts
     begin = begin or "0"
     if is_literal(begin) and int(begin) < 0:
@@ -201,7 +201,7 @@ def address(scope: Scope, value: Held) -> Held:
 
 
 def size(scope: Scope, value: Held) -> Held:
-    """Return how many elements an array has."""
+    """Return the number of elements of an array."""
     count = "1"
     for length in value.lengths:
         count = scope.whole("mul", count, length)

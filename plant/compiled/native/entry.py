@@ -23,7 +23,7 @@ _CODES = {FLOAT: "d", INT: "q", BOOL: "q", COMPLEX: "dd"}
 
 
 def _code(kind: AnyKind) -> str:
-    """Return how a kind's parts are packed."""
+    """Return the packing codes of a kind's parts."""
     match kind:
         case ScalarKind():
             return _CODES[kind]
@@ -218,7 +218,7 @@ class Entry:
 
 
 def _through_object(array: Any) -> int:
-    """Return where an array's numbers lie: NumPy keeps that first in an array, behind Python's own head."""
+    """Return the address of an array's data, which NumPy keeps right behind Python's object header."""
     return _WORD.from_address(id(array) + object.__basicsize__).value
 
 
@@ -232,7 +232,7 @@ _address: Callable[[Any], int] = (
 
 
 def _dtype(kind: AnyKind) -> Any:
-    """Return what an array's numbers are, of an array."""
+    """Return the data type of an array's elements; None of any other kind."""
     return _DTYPES[kind.element] if isinstance(kind, ArrayKind) else None
 
 

@@ -55,7 +55,7 @@ def _binary(scope: Scope, node: ast.BinOp) -> Held:
 
 
 def combined(scope: Scope, operator: ast.operator, a: Held, b: Held) -> Held:
-    """Return what an operator makes of numbers, or of arrays element by element."""
+    """Return the result of an operator on numbers, or on arrays element by element."""
     if isinstance(a.kind, Several) and isinstance(b.kind, Several) and isinstance(operator, ast.Add):
         return several([*a.items, *b.items])
     if not isinstance(a.kind, ArrayKind) and not isinstance(b.kind, ArrayKind):
@@ -127,7 +127,7 @@ def _conditional(scope: Scope, node: ast.IfExp) -> Held:
 
 
 def _merged(scope: Scope, ends: Sequence[tuple[Held, int]], done: str, outside: dict[str, Held]) -> Held:
-    """Return what either branch has computed; what each still lacks is put in before its jump."""
+    """Return the value of either branch; each branch stores its own before its jump."""
     kind = joined("a choice", ends[0][0].kind, ends[1][0].kind)
     places = [scope.room(part) for part in kind.parts]
     for value, at in reversed(ends):
@@ -190,7 +190,7 @@ def _item(scope: Scope, value: Held, index: Held) -> Held:
 
 
 def place_of(scope: Scope, node: ast.Subscript) -> tuple[Held, list[Held]]:
-    """Return what is indexed, and the indices."""
+    """Return the indexed value, and the indices."""
     value = read(scope, node.value)
     parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
     return value, [read(scope, part) for part in parts]

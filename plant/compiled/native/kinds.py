@@ -67,7 +67,7 @@ class ArrayKind:
 
     @property
     def name(self) -> str:
-        """How an error spells it."""
+        """Name in error messages."""
         return f"array of {self.element.name}, {self.rank}-dimensional"
 
 
@@ -81,7 +81,7 @@ class Slice:
 
 @dataclass(frozen=True)
 class Range:
-    """What a loop counts through: begin, end, step."""
+    """Range of a loop: begin, end, step."""
 
     parts: tuple[str, ...] = ("i64", "i64", "i64")
     name: str = "range"
@@ -107,7 +107,7 @@ class Several:
 
     @property
     def name(self) -> str:
-        """How an error spells it."""
+        """Name in error messages."""
         return f"({', '.join(item.name for item in self.items)})"
 
 
@@ -145,7 +145,7 @@ class Held:
 
     @property
     def items(self) -> "tuple[Held, ...]":
-        """What a tuple holds."""
+        """Items of a tuple."""
         if not isinstance(self.kind, Several):
             raise KernelError(f"a tuple is wanted, got {self.kind.name}")
         found: list[Held] = []
@@ -170,7 +170,7 @@ def several(values: "tuple[Held, ...] | list[Held]") -> Held:
 
 
 def double(number: float) -> str:
-    """Return how a number is spelt, to the bit.
+    """Return the hexadecimal text of a number, exact to the bit.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def number(value: object) -> Held:
 
 
 def is_literal(part: str) -> bool:
-    """Return whether a whole number is known while the kernel is compiled."""
+    """Return whether a whole number is a constant when the kernel is compiled."""
     return part.lstrip("-").isdigit()
 
 

@@ -30,7 +30,7 @@ def binding() -> Any:
 
 @cache
 def target() -> str:
-    """Return what machine code depends on beside its kernel: LLVM, the processor, how hard it is optimised."""
+    """Return what machine code depends on beside its kernel: LLVM, processor and optimisation level."""
     llvm = binding()
     features = llvm.get_host_cpu_features().flatten()
     version = ".".join(map(str, llvm.llvm_version_info))
@@ -42,7 +42,7 @@ def target() -> str:
 
 @cache
 def native_width() -> int:
-    """Return how many numbers stand in one of the processor's vectors."""
+    """Return the number of doubles in one of the processor's vectors."""
     features = binding().get_host_cpu_features()
     return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
 

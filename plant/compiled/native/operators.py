@@ -68,7 +68,7 @@ def truth(scope: Scope, value: Held) -> str:
 
 
 def strides(scope: Scope, value: Held) -> list[str]:
-    """Return how far an array's elements stand apart along its axes [elements]."""
+    """Return the strides of an array along its axes [elements]."""
     kind = value.array
     if not kind.packed:
         return list(value.parts[1 + kind.rank :])
@@ -83,7 +83,7 @@ def _floating(scope: Scope, name: str, a: str, b: str) -> str:
 
 
 def arithmetic(scope: Scope, operator: ast.operator, a: Held, b: Held) -> Held:
-    """Return what an operator makes of two numbers, as Python does it; a division by zero gives no error."""
+    """Return the result of an operator on two numbers, as in Python; a division by zero raises no error."""
     kind = type(operator)
     if COMPLEX in (a.kind, b.kind):
         return _complex(scope, kind, a, b)

@@ -284,7 +284,7 @@ def _packed(kind: AnyKind) -> bool:
 
 
 def _hints(node: ast.FunctionDef) -> tuple[str, bool]:
-    """Return how freely arithmetic may be rearranged, and whether a function is a part of whoever calls it."""
+    """Return the flags by which arithmetic may be rearranged, and whether a function is inlined."""
     flags: set[str] = set()
     inlined = False
     for decorator in node.decorator_list:

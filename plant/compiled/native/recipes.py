@@ -98,7 +98,7 @@ def _joined(things: Iterable[object]) -> str | None:
 
 
 def _place(thing: type | FunctionType) -> str | None:
-    """Return where a class or function stands, if it is found there."""
+    """Return the import path of a class or function, if it is found there."""
     if thing.__module__.partition(".")[0] not in PACKAGES:
         return None
     there = getattr(sys.modules.get(thing.__module__), thing.__qualname__, None)

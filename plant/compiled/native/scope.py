@@ -11,7 +11,7 @@ from plant.compiled.native.kinds import BOOL, INT, AnyKind, Held, KernelError, i
 
 
 class Program(Protocol):
-    """What a function asks of the kernel that it is part of."""
+    """Interface of a kernel to its functions."""
 
     constants: dict[str, Held]
 
@@ -33,7 +33,7 @@ class Program(Protocol):
 
 
 def family(kind: AnyKind) -> str:
-    """Return what a variable is for good: a truth, a number, an array, a slice, a tuple."""
+    """Return the lasting kind of a variable: boolean, number, array, slice or tuple."""
     return type(kind).__name__ + (kind.name if kind == BOOL else "")
 
 

@@ -1,4 +1,4 @@
-"""What a kernel takes, read off its documentation: kinds of its arguments, and the shapes that are checked.
+"""Signature of a kernel, read from its documentation: kinds of its arguments, and their checked shapes.
 
 The parameters' section of a numpydoc text says it all: ``drive : ndarray, shape (n,)``. So shapes are said once.
 """
@@ -101,7 +101,7 @@ def _length(text: str) -> Length:
 
 
 def signature_of(function: Callable[..., object], **lengths: int) -> Signature:
-    """Return what a documented function takes.
+    """Return the signature of a documented function.
 
     Parameters
     ----------

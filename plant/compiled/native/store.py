@@ -78,7 +78,7 @@ def _own(path: Path) -> bytes | None:
 
 @cache
 def _refused(folder: Path) -> bool:
-    """Return whether what is in a folder may not be run, and say so once."""
+    """Return whether the kernels in a folder must not be run, with one warning if so."""
     try:
         found = folder.stat()
     except OSError:

@@ -43,7 +43,7 @@ class Timed:
 
     @property
     def name(self) -> str:
-        """What a note calls it."""
+        """Name in notes: the label, else the file's name."""
         return self.label or self.source.replace("\\", "/").rsplit("/", 1)[-1]
 
 

@@ -75,7 +75,7 @@ def is_stamp(cell: str) -> bool:
 
 @lru_cache(maxsize=64)
 def _shaped(text: str) -> bool:
-    """Return whether a stamp looks so; no pattern asks which digit it is, and all stamps of a column look alike."""
+    """Return whether a text with masked digits has the form of a stamp; all stamps of a column look alike."""
     return any(one.fullmatch(text) for one in (*_PATTERNS, _MINUTES))
 
 
@@ -135,7 +135,7 @@ def _all_alike(cells: Sequence[str]) -> Stamps | None:
 
 
 def _offset(zone: str) -> int:
-    """Return by how much a zone is ahead of universal time [ns]; one that is only named is the log's own."""
+    """Return the offset of a zone from universal time [ns]; a zone that is only named is the log's own."""
     if zone[:1] not in ("+", "-"):
         return 0
     digits = zone[1:].replace(":", "").ljust(4, "0")
@@ -143,7 +143,7 @@ def _offset(zone: str) -> int:
 
 
 def _months_first(cells: Sequence[str]) -> bool:
-    """Return whether 3/4/2026 is in March: American, unless no month has that number, or days would be months apart."""
+    """Return whether 3/4/2026 is in March: yes, unless no month has that number, or days would be months apart."""
     found = (_EITHER.fullmatch(cell.strip()) for cell in cells)
     days = {(int(one["one"]), int(one["two"]), int(one["Y"])) for one in found if one}
     if any(one > 12 for one, _, _ in days) or any(two > 12 for _, two, _ in days):
@@ -154,7 +154,7 @@ def _months_first(cells: Sequence[str]) -> bool:
 
 
 def _months_apart(days: Sequence[tuple[int, int, int]]) -> int:
-    """Return how far apart days are, as year, month and day, in units of which a month has 31."""
+    """Return the span of days given as year, month and day, with 31 days in every month."""
     counted = [372 * year + 31 * month + day for year, month, day in days]
     return max(counted, default=0) - min(counted, default=0)
 

@@ -206,7 +206,7 @@ def _not_increasing(time: Array, source: str) -> LogError:
 
 
 def _own_times(channels: Channels) -> bool:
-    """Return whether some channel was logged at times of its own, in rows that the fastest one is missing in."""
+    """Return whether a channel was logged at times of its own, in rows where the fastest one is missing."""
     there = {name: np.isfinite(values) for name, values in channels.items()}
     fastest = max(there.values(), key=np.count_nonzero)
     if np.all(fastest) or np.count_nonzero(fastest) < FEWEST_SAMPLES:
@@ -239,7 +239,7 @@ def _merged(time: Array, channels: Channels, source: str, notes: list[Note]) -> 
 
 
 def _whole_ticks(time: Array) -> Array | None:
-    """Return how many sample times each step takes; None if one is no whole number of them, within 1 %."""
+    """Return the number of sample times in each step; None if one is not a whole number within 1 %."""
     step = np.diff(time)
     if step.min() <= 0.0:
         return None
@@ -263,7 +263,7 @@ def _agrees(time: Array, clock: Clock) -> bool:
 
 
 def _resolution(time: Array, sample_time: float) -> float:
-    """Return what rounding of the times themselves to floats can look like, in sample times."""
+    """Return the largest apparent jitter from rounding of times to floats, in sample times."""
     return 4.0 * float(np.spacing(np.abs(time[[0, -1]]).max())) / sample_time
 
 

@@ -1,4 +1,4 @@
-"""What a cell of a text log holds: a number, one with its unit, a stamp, or a word for nothing measured."""
+"""Contents of a cell in a text log: a number, one with its unit, a stamp, or a word for nothing measured."""
 
 import re
 from functools import lru_cache
@@ -18,7 +18,7 @@ _MEASURED = re.compile(rf"(?P<number>{_DIGITS})\s*(?P<unit>[^\W\d_].*|[%°\[].*)
 
 
 def is_value(cell: str) -> bool:
-    """Return whether a cell is what rows hold: a number with or without a unit, a stamp, or a word for no value."""
+    """Return whether a cell is data: a number with or without a unit, a stamp, or a word for no value."""
     text = cell.strip()
     if not text or len(text) > 60:
         return False

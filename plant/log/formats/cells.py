@@ -108,7 +108,7 @@ def numbers(values: NDArray[Any], name: str, source: str) -> Array:
 
 
 def values_of(name: str, given: Any, source: str) -> Any:
-    """Return what a user has for a column as an array, masked values as missing ones.
+    """Return a user's column as an array, masked values as missing ones.
 
     Parameters
     ----------

@@ -92,7 +92,7 @@ def _text(path: Path, layout: Layout, errors: str = "replace") -> Generator[Text
 
 
 def _source(path: Path, layout: Layout) -> Path | bytes:
-    """Return what pyarrow reads: the file itself where it can, since it reads that in parallel; else its text in UTF-8.
+    """Return the input for pyarrow: the file itself, which it reads in parallel, or else its text in UTF-8.
 
     No thread of pyarrow may call Python back: an error raised there, as of too large a file, ends or hangs the process.
     """
@@ -157,7 +157,7 @@ def _refused(row: int, cell: str) -> Exception:
 
 
 def _lines_if_quoted(source: Path | bytes, layout: Layout) -> int | None:
-    """Return how many lines with anything in them are below the header; None where no quote is."""
+    """Return the number of non-blank lines below the header; None if they have no quote."""
     with source.open("rb") if isinstance(source, Path) else io.BytesIO(source) as file:
         for _ in range(layout.skipped):
             file.readline()

@@ -84,7 +84,7 @@ def read_cells(
 
 
 def _are_names(cells: Sequence[str], names: Sequence[str]) -> bool:
-    """Return whether a row is the header again; a column without a name has got its number."""
+    """Return whether a row repeats the header; a column without a name has its number as name."""
     if cells[0] not in (names[0], "") or len(cells) != len(names):
         return False
     return [cell.strip() or f"column {place + 1}" for place, cell in enumerate(cells)] == list(names)
@@ -99,7 +99,7 @@ class _Row(NamedTuple):
 
     @property
     def said(self) -> str:
-        """What a note shows of it."""
+        """Excerpt of the row for a note."""
         return ", ".join(cell.strip() for cell in self.cells)[:SHOWN]
 
 
@@ -285,7 +285,7 @@ class _Body:
 
 
 def _is_header(cells: Sequence[str]) -> bool:
-    """Return whether a row holds no number but different texts, as names of columns are."""
+    """Return whether a row looks like a header: different texts and no number."""
     texts = {cell.strip() for cell in cells} - set(MISSING)
     return len(texts) > 1 and not any(map(is_value, texts))
 

@@ -91,7 +91,7 @@ class Cells:
             raise thousands_error(column.name, self.parted[thousands[0]], source)
 
     def _whole_beside(self) -> bool:
-        """Return whether many cells are decimals with the other sign, and all beside them whole numbers."""
+        """Return whether many cells are decimals with the other decimal sign, and all others whole numbers."""
         many = len(self.parted) > MOST_STRANGE * len(self.values)
         if not many or not all(map(_DECIMAL.fullmatch, self.parted.values())):
             return False

@@ -1,4 +1,4 @@
-"""How a text log is written: encoding, what separates cells, decimal comma, lines above the header, row of units."""
+"""Layout of a text log: encoding, delimiter, decimal comma, lines above the header, row of units."""
 
 import csv
 import io
@@ -49,7 +49,7 @@ _WIDEST = 10_000
 
 @dataclass(frozen=True)
 class Layout:
-    """How a text log is written.
+    """Layout of a text log.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def cells_of(line: str, delimiter: str) -> list[str]:
 
 
 def layout_of(path: Path) -> Layout:
-    """Return how a text log is written, told by its first lines.
+    """Return the layout of a text log, from its first lines.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def _encoding(start: bytes, source: str) -> str:
 
 
 def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
-    """Return how a text log is written.
+    """Return the layout of a text log.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def _of_twincat(lines: Sequence[str], encoding: str, source: str) -> Layout | No
 
 
 def _header_parts_at_commas(lines: Sequence[str], block: "_Block") -> bool:
-    """Return whether rows that read as one number each have the commas of the line above: `0,1` is two cells then."""
+    """Return whether rows that read as one number have as many commas as the line above: `0,1` is two cells then."""
     first, (cell, *others) = block.rows[0]
     above = next((line for line in reversed(lines[:first]) if line.strip()), "")
     commas = above.count(",")
@@ -244,7 +244,7 @@ class _Block:
 
     @property
     def score(self) -> float:
-        """How much of a layout reads as numbers, by rows and columns; blanks separate only if nothing else does."""
+        """Score of a layout, by its numeric rows and columns; blanks separate only if nothing else does."""
         wide = sum(self.numeric)
         likes = 0.5 if self.delimiter in (BLANKS, "|") else 1.0
         if not self.rows or (wide < 2 and len(self.numeric) > 1):

@@ -1,4 +1,4 @@
-"""What some programs write above the rows of a text log: units, the time step, and a clock for each channel."""
+"""Headers of some programs above the rows of a text log: units, the time step, a clock for each channel."""
 
 import re
 from collections.abc import Sequence

@@ -103,7 +103,7 @@ def format_of(path: Path) -> str:
 
 
 def _in_zip(path: Path) -> str:
-    """Return what an archive holds: NumPy's arrays, a sheet of OpenDocument, or, for all others, Excel's."""
+    """Return the format of a zip archive: NumPy's arrays, a sheet of OpenDocument, or else one of Excel."""
     try:
         with ZipFile(path) as archive:
             names = archive.namelist()
@@ -115,7 +115,7 @@ def _in_zip(path: Path) -> str:
 
 
 def _by_suffix(path: Path, start: bytes) -> str:
-    """Return what a file is taken for that no first bytes tell: text where it is text."""
+    """Return the format of a file that its first bytes do not identify: by its suffix, unless it is text."""
     kind = SUFFIXES.get(path.suffix.lower(), "csv")
     text = start.removeprefix(b"\xef\xbb\xbf").lstrip()
     if kind == "csv" and re.match(rb"<(?:\?xml|!doctype|html|table)\b", text, re.IGNORECASE):

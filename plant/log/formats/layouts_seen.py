@@ -74,7 +74,7 @@ def remember(start: bytes, lines: int, layout: "Layout") -> None:
 
 
 def _plain(start: bytes, header: bytes, layout: "Layout", lines: int) -> bool:
-    """Return whether all lines that would be looked at, but those above the data, are rows of plain numbers."""
+    """Return whether all inspected lines below the header are rows of plain numbers."""
     wanted = lines - layout.skipped
     found = _rows(len(layout.headings), wanted).match(start, len(header))
     if found is None:

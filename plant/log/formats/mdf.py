@@ -97,7 +97,7 @@ def _clock(group: Any, master: int | None) -> tuple[str, str | None]:
 
 
 def _names(group: Any) -> list[str]:
-    """Return what channels are called: without their device, unless two then have one name."""
+    """Return the names of channels, without their device unless two would then share a name."""
     short = Counter(_last(one.name) for one in group.channels)
     return [_last(one.name) if short[_last(one.name)] == 1 else one.name for one in group.channels]
 

@@ -42,7 +42,7 @@ def require_regular(path: Path) -> None:
 
 
 def most_unpacked(size: int) -> int:
-    """Return how many bytes a file may unpack to.
+    """Return the largest size to which a file may unpack.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class Unpacked(io.RawIOBase):
 
 
 def packing_of(path: Path) -> str | None:
-    """Return how a file is packed, ``gzip`` or ``zstd``, by its first bytes; None where it is not."""
+    """Return the compression of a file, ``gzip`` or ``zstd``, by its first bytes; None without one."""
     with path.open("rb") as file:
         start = file.read(4)
     return "gzip" if start.startswith(GZIP) else "zstd" if start == ZSTD else None
@@ -137,7 +137,7 @@ def opened(path: Path) -> BinaryIO:
 
 
 def inflated(content: "bytes | memoryview", most: int, source: str) -> bytes:
-    """Return what zlib packed.
+    """Return the decompressed content of zlib data.
 
     Raises
     ------

@@ -77,7 +77,7 @@ def _in_parts(path: Path, file: Any, chosen: Sequence[Column], before: Sequence[
 
 
 def _before(names: Sequence[str]) -> list[int]:
-    """Return how many columns before each have its name."""
+    """Return for each column how many before it have the same name."""
     seen, out = Counter[str](), list[int]()
     for name in names:
         out.append(seen[name])

@@ -64,7 +64,7 @@ def _number(value: Any) -> float | None:
 
 
 def _offset(value: Any) -> float:
-    """Return by how much the first sample is later than the beginning [s]."""
+    """Return the delay of the first sample after the beginning [s]."""
     try:
         offset = float(value)
     except (TypeError, ValueError):

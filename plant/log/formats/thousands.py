@@ -84,7 +84,7 @@ def decimal_point_of(numbers: Iterable[str]) -> str:
 
 
 def groups_thousands(cells: Sequence[str]) -> bool:
-    """Return whether a column holds whole numbers such as 998 and 1,002.
+    """Return whether a column holds whole numbers with separated thousands, such as 998 and 1,002.
 
     Decimals leave other counts of digits behind the comma, or a zero before it.
 
@@ -105,12 +105,12 @@ def groups_thousands(cells: Sequence[str]) -> bool:
 
 
 def is_grouped(cell: str) -> bool:
-    """Return whether a cell is a number of thousands, or of ones with three decimals: 1.002, not 0.998 or 1.02."""
+    """Return whether a cell may have separated thousands, or three decimals: 1.002, not 0.998 or 1.02."""
     return _GROUPED.fullmatch(cell) is not None
 
 
 def may_group_thousands(values: Array) -> bool:
-    """Return whether numbers, read as decimals, can be whole ones such as 998 and 1.002; only their text tells.
+    """Return whether numbers read as decimals may be whole ones, such as 998 and 1.002; only their text tells.
 
     Parameters
     ----------

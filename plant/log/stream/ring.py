@@ -75,7 +75,7 @@ class RingWriter:
         self._held[: len(MAGIC)] = MAGIC
 
     def room(self) -> int:
-        """Return how many rows can be written before one that was not read is lost."""
+        """Return the number of rows that can be written before an unread one is lost."""
         return len(self._rows) - 1 - (self.written - _whole(self._held, READ_AT))
 
     def write(self, rows: Array, *, wait: bool = False) -> None:

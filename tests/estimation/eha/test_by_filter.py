@@ -11,7 +11,7 @@ from estimation.eha.bulk_modulus import _fitted, estimate_bulk_modulus
 from estimation.eha.by_filter import _settled, _verdict
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate
 from estimation.finding import Outcome
-from estimation.fits.explaining.form_fit import FormFit
+from estimation.fits.hypothesis_search.form_fit import FormFit
 from estimation.notes import EstimateCode
 from estimation.trust.consistency import MISMATCH_NIS
 from faults.conditions import CONDITIONS, parameters_for

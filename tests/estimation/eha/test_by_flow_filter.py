@@ -14,8 +14,8 @@ from estimation.eha import bulk_modulus as subject
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.eha.by_flow_filter import BIASES, LEAKAGES, MODULI, drive_noise, filter_flow
 from estimation.finding import Outcome
-from estimation.fits.explaining.form_fit import FormFit
-from estimation.fits.flow.traits import LogTraits
+from estimation.fits.flow.log_traits import LogTraits
+from estimation.fits.hypothesis_search.form_fit import FormFit
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.chambers import FLOOR_NOISE
 from estimation.models.eha_forms import BULK_MODULUS

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.eha import explained
+from estimation.eha import explanation_notes
 from estimation.eha.changing_leakage import leakage_over
-from estimation.eha.explained import notes_of, rig_set_right, set_right
+from estimation.eha.explanation_notes import notes_of, rig_set_right, set_right
 from estimation.eha.rig_share import GAIN, rig_notes, scaled_responses, with_total
 from estimation.finding import Quantity
-from estimation.fits.explaining.tried import Explanation
+from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.log_checks.clean import CleanLog
 from plant.eha.doubts import PRESSURE_GAIN
 from plant.eha.model import EhaParameters
@@ -70,7 +70,7 @@ VALUES: dict[str, tuple[float, float]] = {
 @NUMBERS.case()
 def what_explains_a_log() -> dict[str, Any]:
     told: dict[str, Any] = {}
-    for name in explained._NOTES:  # pyright: ignore[reportPrivateUsage]
+    for name in explanation_notes._NOTES:  # pyright: ignore[reportPrivateUsage]
         delays = {PRESSURE: 2e-3, SPEED: 1e-3, POSITION: 4e-3}
         (note,) = notes_of(explanation((name,), delays, **VALUES), P)
         told[name] = {"code": str(note.code), **note.data}
@@ -137,7 +137,7 @@ def logs_that_are_set_right() -> dict[str, Any]:
         set_right(replace(log, record=record.replace(velocity_m_s=None)), explanation((), {POSITION: 3e-2})).record
     )
     right = rig_set_right(P, explanation((), **VALUES))
-    told["rig"] = {name: getattr(right, name) for name in explained.RIG_ENTRIES}
+    told["rig"] = {name: getattr(right, name) for name in explanation_notes.RIG_ENTRIES}
     return told
 
 

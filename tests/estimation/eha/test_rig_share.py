@@ -11,9 +11,9 @@ from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.eha.estimate import estimate_log
 from estimation.eha.rig_share import delivery_left_open, fitted_responses, scaled_responses, with_total, with_wear
 from estimation.finding import Quantity, positive_interval_95
-from estimation.fits.explaining.left_open import wear_open
-from estimation.fits.explaining.promises import Promise
 from estimation.fits.flow.fit import fit_flow
+from estimation.fits.hypothesis_search.not_excluded import open_wear_note
+from estimation.fits.hypothesis_search.predicted_gains import PredictedGain
 from estimation.notes import EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.doubts import DOUBTS, PRESSURE_GAIN, Spread
@@ -196,6 +196,6 @@ def test_wear_that_is_not_excluded_opens_displacement_downwards_alone() -> None:
 
 
 def test_what_is_left_open_of_a_delivery_is_where_it_likeliest_is_and_how_well_that_is_known() -> None:
-    (noted,) = wear_open(Promise(1.0, -0.04, 0.05))
+    (noted,) = open_wear_note(PredictedGain(1.0, -0.04, 0.05))
     assert delivery_left_open((noted,)) == (pytest.approx(-0.04), pytest.approx(0.05), -math.inf)
     assert delivery_left_open(()) is None

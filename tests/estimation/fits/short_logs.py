@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from estimation.fits.explaining.wide_log import widened
 from estimation.fits.flow.log import flow_log
 from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypothesis_search.wide_log import widened
 from estimation.models.flow import FLOW_FORM, STIFFNESS
 from plant.arrays import Array
 from plant.eha.circuit_parameters import circuit_of

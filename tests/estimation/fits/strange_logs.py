@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from estimation.fits.explaining.tried import Explanation
 from estimation.fits.flow.fit import fit_flow
+from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.log_checks.clean import clean_log
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters

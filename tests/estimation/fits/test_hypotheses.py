@@ -10,18 +10,19 @@ import pytest
 from scipy.signal import lfilter
 
 from estimation.eha.estimate import estimate_log
-from estimation.eha.explained import notes_of, rig_set_right, set_right
-from estimation.fits.explaining import explain as module
-from estimation.fits.explaining import settled
-from estimation.fits.explaining.left_open import OPEN_DELIVERY
-from estimation.fits.explaining.tried import Explanation, Tried
-from estimation.fits.flow import asked
-from estimation.fits.flow.asked import near_starts
-from estimation.fits.flow.fit import _wanted, fit_flow  # pyright: ignore[reportPrivateUsage]
+from estimation.eha.explanation_notes import notes_of, rig_set_right, set_right
+from estimation.fits.flow import asked_hypotheses
+from estimation.fits.flow.asked_hypotheses import near_starts
+from estimation.fits.flow.belief import wanted_cost
+from estimation.fits.flow.fit import fit_flow
+from estimation.fits.flow.log_traits import LogTraits
 from estimation.fits.flow.search import MAKEUP_TRIED, flow_starts
-from estimation.fits.flow.traits import LogTraits
 from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import HYPOTHESES, LATEST
+from estimation.fits.hypothesis_search import coarse_search
+from estimation.fits.hypothesis_search import explain as module
+from estimation.fits.hypothesis_search.explanation import Explanation, Trial
+from estimation.fits.hypothesis_search.not_excluded import OPEN_DELIVERY
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.first_belief import begins_in_motion, first_load
 from estimation.models.wide_flow import WIDE_FLOW_FORM, WideFlowParameters, grown_leakage
@@ -60,7 +61,7 @@ def test_a_speed_that_lags_by_little_more_than_a_sample_is_no_lead_of_the_motor(
     lag, std = found.values["speed_lag"]
     assert 1.0 < lag / record.sample_time < 1.6  # half a sample of it is how lines between samples follow steps
     assert std < 0.02 * lag
-    monkeypatch.setattr(asked, "FARTHEST_LEAD", np.inf)
+    monkeypatch.setattr(asked_hypotheses, "FARTHEST_LEAD", np.inf)
     assert fit_flow(lagged, HEALTHY, HEALTHY.bulk_modulus).explanation is None
 
 
@@ -154,15 +155,15 @@ def test_a_delay_is_sought_no_longer_than_a_sensor_may_have(monkeypatch: pytest.
     (late,) = (one for one in HYPOTHESES if one.name == "pressure_late")
     plain = SimpleNamespace(coarsened=lambda: plain)
 
-    def falling(_: object, tried: Tried, *__: object, **___: object) -> Tried:
+    def falling(_: object, tried: Trial, *__: object, **___: object) -> Trial:
         delay = tried.delays.get(late.late, 0.0)
         return replace(tried, point=Point(np.zeros(1), 1e3 - delay, np.zeros(1), np.eye(1)))
 
-    monkeypatch.setattr(settled, "descended", falling)
-    monkeypatch.setattr(settled, "_revived", lambda *_: None)
-    monkeypatch.setattr(settled, "delayed", lambda log, _: log)
-    begun = Tried((late,), Point(np.zeros(1), 1e3, np.zeros(1), np.eye(1)), {}, {}, {})
-    found = settled.settled(cast("GreyBoxLog", plain), begun)
+    monkeypatch.setattr(coarse_search, "descended", falling)
+    monkeypatch.setattr(coarse_search, "_revived", lambda *_: None)
+    monkeypatch.setattr(coarse_search, "delayed", lambda log, _: log)
+    begun = Trial((late,), Point(np.zeros(1), 1e3, np.zeros(1), np.eye(1)), {}, {}, {})
+    found = coarse_search.search_coarsely(cast("GreyBoxLog", plain), begun)
     assert found.delays[late.late] == pytest.approx(LATEST, abs=1e-3)
 
 
@@ -244,10 +245,10 @@ def test_play_of_the_encoder_is_named_and_taken_up() -> None:
 
 def test_an_encoder_zero_need_be_no_likelier_than_held_volumes_and_anything_else_must() -> None:
     held, swinging = made_fit(100.0, 2e8, 1e6), made_fit(300.0, 2e8, 1e6)
-    wanted = partial(_wanted, homed=True, late=False)
+    wanted = partial(wanted_cost, homed=True, late=False)
     assert wanted(("encoder_zero",), held, swinging) == 100.0 + module.WORTH
     assert wanted(("encoder_zero",), held, held) == 100.0 - module.WORTH
-    assert _wanted(("encoder_zero",), held, swinging, homed=False, late=False) == 100.0 - module.WORTH
+    assert wanted_cost(("encoder_zero",), held, swinging, homed=False, late=False) == 100.0 - module.WORTH
     assert wanted(("position_play",), held, swinging) == 100.0 - module.WORTH
     assert wanted(("position_play", "position_late"), held, swinging) == -np.inf
     assert wanted(("volume",), held, swinging) == wanted(("encoder_zero", "air"), held, swinging) == 90.0
@@ -255,7 +256,7 @@ def test_an_encoder_zero_need_be_no_likelier_than_held_volumes_and_anything_else
 
 def test_the_lag_of_a_filtered_pressure_is_believed_whatever_it_gains() -> None:
     held, swinging = made_fit(100.0, 2e8, 1e6), made_fit(300.0, 2e8, 1e6)
-    wanted = partial(_wanted, best=held, swinging=swinging, homed=False)
+    wanted = partial(wanted_cost, best=held, swinging=swinging, homed=False)
     assert wanted(("pressure_late",), late=True) == 100.0 + module.WORTH
     assert wanted(("pressure_late",), late=False) == 100.0 - module.WORTH
     assert wanted(("pressure_late", "air"), late=True) == wanted(("volume",), late=True) == 100.0 - module.WORTH

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.eha.explained import notes_of
+from estimation.eha.explanation_notes import notes_of
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.hypotheses import HYPOTHESES
 from estimation.log_checks.clean import clean_log

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.convolution import convolved, smooth_length
-from estimation.fits.greybox.averaged import averaged, block_means, samples_a_block
+from estimation.fits.greybox.block_averages import averaged, block_means, samples_a_block
 from estimation.fits.greybox.covariance import _autocovariance, automatic_lags, least_squares_covariance
 from estimation.fits.greybox.descent import Point, descend, descend_together
 from estimation.fits.greybox.log import GreyBoxLog, OutputNoise

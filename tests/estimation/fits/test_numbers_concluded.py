@@ -8,22 +8,22 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from estimation.fits.explaining.objections import fit_explains_all
-from estimation.fits.explaining.promises import NOTHING_PROMISED, Promise, slopes_of
-from estimation.fits.explaining.tried import Tried
-from estimation.fits.explaining.wide_log import widened
-from estimation.fits.explaining.wide_problem import flow_bounds, freed, own_starts
-from estimation.fits.flow import asked as asking
+from estimation.fits.flow import asked_hypotheses as asking
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import plain as plain_flow
 from estimation.fits.flow.belief import wanted_cost
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import homed_at_stop
-from estimation.fits.flow.traits import LogTraits
+from estimation.fits.flow.log_traits import LogTraits
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.play import ShownPlay
 from estimation.fits.hypotheses import BEGUN, HYPOTHESES, MAY_HIDE
+from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.fit_objections import fit_explains_all
+from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, PredictedGain, slopes_of
+from estimation.fits.hypothesis_search.wide_log import widened
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed, own_starts
 from estimation.fits.motion import fit as motion_fit
 from estimation.fits.motion.fit import _starts, _steps, motion_log
 from estimation.fits.motion.search import MOST_WORK, Begun, MotionSearch, explained, rough
@@ -49,7 +49,7 @@ def concluded(
     strange: GreyBoxFit,
     *names: str,
     sensed: Any = None,
-    open_by: Promise = NOTHING_PROMISED,
+    open_by: PredictedGain = NO_GAIN,
     **how: Any,
 ) -> Any:
     """Return what is told of a log by its plain fits, and by one under hypotheses."""
@@ -62,17 +62,19 @@ def concluded(
         return explanation
 
     calls = asked
-    promises = [*(2 * [Promise(40.0, 0.2, 0.05)]), *(len(MAY_HIDE) * [Promise(0.0, 0.0, 0.05)])]
+    promises = [*(2 * [PredictedGain(40.0, 0.2, 0.05)]), *(len(MAY_HIDE) * [PredictedGain(0.0, 0.0, 0.05)])]
     with (
         patch.multiple(
-            asking, promised_each=lambda *_, **__: promises, promised=lambda *_, **__: Promise(0.0, 0.0, 0.05)
+            asking,
+            predicted_gains=lambda *_, **__: promises,
+            predicted_gain=lambda *_, **__: PredictedGain(0.0, 0.0, 0.05),
         ),
         patch.object(plain_flow, "balanced", lambda *_, **__: fits),
         patch.multiple(
             flow_fit,
             explain=explained,
-            uneven_loss=lambda *_: None,
-            lower_valley=lambda *_: None,
+            varying_loss=lambda *_: None,
+            lower_minimum=lambda *_: None,
             contradicted=lambda *_: (),
             sensed_play=lambda _: sensed or ShownPlay(0.0, 0.0),
         ),
@@ -114,7 +116,7 @@ def conclusions_of_the_flow_form() -> dict[str, Any]:
         "played, shown": concluded(
             [replace(plain(200.0), play=ShownPlay(3e-5, 9.0))], strange, "position_play", sensed=ShownPlay(3e-5, 2.3)
         ),
-        "wear is left open": concluded([plain(200.0)], strange, "volume", open_by=Promise(0.0, 0.0, 0.12)),
+        "wear is left open": concluded([plain(200.0)], strange, "volume", open_by=PredictedGain(0.0, 0.0, 0.12)),
         "a play is left": concluded([plain(200.0)], strange, "delivery", sensed=sensed),
         "held volumes": concluded(
             [plain(100.0, HELD_FLOW_FORM), plain(130.0), plain(128.0, MASS_FLOW_FORM)], strange, "delivery"
@@ -182,7 +184,7 @@ def bounds_and_starts_of_hypotheses() -> dict[str, Any]:
     for one in HYPOTHESES:
         if one.least:
             tried = [
-                Tried((one,), SimpleNamespace(cost=3.0), {one.free[0]: share * one.least}, {}, {})  # pyright: ignore[reportArgumentType]
+                Trial((one,), SimpleNamespace(cost=3.0), {one.free[0]: share * one.least}, {}, {})  # pyright: ignore[reportArgumentType]
                 for share in (0.99, -0.99, 1.0, -1.01)
             ]
             values["meant"].append([one.name, *(each.meant for each in tried)])

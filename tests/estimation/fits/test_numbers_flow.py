@@ -6,8 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.fits.explaining.form_fit import FormFit
-from estimation.fits.explaining.wide_problem import flow_bounds, freed
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import _swept_share, speed_gaps, usual_leakage, without_strays
 from estimation.fits.flow.search import balanced, flow_starts
@@ -17,6 +15,8 @@ from estimation.fits.greybox.fit import GreyBoxFit, Search, concluded, explained
 from estimation.fits.greybox.problem import Problem, search_bounds
 from estimation.fits.greybox.problem import weighed as sums_of
 from estimation.fits.hypotheses import HYPOTHESES, LIMITS
+from estimation.fits.hypothesis_search.form_fit import FormFit
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed
 from estimation.log_checks.bridging import within_gaps
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM
 from tests.estimation.fits.short_logs import (

@@ -13,18 +13,18 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from estimation.fits.explaining import explain as explaining
-from estimation.fits.explaining import finished as finishing
-from estimation.fits.explaining import promises as promising
-from estimation.fits.explaining import screened, settled
 from estimation.fits.flow import search as flow_search
 from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox import fit as greybox_fit
 from estimation.fits.greybox.descent import Point
-from estimation.fits.greybox.descents_in_turn import Way
 from estimation.fits.greybox.freed_problem import FreedProblem
-from estimation.fits.greybox.sparing import LAST
+from estimation.fits.greybox.parallel_descents import Way
+from estimation.fits.greybox.spared_steps import LAST
 from estimation.fits.hypotheses import HYPOTHESES
+from estimation.fits.hypothesis_search import coarse_search, screening
+from estimation.fits.hypothesis_search import explain as explaining
+from estimation.fits.hypothesis_search import final_fits as finishing
+from estimation.fits.hypothesis_search import predicted_gains as promising
 from estimation.fits.motion import fit as motion_fit
 from estimation.fits.motion import force_scale
 from estimation.fits.motion import search as motion_search
@@ -142,7 +142,7 @@ def plan_of_explanations() -> dict[str, Any]:
     told: dict[str, Any] = {}
     short = seen(log(0.5))
     asked = [one for one in HYPOTHESES if one.name in ("pressure_late", "pressure_offset", "relief_low", "volume")]
-    promises = [promising.Promise(float(gain), 1.0, 1.0) for gain in range(len(HYPOTHESES))]
+    promises = [promising.PredictedGain(float(gain), 1.0, 1.0) for gain in range(len(HYPOTHESES))]
     costs = {
         "all alike": lambda _: 1000.0,
         "one is better": lambda k: 1000.0 - 10.0 * (k % 7 == 0),
@@ -158,7 +158,7 @@ def plan_of_explanations() -> dict[str, Any]:
 
     for name, cost in costs.items():
         with (
-            planned(cost, explaining, screened, settled, finishing) as plan,
+            planned(cost, explaining, screening, coarse_search, finishing) as plan,
             patch.object(promising, "_promises", promised),
             patch.object(finishing, "concluded", concluded),
         ):

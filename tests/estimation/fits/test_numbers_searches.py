@@ -10,17 +10,17 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from estimation.fits.explaining.explain import explain
-from estimation.fits.explaining.wide_problem import flow_bounds
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import without_strays
+from estimation.fits.flow.log_traits import LogTraits
 from estimation.fits.flow.search import balanced, flow_starts
-from estimation.fits.flow.traits import LogTraits
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.fit import Search, explained, roughly
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.hypotheses import HYPOTHESES
+from estimation.fits.hypothesis_search.explain import explain
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds
 from estimation.fits.motion.fit import fit_motion
 from plant.arrays import Array
 from plant.eha.circuit_parameters import circuit_of

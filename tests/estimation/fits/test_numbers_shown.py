@@ -8,9 +8,17 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from estimation.fits.greybox import play, play_courses, teeth
+from estimation.fits.greybox import play, play_courses, pump_ripple
 from estimation.fits.greybox.lateness import LATE_NUDGE, changes_beside, lateness
-from estimation.fits.greybox.teeth import COUNTS, Teeth, _delivered, _likeliest, _turned, shown_teeth, with_teeth
+from estimation.fits.greybox.pump_ripple import (
+    COUNTS,
+    Ripple,
+    _delivered,
+    _likeliest,
+    _turned,
+    shown_ripple,
+    with_ripple,
+)
 from estimation.fits.hypotheses import LEAST_PLAY
 from estimation.models.flow import HELD_FLOW_FORM
 from plant.arrays import Array
@@ -205,7 +213,7 @@ def teeth_in_residuals() -> dict[str, Any]:
     bread = np.linalg.inv(columns.T @ columns + 1e-3 * np.eye(columns.shape[1])).astype(np.float64)
     told: dict[str, Any] = {}
     for name, counts in {"few": (7, 12), "many": COUNTS}.items():
-        shown, offset = shown_teeth(one, theta, errors.ravel(), bread, columns, counts)
+        shown, offset = shown_ripple(one, theta, errors.ravel(), bread, columns, counts)
         told[name] = {
             str(count): [*astuple(each.teeth), each.teeth.amplitude, each.gain, each.std, *some(each.opened)]
             for count, each in shown.items()
@@ -213,12 +221,12 @@ def teeth_in_residuals() -> dict[str, Any]:
         told[f"{name}, offsets"] = [[each.offset, each.offset_std] for each in shown.values()]
         told[f"{name}, offset of speed"] = [offset.value, offset.gain, offset.std, *some(offset.opened)]
     fast = one.on(replace(one.log, drives=one.log.drives * np.array([4.0, 1.0])[: one.log.drives.shape[1]]))
-    told["felt of a fast pump"] = list(shown_teeth(fast, theta, errors.ravel(), bread, columns, (5, 60))[0])
+    told["felt of a fast pump"] = list(shown_ripple(fast, theta, errors.ravel(), bread, columns, (5, 60))[0])
     leaks = one.model.unknowns.index("leakage_coefficient")
     rng = np.random.default_rng(6)
     made = [rng.normal(size=errors.size) for _ in range(6)]
     told["likeliest"] = [sought(one, theta, each, COUNTS) for each in made]
-    with patch.object(teeth, "LIKELIEST", len(COUNTS)):
+    with patch.object(pump_ripple, "LIKELIEST", len(COUNTS)):
         told["ranks"] = [sought(one, theta, each, COUNTS) for each in made]
         told["ranks of a fast pump"] = [sought(fast, theta, each, COUNTS) for each in made]
         told["ranks of a leaky pump"] = [
@@ -230,12 +238,12 @@ def teeth_in_residuals() -> dict[str, Any]:
     between, steps = _turned(one.log.drives[:, 0], one.log.sample_time)
     told["turned"] = [between[:3], some(between, 9), steps[:3], some(steps, 9)]
     told["delivered"] = [
-        some(_delivered(Teeth(count, *parts), (between, steps), one.log.sample_time), 9)
+        some(_delivered(Ripple(count, *parts), (between, steps), one.log.sample_time), 9)
         for count in (7, 19)
         for parts in ((0.1, 0.0), (0.0, 0.1), (-0.03, 0.2))
     ]
     told["followed up to [rad/s]"] = edge(
-        lambda rate: bool(np.any(with_teeth(steady(rate), [Teeth(12, 0.1, 0.0)]).drives[:, 0] != rate)), 100.0, 400.0
+        lambda rate: bool(np.any(with_ripple(steady(rate), [Ripple(12, 0.1, 0.0)]).drives[:, 0] != rate)), 100.0, 400.0
     )
     told["speed"] = some(speed)
     return told

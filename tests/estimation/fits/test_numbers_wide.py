@@ -9,19 +9,19 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from estimation.fits.explaining.explain import explain
-from estimation.fits.explaining.form_fit import weighed, with_structure
-from estimation.fits.explaining.objections import objections
-from estimation.fits.explaining.promises import Promise, promised
-from estimation.fits.explaining.tried import Explanation
-from estimation.fits.explaining.wide_log import delayed, usual_values
-from estimation.fits.explaining.wide_problem import freed, own_starts
-from estimation.fits.flow import asked
-from estimation.fits.flow.asked import asked_of, near_starts
+from estimation.fits.flow import asked_hypotheses
+from estimation.fits.flow.asked_hypotheses import hypotheses_asked, near_starts
 from estimation.fits.flow.search import _guess, _search, flow_starts
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, PRESUMED
+from estimation.fits.hypothesis_search.explain import explain
+from estimation.fits.hypothesis_search.explanation import Explanation
+from estimation.fits.hypothesis_search.fit_objections import objections
+from estimation.fits.hypothesis_search.form_fit import weighed, with_structure
+from estimation.fits.hypothesis_search.predicted_gains import PredictedGain, predicted_gain
+from estimation.fits.hypothesis_search.wide_log import delayed, usual_values
+from estimation.fits.hypothesis_search.wide_problem import freed, own_starts
 from estimation.fits.motion import fit as motion_fit
 from estimation.fits.motion.fit import _starts, _steps, motion_log
 from estimation.fits.motion.force_scale import disagree
@@ -69,10 +69,10 @@ def objections_on_either_side() -> dict[str, Any]:
 
 
 @contextmanager
-def all_promise(one: Promise) -> Iterator[None]:
+def all_promise(one: PredictedGain) -> Iterator[None]:
     """Let every hypothesis promise the same."""
-    each = [one] * len(asked.ALWAYS_ASKED)
-    with patch.multiple(asked, promised=lambda *_, **__: one, promised_each=lambda *_, **__: each):
+    each = [one] * len(asked_hypotheses.ALWAYS_ASKED)
+    with patch.multiple(asked_hypotheses, predicted_gain=lambda *_, **__: one, predicted_gains=lambda *_, **__: each):
         yield
 
 
@@ -92,11 +92,13 @@ def what_is_asked_of_a_log() -> dict[str, Any]:
         (31.0, 0.51, 0.05),
         (31.0, 0.49, 0.05),
     ):
-        with all_promise(Promise(gain, size, deviation)):
-            asked, remarks = asked_of(base, PAPER, sound, sound, loaded=False, moving=False)
+        with all_promise(PredictedGain(gain, size, deviation)):
+            asked, remarks = hypotheses_asked(base, PAPER, sound, sound, loaded=False, moving=False)
         told[f"gain {gain:g}, size {size:g}, deviation {deviation:g}"] = [[one.name for one in asked], noted(remarks)]
     poor = made_fit(1.0, 2e8, 1e6, chi=2.0)
-    told["of a poor fit"] = [one.name for one in asked_of(base, PAPER, poor, poor, loaded=False, moving=False)[0]]
+    told["of a poor fit"] = [
+        one.name for one in hypotheses_asked(base, PAPER, poor, poor, loaded=False, moving=False)[0]
+    ]
     for gain, fed, chi, likeliest in (
         (9.0, 1.0, 1.15, True),
         (11.0, 1.0, 1.0, True),
@@ -108,12 +110,15 @@ def what_is_asked_of_a_log() -> dict[str, Any]:
     ):
         plain = made_fit(100.0, 2e8, 1e6, chi=chi)
         fit = replace(plain, values={**plain.values, "makeup_conductance": fed * PAPER.makeup_conductance})
-        with all_promise(Promise(gain, 0.0, 0.05)):
-            asked, _ = asked_of(base, PAPER, fit, fit if likeliest else sound, loaded=False, moving=True)
+        with all_promise(PredictedGain(gain, 0.0, 0.05)):
+            asked, _ = hypotheses_asked(base, PAPER, fit, fit if likeliest else sound, loaded=False, moving=True)
         told[f"in motion: {gain:g}, {fed:g}, {chi:g}, {likeliest}"] = [one.name for one in asked]
     lengths = (np.zeros((count, 2)) for count in (70000, 70001))
     told["of long logs under load"] = [
-        [one.name for one in asked_of(replace(base, drives=drives), PAPER, sound, sound, loaded=True, moving=False)[0]]
+        [
+            one.name
+            for one in hypotheses_asked(replace(base, drives=drives), PAPER, sound, sound, loaded=True, moving=False)[0]
+        ]
         for drives in lengths
     ]
     starts = flow_starts(PAPER, 3e8)
@@ -186,9 +191,9 @@ def promises_of_hypotheses() -> dict[str, Any]:
     }
     told: dict[str, Any] = {}
     for one in HYPOTHESES:
-        gain, size, deviation = promised(seen(off), PAPER, plain, one)
+        gain, size, deviation = predicted_gain(seen(off), PAPER, plain, one)
         told[one.name] = {"gain": round(gain, 3), "size": Found(size, deviation)}
-    told["delivery by mass"] = list(promised(seen(record), PAPER, plain, DELIVERY, by_mass=True))
+    told["delivery by mass"] = list(predicted_gain(seen(record), PAPER, plain, DELIVERY, by_mass=True))
     return told
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.eha.explained import notes_of
+from estimation.eha.explanation_notes import notes_of
 from estimation.fits.flow.fit import fit_flow
 from estimation.log_checks.clean import clean_log
 from estimation.models.wide_flow import compressed

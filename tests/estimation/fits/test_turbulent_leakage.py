@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.eha.explained import notes_of
-from estimation.fits.explaining.wide_log import widened
-from estimation.fits.explaining.wide_problem import freed
+from estimation.eha.explanation_notes import notes_of
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log, without_strays
 from estimation.fits.hypotheses import LEAKAGE_RISE, LEAKAGE_TURBULENT
+from estimation.fits.hypothesis_search.wide_log import widened
+from estimation.fits.hypothesis_search.wide_problem import freed
 from estimation.log_checks.clean import clean_log
 from estimation.models.wide_flow import (
     LAMINAR_BELOW,

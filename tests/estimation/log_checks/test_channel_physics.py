@@ -13,7 +13,7 @@ import pytest
 from estimation.eha import bulk_modulus
 from estimation.eha.estimate import estimate_log
 from estimation.finding import Outcome
-from estimation.fits.explaining.form_fit import FormFit
+from estimation.fits.hypothesis_search.form_fit import FormFit
 from estimation.log_checks import channel_physics
 from estimation.log_checks.channel_physics import channel_mistakes
 from estimation.log_checks.flow_balance import FlowBalance

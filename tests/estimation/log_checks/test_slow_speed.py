@@ -5,7 +5,7 @@ import pytest
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.fits.flow import fit as flow_fit
-from estimation.fits.flow.traits import LogTraits
+from estimation.fits.flow.log_traits import LogTraits
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.held import without_held
 from estimation.notes import SensorCode

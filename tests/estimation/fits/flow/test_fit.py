@@ -10,7 +10,7 @@ import pytest
 from estimation.eha.bulk_modulus import LEAST_SQUARES, estimate_bulk_modulus
 from estimation.fits.flow.fit import _told_by, fit_flow  # pyright: ignore[reportPrivateUsage]
 from estimation.fits.flow.log import speed_gaps
-from estimation.fits.greybox.work import Work
+from estimation.fits.greybox.work_limit import Work
 from estimation.notes import EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import circuit_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.eha.explained import lateness
+from estimation.eha.explanation_notes import lateness
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import _swept_share, carried, flow_log, speed_gaps, without_strays
 from estimation.fits.greybox.freed_problem import FreedProblem

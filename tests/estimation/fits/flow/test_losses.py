@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.fits.explaining.form_fit import DISCRETISED
 from estimation.fits.flow.losses import losses, with_lumped, with_lumped_slopes
 from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.hypothesis_search.form_fit import DISCRETISED
 from estimation.models.flow import FLOW_FORM
 from plant.arrays import Array
 from plant.eha.model import EhaParameters

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.fits.explaining.objections import objections
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log, without_strays
 from estimation.fits.flow.plain import FitStart, Logged, plain_fits
 from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.hypothesis_search.fit_objections import objections
 from estimation.models.completed_flow import balances_mass
 from faults.conditions import severity
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of

@@ -5,7 +5,7 @@ import pytest
 
 from estimation.arrays import Array
 from estimation.fits.flow.log import flow_log
-from estimation.fits.greybox.averaged import block_means
+from estimation.fits.greybox.block_averages import block_means
 from plant.components.valves import pumped_flow
 from plant.eha.model import EhaParameters
 from plant.log.record import Record

@@ -3,7 +3,6 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from estimation.fits.explaining.promises import promised, promised_each
 from estimation.fits.flow import search as flow_search
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log, outruns_pump
@@ -11,6 +10,7 @@ from estimation.fits.flow.search import balanced, flow_starts
 from estimation.fits.greybox.fit import GreyBoxFit, roughly
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO
+from estimation.fits.hypothesis_search.predicted_gains import predicted_gain, predicted_gains
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import MASS_FLOW_FORM, STIFFNESS
@@ -124,16 +124,16 @@ def by_mass(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:
 def test_what_a_hypothesis_promises_is_asked_where_the_plain_fit_stands() -> None:
     log = seen(recorded("minor_friction", 10.0, 2e-3))
     plain = by_mass(balanced(log, HEALTHY, STARTS)).values
-    assert promised(log, HEALTHY, plain, DELIVERY, by_mass=True)[0] < 10.0
-    assert promised(log, HEALTHY, plain, DELIVERY, by_mass=False)[0] > 100.0
+    assert predicted_gain(log, HEALTHY, plain, DELIVERY, by_mass=True)[0] < 10.0
+    assert predicted_gain(log, HEALTHY, plain, DELIVERY, by_mass=False)[0] > 100.0
 
 
 def test_what_is_promised_together_is_promised_alone() -> None:
     log = seen(recorded("minor_friction", 10.0, 2e-3))
     plain = balanced(log, HEALTHY, STARTS)[0].values
-    together = promised_each(log, HEALTHY, plain, (DELIVERY, ENCODER_ZERO))
+    together = predicted_gains(log, HEALTHY, plain, (DELIVERY, ENCODER_ZERO))
     for one, told in zip((DELIVERY, ENCODER_ZERO), together, strict=True):
-        assert tuple(told) == pytest.approx(tuple(promised(log, HEALTHY, plain, one)), rel=1e-4)
+        assert tuple(told) == pytest.approx(tuple(predicted_gain(log, HEALTHY, plain, one)), rel=1e-4)
 
 
 def test_slopes_that_the_fit_has_found_promise_what_slopes_taken_anew_do() -> None:
@@ -141,7 +141,7 @@ def test_slopes_that_the_fit_has_found_promise_what_slopes_taken_anew_do() -> No
     fit = by_mass(balanced(log, HEALTHY, STARTS))
     slopes = dict(zip(fit.model.unknowns, fit.slopes.T, strict=True))
     anew, known = (
-        promised_each(log, HEALTHY, fit.values, (DELIVERY, ENCODER_ZERO), by_mass=True, slopes=one)
+        predicted_gains(log, HEALTHY, fit.values, (DELIVERY, ENCODER_ZERO), by_mass=True, slopes=one)
         for one in ({}, slopes)
     )
     for one, other in zip(anew, known, strict=True):

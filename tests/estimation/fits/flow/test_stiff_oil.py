@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.fits.explaining.form_fit import FormFit
 from estimation.fits.flow.fit import fit_flow
+from estimation.fits.hypothesis_search.form_fit import FormFit
 from experiments.open_benchmark.draws import course_of, draw_plain
 from experiments.open_benchmark.run import run
 from plant.eha.model import EhaParameters

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.fits.explaining.tried import Explanation
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import plain as plain_flow
-from estimation.fits.flow.asked import worth_in
+from estimation.fits.flow.asked_hypotheses import worth_in
 from estimation.fits.flow.turns_read import turned_beside, with_turns_read
-from estimation.fits.greybox.course import Course
 from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.intersample_doubt import IntersampleDoubt
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import PUMP_COMPRESSES
+from estimation.fits.hypothesis_search.explanation import Explanation
 from plant.arrays import Array
 from plant.log.record import Record
 from tests.estimation.fits.short_logs import PAPER, POSITION, PRESSURE, SPEED, made_fit, seen
@@ -87,7 +87,7 @@ def test_what_a_turn_pumps_is_swept_less_and_a_fast_log_stays_what_it_was() -> N
 def test_a_hypothesis_must_gain_at_each_turn_of_a_slow_log_by_the_noise_that_it_leaves() -> None:
     """76 at nine turns was a pump that compresses its oil, which was not there, and leakage was 66 % low."""
     log = seen(slow())
-    turning = replace(log, course=Course(np.where(np.arange(len(log.drives)) % 30 < 2, 1e6, 0.0)))
+    turning = replace(log, course=IntersampleDoubt(np.where(np.arange(len(log.drives)) % 30 < 2, 1e6, 0.0)))
     assert worth_in(log) == 10.0
     assert worth_in(turning) == pytest.approx(10.0 * turning.passes)
     assert turning.passes > 10.0
@@ -112,9 +112,9 @@ def test_what_looks_strange_is_believed_where_it_gains_with_turns_read_too(
 
     monkeypatch.setattr(plain_flow, "balanced", fitted)
     monkeypatch.setattr(plain_flow, "with_course", lambda log, fitted, _: (fitted(log), log)[1])
-    monkeypatch.setattr(flow_fit, "asked_of", lambda *_, **__: ((PUMP_COMPRESSES,), ()))
+    monkeypatch.setattr(flow_fit, "hypotheses_asked", lambda *_, **__: ((PUMP_COMPRESSES,), ()))
     monkeypatch.setattr(flow_fit, "explain", explain)
-    monkeypatch.setattr(flow_fit, "lower_valley", lambda *_: None)
+    monkeypatch.setattr(flow_fit, "lower_minimum", lambda *_: None)
     answer = flow_fit.fit_flow(slow(), PAPER, PAPER.bulk_modulus, {}, None)
     assert not read[0]
     assert read[-1]

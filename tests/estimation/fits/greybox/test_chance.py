@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.fits.explaining.objections import fit_explains, fit_explains_all
 from estimation.fits.greybox.chance import alike_by_chance, largest_chi_square
 from estimation.fits.greybox.fit import concluded, explained
 from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.hypothesis_search.fit_objections import fit_explains, fit_explains_all
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.flow import FLOW_FORM
 from plant.log.record import Record

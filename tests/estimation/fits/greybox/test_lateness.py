@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.eha.explained import notes_of, set_right
+from estimation.eha.explanation_notes import notes_of, set_right
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.greybox.lateness import LEAST_LATE, most_late
 from estimation.fits.hypotheses import LATEST

@@ -11,13 +11,10 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from estimation.fits.explaining.form_fit import FormFit
-from estimation.fits.explaining.objections import DOUBTED
-from estimation.fits.explaining.promises import NOTHING_PROMISED, Promise
-from estimation.fits.flow import asked
+from estimation.fits.flow import asked_hypotheses
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import plain as plain_flow
-from estimation.fits.flow.asked import ALWAYS_ASKED
+from estimation.fits.flow.asked_hypotheses import ALWAYS_ASKED
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.search import balanced, flow_starts
 from estimation.fits.greybox.play import (
@@ -33,6 +30,9 @@ from estimation.fits.greybox.play import (
     sensed_play,
 )
 from estimation.fits.hypotheses import PLAY, Hypothesis
+from estimation.fits.hypothesis_search.fit_objections import DOUBTED
+from estimation.fits.hypothesis_search.form_fit import FormFit
+from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, PredictedGain
 from estimation.notes import EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.arrays import Array
@@ -243,7 +243,7 @@ def concluded(
     fit = replace(made_fit(500.0, 2e8, 1e5), play=ShownPlay(3e-5, plain, moved={"bulk_modulus": -0.02}))
     played = replace(made_fit(100.0, 2.1e8, 1e5, chi=chi), play=ShownPlay(1e-5, strange))
     values = {name: (value, played.std[name]) for name, value in played.values.items()}
-    explanation = SimpleNamespace(names=("position_play",), values=values, fit=played, delivery_open=NOTHING_PROMISED)
+    explanation = SimpleNamespace(names=("position_play",), values=values, fit=played, delivery_open=NO_GAIN)
 
     def explained(*_: Any, asked: Sequence[Hypothesis], paired: bool, **__: Any) -> Any:
         assert asked == (PLAY,)
@@ -251,9 +251,11 @@ def concluded(
         return explanation
 
     monkeypatch.setattr(plain_flow, "balanced", lambda *_, **__: [fit])
-    monkeypatch.setattr(asked, "promised_each", lambda *_, **__: len(ALWAYS_ASKED) * [Promise(0.0, 0.0, 0.01)])
+    monkeypatch.setattr(
+        asked_hypotheses, "predicted_gains", lambda *_, **__: len(ALWAYS_ASKED) * [PredictedGain(0.0, 0.0, 0.01)]
+    )
     monkeypatch.setattr(flow_fit, "explain", explained)
-    monkeypatch.setattr(flow_fit, "lower_valley", lambda *_: None)
+    monkeypatch.setattr(flow_fit, "lower_minimum", lambda *_: None)
     return fit_flow(record or logged("normal", "prbs", 0.0), PAPER, PAPER.bulk_modulus)
 
 
@@ -266,7 +268,7 @@ def test_a_play_that_is_shown_is_asked_for_and_believed_where_no_more_than_noise
     assert asked.explanation is not None
     assert not asked.reasons
     moved = 0.05  # of it a share is left open
-    assert asked.parameters["bulk_modulus"][1] == pytest.approx(
+    assert asked_hypotheses.parameters["bulk_modulus"][1] == pytest.approx(
         np.hypot(PLAY_STRUCTURE, PLAY_OPEN * moved) * 2.1e8, rel=0.01
     )
 

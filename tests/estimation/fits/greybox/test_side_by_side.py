@@ -6,8 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from estimation.fits.explaining.wide_log import usual_values, widened
-from estimation.fits.explaining.wide_problem import freed
 from estimation.fits.greybox import freed_problem, side_by_side
 from estimation.fits.greybox.freed_problem import NUDGE, FreedProblem
 from estimation.fits.greybox.gap_loops import residuals_across_gaps
@@ -17,6 +15,8 @@ from estimation.fits.greybox.problem import OUTLIER, Problem
 from estimation.fits.greybox.side_by_side import LANES, MANY, compile_side_by_side
 from estimation.fits.greybox.side_by_side_loops import residuals_side_by_side
 from estimation.fits.hypotheses import HYPOTHESES
+from estimation.fits.hypothesis_search.wide_log import usual_values, widened
+from estimation.fits.hypothesis_search.wide_problem import freed
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
 from estimation.models.greybox import GreyBoxModel

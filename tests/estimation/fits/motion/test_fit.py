@@ -4,10 +4,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.fits.explaining.form_fit import FormFit
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
+from estimation.fits.hypothesis_search.form_fit import FormFit
 from estimation.fits.motion import fit as motion_fit
 from estimation.fits.motion import search as motion_search
 from estimation.fits.motion.fit import fit_motion

@@ -112,7 +112,7 @@ def test_where_the_work_is_done_the_end_is_searched_on_while_that_gains_a_share(
 
 
 def test_an_end_that_explains_the_beginning_is_carried_on_as_a_start_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(motion_search, "settled", lambda problem, *_: problem.at(np.array([7.5])))
+    monkeypatch.setattr(motion_search, "annealed", lambda problem, *_: problem.at(np.array([7.5])))
     (first, second), _ = ended(lambda at: 1.0 if at == 7.5 else 2.0, lambda _: 2.5)
     assert (first.explains, second.explains) == (True, False)
     assert first.point.theta[0] == 7.5

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from estimation.eha.explained import LEAKAGE_COURSE
+from estimation.eha.explanation_notes import LEAKAGE_COURSE
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for

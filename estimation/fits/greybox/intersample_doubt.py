@@ -1,0 +1,257 @@
+"""Unknown motor speed between the samples of a slow log (intersample behaviour), as noise of the pressure.
+
+A slow log says how fast the motor turns at its samples, not in between. Where speed turns suddenly the oil that is
+pumped by straight lines is off in two ways. A command that came at an unknown time leaves a volume open, which leaks
+off: pressure walks, and comes back as slowly as leakage lets it. And a motor that nears its new speed over a sample or
+two is off by the same course each time, which comes back by itself: the samples beside a turn are off, those after it
+are not.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.arrays import Array, IntArray
+from estimation.fits.greybox.intersample_speed import steady_bend
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.problem import Problem
+from plant.solvers.steps import parameter_names
+
+SLOW = 1.5e-3
+"""Sample time from which the motor's course between samples counts [s]; judged: to 1 ms its lead takes it up."""
+
+OWN_NOISE = 4.0
+"""Deviations of speed's noise beyond which a second difference is a turn of the motor [dimensionless]."""
+
+MAY_VANISH = ("leakage_coefficient", "flow_bias")
+"""Unknowns that a slow log may put to nothing, and so far from what they are that bulk modulus follows."""
+
+NUDGE = 1e-2
+"""Change by which an answer is read off: of those unknowns as a share of the rig's value, of what is added to motor
+speed as a share of that [fraction]."""
+
+
+IN_VOLUME = 0.5 * np.array([[1.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+"""Oil that the three of `ways` pump in a sample, by the rise in the sample before, after, and two before; the motor's
+lead takes up what goes with the sample's own rise."""
+
+USUAL = 0.1
+"""Standard deviation of each before the log is seen, over a sample time [fraction]: 0.02 to 0.15 for motors of 2 to 6
+ms at 100 to 500 Hz."""
+
+
+@dataclass(frozen=True, eq=False)
+class IntersampleDoubt:
+    """Doubt about the motor's speed between samples.
+
+    Parameters
+    ----------
+    turns : ndarray, shape (n,)
+        What pressure would rise by, did the largest turn of the speed beside it add to the oil pumped up to a sample
+        [Pa].
+    staying, passing : float
+        Standard deviation of what stays, and of what comes back, over that [fraction].
+    kept : float
+        What leakage leaves of it by the next sample [fraction].
+    """
+
+    turns: Array
+    staying: float = 1.0
+    passing: float = 1.0
+    kept: float = 1.0
+
+    def passes(self, variance: float) -> float:
+        """Return the number of bends of motor speed that noise does not hide.
+
+        Each turn is felt in the time before it and in that after it.
+
+        Parameters
+        ----------
+        variance : float
+            Of the pressure's noise, a sample [Pa squared].
+
+        Returns
+        -------
+        float
+            At least 1 [count].
+        """
+        left = (self.staying**2 + self.passing**2) * self.turns**2
+        return max(1.0, 0.5 * float(np.sum(left / (left + variance))))
+
+    def walk(self, samples: int, block: int) -> Array:
+        """Return the variance that pressure gains after each block but the last.
+
+        Parameters
+        ----------
+        samples, block : int
+            Samples of the log's beginning that is asked, and of a block [count].
+
+        Returns
+        -------
+        ndarray, shape (blocks - 1,)
+            Of a single block one zero [Pa squared].
+
+        Examples
+        --------
+        >>> Course(np.array([0.0, 0.0, 3.0, 4.0]), 2.0).walk(4, 1).tolist()
+        [0.0, 36.0, 64.0]
+        """
+        begins = _begins(samples, block)[1:]
+        return np.add.reduceat((self.staying * self.turns[:samples]) ** 2, begins) if begins.size else np.zeros(1)
+
+    def beside(self, samples: int, block: int) -> Array:
+        """Return the variance of each block's mean that comes back.
+
+        Parameters
+        ----------
+        samples, block : int
+            As of `walk`.
+
+        Returns
+        -------
+        ndarray, shape (blocks,)
+            [Pa squared]
+
+        Examples
+        --------
+        >>> Course(np.array([0.0, 0.0, 3.0, 4.0]), passing=2.0).beside(4, 1).tolist()
+        [0.0, 36.0, 64.0, 64.0]
+        """
+        near = np.maximum(self.turns, np.append(self.turns[1:], 0.0))[:samples]
+        begins = _begins(samples, block)
+        return np.add.reduceat((self.passing * near) ** 2, begins) / np.diff(np.append(begins, samples)) ** 2
+
+
+def _begins(samples: int, block: int) -> IntArray:
+    return np.arange(0, samples, block)
+
+
+def turns(log: GreyBoxLog) -> Array:
+    """Return the bend of motor speed at either end of the interval up to each sample, the larger of both.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, motor speed its first drive.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Second differences that are not steady, less what its noise makes of them [rad/s].
+    """
+    speed = log.drives[:, 0]
+    bend = np.diff(speed, n=2, prepend=speed[0], append=speed[-1])
+    turn = np.where(steady_bend(speed) == 0.0, np.abs(bend), 0.0)
+    return np.maximum(np.maximum(turn, np.append(0.0, turn[:-1])) - OWN_NOISE * log.drive_std[0], 0.0)
+
+
+def answered(problem: Problem, theta: Array, speeds: Iterable[Array]) -> Array:
+    """Return the response of residuals to a change of motor speed.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem, motor speed its first drive.
+    theta : ndarray, shape (unknowns,)
+        Where it is asked [dimensionless].
+    speeds : iterable of ndarray, each of shape (n,)
+        What is added [rad/s].
+
+    Returns
+    -------
+    ndarray, shape (outputs * blocks, several)
+        Residuals, over what is added [dimensionless].
+    """
+    drives = problem.log.drives
+    others = [np.column_stack([NUDGE * one, np.zeros_like(drives[:, 1:])]) for one in speeds]
+    known, *moved = problem.disturbed(theta, [drives, *(drives + other for other in others)])
+    return np.stack([(one - known).ravel() for one in moved], axis=-1) / NUDGE
+
+
+def ways(speed: Array) -> Array:
+    """Return the rises of speed near each sample with which the oil pumped up to it may vary.
+
+    Parameters
+    ----------
+    speed : ndarray, shape (n,)
+        At the samples [rad/s].
+
+    Returns
+    -------
+    ndarray, shape (3, n)
+        The rise up to a sample, after it, and up to the one before [rad/s].
+
+    Examples
+    --------
+    >>> ways(np.array([0.0, 1.0, 3.0])).tolist()
+    [[0.0, 1.0, 2.0], [1.0, 2.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    rise = np.diff(speed, prepend=speed[0])
+    return np.stack([rise, np.append(rise[1:], 0.0), np.append(0.0, rise[:-1])])
+
+
+def opened(problem: Problem, theta: Array, errors: Array, bread: Array, slopes: Array) -> Array:
+    """Return the covariance of unknowns from a motor that bends its course alike at each turn.
+
+    It filters the samples, by weights that are not fitted. What the residuals say of them, and what they leave open, is
+    what the unknowns may be off by.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem, motor speed its first drive.
+    theta : ndarray, shape (unknowns,)
+        Its solution [dimensionless].
+    errors : ndarray, shape (outputs, blocks)
+        The normalised residuals there [dimensionless].
+    bread : ndarray, shape (felt, felt)
+        Inverse of the normal equations of the unknowns that are felt [dimensionless].
+    slopes : ndarray, shape (outputs * blocks, felt)
+        Derivatives of the residuals by them [dimensionless].
+
+    Returns
+    -------
+    ndarray, shape (felt, felt)
+        [dimensionless]
+    """
+    columns = answered(problem.coarse, theta, ways(problem.log.drives[:, 0]))
+    answers = bread @ (slopes.T @ columns)
+    free = columns - slopes @ answers
+    spread = np.linalg.inv(free.T @ free + IN_VOLUME.T @ IN_VOLUME / USUAL**2)
+    weights = spread @ (free.T @ errors.ravel())
+    return np.asarray(answers @ (spread + np.outer(weights, weights)) @ answers.T, dtype=np.float64)
+
+
+def vanished(problem: Problem, theta: Array, errors: Array, felt: NDArray[np.intp]) -> list[Array]:
+    """Return the derivatives by unknowns that a fit has driven to zero, where their logarithms have no effect.
+
+    Where they are left out, bulk modulus seems as sure as if a pump without any loss were known.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    theta : ndarray, shape (unknowns,)
+        Its solution [dimensionless].
+    errors : ndarray, shape (outputs, blocks)
+        The normalised residuals there [dimensionless].
+    felt : ndarray of int, shape (felt,)
+        Places of the unknowns that are felt.
+
+    Returns
+    -------
+    list of ndarray, each of shape (outputs * blocks,)
+        By the rig's value of each [dimensionless].
+    """
+    rig = dict(zip(parameter_names(problem.model.parameters), problem.log.parameters.tolist(), strict=True))
+    found: list[Array] = []
+    for place, name in enumerate(problem.model.unknowns):
+        if name in MAY_VANISH and place not in felt and rig[name] > 0.0:
+            moved = theta.copy()
+            moved[place] = np.log(np.exp(theta[place]) + NUDGE * rig[name])
+            column = (problem.residuals(moved) - errors).ravel() / NUDGE
+            if float(column @ column) > 1.0:
+                found.append(column)
+    return found

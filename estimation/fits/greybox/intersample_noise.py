@@ -1,0 +1,137 @@
+"""`likeliest(problem, theta, course)`: how large the intersample doubt of a slow log is."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.fits.greybox.intersample_doubt import IntersampleDoubt, answered
+from estimation.fits.greybox.problem import Problem
+
+SHARES = np.array([0.5, 0.7, 1.0, 1.4])
+"""Variances of the pressure's noise that are tried, over what was read off the log [fraction]: in a slow log the latter
+holds some of what the actuator does."""
+
+TRIED = np.array([0.0, *np.geomspace(0.005, 0.28, 7)])
+"""What is tried of what is open of the oil pumped in a sample, over what a turn of the speed could make of it
+[fraction]: a speed that jumps at an unknown time leaves ``12^-1/2`` open."""
+
+LONGEST = 5000
+"""Blocks of a log's beginning that are asked what is open [count]."""
+
+AT_ONCE = 64
+"""Blocks whose products are summed at a time [count]."""
+
+ALIKE = 1e-9
+"""Power of a combination of columns of length one below which it tells nothing [dimensionless]: rounding is some 1e-15
+of it."""
+
+
+def likeliest(problem: Problem, theta: Array, course: IntersampleDoubt) -> tuple[float, float, float]:
+    """Return the most likely lasting and returning parts of the doubt, under any of `SHARES` of the pressure's noise.
+
+    In a log that the form does not explain what is off may not leak: whether it does is asked too.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    theta : ndarray, shape (unknowns,)
+        Its solution [dimensionless].
+    course : Course
+        Its turns count, and what leakage keeps.
+
+    Returns
+    -------
+    tuple of float
+        What stays, what comes back, and what is kept, see `IntersampleDoubt` [fraction].
+    """
+    log, unit = problem.log, replace(course, staying=1.0, passing=1.0)
+    (noise,) = log.noise
+    still = problem.on(replace(log, course=None, noise=(replace(noise, walk=0.0),)))
+    samples, block = len(log.measured), max(1, round(log.block / log.sample_time))
+    left, freed = _without_offset(still, theta, LONGEST)
+    level = noise.variance / block
+    walk, beside = np.append(0.0, unit.walk(samples, block)), unit.beside(samples, block)
+    tried = [
+        (*restricted(left * level**0.5, freed, level, walk, beside, one**block), one) for one in (course.kept, 1.0)
+    ]
+    staying, passing, _, kept = min(tried, key=lambda one: one[2])
+    return staying, passing, kept
+
+
+def restricted(
+    left: Array, freed: Array, level: float, walk: Array, beside: Array, kept: float = 1.0
+) -> tuple[float, float, float]:
+    """Return the likeliest noise of residuals from which a fit has taken what its unknowns could.
+
+    A log under steps has some twenty turns, of which ten unknowns take up half. To the likelihood of what is left those
+    were quiet; the restricted one counts what was taken (Patterson and Thompson 1971, Biometrika 58).
+
+    Parameters
+    ----------
+    left : ndarray, shape (blocks,)
+        Residuals, 0 where missing [Pa].
+    freed : ndarray, shape (blocks, columns)
+        What was taken out of them: columns of length one at right angles [dimensionless].
+    level : float
+        Variance of the pressure's noise in a block [Pa squared].
+    walk, beside : ndarray, shape (blocks,)
+        Variance that is gained up to each block, and that comes back, where each is open in full [Pa squared].
+    kept : float
+        What is left by the next block of what stays [fraction].
+
+    Returns
+    -------
+    tuple of float
+        What stays and what comes back, see `IntersampleDoubt` [fraction], and twice the negative log-likelihood, but
+        for a constant.
+    """
+    share, staying, passing = (one.ravel() for one in np.meshgrid(SHARES, TRIED, TRIED, indexing="ij"))
+    white, walks, passes = share * level, staying**2, passing**2
+    values = np.column_stack([left, freed])
+    mean, spread, cost = np.zeros((len(white), values.shape[1])), np.zeros_like(white), np.zeros_like(white)
+    whitened, together = list[Array](), np.zeros((len(white), values.shape[1], values.shape[1]))
+    for value, gained, there in zip(values, walk.tolist(), beside.tolist(), strict=False):
+        spread = kept**2 * spread + walks * gained
+        mean *= kept
+        if value[0] == 0.0:  # missing
+            continue
+        total = spread + white + passes * there
+        innovation = (value - mean) / np.sqrt(total)[:, None]
+        cost += np.minimum(innovation[:, 0] ** 2, 9.0) + np.log(total)
+        whitened.append(innovation)
+        if len(whitened) == AT_ONCE:
+            together += _squares(whitened)
+        mean += (spread / np.sqrt(total))[:, None] * innovation
+        spread -= spread / total * spread
+    if whitened:
+        together += _squares(whitened)
+    known, pulled = together[:, 1:, 1:], together[:, 1:, 0]
+    cost += np.linalg.slogdet(known)[1] - np.sum(pulled * np.linalg.solve(known, pulled[..., None])[..., 0], axis=1)
+    at = int(np.argmin(cost))
+    return float(staying[at]), float(passing[at]), float(cost[at])
+
+
+def _squares(whitened: list[Array]) -> Array:
+    """Return sums of products of what was whitened, shape (noises, columns, columns), and forget it."""
+    parts = np.stack(whitened, axis=1)
+    whitened.clear()
+    return np.asarray(parts.transpose(0, 2, 1) @ parts, dtype=np.float64)
+
+
+def _without_offset(problem: Problem, theta: Array, most: int) -> tuple[Array, Array]:
+    """Return residuals of the first blocks less what an offset of motor speed and the unknowns make of them.
+
+    An offset leaves pressure off for long. A walk of the pressure would take it up, and none would be found. With them,
+    as columns of length one that are at right angles, is what was taken out.
+    """
+    errors, slopes = problem.linearised(theta)
+    columns = np.column_stack([answered(problem, theta, [np.ones(len(problem.log.drives))]), slopes])
+    errors, columns = errors.ravel()[:most], columns[:most]
+    sizes = np.linalg.norm(columns, axis=0)
+    columns = columns[:, sizes > 0.0] / sizes[sizes > 0.0]
+    squares, ways_out = np.linalg.eigh(columns.T @ columns)
+    told = squares > ALIKE
+    basis = columns @ (ways_out[:, told] / np.sqrt(squares[told]))  # exactly none where a block is missing
+    return errors - basis @ (basis.T @ errors), basis

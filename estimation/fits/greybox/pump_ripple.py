@@ -1,0 +1,345 @@
+"""Flow ripple of the pump by its gear teeth: test on a fit's residuals, and a log whose speed includes it.
+
+A pump delivers a little more and a little less as each of its teeth passes, by the angle of its shaft. Turned slowly, a
+tooth lasts as long as a stroke's pressure, and is taken for soft oil. The angle is the integral of the logged speed.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.fits.greybox.gains_beside import gains_beside
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.problem import Problem
+from plant.solvers.steps import parameter_names
+
+COUNTS = tuple(range(5, 20))
+"""Teeth a turn that are looked for: gear pumps have 7 to 16, pumps with an odd count of pistons pulse twice for each
+[count]."""
+
+NUDGE = 1e-2
+"""Amplitude of the teeth, as a share of the flow, by which the residuals' answer to them is read off [fraction]."""
+
+MOST_BETWEEN = 1.0
+"""Half the phase of the teeth from sample to sample up to which they are followed [rad]: three samples a tooth."""
+
+LIKELIEST = 3
+"""Counts of which the model is asked [count]: with two waves each and the log itself they run side by side."""
+
+LEAST_TEETH = 0.03
+"""Amplitude from which teeth are taken up, as a share of the flow [fraction]; judged. Smaller ones are integrated out,
+see `estimation.fits.greybox.small_pump_ripple`."""
+
+MOST_OFFSET = 1.0
+"""Largest offset of logged speed that is looked for [rad/s]: 10 revolutions a minute; judged."""
+
+LOOKS_A_TURN = 16
+"""Parts of the fastest turn of the teeth's phase, by an offset, over which residuals are summed [count]."""
+
+FINER = 4
+"""Offsets that are tried for each that a log tells apart [count]."""
+
+OFFSET_NUDGE = 1e-4
+"""Offset by which the answer to one is read off [rad/s]: it turns the phase by little over the longest log."""
+
+
+@dataclass(frozen=True)
+class Ripple:
+    """Flow ripple of a pump at its tooth frequency.
+
+    Parameters
+    ----------
+    count : int
+        How many pass in a turn [count].
+    cosine, sine : float
+        Their parts that go with the shaft's angle since the first sample, as shares of the flow [fraction].
+    """
+
+    count: int
+    cosine: float
+    sine: float
+
+    @property
+    def amplitude(self) -> float:
+        """Amplitude, as a share of the flow [fraction]."""
+        return float(np.hypot(self.cosine, self.sine))
+
+
+class Turning(NamedTuple):
+    """Rotation of a pump beside its logged speed.
+
+    Parameters
+    ----------
+    teeth : tuple of Teeth
+        What is in its flow.
+    offset : float
+        By how much the logged speed exceeds the shaft's [rad/s].
+    """
+
+    teeth: tuple[Ripple, ...] = ()
+    offset: float = 0.0
+
+
+EVENLY = Turning()
+"""As the log says, without teeth."""
+
+
+class ShownRipple(NamedTuple):
+    """Flow ripple of one tooth count as the residuals of a fit show it.
+
+    Parameters
+    ----------
+    teeth : Teeth
+        What the log asks for beside what its drives hold, to first order.
+    gain : float
+        In log-likelihood, Rao's score statistic over two, less what the search for an offset costs [dimensionless].
+    std : float
+        Standard deviation of the amplitude [fraction].
+    opened : ndarray, shape (unknowns,)
+        Variance of the unknowns' coordinates that is added where these teeth are unknown too [dimensionless].
+    offset : float
+        By how much the logged speed exceeds the shaft's with these teeth [rad/s].
+    offset_std : float
+        Standard deviation of that, where the drives hold an offset and these teeth [rad/s].
+    power : ndarray, shape (2, 2)
+        Inverse of the covariance of cosine and sine [dimensionless].
+    answers : ndarray, shape (unknowns, 2)
+        By how much the unknowns fall as cosine and sine grow [dimensionless].
+    beside : float
+        What they gain beside the likeliest count, less that cost [dimensionless].
+    """
+
+    teeth: Ripple
+    gain: float
+    std: float
+    opened: Array
+    offset: float = 0.0
+    offset_std: float = 0.0
+    power: Array = np.eye(2)
+    answers: Array = np.zeros((1, 2))
+    beside: float = 0.0
+
+
+def with_ripple(log: GreyBoxLog, teeth: Sequence[Ripple], offset: float = 0.0) -> GreyBoxLog:
+    """Return a log whose speed includes the pump's flow ripple.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, motor speed its first drive.
+    teeth : sequence of Teeth
+        What is in the flow.
+    offset : float
+        By how much the logged speed exceeds the shaft's [rad/s].
+
+    Examples
+    --------
+    >>> log = GreyBoxLog(np.full((3, 1), 0.1), np.zeros((3, 1)), np.zeros(0), 0.01, np.ones(3, dtype=int), ())
+    >>> with_teeth(log, [Teeth(12, 0.1, 0.0)]).drives[:, 0].round(3).tolist()
+    [0.11, 0.11, 0.11]
+    """
+    drives = log.drives.copy()
+    drives[:, 0] = delivering(drives[:, 0], teeth, offset, log.sample_time)
+    return replace(log, drives=drives, teeth=tuple(teeth), speed_offset=offset)
+
+
+def delivering(speed: Array, teeth: Sequence[Ripple], offset: float, sample_time: float) -> Array:
+    """Return the speed at which a pump without ripple delivers the flow of one with ripple.
+
+    Parameters
+    ----------
+    speed : ndarray, shape (n,)
+        As it is logged [rad/s].
+    teeth : sequence of Teeth
+        What is in the flow.
+    offset : float
+        By how much the logged speed exceeds the shaft's [rad/s].
+    sample_time : float
+        Seconds between samples [s].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        [rad/s]
+    """
+    shaft = speed - offset
+    turned = _turned(shaft, sample_time)
+    return sum((_delivered(one, turned, sample_time) for one in teeth), shaft)
+
+
+class ShownOffset(NamedTuple):
+    """Offset of the logged speed as the residuals of a fit show it.
+
+    Parameters
+    ----------
+    value : float
+        By how much it exceeds the shaft's, to first order [rad/s].
+    gain : float
+        In log-likelihood [dimensionless].
+    std : float
+        Standard deviation of the value [rad/s].
+    opened : ndarray, shape (unknowns,)
+        Variance of the unknowns' coordinates that is added where this offset is unknown too [dimensionless].
+    """
+
+    value: float
+    gain: float
+    std: float
+    opened: Array
+
+
+NO_OFFSET = ShownOffset(0.0, 0.0, np.inf, np.zeros(1))
+"""Where a fit was not asked, or feels none."""
+
+
+def shown_ripple(
+    problem: Problem, theta: Array, errors: Array, bread: Array, slopes: Array, counts: Sequence[int]
+) -> tuple[Mapping[int, ShownRipple], ShownOffset]:
+    """Return the flow ripple that a fit's residuals show, and an offset of speed.
+
+    Without any, each count gains 10 by chance in one log of 22,000, one of `COUNTS` in one log of 1500.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem, motor speed its first drive.
+    theta : ndarray, shape (unknowns,)
+        Its solution [dimensionless].
+    errors : ndarray, shape (blocks,)
+        The normalised residuals there [dimensionless].
+    bread : ndarray, shape (felt, felt)
+        Inverse of the normal equations of the unknowns that are felt [dimensionless].
+    slopes : ndarray, shape (blocks, felt)
+        Derivatives of the residuals by them [dimensionless].
+    counts : sequence of int
+        Teeth a turn that are looked for [count]; of many the model is asked of the `LIKELIEST`.
+
+    Returns
+    -------
+    tuple of Mapping[int, ShownTeeth] and ShownOffset
+        By their count in a turn, `opened` of the unknowns that are felt; a count that is not felt is left out.
+    """
+    log = problem.log
+    sought = [_Sought(count) for count in counts]
+    sought = _likeliest(problem, theta, errors, counts) if len(counts) > LIKELIEST else sought
+    ways = [_ways(log, one) for one in sought]
+    level = np.full(len(log.drives), -1.0)
+    every = [*(each for several in ways for each in several), (level, NUDGE)]
+    moved_drives = [np.column_stack([log.drives[:, 0] + size * way, log.drives[:, 1:]]) for way, size in every]
+    known, *moved = problem.coarse.disturbed(theta, [log.drives, *moved_drives])
+    sizes = [size for _, size in every]
+    columns = (np.stack([one.ravel() for one in moved], axis=-1) - known.reshape(-1, 1)) / sizes
+    answers = bread @ (slopes.T @ columns)
+    free = columns - slopes @ answers
+    along, shown, first = -(errors @ free), dict[int, ShownRipple](), 0
+    beside = gains_beside(free, along, [len(several) for several in ways], [one.price for one in sought])
+    for one, several, gained in zip(sought, ways, beside, strict=True):
+        its = slice(first, first := first + len(several))
+        power = free[:, its].T @ free[:, its]
+        scale = np.sqrt(power.diagonal())
+        if not np.all(scale > 0.0) or np.linalg.cond(power / np.outer(scale, scale)) > 1.0 / np.finfo(float).eps:
+            continue
+        spread = np.linalg.inv(power)
+        cosine, sine, *offset = map(float, spread @ along[its])
+        opened = np.einsum("ij,jk,ik->i", answers[:, its], spread, answers[:, its])
+        shown[one.count] = ShownRipple(
+            Ripple(one.count, cosine, sine),
+            0.5 * float(along[its] @ spread @ along[its]) - one.price,
+            float(np.linalg.norm(spread[:2, :2], 2)) ** 0.5,
+            opened,
+            offset[0] if offset else one.offset,
+            float(spread[2, 2]) ** 0.5 if offset else 0.0,
+            np.asarray(np.linalg.inv(spread[:2, :2]), dtype=float),
+            answers[:, its][:, :2],
+            gained,
+        )
+    power, pulled = float(free[:, -1] @ free[:, -1]), float(along[-1])
+    if power == 0.0:
+        return shown, NO_OFFSET
+    return shown, ShownOffset(pulled / power, 0.5 * pulled**2 / power, power**-0.5, answers[:, -1] ** 2 / power)
+
+
+@dataclass(frozen=True)
+class _Sought:
+    """A count of teeth, the offset of speed with which it is sought, and what that costs in log-likelihood."""
+
+    count: int
+    offset: float = 0.0
+    price: float = 0.0
+
+
+def _ways(log: GreyBoxLog, one: _Sought) -> list[tuple[Array, float]]:
+    """Return changes of speed, each for a unit, and how many units of it are tried: two waves, and an offset.
+
+    An offset that the drives hold is sought with the teeth that tell it, once they are held.
+    """
+    speed, step = log.drives[:, 0], log.sample_time
+    turned = _turned(speed - one.offset, step)
+    waves = [_delivered(Ripple(one.count, *parts), turned, step) for parts in ((1.0, 0.0), (0.0, 1.0))]
+    ways = [(wave, NUDGE) for wave in waves]
+    if log.speed_offset == 0.0 or all(each.count != one.count for each in log.teeth):
+        return ways
+    now, then = (delivering(speed, log.teeth, off, step) for off in (0.0, OFFSET_NUDGE))
+    return [*ways, ((then - now) / OFFSET_NUDGE, NUDGE)]
+
+
+def _turned(speed: Array, step: float) -> tuple[Array, Array]:
+    """Return the shaft's angle halfway between samples, before the first and after the last one too, and its steps."""
+    at = np.concatenate([[0.0], np.cumsum(0.5 * step * (speed[1:] + speed[:-1]))])
+    halfway = at[:-1] + step * (3.0 * speed[:-1] + speed[1:]) / 8.0
+    between = np.concatenate([[-0.5 * step * speed[0]], halfway, [at[-1] + 0.5 * step * speed[-1]]])
+    return between, np.pad(np.abs(np.diff(at)), 1, mode="edge")
+
+
+def _delivered(teeth: Ripple, turned: tuple[Array, Array], sample_time: float) -> Array:
+    """Return the speed that delivers what teeth add [rad/s].
+
+    Straight lines between samples then deliver what teeth do that pass at an even speed. Teeth of which too few samples
+    are taken deliver their mean, which is none.
+    """
+    between, steps = turned
+    phase, half = teeth.count * between, 0.5 * teeth.count * steps
+    seen = half < MOST_BETWEEN
+    volume = (teeth.cosine * np.sin(phase) - teeth.sine * np.cos(phase)) / teeth.count
+    return np.diff(np.where(seen, volume / np.cos(np.where(seen, half, 0.0)), 0.0)) / sample_time
+
+
+def _likeliest(problem: Problem, theta: Array, errors: Array, counts: Sequence[int]) -> Sequence[_Sought]:
+    """Return the counts of teeth that residuals go with most, as pressure answers at an even speed, without the model.
+
+    It then leaks away at one rate, so that it lags behind what teeth deliver by less the faster they pass. An offset of
+    speed turns the phase evenly, so that residuals times waves have a peak at its frequency.
+    """
+    log, rig = problem.log, problem.model.parameters
+    value = {
+        **dict(zip(parameter_names(rig), log.parameters.tolist(), strict=True)),
+        **problem.model.values(theta),
+    }
+    rate = value["leakage_coefficient"] * value["bulk_modulus"] / value["chamber_volume"]
+    blocks = np.linspace(0, len(log.drives) - 1, len(errors)).astype(np.intp)
+    speed, angle = log.drives[:, 0], _turned(log.drives[:, 0], log.sample_time)[0][1:]
+    delivers = np.abs(speed) * value["pump_displacement"] > value["flow_bias"]
+    speed, weighed, turn = speed[blocks], errors * delivers[blocks], np.exp(1j * angle[blocks])
+    length, wave, found = log.sample_time * len(log.drives), np.ones_like(turn), list[tuple[float, _Sought]]()
+    for count, more in zip(counts, np.diff(counts, prepend=0).tolist(), strict=True):
+        wave, passing = wave * turn**more, count * speed
+        seen = np.abs(passing) * log.sample_time < 2.0 * MOST_BETWEEN
+        answer = passing * seen / (rate**2 + passing**2)  # times rate - 1j * passing: what real numbers can is quicker
+        power = float(np.sum(answer * passing * delivers[blocks]))
+        turns = MOST_OFFSET * count * length / (2.0 * np.pi)  # of the phase, by the largest offset
+        looks = min(len(errors), int(np.ceil(LOOKS_A_TURN * turns)))
+        starts = np.arange(looks) * len(errors) // looks
+        along = np.add.reduceat(wave * (weighed * answer * (rate - 1j * passing)), starts)
+        peaks = np.abs(np.fft.fft(along, FINER * looks)) ** 2 / power if power > 0.0 else np.zeros(FINER * looks)
+        turned = np.fft.fftfreq(FINER * looks, 1.0 / looks)
+        near = np.where(np.abs(turned) <= turns, peaks, 0.0)
+        at, price = int(np.argmax(near)), float(np.log(max(2.0 * turns, 1.0)))
+        if near[at] - price > near[0]:
+            offset = 2.0 * np.pi * float(turned[at]) / (count * length)
+            found.append((float(near[at]) - price, _Sought(count, offset, price)))
+        else:
+            found.append((float(near[0]), _Sought(count)))
+    return [one for _, one in sorted(found, key=lambda pair: -pair[0])[:LIKELIEST]]

@@ -1,0 +1,96 @@
+"""Pump ripple too small to fit: integrated out, with the shift and variance that it adds to the unknowns.
+
+Every gear pump has some. Below `LEAST_TEETH` a log seldom tells their count, but where oil is slow beside a tooth they
+put bulk modulus off by more than a deviation. Their answer is linear, so that no fit is made anew.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from estimation.fits.greybox.pump_ripple import COUNTS, LEAST_TEETH, ShownRipple
+
+ANY_TEETH = 0.5
+"""Probability before a log is seen that teeth are felt at all: a simulator may have none [fraction]."""
+
+SMALL_STD = LEAST_TEETH / 6.0**0.5
+"""Standard deviation of the cosine and the sine of small teeth, of any size up to `LEAST_TEETH` alike [fraction]."""
+
+
+MOVED = ("bulk_modulus", "leakage_coefficient", "flow_bias")
+"""What is told with small teeth taken into account; all are fitted as logarithms."""
+
+NOT_MOVED: tuple[Mapping[str, float], Mapping[str, float]] = ({}, {})
+"""What teeth move where a fit was not asked for them, or holds some."""
+
+
+MOST_MOVED = 1.0
+"""Logarithm of the factor by which small teeth move a parameter at most [dimensionless]; judged."""
+
+
+def small_pump_ripple(
+    shown: Mapping[int, ShownRipple], names: Sequence[str]
+) -> tuple[Mapping[str, float], Mapping[str, float]]:
+    """Return the shift of the unknowns if a small ripple is unknown too, and the variance that this adds.
+
+    Teeth of each count that was asked are weighed by their evidence beside none (Kass and Raftery 1995, Journal of the
+    American Statistical Association 90, equation 1), cosine and sine being normal before the log is seen.
+
+    Parameters
+    ----------
+    shown : Mapping[int, ShownTeeth]
+        What residuals say of each, by their count in a turn.
+    names : sequence of str
+        The unknowns that are felt.
+
+    Returns
+    -------
+    tuple of Mapping[str, float]
+        In the fitted coordinates [dimensionless], by unknown.
+    """
+    alone = [one for one in shown.values() if one.offset == 0.0]
+    share = ANY_TEETH / len(COUNTS)
+    weights, moves, variances = [1.0 - share * len(alone)], [np.zeros(len(names))], [np.zeros(len(names))]
+    for one in alone:
+        along = one.power @ np.array([one.teeth.cosine, one.teeth.sine])
+        spread = np.linalg.inv(one.power + np.eye(2) / SMALL_STD**2)
+        tested = float(np.linalg.slogdet(np.eye(2) + SMALL_STD**2 * one.power)[1])
+        weights.append(share * float(np.exp(min(0.5 * float(along @ spread @ along) - 0.5 * tested, 700.0))))
+        moves.append(-one.answers @ spread @ along)
+        variances.append(np.einsum("ij,jk,ik->i", one.answers, spread, one.answers))
+    likely = np.array(weights) / np.sum(weights)
+    moved = likely @ np.array(moves)
+    variance = likely @ (np.array(variances) + (np.array(moves) - moved) ** 2)
+    return dict(zip(names, moved.tolist(), strict=True)), dict(zip(names, variance.tolist(), strict=True))
+
+
+def with_small_ripple(
+    found: Mapping[str, tuple[float, float]], small: tuple[Mapping[str, float], Mapping[str, float]]
+) -> dict[str, tuple[float, float]]:
+    """Return the result, shifted and widened by a small pump ripple.
+
+    Parameters
+    ----------
+    found : Mapping[str, tuple of float]
+        Value and deviation by parameter [SI].
+    small : tuple of Mapping[str, float]
+        As of `small_pump_ripple` [dimensionless].
+
+    Returns
+    -------
+    dict[str, tuple of float]
+        The same, those of `MOVED` changed [SI].
+
+    Examples
+    --------
+    >>> with_small_teeth({"bulk_modulus": (2e8, 3e5)}, ({"bulk_modulus": 0.0}, {"bulk_modulus": 4e-6}))
+    {'bulk_modulus': (200000000.0, 500000.0)}
+    """
+    moved, variance = small
+    out = dict(found)
+    for name in (name for name in MOVED if name in moved and name in found):
+        value, std = found[name]
+        step = moved[name] if abs(moved[name]) <= MOST_MOVED else 0.0  # no fit is linear so far: it is only uncertain
+        out[name] = value * math.exp(step), math.hypot(std, value * variance[name] ** 0.5)
+    return out

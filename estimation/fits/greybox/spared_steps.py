@@ -1,0 +1,105 @@
+"""Short model steps only where they matter, during a search; its end uses all of them.
+
+Between samples pressures are all but straight lines, so that one step is as exact as four. A few samples differ: a
+valve opens or shuts there. Which they are is read off two runs at one point, so that a search has one misfit
+throughout. See decision 294.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.arrays import IntArray
+from estimation.fits.greybox.problem import Problem
+from estimation.fits.greybox.side_by_side import LANES
+from plant.arrays import Array
+
+FELT_ERRORS = (1e-4, 3e-4, 1e-3, 3e-3)
+"""A sample has short steps if one long step errs there by more than the first, in standard deviations of its noise, or
+by the next one where too many samples do [dimensionless]. On 20 plain training logs the first moves the optimum by
+0.017 deviations of bulk modulus at most."""
+
+AROUND = 3
+"""How many samples before and after it have them, too: a search moves the moment at which a valve opens [samples]."""
+
+MOST_SHORT = 0.3
+"""Share of samples with short steps that is too many [fraction]."""
+
+LAST = 4
+"""Evaluations with all short steps at the end of a search that had few [count]."""
+
+
+def sparing_steps(problem: Problem, theta: Array) -> IntArray:
+    """Return model steps up to each sample: one where that is as exact as several, near a point.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    theta : ndarray, shape (unknowns,)
+        The point [dimensionless].
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        Those of the log where nothing is to be spared, or it has gaps [count].
+    """
+    log = problem.log
+    if log.gaps.size or np.max(log.steps) == 1:
+        return log.steps
+    errors = _long_step_errors(problem, theta)
+    for felt in FELT_ERRORS:
+        short = np.convolve(errors > felt, np.ones(2 * AROUND + 1), "same") > 0.0
+        if np.mean(short) <= MOST_SHORT:
+            return np.where(short, log.steps, 1)
+    return log.steps
+
+
+def with_steps(problem: Problem, steps: IntArray | None) -> Problem:
+    """Return a problem with other model steps.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    steps : ndarray of int, shape (n,), or None
+        Up to each sample [count]; None for those that it has.
+
+    Returns
+    -------
+    Problem
+        The problem; the same one where it has those.
+    """
+    log = problem.log.stepped(steps)
+    return problem if log is problem.log else problem.on(log)
+
+
+def spared(problem: Problem, theta: Array) -> Problem:
+    """Return a problem with short model steps where they matter near a point, see `sparing_steps`.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    theta : ndarray, shape (unknowns,)
+        The point [dimensionless].
+
+    Returns
+    -------
+    Problem
+        The problem; the same one where nothing is to be spared.
+    """
+    return with_steps(problem, sparing_steps(problem, theta))
+
+
+def _long_step_errors(problem: Problem, theta: Array) -> Array:
+    """Return the error of one long step up to each sample, over the noise, shape (n,) [dimensionless].
+
+    What a step errs by stays until the oil has leaked off, so that errors of steps are differences.
+    """
+    log = problem.log
+    white = tuple(one.scaled(1.0, 0.0) for one in log.noise)
+    bare = replace(log, measured=np.zeros(log.measured.shape), block=log.sample_time, noise=white, course=None)
+    rows = [log.parameters] * min(1 + len(theta), LANES)  # side by side, as a search has them: no kernel for these two
+    fine, rough = (problem.on(one).residuals_of(theta, rows)[0] for one in (bare, bare.coarsened()))
+    return np.max(np.abs(np.diff(rough - fine, axis=1, prepend=0.0)), axis=0)

@@ -1,0 +1,200 @@
+"""Coarse search for the optimum of a set of hypotheses, with one model step per sample."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.fits.greybox.descent import descend
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypotheses import LATEST, Hypothesis
+from estimation.fits.hypothesis_search.decimation import decimated
+from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.wide_log import balanced_by, delayed, usual_values
+from estimation.fits.hypothesis_search.wide_problem import AIR_ONSET, AIR_WIDTH, flow_bounds, freed
+from estimation.models.wide_flow import LINEAR
+from plant.arrays import Array
+
+SETTLING = 40
+"""Evaluations of the model at most on a way down [count]."""
+
+SLIGHT = 1e-4
+"""Share of the cost that a further step must promise with long model steps [fraction]: these err by more."""
+
+NEAR = 2.0
+"""First radius of a search [dimensionless]: it begins where the plain form ended, or a simpler hypothesis."""
+
+FINEST_DELAY = 1e-3
+"""Step in which a delay is sought [s]; what is left of it goes into the lag."""
+
+MAY_VANISH, VANISHED = ("leakage_coefficient", "flow_bias", "makeup_conductance"), 1e-2
+"""What a search may take for nothing by mistake, and the share of the rig's value below which it has."""
+
+ONSETS, WIDTHS = np.linspace(0.03, 0.97, 21), (0.02, 0.07, 0.25)
+"""Middle times at which air is tried to get in once all else is known, and how long that takes [fraction of a log]."""
+
+LEAST_BETTER = 10.0
+"""Gain in log-likelihood for which air is led to another time [dimensionless]: the worth of a hypothesis."""
+
+
+def search_coarsely(log: GreyBoxLog, tried: Trial, wanted: float = np.inf, every: int = 1) -> Trial:
+    """Return a set of hypotheses at its optimum, with one model step per sample or per few samples.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    tried : Tried
+        The set, from where it has come.
+    wanted : float
+        Cost above which it is of no use, so that it is not followed there [dimensionless].
+    every : int
+        How many samples are one, see `decimated` [count].
+    """
+    early, known = coarsened(log, tried.delays, tried.together, every), freed_at_end(tried.together[:-1])
+    best = _led_down(early, tried, tried.point.theta, *known, wanted=wanted)
+    if (revived := _revived(log, best, *known)) is not None:
+        best = min(best, _led_down(early, best, revived, *known, wanted=wanted), key=lambda one: one.cost)
+    if len(tried.together[-1].delays) > 1:
+        best = _punctual(log, best, every, *known)
+    return _entered(early, best, wanted) if any(one.from_entry for one in tried.together) else best
+
+
+def _led_down(log: GreyBoxLog, tried: Trial, start: Array, *more: str, wanted: float) -> Trial:
+    """Return a set of hypotheses led down with long model steps."""
+    return descended(log, tried, start, SETTLING, *more, wanted=wanted, least_share=SLIGHT)
+
+
+def _punctual(log: GreyBoxLog, best: Trial, every: int, *known: str) -> Trial:
+    """Return a set of hypotheses with the delay of its last one sought in steps of `FINEST_DELAY`."""
+    channel, early = best.together[-1].late, min(best.together[-1].delays) < 0.0
+    least, most = (-LATEST, 0.0) if early else (0.0, LATEST)
+    for step in (FINEST_DELAY, -FINEST_DELAY):
+        while least <= (delay := best.delays.get(channel, 0.0) + step) <= most:
+            moved = replace(best, delays={channel: delay})
+            later = coarsened(log, moved.delays, moved.together, every)
+            moved = _led_down(later, moved, best.point.theta, *known, wanted=best.cost)
+            if moved.cost >= best.cost:
+                break
+            best = moved
+    return best
+
+
+def _entered(log: GreyBoxLog, tried: Trial, wanted: float) -> Trial:
+    """Return a set of hypotheses with air that gets in when, and as quickly as, it does likeliest.
+
+    A descent finds the nearest time only.
+    """
+    more = freed_at_end(tried.together)
+    problem = freed(log, tried.together, *more)
+    places = [problem.model.unknowns.index(name) for name in (AIR_ONSET, AIR_WIDTH)]
+    theta = problem.model.theta({**usual_values(log), **tried.values})
+    asked = [
+        (onset / LINEAR[AIR_ONSET], np.log(width))
+        for width in WIDTHS
+        for onset in np.maximum(ONSETS - 0.5 * width, 0.0)
+    ]
+    for _ in range(len(WIDTHS)):
+        thetas = np.repeat(theta[None], len(asked) + 1, axis=0)
+        thetas[1:, places] = asked
+        start = thetas[int(np.argmin(problem.costs([*thetas])))]
+        further = _led_down(log, tried, start, *more, wanted=wanted)
+        if further.cost > tried.cost - LEAST_BETTER:
+            break
+        tried, theta = further, further.point.theta
+    return tried
+
+
+def _revived(log: GreyBoxLog, tried: Trial, *more: str) -> Array | None:
+    """Return a start with the rig's value of what has all but vanished, from where a logarithm finds no way back."""
+    lost = vanished_values(log, tried.values)
+    return freed(log, tried.together, *more).model.theta({**tried.values, **lost}) if lost else None
+
+
+def vanished_values(log: GreyBoxLog, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the rig's values of parameters that have almost vanished.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    values : Mapping[str, float]
+        What a search has found [SI].
+
+    Returns
+    -------
+    dict
+        By name, of `MAY_VANISH` [SI].
+    """
+    usual = usual_values(log)
+    return {name: usual[name] for name in MAY_VANISH if values[name] < VANISHED * usual[name]}
+
+
+def descended(
+    log: GreyBoxLog,
+    tried: Trial,
+    start: Array,
+    evaluations: int,
+    *more: str,
+    wanted: float = np.inf,
+    least_share: float = 0.0,
+) -> Trial:
+    """Return a set of hypotheses after a descent from a start.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    tried : Tried
+        The set.
+    start : ndarray, shape (unknowns,)
+        Fitted coordinates [dimensionless].
+    evaluations : int
+        How often the model may be evaluated [count].
+    *more : str
+        What is freed beside the hypotheses.
+    wanted : float
+        See `search_coarsely` [dimensionless].
+    least_share : float
+        Share of the cost that a further step must promise [fraction].
+
+    Returns
+    -------
+    Tried
+        The set where the search ended.
+    """
+    problem = freed(log, tried.together, *more)
+    bounds = flow_bounds(problem.model, [start], log)
+    point = descend(problem.at, start, evaluations, bounds, radius=NEAR, wanted=wanted, least_share=least_share)
+    return replace(tried, point=point, values=problem.model.values(point.theta))
+
+
+def coarsened(
+    log: GreyBoxLog, delays: Mapping[str, float], together: tuple[Hypothesis, ...], every: int = 1
+) -> GreyBoxLog:
+    """Return a log with one model step per sample, as the coarse search uses it.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    delays : Mapping[str, float]
+        How late channels come [s].
+    together : tuple of Hypothesis
+        The set; by mass if one of them says so.
+    every : int
+        How many samples are one, see `decimated` [count].
+    """
+    row = decimated(delayed(log, delays), every)
+    return balanced_by(row, 1.0) if any(one.by_mass for one in together) else row
+
+
+def freed_at_end(together: Iterable[Hypothesis]) -> list[str]:
+    """Return the parameters that a hypothesis frees only at the end of its search; beside another one, from the start.
+
+    Returns
+    -------
+    list of str
+        Parameters of the wide form.
+    """
+    return [name for one in together for name in one.at_end]

@@ -1,0 +1,338 @@
+"""`explain(log, parameters, ...) -> Explanation`: the hypotheses under which a log is explained, alone or two together.
+
+A log that the plain flow form does not explain is fitted under the hypotheses that the slopes of that fit promise most
+of, then under the others, then under pairs with the likeliest; what is freed without need only widens the interval.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+
+from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, START_LOAD, VOLUME, Hypothesis
+from estimation.fits.hypothesis_search.coarse_search import coarsened, vanished_values
+from estimation.fits.hypothesis_search.compatible_hypotheses import compatible_hypotheses
+from estimation.fits.hypothesis_search.decimation import FEW, Decimation, cost_over_noise, decimation_for
+from estimation.fits.hypothesis_search.decimation_limit import decimation_limit
+from estimation.fits.hypothesis_search.explanation import Explanation, Trial
+from estimation.fits.hypothesis_search.final_fits import ALIKE, REACHED, with_less_lag
+from estimation.fits.hypothesis_search.form_fit import weighed
+from estimation.fits.hypothesis_search.predicted_gains import (
+    NO_GAIN,
+    PredictedGain,
+    by_predicted_gain,
+    predicted_gain_beside,
+)
+from estimation.fits.hypothesis_search.ranking import (
+    NEARLY_AS_GOOD,
+    ended_apart,
+    likeliest,
+    ranked,
+    ranked_optima,
+    refined,
+)
+from estimation.fits.hypothesis_search.screening import NEARLY, nearing, promising_starts, screen
+from estimation.fits.hypothesis_search.wide_log import (
+    balanced_by,
+    delayed,
+    usual_pressure,
+    usual_values,
+    widened,
+)
+from estimation.fits.hypothesis_search.wide_problem import freed, own_starts
+from estimation.models.wide_flow import GROWTH, grown_leakage
+from plant.eha.model import EhaParameters
+
+DEFERRED = 4.0
+"""What the likeliest hypotheses leave on few samples, over the noise, from which the others are compared before any of
+them is sought with all samples [dimensionless]; judged."""
+
+TRUSTED = 5.0
+"""How many times what slopes promise a hypothesis may gain where little is left [dimensionless]."""
+
+NOISE = 1.05
+"""What is left over the noise by a pair below which no valve and no air is sought in its place [dimensionless]."""
+
+BESIDE = 50.0
+"""Gain in log-likelihood that slopes promise another volume beside a pump that delivers less, from which the two are
+sought together [dimensionless]; judged."""
+
+WORTH = 10.0
+"""Gain in log-likelihood below which a hypothesis is not accepted [dimensionless]."""
+
+
+Accepted: TypeAlias = Callable[[GreyBoxFit], bool]
+
+
+def explain(
+    log: GreyBoxLog,
+    parameters: EhaParameters,
+    starts: Sequence[Mapping[str, float]],
+    accepted: Accepted,
+    *,
+    asked: Sequence[Hypothesis] = HYPOTHESES,
+    paired: bool = True,
+    hopeless: float = np.inf,
+    by_mass: bool = False,
+    useful: float = np.inf,
+) -> Explanation | None:
+    """Return the hypotheses that explain a log best, alone or two together.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    starts : sequence of Mapping[str, float]
+        First guesses of the plain form's unknowns [SI].
+    accepted : callable
+        ``accepted(fit)``: whether a fit explains the log.
+    asked : sequence of Hypothesis
+        What is tried alone; pairs are with any other.
+    paired : bool
+        Whether pairs are tried where nothing explains the log alone.
+    hopeless : float
+        Cost from which the best alone counts for so little that no pair is tried [dimensionless].
+    by_mass : bool
+        Whether mass is balanced while hypotheses are compared, as where the likelier plain fit does; else volume. At
+        high pressure the two differ by more than what is strange.
+    useful : float
+        Cost above which what is tried alone is of no use [dimensionless].
+
+    Returns
+    -------
+    Explanation or None
+        The likeliest; whether it explains the log is for the gate to say. None where it leaves far too much.
+    """
+    wide = balanced_by(widened(log, parameters, starts[0]), 1.0 if by_mass else 0.0)
+    plain = _plain_point(wide, starts[0])
+    likely, others, gains = by_predicted_gain(wide, (), starts[0], asked)
+    left = cost_over_noise(wide, plain.cost)
+    spared = Decimation(decimation_limit(wide, starts[0], decimation_for(wide, left)), left, starts)
+    finished = _alone(wide, plain.cost, (likely, others, gains), spared, accepted, useful)
+    if finished[0].fits and not _explained(finished[0], accepted):
+        finished = ranked([*finished, *filter(None, [with_less_lag(wide, finished[0])])])
+    if paired and finished[0].cost < hopeless and not _by_itself(wide, finished[0], accepted):
+        first, second = finished[0], finished[1] if len(finished) > 1 else None
+        pairs = _paired(wide, first, starts[0], accepted)
+        near = cost_over_noise(wide, first.cost) < NEARLY or (pairs and _explained(pairs[0], accepted))
+        as_good = second and second.cost <= NEARLY_AS_GOOD * first.cost and not _same(first, second)
+        sought = not (pairs and _explained(pairs[0], accepted) and cost_over_noise(wide, pairs[0].cost) < NOISE)
+        if second and near and as_good and sought:
+            pairs += _paired(wide, second, starts[0], accepted, rivalled=min(one.cost for one in (first, *pairs)))
+        finished = _distinct([first, *pairs])
+        if begun := [one for one in asked if one.from_first_sample and one.free == START_LOAD.free]:
+            finished = _distinct([*finished, *_rig_and_load(wide, begun[0], finished[0], spared, accepted)])
+    best = finished[0]
+    if not best.fits:
+        return None
+    rivals = [one for one in finished[1:] if one.fits and one.cost < best.cost + ALIKE]
+    found = weighed([fit for one in (best, *rivals) for fit in one.fits])
+    values = {name: (value, best.fit.std[name]) for name, value in best.fit.values.items()} | dict(found)
+    if any(name in values for name in GROWTH):  # what is told of a leakage is what it is at the end
+        ended = float(grown_leakage(1.0, *(values.get(name, (0.0, 0.0))[0] for name in GROWTH)))
+        value, std = values["leakage_coefficient"]
+        values["leakage_coefficient"] = ended * value, ended * std
+    names = tuple(one.name for one in best.together)
+    open_by = _delivery_open(wide, best)
+    return Explanation(names, values, best.delays, best.fit, len(rivals), usual_pressure(log, parameters), open_by)
+
+
+def _alone(
+    log: GreyBoxLog,
+    plain: float,
+    asked: tuple[Sequence[Hypothesis], Sequence[Hypothesis], Mapping[str, float]],
+    spared: Decimation,
+    accepted: Accepted,
+    useful: float = np.inf,
+) -> list[Trial]:
+    """Return the hypotheses that explain a log alone, best first: of those of largest predicted gain, else of all.
+
+    Where what promises most leaves much on few samples, the others are compared on few samples too before any is led
+    on, and the better ones are led on first. Where the plain form leaves little, slopes hold far enough: what promises
+    too little is not tried then, nor is a start from which the first hypothesis came nowhere.
+    """
+    (likely, others, gains), starts, every = asked, spared.starts, spared.every
+    faint = decimation_for(log, spared.left) == 1 and len(log.drives) >= FEW
+    begun = [[*screen(log, (likely[0],), starts, every=every)]]
+    if faint:
+        places = [i for i, start in enumerate(starts) if start in promising_starts(starts, begun)]
+        ways = [begun[0][i] for i in places]
+        places = [i for n, i in enumerate(places) if all(ended_apart(one, ways[n]) for one in ways[:n])]
+        starts, begun = [starts[i] for i in places], [[begun[0][i] for i in places]]
+    begun += [[*screen(log, (one,), starts, every=every)] for one in likely[1:]]
+    ended = ranked_optima(log, begun, spared=spared)
+    if others and every > 1 and cost_over_noise(log, ended[0].cost) > DEFERRED:
+        known = ended[0].cost
+        more = ranked_optima(
+            log, nearing(log, others, starts, promising_starts(starts, begun), known, every), known, spared
+        )
+        first, second = sorted((ended, more), key=lambda each: each[0].cost)
+        finished = refined(log, first, spared=spared)
+        return ranked([*finished, *refined(log, second, finished[0].cost, spared)])
+    finished = refined(log, ended, spared=spared._replace(starts=promising_starts(starts, begun)), useful=useful)
+    if _explained(finished[0], accepted):  # a stuck valve was told as a small step of leakage, at 1.1 times the noise
+        others = [one for one in others if one.far] if cost_over_noise(log, finished[0].cost) > NOISE else []
+    if not others:
+        return finished
+    known = finished[0].cost
+    tried = _promising_enough(others, gains, plain - NEARLY_AS_GOOD * known) if faint else others
+    if not tried:
+        return finished
+    more = nearing(log, tried, starts, promising_starts(starts, begun), known, every)
+    return ranked([*finished, *likeliest(log, more, known, spared)])
+
+
+def _promising_enough(asked: Sequence[Hypothesis], gains: Mapping[str, float], needed: float) -> Sequence[Hypothesis]:
+    """Return the hypotheses that may bring a gain, and those of which slopes say nothing."""
+    return [one for one in asked if one.far or one.beside or TRUSTED * gains[one.name] >= needed]
+
+
+def _paired(
+    log: GreyBoxLog, first: Trial, plain: Mapping[str, float], accepted: Accepted, *, rivalled: float = np.inf
+) -> list[Trial]:
+    """Return the pairs of hypotheses that explain a log better than the first one alone, best first.
+
+    What slopes promise most is tried first, and all else where that does not explain the log: slopes are taken where
+    the first hypothesis has gone to take up what the second one does. The best of it is fitted to the end in any case.
+    Beside a rival of the best, ``rivalled`` is the cost of what is known. Nothing is tried there where all hypotheses
+    together do not explain the log, and a pair counts only if it comes lower.
+    """
+    late = delayed(log, first.delays)
+    taken = {one.name for one in first.together}
+    asked = [one for one in HYPOTHESES if one.name not in taken]
+    reached = compatible_hypotheses(log, first, asked)
+    if rivalled < np.inf and len(reached) < len(asked):
+        return []
+    likely, others, gains = by_predicted_gain(late, first.together, first.values, reached)
+    begun = [_begun_again(log, first), {**plain, **own_starts(log, first.together[-1])[0]}]
+    left = cost_over_noise(log, first.cost)
+    every = decimation_limit(log, first.coarse or first.values, decimation_for(log, left), first.together, first.delays)
+    spared = Decimation(every, left, begun)
+    long, useful = len(log.drives) >= FEW, min(first.cost, rivalled) - WORTH
+    faint = long and decimation_for(log, left) == 1
+    if long:  # none is told that does not explain the log
+        useful = min(useful, (REACHED if len(reached) < len(asked) else NEARLY) * first.cost / left)
+    far, rest = [one for one in others if one.far], [one for one in others if not one.far]
+    near = [*likely, *far]
+    nearer: list[list[Trial]] = []
+    for one in likely if faint else near:
+        nearer.append([*screen(late, (*first.together, one), begun, every=spared.every)])
+        if faint and min(way.cost for way in nearer[-1]) < NEARLY * first.cost and len(begun) > 1:
+            begun, nearer = _kept(begun, nearer)
+    least = min(first.cost, rivalled)
+    ended = ranked_optima(late, nearer, least, spared) if nearer else []
+    if ended and rest and long and not faint and cost_over_noise(log, ended[0].cost) > REACHED:
+        known = min(least, ended[0].cost)
+        wanted, begun = NEARLY_AS_GOOD * known, promising_starts(begun, nearer)
+        more = [screen(late, (*first.together, one), begun, wanted, spared.every) for one in rest]
+        ended, others = sorted((ended, ranked_optima(late, more, known, spared)), key=lambda each: each[0].cost)
+        pairs = refined(late, ended, least, spared, useful)
+        known, useful = min([least, *(one.cost for one in pairs[:1])]), _as_useful(pairs, useful)
+        return _better(first, ranked([*pairs, *refined(late, others, known, spared, useful)]), least)
+    pairs = refined(late, ended, least, spared, useful)
+    useful = _as_useful(pairs, useful)
+    if faint and not (pairs and _explained(pairs[0], accepted) and cost_over_noise(log, pairs[0].cost) < NOISE):
+        wanted = NEARLY * min([least, *(one.cost for one in pairs[:1])])
+        distant = [[*screen(late, (*first.together, one), begun, wanted, spared.every)] for one in far]
+        distant = [ways for ways in distant if min(one.cost for one in ways) < wanted]
+        pairs = ranked([*pairs, *likeliest(late, distant, wanted / NEARLY, spared, useful)]) if distant else pairs
+        useful = _as_useful(pairs, useful)
+    if not pairs or not _explained(pairs[0], accepted):
+        known = min([least, *(one.cost for one in pairs[:1])])
+        if faint:
+            needed = first.cost - min(NEARLY_AS_GOOD * known, REACHED * first.cost / left)
+            rest = _promising_enough(rest, gains, max(WORTH, needed))
+        wanted, begun = NEARLY_AS_GOOD * known, promising_starts(begun, nearer) if long and nearer else begun
+        more = [screen(late, (*first.together, one), begun, wanted, spared.every) for one in rest]
+        if more:
+            pairs = ranked([*pairs, *likeliest(late, more, known, spared, useful)])
+    return _better(first, pairs, least)
+
+
+def _rig_and_load(
+    log: GreyBoxLog, load: Hypothesis, best: Trial, spared: Decimation, accepted: Accepted
+) -> list[Trial]:
+    """Return a load at the start of a log together with a pump and chambers that the rig file has wrong.
+
+    A load is no error of a rig file, so two errors may come beside it. Searched one after the other, each of the three
+    takes up what belongs to the others. They are sought together only where no two hypotheses explain the log.
+    """
+    if _explained(best, accepted):
+        return []
+    together = DELIVERY, VOLUME, load
+    tried = [*screen(log, together, spared.starts, every=spared.every)]
+    return [one for one in likeliest(log, [tried], best.cost, spared) if _explained(one, accepted)]
+
+
+def _better(first: Trial, pairs: Iterable[Trial], least: float) -> list[Trial]:
+    """Return the pairs that come lower than what is known, with the delays of the first hypothesis."""
+    better = (one for one in pairs if one.cost < least - WORTH)
+    return [replace(one, delays={**first.delays, **one.delays}) for one in better]
+
+
+def _kept(
+    starts: Sequence[Mapping[str, float]], tried: Sequence[Sequence[Trial]]
+) -> tuple[list[Mapping[str, float]], list[list[Trial]]]:
+    """Return the starts that are used again, and what was tried from these."""
+    kept = promising_starts(starts, tried)
+    return kept, [[way for start, way in zip(starts, each, strict=True) if start in kept] for each in tried]
+
+
+def _as_useful(pairs: Sequence[Trial], useful: float) -> float:
+    """Return the cost above which no further pair is told, given those that are known, the best first."""
+    return min(useful, pairs[0].cost + ALIKE) if pairs and pairs[0].fits else useful
+
+
+def _plain_point(log: GreyBoxLog, plain: Mapping[str, float]) -> Point:
+    """Return the end of the plain form's search, with one model step per sample."""
+    problem = freed(coarsened(log, {}, ()), ())
+    return problem.at(problem.model.theta({**usual_values(log), **plain}))
+
+
+def _explained(tried: Trial, accepted: Accepted) -> bool:
+    return not tried.void and bool(tried.fits) and accepted(tried.fit)
+
+
+def _by_itself(log: GreyBoxLog, tried: Trial, accepted: Accepted) -> bool:
+    """Return whether a set of hypotheses explains a log, and is no worn pump that stands for a wrong area.
+
+    An area is the ratio of what is delivered and of a volume: both are asked for then.
+    """
+    if not _explained(tried, accepted):
+        return False
+    if tried.together != (DELIVERY,):
+        return True
+    return predicted_gain_beside(log, tried.together, tried.values, VOLUME).gain < BESIDE
+
+
+def _same(one: Trial, other: Trial) -> bool:
+    """Return whether two sets free the same unknowns and reach the same optimum: a late or an early speed."""
+    free, others = ({name for each in tried.together for name in each.free} for tried in (one, other))
+    return free == others and not ended_apart(one, other)
+
+
+def _begun_again(log: GreyBoxLog, first: Trial) -> Mapping[str, float]:
+    """Return the end of a search with long model steps as the next start, its vanished values reset."""
+    ended = first.coarse or first.values
+    return {**ended, **vanished_values(log, ended)}
+
+
+def _delivery_open(log: GreyBoxLog, best: Trial) -> PredictedGain:
+    """Return the predicted gain of another pump delivery beside an explanation of a log; see `Explanation`."""
+    if DELIVERY.free[0] in best.values:
+        return NO_GAIN
+    return predicted_gain_beside(delayed(log, best.delays), best.together, best.values, DELIVERY)
+
+
+def _distinct(tried: Iterable[Trial]) -> list[Trial]:
+    """Return the best of each set of hypotheses, in whatever order these came; the best first."""
+    best: dict[frozenset[str], Trial] = {}
+    for one in ranked(tried):
+        best.setdefault(frozenset(each.name for each in one.together), one)
+    return [*best.values()]

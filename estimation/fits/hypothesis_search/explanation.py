@@ -1,0 +1,92 @@
+"""A set of hypotheses on trial, and the explanation of a log that comes out."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.hypotheses import Hypothesis
+from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, PredictedGain
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A set of hypotheses with the best point that its search has found.
+
+    Parameters
+    ----------
+    together : tuple of Hypothesis
+        The hypotheses.
+    point : Point
+        Where the search under them is.
+    values : Mapping[str, float]
+        The parameters there [SI].
+    delays : Mapping[str, float]
+        Times by which channels come late beside their lags [s].
+    rig : Mapping[str, float]
+        What the rig file says, and what is strange absent [SI].
+    fits : tuple of GreyBoxFit
+        Once it is finished: the likelier balance first, by volume or by mass, then the other one if it counts.
+    void : bool
+        Whether what was found is not what the hypotheses say.
+    coarse : Mapping[str, float]
+        Once it is finished: its values where its search with long model steps ended [SI].
+    """
+
+    together: tuple[Hypothesis, ...]
+    point: Point
+    values: Mapping[str, float]
+    delays: Mapping[str, float]
+    rig: Mapping[str, float]
+    fits: tuple[GreyBoxFit, ...] = ()
+    void: bool = False
+    coarse: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    @property
+    def cost(self) -> float:
+        """Cost of the best, infinite where it is not what the hypotheses say [dimensionless]."""
+        return self.point.cost if self.meant and not self.void else np.inf
+
+    @property
+    def meant(self) -> bool:
+        """Whether what was found is what the hypotheses say, and no use of what they free beside."""
+        large = all(not one.least or abs(self.values[one.free[0]]) >= one.least for one in self.together)
+        return large and all(not one.lower or self.values[one.free[0]] < self.rig[one.free[0]] for one in self.together)
+
+    @property
+    def fit(self) -> GreyBoxFit:
+        """Its fit by the likelier balance."""
+        return self.fits[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """Explanation of a log that the plain flow form does not fit.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The hypotheses that were accepted together.
+    values : Mapping[str, tuple of float]
+        Value and standard deviation by parameter, in SI.
+    delays : Mapping[str, float]
+        Times by which channels come late beside their lags [s].
+    fit : GreyBoxFit
+        The fit under them.
+    rivals : int
+        How many other sets of hypotheses explain the log about as well.
+    stated_pressure : float
+        Absolute pressure that bulk modulus is stated at, where the oil holds air [Pa].
+    delivery_open : Promise
+        What another delivery of the pump promises beside them; nothing where that is part of the explanation.
+    """
+
+    names: tuple[str, ...]
+    values: Mapping[str, tuple[float, float]]
+    delays: Mapping[str, float]
+    fit: GreyBoxFit
+    rivals: int
+    stated_pressure: float
+    delivery_open: PredictedGain = NO_GAIN

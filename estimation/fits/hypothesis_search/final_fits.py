@@ -1,0 +1,175 @@
+"""Final fits of sets of hypotheses: short model steps, balanced by volume and by mass."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.fits.greybox.descent import Point, descend
+from estimation.fits.greybox.fit import GreyBoxFit, concluded
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.spared_steps import LAST, spared
+from estimation.fits.hypothesis_search.coarse_search import FINEST_DELAY, NEAR, coarsened, descended, freed_at_end
+from estimation.fits.hypothesis_search.decimation import FEW, cost_over_noise
+from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.wide_log import balanced_by, balances_mass, delayed, usual_values
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed
+from estimation.models.flow import STIFFNESS
+from plant.arrays import Array
+
+FINISHING = 12
+"""Evaluations of the model for the last search, with short model steps."""
+
+ROUNDS = 6
+"""How often the last ones are made at most, while each gains what would tell a hypothesis from another [count]."""
+
+UNFINISHED = 10.0
+"""Half the sum of squares over what noise alone makes of it, from which a set of hypotheses is not fitted with short
+model steps [dimensionless]; what explains a log comes to 1.2."""
+
+FINISHED, REACHED = 0.7, 1.5
+"""A search with short model steps goes on while its steps promise to bring the cost to the first share of itself (six
+rounds of it make an eighth), but is never asked for less than the second times what noise alone makes [fractions]."""
+
+FAR_BEHIND = 1.2
+"""How many times the cost that would be of use one still is after twelve evaluations that no more are made for it
+[dimensionless]."""
+
+NEVER = float(np.finfo(np.float64).max)
+"""Cost of a fit that is not what its hypotheses say, so that it is not believed [dimensionless]."""
+
+LITTLE = 1e-3
+"""Share of the cost below which a gain tells nothing of what leaves far more than noise [fraction]; judged."""
+
+CLOSE = 60.0
+"""Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""
+
+ALIKE = 15.0
+"""Difference of log-likelihood up to which two sets of hypotheses are said to explain a log alike [dimensionless]."""
+
+
+def final_fit(log: GreyBoxLog, tried: Trial, useful: float = np.inf) -> Trial:
+    """Return the final fit of a set of hypotheses, balanced by volume and by mass.
+
+    Balanced by mass, the inner circuit yields as it does in the plain form. A log that does not tell the two apart is
+    believed neither alone: they may differ by three deviations. The balance in which the set was sought comes first,
+    and the other is not followed where it will not come as low.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    tried : Tried
+        The set, where long model steps led.
+    useful : float
+        Cost above which it is of no use [dimensionless].
+
+    Returns
+    -------
+    Tried
+        The set where short model steps lead, with its fits; one that is not what it says has the cost `NEVER`.
+    """
+    row = delayed(log, tried.delays)
+    done: list[tuple[Trial, FreedProblem]] = []
+    last = freed_at_end(tried.together)
+    sought_by = balances_mass(coarsened(log, {}, tried.together))
+    for share in (1.0, 0.0) if sought_by else (0.0, 1.0):
+        own, more = balanced_by(row, share), (STIFFNESS, *last) if share else last
+        problem, begun = freed(own, tried.together, *more), done[-1][0] if done else tried
+        start = problem.model.theta({**usual_values(own), **begun.values})
+        done.append((_to_its_end(problem, begun, start, *more, useful=useful), problem))
+        useful = min(useful, done[-1][0].cost + ALIKE)
+    done.sort(key=lambda one: one[0].cost)
+    best = replace(done[0][0], coarse=tried.values)
+    count = [one for one in done if one[0].cost <= best.cost + ALIKE]
+    first, *rivals = (_concluded(problem, one.point, log) for one, problem in count)
+    found = ((one, one.free[0]) for one in best.together)
+    if best.meant and all(one.told(best.values[name], first.std.get(name, 0.0)) for one, name in found):
+        return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
+    return replace(best, void=True, fits=(replace(first, cost=NEVER),))
+
+
+def with_less_lag(log: GreyBoxLog, tried: Trial) -> Trial | None:
+    """Return the final fit of a set of hypotheses in which one more step of delay replaces the lag.
+
+    With long model steps a lag and a delay that last alike leave nearly the same. In stiff oil short ones tell them
+    apart.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    tried : Tried
+        The set, fitted to the end.
+
+    Returns
+    -------
+    Tried or None
+        The set; none where its last hypothesis has no delays, or no lag to give.
+    """
+    last = tried.together[-1]
+    if len(last.delays) < 2 or min(last.delays) < 0.0:
+        return None
+    lag = last.free[0]
+    left = tried.values[lag] - FINEST_DELAY
+    if abs(left) > 0.5 * FINEST_DELAY:
+        return None
+    later = {**tried.delays, last.late: tried.delays.get(last.late, 0.0) + FINEST_DELAY}
+    return final_fit(log, replace(tried, delays=later, values={**tried.values, lag: max(left, 0.0)}), tried.cost)
+
+
+def _concluded(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxFit:
+    least, _ = flow_bounds(problem.model, [point.theta], log)
+    return concluded(problem, point, least=least, warned=False)
+
+
+def _to_its_end(problem: FreedProblem, tried: Trial, start: Array, *more: str, useful: float = np.inf) -> Trial:
+    """Return the end of a search with short model steps: where they matter on the way, and all of them at the end."""
+    best = _led_on(problem, tried, start, *more, useful=useful)
+    bounds = flow_bounds(problem.model, [best.point.theta], problem.log)
+    point = descend(problem.at, best.point.theta, LAST, bounds, radius=NEAR, wanted=useful)
+    return replace(best, point=point, values=problem.model.values(point.theta))
+
+
+def _led_on(problem: FreedProblem, tried: Trial, start: Array, *more: str, useful: float = np.inf) -> Trial:
+    """Return the optimum with short model steps; that with long ones may be far from it.
+
+    Which samples have them is found anew in each round.
+    """
+    log = problem.log
+
+    def further(one: Trial, theta: Array) -> Trial:
+        wanted = min(useful, _hoped(log, one.cost))
+        return descended(spared(problem, theta).log, one, theta, FINISHING, *more, wanted=wanted)
+
+    best = further(tried, start)
+    for _ in range(ROUNDS - 1):
+        if best.cost > FAR_BEHIND * useful:
+            break
+        again = further(best, best.point.theta)
+        gained = best.cost - again.cost
+        if gained > 0.0:
+            best = again
+        if gained < max(CLOSE, LITTLE * best.cost):
+            break
+    return best
+
+
+def _hoped(log: GreyBoxLog, cost: float) -> float:
+    """Return the cost to which a search with short model steps must promise to come, lest it ends."""
+    if len(log.drives) < FEW or not np.isfinite(cost):
+        return np.inf
+    return max(FINISHED * cost, REACHED * cost / cost_over_noise(log, cost))
+
+
+def is_hopeless(log: GreyBoxLog, cost: float) -> bool:
+    """Return whether a long log is so far from explained that short model steps cannot help.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    cost : float
+        Half the sum of squares that is left [dimensionless].
+    """
+    return len(log.drives) >= FEW and cost_over_noise(log, cost) >= UNFINISHED

@@ -1,0 +1,129 @@
+"""`objections(fit, noisy)`: objections to a fit of the flow form, from its residuals."""
+
+from estimation.fits.greybox.chance import LARGEST_CHI_SQUARE, alike_by_chance, largest_chi_square
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.lateness import most_late
+from estimation.notes import EstimateCode
+from plant.notes import Note
+
+DOUBTED = 1.1
+"""The same above which a log that begins under load or in motion is not explained: its fit has many valleys, and the
+sensors' noise is known to a twentieth [dimensionless]."""
+
+LARGEST_AUTOCORRELATION = 0.1
+"""Correlation of neighbouring residuals above which the same is said [dimensionless]."""
+
+NOISY = (1.44, 0.3)
+"""The same two where noise of position counts: it is known to a fifth, and an encoder's steps are not white."""
+
+LATE_WORTH = 20.0
+"""Gain in log-likelihood from which speed or position is said to come late or early, if no hypothesis says more. On
+logs of 18 kinds of strange rigs, and on 18 of a foreign bench, the gain of a right explanation is 6 at most, and that
+of a position that lags by 3 ms is 390 to 2800. A log is asked from `WORTH` on: half a millisecond may gain 10, and move
+bulk modulus by seven deviations [dimensionless]."""
+
+LATE_SHARE = 0.25
+"""Share of what a log leaves unexplained that this must take up to be named beside it [fraction]."""
+
+
+def limits(noisy: bool, samples: float) -> tuple[float, float]:
+    """Return the limits on the residuals of a fit that explains a log; a short log has wider ones.
+
+    Parameters
+    ----------
+    noisy : bool
+        Whether the position's noise counts with the slopes.
+    samples : float
+        Residuals that are counted [count].
+
+    Returns
+    -------
+    tuple of float
+        The largest mean squared normalised residual, and correlation of neighbouring ones [dimensionless].
+    """
+    largest, correlated = NOISY if noisy else (LARGEST_CHI_SQUARE, LARGEST_AUTOCORRELATION)
+    return largest_chi_square(samples, largest), max(correlated, alike_by_chance(samples))
+
+
+def doubted(fit: GreyBoxFit) -> bool:
+    """Return whether the residuals of a fit exceed the sensors' noise.
+
+    Parameters
+    ----------
+    fit : GreyBoxFit
+        The fit of a log whose noise of position does not count.
+    """
+    return fit.chi_square[0] > largest_chi_square(fit.seen, DOUBTED)
+
+
+def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
+    """Return the objections to a fit.
+
+    Parameters
+    ----------
+    fit : GreyBoxFit
+        The fit.
+    noisy : bool
+        Whether the position's noise counts with the slopes.
+
+    Returns
+    -------
+    tuple of Note
+        Nothing where the fit explains the log.
+    """
+    reasons: list[Note] = []
+    largest, correlated = limits(noisy, fit.seen)
+    if fit.chi_square[0] > largest:
+        reasons.append(EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=fit.chi_square[0] ** 0.5))
+    if abs(fit.autocorrelation[0]) > correlated and not _too_noisy(fit):
+        reasons.append(EstimateCode.PRESSURE_RESIDUALS_CORRELATED.note(correlation=fit.autocorrelation[0]))
+    channel, late, gain = most_late(fit.late)
+    wanted = LATE_SHARE * fit.cost * (1.0 - 1.0 / fit.chi_square[0]) if reasons else 0.0
+    if gain > max(LATE_WORTH, wanted):
+        when = "late" if late > 0.0 else "early"
+        reasons.insert(0, EstimateCode.CHANNEL_LATE.note(channel=channel, milliseconds=1e3 * abs(late), when=when))
+    return tuple(reasons)
+
+
+def _too_noisy(fit: GreyBoxFit) -> bool:
+    """Return whether residuals are smaller than expected and alternate: the motor's noise was assumed too large.
+
+    The random walk that it makes of pressure is then followed too closely. Intervals are too wide, not too narrow.
+    """
+    return fit.chi_square[0] < 1.0 and fit.autocorrelation[0] < 0.0
+
+
+def fit_explains(fit: GreyBoxFit, noisy: bool) -> bool:
+    """Return whether a fit has no objection; see `objections`.
+
+    Parameters
+    ----------
+    fit : GreyBoxFit
+        The fit.
+    noisy : bool
+        Whether the position's noise counts with the slopes.
+
+    Returns
+    -------
+    bool
+        Whether it is so.
+    """
+    return not objections(fit, noisy)
+
+
+def fit_explains_all(fit: GreyBoxFit, noisy: bool) -> bool:
+    """Return whether the residuals of a fit are no larger than the sensors' noise; see `objections`.
+
+    Parameters
+    ----------
+    fit : GreyBoxFit
+        The fit.
+    noisy : bool
+        Whether the position's noise counts with the slopes.
+
+    Returns
+    -------
+    bool
+        Whether it is so.
+    """
+    return fit_explains(fit, noisy) and (noisy or not doubted(fit))

@@ -1,0 +1,158 @@
+"""Result of a fitted form, and the average over forms that explain a log equally well."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.pump_ripple import EVENLY, Turning
+from plant.arrays import Array
+from plant.notes import Note
+
+if TYPE_CHECKING:
+    from estimation.fits.hypothesis_search.explanation import Explanation
+
+LONGEST_STEP = 2.5e-4
+"""Longest step of a form [s]; slower logs are sub-stepped."""
+
+TEMPER = 5.0
+"""What a difference of log-likelihood is divided by before models are weighed. None is exact: on a log of the circuit
+the balance that explained it better by 5.6 put bulk modulus five deviations off, the other one not [dimensionless]."""
+
+DISCRETISED = 3e-5
+"""Relative standard deviation of bulk modulus from a form's steps and from what is averaged before it [fraction]. Two
+training logs at 10 kHz, known to 0.002 % from noise, are 0.005 and 0.007 % too high under any noise; likeliest on 876
+logs is 0.002 to 0.003 %."""
+
+
+@dataclass(frozen=True, eq=False)
+class FormFit:
+    """Result of a form that was fitted to a log.
+
+    Parameters
+    ----------
+    parameters : Mapping[str, tuple of float]
+        Value and standard deviation in SI, by parameter name; the deviation is that of the log's noise.
+    bound : float
+        Relative standard deviation of bulk modulus from the log's noise [fraction].
+    chi_square : float
+        Mean squared residual over the sensor's variance [dimensionless].
+    reasons : tuple of Note
+        What speaks against the fit.
+    rig_slopes : Mapping[str, Mapping[str, float]]
+        By uncertain entry of the rig: by how much each parameter would differ, in SI, per relative change of the entry.
+    explanation : Explanation or None
+        What was added to the form to explain the log; None where nothing had to be.
+    remarks : tuple of Note
+        What the log leaves open, and is nothing against the fit.
+    turning : Turning
+        Teeth of the pump and offset of the speed that were taken up.
+    correlation : float
+        Of the errors of leakage coefficient and flow bias [dimensionless].
+    """
+
+    parameters: Mapping[str, tuple[float, float]]
+    bound: float
+    chi_square: float
+    reasons: tuple[Note, ...]
+    rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
+    explanation: "Explanation | None" = None
+    remarks: tuple[Note, ...] = ()
+    turning: Turning = EVENLY
+    correlation: float = 0.0
+
+
+def with_structure(found: Mapping[str, tuple[float, float]], structure: float) -> dict[str, tuple[float, float]]:
+    """Return the result with a wider deviation of bulk modulus, because the form itself may be wrong.
+
+    Parameters
+    ----------
+    found : Mapping[str, tuple of float]
+        Value and deviation by parameter [SI].
+    structure : float
+        Relative standard deviation of bulk modulus from what the form leaves out [fraction].
+
+    Returns
+    -------
+    dict[str, tuple of float]
+        The same, the deviation of bulk modulus wider [SI].
+    """
+    value, std = found["bulk_modulus"]
+    return {**found, "bulk_modulus": (value, float(np.hypot(std, structure * value)))}
+
+
+def weights_of(fits: Sequence[GreyBoxFit], temper: float = TEMPER, beforehand: Sequence[float] | None = None) -> Array:
+    """Return the probability of each of several models of one log.
+
+    Parameters
+    ----------
+    fits : sequence of GreyBoxFit
+        Of the same log.
+    temper : float
+        What a difference of log-likelihood is divided by [dimensionless].
+    beforehand : sequence of float, optional
+        Their weights before the log is seen [dimensionless]; equal ones if not given.
+
+    Returns
+    -------
+    ndarray, shape (fits,)
+        Weights that sum to one [fraction].
+    """
+    costs = np.array([fit.cost for fit in fits])
+    weights = np.exp(-np.minimum((costs - np.min(costs)) / temper, 700.0))
+    weights *= 1.0 if beforehand is None else np.array(beforehand)
+    return np.asarray(weights / np.sum(weights), dtype=np.float64)
+
+
+def weighed(
+    fits: Sequence[GreyBoxFit], temper: float = TEMPER, beforehand: Sequence[float] | None = None
+) -> Mapping[str, tuple[float, float]]:
+    """Return values and deviations over several models of one log, each weighed by its likelihood.
+
+    A model that explains the log less well counts by a power of ``exp(-chi^2/2)``, see `TEMPER`; where two explain it
+    alike, what they disagree on goes into the deviation (Hoeting et al. 1999, Statistical Science 14, equations 3 and
+    4).
+
+    Parameters
+    ----------
+    fits : sequence of GreyBoxFit
+        Of the same log, with the same unknowns.
+    temper : float
+        What a difference of log-likelihood is divided by [dimensionless].
+    beforehand : sequence of float, optional
+        Their weights before the log is seen [dimensionless]; equal ones if not given.
+
+    Returns
+    -------
+    Mapping[str, tuple of float]
+        Value and deviation by parameter [SI].
+    """
+    return averaged(fits, weights_of(fits, temper, beforehand))
+
+
+def averaged(fits: Sequence[GreyBoxFit], weights: Array) -> Mapping[str, tuple[float, float]]:
+    """Return values and deviations over several models of one log under given weights, see `weighed`.
+
+    Parameters
+    ----------
+    fits : sequence of GreyBoxFit
+        Of the same log, with the same unknowns.
+    weights : ndarray, shape (fits,)
+        As `weights_of` returns them [fraction].
+
+    Returns
+    -------
+    Mapping[str, tuple of float]
+        Value and deviation by parameter [SI].
+    """
+    best = min(fits, key=lambda fit: fit.cost)
+    found: dict[str, tuple[float, float]] = {}
+    for name in (name for name in best.values if all(name in fit.values for fit in fits)):
+        values = np.array([fit.values[name] for fit in fits])
+        stds = np.array([fit.std[name] for fit in fits])
+        mean = float(weights @ values)
+        heavy = weights > np.finfo(np.float64).eps
+        found[name] = mean, float(np.sqrt(weights[heavy] @ (stds[heavy] ** 2 + (values[heavy] - mean) ** 2)))
+    return found

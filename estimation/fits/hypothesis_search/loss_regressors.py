@@ -1,0 +1,217 @@
+"""Regressors of a varying loss: position, shaft angle, speed, pressure, or direction.
+
+A scored bore leaks where the piston passes the score, a worn tooth once a turn, a pump that fills badly loses flow
+above some speed, a lip that lifts leaks above some pressure, and a leaking relief valve leaks one way.
+See decision 288.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypothesis_search.fault_guesses import leakage_guess
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+
+BORE, TOOTH, FILLING, LIFTING, ONE_WAY, WEAR = "bore", "tooth", "filling", "lifting", "one_way", "wear"
+"""What a loss goes with: position, the shaft's angle, speed from some speed on, pressure from some pressure on, the
+direction of pressure, speed."""
+
+AVERAGED = 1e-2
+"""Time over which pressure is averaged where its direction is asked for [s]; judged: it reverses about as fast."""
+
+NARROWEST = 2e-4
+"""Least width of a score [m], or of a tooth's passing over its tenth [rad]; judged."""
+
+LEAST_POWER, MOST_POWER = 0.7, 3.0
+"""Powers with which a loss may grow from where it begins [dimensionless]: a flow that a pump no longer takes in grows
+evenly, a lip that is pushed open with the cube of its gap."""
+
+WIDEST_TOOTH = 1.0
+"""Largest width of a tooth's passing [rad]: a wider one is no single tooth's."""
+
+
+@dataclass(frozen=True)
+class LossRegressor:
+    """A signal with which a loss varies.
+
+    Parameters
+    ----------
+    kind : str
+        `BORE`, `TOOTH`, `FILLING`, `LIFTING`, `ONE_WAY` or `WEAR`.
+    at : float
+        Where it is largest [m, rad], from where on it grows [rad/s, Pa], or the sign of its pressure.
+    width : float
+        How wide it is [m, rad], or the power with which it grows from there [dimensionless]; 1 where it has neither.
+    """
+
+    kind: str
+    at: float
+    width: float = 1.0
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Fields that are fitted."""
+        return () if self.kind in (ONE_WAY, WEAR) else ("at", "width")
+
+
+class LossSignals(NamedTuple):
+    """The measured signals that loss regressors are made of.
+
+    Parameters
+    ----------
+    speed, angle, position, pressure : ndarray, shape (n,)
+        Of the motor [rad/s, rad], of the piston [m], across it [Pa].
+    steady : ndarray, shape (n,)
+        The same pressure averaged over `AVERAGED` [Pa]: at rest, half of its noise would pass for one direction.
+    leakage, displacement : float
+        Of the rig [m^3/(s Pa), m^3/rad].
+    """
+
+    speed: Array
+    angle: Array
+    position: Array
+    pressure: Array
+    steady: Array
+    leakage: float
+    displacement: float
+
+    def of(self, course: LossRegressor) -> Array:
+        """Return a unit of a loss: a healthy leakage at its worst, or all flow above a speed.
+
+        Parameters
+        ----------
+        course : Course
+            What it goes with [SI].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Flow from chamber 1 to chamber 2 [m^3/s].
+        """
+        along = self.leakage * self.pressure
+        match course.kind:
+            case "bore":
+                return along * np.exp(-0.5 * ((self.position - course.at) / course.width) ** 2)
+            case "tooth":
+                return along * np.exp((np.cos(self.angle - course.at) - 1.0) / course.width**2)
+            case "filling":
+                return self.displacement * np.sign(self.speed) * _above(self.speed, course)
+            case "wear":
+                return self.displacement * self.speed
+            case "lifting":
+                return self.leakage * np.sign(self.pressure) * _above(self.pressure, course)
+            case _:
+                return self.leakage * np.where(self.steady * course.at > 0.0, self.steady, 0.0)
+
+    def tried(self) -> list[LossRegressor]:
+        """Return the courses that a log is asked for.
+
+        Returns
+        -------
+        list of Course
+            A score only where the piston moves by several of its least widths.
+        """
+        low, high = float(np.min(self.position)), float(np.max(self.position))
+        fastest = float(np.max(np.abs(self.speed)))
+        highest = float(np.quantile(np.abs(self.pressure), 0.99))
+        span = high - low
+        places = np.linspace(low, high, 13).tolist() if span > 10.0 * NARROWEST else []
+        return [
+            *(LossRegressor(BORE, at, max(share * span, NARROWEST)) for at in places for share in (0.04, 0.1, 0.25)),
+            *(LossRegressor(TOOTH, float(at), width) for at in np.arange(12) * np.pi / 6.0 for width in (0.25, 0.7)),
+            *(LossRegressor(FILLING, share * fastest) for share in (0.2, 0.35, 0.5, 0.65, 0.8) if fastest > 0.0),
+            *(LossRegressor(LIFTING, share * highest) for share in (0.3, 0.5, 0.65, 0.8, 0.9) if highest > 0.0),
+            *(LossRegressor(ONE_WAY, side) for side in (-1.0, 1.0)),
+            LossRegressor(WEAR, 0.0),
+        ]
+
+    def moves(self, course: LossRegressor) -> dict[str, float]:
+        """Return the finite-difference steps of a regressor's fitted fields.
+
+        Parameters
+        ----------
+        course : Course
+            What a loss goes with [SI].
+
+        Returns
+        -------
+        dict
+            By field that is sought, in its unit.
+        """
+        along = {BORE: 0.05 * course.width, TOOTH: 0.05, FILLING: 0.01 * course.at, LIFTING: 0.01 * course.at}
+        return {name: along[course.kind] if name == "at" else 0.05 * course.width for name in course.free}
+
+
+def _above(what: Array, course: LossRegressor) -> Array:
+    """Return a power of how far a signal is above where a loss begins, in that unit: itself where the power is 1."""
+    return course.at * np.maximum(np.abs(what) / course.at - 1.0, 0.0) ** course.width
+
+
+def loss_signals(log: GreyBoxLog, parameters: EhaParameters) -> LossSignals:
+    """Return the signals that loss regressors are made of.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    Measured
+        Pressure is interpolated where it is missing, and none where it is missing throughout.
+    """
+    speed, position, pressure = log.drives[:, 0], log.drives[:, 1], log.measured[:, 0]
+    rows, seen = np.arange(len(pressure)), np.isfinite(pressure)
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * log.sample_time * (speed[1:] + speed[:-1]))])
+    pressure = np.interp(rows, rows[seen], pressure[seen]) if np.any(seen) else np.zeros(len(rows))
+    half = round(0.5 * AVERAGED / log.sample_time)
+    window = np.full(2 * half + 1, 1.0 / (2 * half + 1))
+    return LossSignals(
+        speed,
+        angle,
+        position,
+        pressure,
+        np.convolve(np.pad(pressure, half, mode="edge"), window, "valid"),
+        leakage_guess(parameters),
+        parameters.pump_displacement,
+    )
+
+
+def shifted(course: LossRegressor, step: Mapping[str, float], share: float) -> LossRegressor:
+    """Return a regressor shifted by a share of a step.
+
+    Parameters
+    ----------
+    course : Course
+        What a loss goes with [SI].
+    step : Mapping[str, float]
+        By how much, by field [SI].
+    share : float
+        Of that step [fraction].
+
+    Returns
+    -------
+    Course
+        No width changes by more than a factor of two, nor leaves its bounds.
+
+    Examples
+    --------
+    >>> moved(Course(BORE, 0.01, 0.004), {"at": 0.002, "width": 0.1}, 0.5)
+    Course(kind='bore', at=0.011, width=0.008)
+    """
+    changed = {name: getattr(course, name) + share * by for name, by in step.items()}
+    if course.kind in (FILLING, LIFTING):
+        changed["at"] = max(changed.get("at", course.at), 0.5 * course.at)
+    if "width" in changed:
+        powers = LEAST_POWER, MOST_POWER
+        ends = {BORE: (NARROWEST, np.inf), TOOTH: (10.0 * NARROWEST, WIDEST_TOOTH), FILLING: powers, LIFTING: powers}
+        least, most = ends[course.kind]
+        width = min(max(changed["width"], 0.5 * course.width, least), 2.0 * course.width, most)
+        changed["width"] = float(width)
+    return replace(course, **changed)

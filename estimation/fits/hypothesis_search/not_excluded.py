@@ -1,0 +1,120 @@
+"""`unseen_valve_note(fit)`, `open_wear_note(promise, most)`: notes on faults that a fit does not exclude."""
+
+import math
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypothesis_search.predicted_gains import PredictedGain
+from estimation.log_checks.channel_names import PRESSURE, SPEED
+from estimation.models.completed_flow import CRACKS
+from estimation.models.flow import FLOW_FORM
+from estimation.notes import RigCode
+from plant.notes import Note
+
+OPEN_DELIVERY = 0.1
+"""How far the logarithm of the pump's delivery may lie below that of a sound one, within two deviations, from which a
+worn pump is not excluded [dimensionless]: the probability of one that delivers less than 90 % is then 2 % or more."""
+
+LEAST_WORN = 0.03
+"""How far it must likeliest lie below for a worn pump not to be excluded where two deviations exclude a sound one
+[dimensionless]: slopes promise too little of a pump that is far from sound. None of 88 sound training logs at one speed
+promised as much without being open already."""
+
+LOSE_FLOW = frozenset(
+    {
+        "leakage_growth",
+        "leakage_rise",
+        "leakage_step",
+        "leakage_turbulent",
+        "makeup_blocked",
+        "port_a_drains",
+        "port_b_drains",
+        "pump_compresses",
+        "relief_low",
+        "single_rod",
+    }
+)
+"""Hypotheses under which flow is lost, or swept, that is neither leakage of one coefficient nor a flow bias."""
+
+
+def unseen_valve_note(fit: GreyBoxFit) -> tuple[Note, ...]:
+    """Return a note if a log shows the effect of one make-up valve only.
+
+    With a valve that never opens a log has the same likelihood whatever the valve is. In sound actuators that are
+    driven to and fro both are felt.
+
+    Parameters
+    ----------
+    fit : GreyBoxFit
+        A fit of the flow form; one without valves that crack tells nothing.
+
+    Returns
+    -------
+    tuple of Note
+        One at most.
+    """
+    unseen = [side for side, name in zip("AB", CRACKS, strict=True) if np.isinf(fit.std.get(name, 0.0))]
+    return (RigCode.MAKEUP_UNSEEN.note(side=unseen[0]),) if len(unseen) == 1 else ()
+
+
+def share_lost(
+    log: GreyBoxLog, values: Mapping[str, float], displacement: float, strange: Collection[str] = ()
+) -> float:
+    """Return how far the logarithm of a pump's delivery may lie below that of a sound pump, if no leakage is negative.
+
+    Oil that a worn pump does not deliver is oil that a fit with a sound one takes for leakage and flow bias. Slopes do
+    not know that neither of the two is less than nothing.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as a flow form sees it.
+    values : Mapping[str, float]
+        What a fit with a sound pump found [SI].
+    displacement : float
+        Of that pump [m^3/rad].
+    strange : collection of str
+        Hypotheses that explain the log.
+
+    Returns
+    -------
+    float
+        Logarithm of what is pumped over what is left of it, in the mean of the log [dimensionless]; infinite where all
+        is lost, where the fit tells neither, and where flow is lost in yet another way.
+    """
+    if LOSE_FLOW & set(strange) or not {"flow_bias", "leakage_coefficient"} <= set(values):
+        return math.inf
+    pumped = displacement * float(np.nanmean(np.abs(log.drives[:, FLOW_FORM.drives.index(SPEED)])))
+    pressure = float(np.nanmean(np.abs(log.measured[:, FLOW_FORM.outputs.index(PRESSURE)])))
+    lost = values["flow_bias"] + values["leakage_coefficient"] * pressure
+    return -math.log1p(-lost / pumped) if lost < pumped else math.inf
+
+
+def open_wear_note(delivery: PredictedGain, most: float = math.inf) -> tuple[Note, ...]:
+    """Return a note if a log cannot separate a worn pump from leakage or flow bias.
+
+    Parameters
+    ----------
+    delivery : Promise
+        What a delivery of its own promises beside all that is fitted.
+    most : float
+        How far the logarithm of the delivery may lie below that of a sound pump at most, see `share_lost`
+        [dimensionless].
+
+    Returns
+    -------
+    tuple of Note
+        One at most.
+    """
+    width = 2.0 * delivery.deviation
+    less = width - delivery.size
+    sound = delivery.size >= -max(width, LEAST_WORN)
+    if sound and not min(less, most) > OPEN_DELIVERY:
+        return ()
+    if most < less:
+        ends = {"likeliest": 100.0 * delivery.size, "most": 100.0 * most}
+        return (RigCode.WEAR_NOT_EXCLUDED.note(percent=100.0 * most, half_width=100.0 * width, **ends),)
+    return (RigCode.WEAR_NOT_EXCLUDED.note(percent=100.0 * less, half_width=100.0 * width),)

@@ -1,0 +1,199 @@
+"""Predicted gain of each hypothesis beside a fit: first order, from one evaluation of the slopes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypotheses import Hypothesis
+from estimation.fits.hypothesis_search.air_entry import likeliest_entry
+from estimation.fits.hypothesis_search.leakage_step import likeliest_step
+from estimation.fits.hypothesis_search.wide_log import balanced_by, usual_values, widened
+from estimation.fits.hypothesis_search.wide_problem import freed
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+
+LIKELIEST = 4
+"""Hypotheses that are tried first, of which the slopes of the fit so far promise most."""
+
+STEPPED = 0.25
+"""Share that a step must explain of what one leakage leaves of the lost flow, to be tried first [fraction]; judged. A
+step that multiplies leakage is too large for slopes to promise it."""
+
+AIRED = 0.1
+"""The same of air that gets in within the log, of what oil that stays as it is leaves [fraction]; judged."""
+
+
+class PredictedGain(NamedTuple):
+    """Gain in log-likelihood that a hypothesis predicts beside a fit, to first order.
+
+    Parameters
+    ----------
+    gain : float
+        In log-likelihood, Rao's score statistic over two [dimensionless].
+    size : float
+        How far up what is freed first would move in its fitted coordinate: for a logarithm a relative change
+        [dimensionless].
+    deviation : float
+        How well that coordinate would then be known, what is presumed of it included [dimensionless].
+    """
+
+    gain: float
+    size: float
+    deviation: float
+
+
+NO_GAIN = PredictedGain(0.0, 0.0, 0.0)
+"""Of what is known already."""
+
+
+def predicted_gain(
+    log: GreyBoxLog, parameters: EhaParameters, plain: Mapping[str, float], one: Hypothesis, *, by_mass: bool = False
+) -> PredictedGain:
+    """Return the predicted gain of a hypothesis beside the plain fit, to first order.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    plain : Mapping[str, float]
+        What the plain form found [SI].
+    one : Hypothesis
+        What is asked.
+    by_mass : bool
+        Whether the plain fit balances mass: promises are of where it stands.
+    """
+    return predicted_gains(log, parameters, plain, (one,), by_mass=by_mass)[0]
+
+
+def predicted_gains(
+    log: GreyBoxLog,
+    parameters: EhaParameters,
+    plain: Mapping[str, float],
+    asked: Sequence[Hypothesis],
+    *,
+    by_mass: bool = False,
+    slopes: Mapping[str, Array] = MappingProxyType({}),
+) -> list[PredictedGain]:
+    """Return the predicted gain of each of several hypotheses alone, from one evaluation; see `predicted_gain`.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    plain : Mapping[str, float]
+        What the plain form found [SI].
+    asked : sequence of Hypothesis
+        What is asked; none holds an unknown of the plain form.
+    by_mass : bool
+        Whether the plain fit balances mass.
+    slopes : Mapping[str, ndarray of shape (blocks,)], optional
+        Derivatives of the plain fit's normalised residuals, by unknown; they need not be taken again [dimensionless].
+    """
+    wide = widened(log, parameters, plain)
+    return _promises(balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, asked, slopes)
+
+
+def predicted_gain_beside(
+    log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], one: Hypothesis
+) -> PredictedGain:
+    """Return the predicted gain of one more hypothesis beside those accepted.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    together : tuple of Hypothesis
+        What is taken already.
+    found : Mapping[str, float]
+        What the fit under them found [SI].
+    one : Hypothesis
+        What is asked.
+    """
+    return _promises(log, together, found, (one,))[0]
+
+
+def by_predicted_gain(
+    log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], asked: Sequence[Hypothesis]
+) -> tuple[list[Hypothesis], list[Hypothesis], dict[str, float]]:
+    """Return the hypotheses of largest predicted gain beside those accepted, best first; the others; all gains.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    together : tuple of Hypothesis
+        What is taken already.
+    found : Mapping[str, float]
+        What the fit so far found [SI].
+    asked : sequence of Hypothesis
+        What else is asked.
+
+    Returns
+    -------
+    tuple of list of Hypothesis, list of Hypothesis, and dict
+        The `LIKELIEST`, the others, and the gain in log-likelihood that each promises, by its name [dimensionless].
+    """
+    promises = _promises(log.coarsened(), together, found, asked)
+    stepped = any(one.from_change for one in asked) and likeliest_step(log).share > STEPPED
+    aired = any(one.from_entry for one in asked) and likeliest_entry(log).share > AIRED
+    first = [(stepped and one.from_change) or (aired and one.from_entry) for one in asked]
+    order = sorted(range(len(asked)), key=lambda i: (not first[i], -promises[i].gain))
+    likely = [asked[i] for i in order if first[i] or not asked[i].far][:LIKELIEST]
+    gains = {one.name: each.gain for one, each in zip(asked, promises, strict=True)}
+    return likely, [one for one in asked if one not in likely], gains
+
+
+def _promises(
+    log: GreyBoxLog,
+    together: tuple[Hypothesis, ...],
+    found: Mapping[str, float],
+    asked: Sequence[Hypothesis],
+    slopes: Mapping[str, Array] = MappingProxyType({}),
+) -> list[PredictedGain]:
+    """Return the predicted gain of each hypothesis beside those accepted, from one evaluation."""
+    problem = freed(log, (*together, *(replace(one, instead=()) for one in asked)))
+    theta = problem.model.theta({**usual_values(log), **found})
+    point = problem.at_beside(theta, slopes) if slopes else problem.at(theta)
+    # an unknown at its bound promises what only the hypothesis in its place can keep
+    held = {name for one in asked for name in one.instead}
+    own = [name for name in freed(log, together).model.unknowns if name not in held]
+
+    def step(names: Sequence[str]) -> tuple[float, Array, Array]:
+        places = [problem.model.unknowns.index(name) for name in names]
+        gradient = point.gradient[places]
+        gram = point.gram[np.ix_(places, places)]
+        known = np.asarray(np.linalg.pinv(gram, rcond=len(places) * np.finfo(float).eps), dtype=np.float64)
+        moved: Array = known @ gradient
+        return 0.5 * float(gradient @ moved), moved, np.diag(known)
+
+    before = step(own)[0]
+    promises: list[PredictedGain] = []
+    for one in asked:
+        names = list(dict.fromkeys((*own, *one.free)))
+        gain, moved, variances = step(names)
+        place = names.index(one.free[0])
+        promises.append(PredictedGain(gain - before, -float(moved[place]), float(variances[place]) ** 0.5))
+    return promises
+
+
+def slopes_of(fit: GreyBoxFit, log: GreyBoxLog) -> Mapping[str, Array]:
+    """Return the slopes of a plain fit's residuals that the wide form shares.
+
+    Returns
+    -------
+    Mapping[str, ndarray]
+        By unknown, shape (samples,) [dimensionless]; none where noise counts with them, or speed has gaps: they are the
+        fit's own then.
+    """
+    if log.passes_on or log.gaps.size:
+        return {}
+    return dict(zip(fit.model.unknowns, fit.slopes.T, strict=False))

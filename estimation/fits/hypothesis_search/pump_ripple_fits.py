@@ -1,0 +1,308 @@
+"""`with_pump_ripple(log, fitted)`: fits of a log with the pump's ripple in its speed, if residuals show one."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.finding import NORMAL_95
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.pump_ripple import COUNTS, LEAST_TEETH, MOST_OFFSET, Ripple, ShownRipple, with_ripple
+from estimation.notes import EstimateCode, RigCode
+from plant.notes import Note
+
+TEETH_WORTH = 10.0
+"""Gain in log-likelihood from which a log is asked for a pump's teeth [dimensionless]: by chance the likeliest of all
+counts gains it in one log of 1500. Of 60 training logs without teeth none gains 6."""
+
+OFFSET_WORTH = 20.0
+"""Gain in log-likelihood from which an offset of speed is subtracted before teeth are looked for [dimensionless]."""
+
+OFFSET_SETTLED = 2.0
+"""Gain from which an offset that was subtracted is corrected [dimensionless]: two deviations."""
+
+KEPT = 0.5
+"""Share of its promise that an offset of speed must keep [fraction]: residuals answer it evenly, so that one keeps 0.8
+or more."""
+
+SURE = 0.3
+"""Share of what no fit may leave that one with an offset of speed and no teeth may [fraction]; judged. A piston with a
+rod on one side looks like an offset: a log passed with one, bulk modulus 39 % too low, that left 12 % of its noise's
+variance too much. Of 160 plain training logs none leaves more than 6 %."""
+
+CHANCE = 3.0
+"""Standard deviations of the mean of squared noise that are no misfit [dimensionless]: they count in short logs."""
+
+CONTRADICTS = 4.0
+"""Deviations of the flow's offset of speed from that of teeth from which they are not of one log [dimensionless]."""
+
+LEAST_OFFSET = 0.01
+"""Offset of speed from which it is told [rad/s]; judged: a tenth of a revolution a minute is what encoders drift by."""
+
+MOST_LINEAR = 0.5
+"""Deviations by which smaller teeth may move bulk modulus before they are taken up too [dimensionless]: to first order
+they moved one log by 0.06 %, and in full by none."""
+
+ONE_SIDED_95 = 1.645
+"""Deviations by which teeth that are left must be larger than small ones [dimensionless]: pumps are sound up to there,
+and in one of 400 plain logs of pumps with 0 to 3 % noise alone carried a ripple of 2 % above 3 %."""
+
+MOST_TEETH = 0.4
+"""Amplitude up to which teeth are believed, as a share of the flow [fraction]; judged: a pump's flow does not pulse so.
+Where speed is logged with an offset, teeth seem to wander, and another count took up 59 %."""
+
+STANDS_OUT, BY_CHANCE = 4.0, 5.0
+"""How many times as much as any other count the teeth must gain, less what another one gains by chance [dimensionless]:
+what a fit leaves for other reasons shows in several counts. The other gains that beside them, since teeth that pass at
+a steady speed show as another count with an offset of speed too. On 184 training logs of 34 kinds what stands out so
+is the count that is there, 13 times."""
+
+OVERTONE_WORTH = 5.0
+"""Gain from which twice their count is taken up with them [dimensionless]: by chance one log in 150 gains it."""
+
+HOPE = 10.0
+"""How many times what residuals promise teeth or an offset of speed may gain at most, where they would have to explain
+a log that is not explained without [dimensionless]; judged: residuals answer both nearly evenly."""
+
+ROUNDS = 4
+"""How often teeth are corrected at most [count]."""
+
+SETTLED = 0.5
+"""Gain in log-likelihood that is left where a correction matters no more: a deviation [dimensionless]."""
+
+
+class RippleFits(NamedTuple):
+    """Fits of a log, with the pump ripple that they take up.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, its speed with the teeth that were taken up, and without its offset.
+    fits : sequence of GreyBoxFit
+        By every form that counts.
+    remarks : tuple of Note
+        What was taken up.
+    left : tuple of Note
+        What residuals show and was not taken up: an objection to a fit that nothing else speaks against.
+    """
+
+    log: GreyBoxLog
+    fits: Sequence[GreyBoxFit]
+    remarks: tuple[Note, ...] = ()
+    left: tuple[Note, ...] = ()
+
+    @property
+    def best(self) -> GreyBoxFit:
+        """The likeliest fit."""
+        return min(self.fits, key=lambda fit: fit.cost)
+
+
+Fitted = Callable[[GreyBoxLog], Sequence[GreyBoxFit]]
+
+
+def with_pump_ripple(
+    log: GreyBoxLog,
+    fitted: Fitted,
+    explains: Callable[[GreyBoxFit], bool],
+    largest: float = np.inf,
+    offset: float = 0.0,
+) -> RippleFits:
+    """Return the fits of a log, with pump ripple and an offset of speed if its residuals show them.
+
+    A log with gaps in its speed is not asked: the angle of its shaft is not known.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, motor speed its first drive.
+    fitted : callable
+        ``fitted(log)``: its fits by every form that counts.
+    explains : callable
+        ``explains(fit)``: whether a fit explains the log. Where it does not with teeth, something else is strange that
+        they would hide: a pump that delivers 4 % more looked like teeth of 19 %.
+    largest : float
+        Mean squared normalised residual above which no fit explains a log [dimensionless].
+    offset : float
+        First guess of how much the logged speed exceeds the shaft's [rad/s].
+
+    Returns
+    -------
+    Toothed
+        The log, its fits, and notes on what was taken up.
+    """
+    if log.gaps.size:
+        return RippleFits(log, fitted(log))
+    guessed = with_ripple(log, (), offset) if offset else log
+    plain = RippleFits(guessed, fitted(asked_for_ripple(guessed)))
+    if not _hopeful(plain.fits, largest):
+        return plain._replace(left=_left(plain))
+    shifted = _shifted(log, plain, fitted, largest)
+    if offset:
+        plain, shifted = shifted or plain, None
+        plain = plain._replace(remarks=_told_offset(plain.log.speed_offset, plain.best.speed_offset.std))
+    worth = plain.best.cost - TEETH_WORTH
+    found = None
+    for begun in (plain,) if shifted is None else (shifted, plain):
+        found = _with_teeth(log, begun, fitted)
+        if found is not None and found.best.cost < worth and explains(found.best):
+            return found
+        sure = begun.best.chi_square[0] <= 1.0 + SURE * (largest - 1.0) + CHANCE * (2.0 / len(log.drives)) ** 0.5
+        if begun is shifted and sure and explains(begun.best) and begun.best.cost < plain.best.cost - OFFSET_WORTH:
+            offset = begun.log.speed_offset
+            told = _told_offset(offset, begun.best.speed_offset.std)
+            return begun._replace(log=replace(begun.log, counts=()), remarks=told)
+    return plain._replace(left=() if found is not None and _by_chance(plain.best, found.best) else _left(plain))
+
+
+def _by_chance(plain: GreyBoxFit, with_them: GreyBoxFit) -> bool:
+    """Return whether a fit with pump ripple kept its predicted gain, and gained no more than chance does."""
+    promised = max(one.gain for one in plain.teeth.values())
+    return KEPT * promised < plain.cost - with_them.cost < TEETH_WORTH
+
+
+def asked_for_ripple(log: GreyBoxLog) -> GreyBoxLog:
+    """Return a log on which fits test for pump ripple, if it has none yet and the shaft's angle is known."""
+    return log if log.teeth or log.gaps.size else replace(log, counts=COUNTS)
+
+
+def _hopeful(fits: Sequence[GreyBoxFit], largest: float) -> bool:
+    """Return whether pump ripple or a speed offset may explain a log that is unexplained without them."""
+    for fit in fits:
+        promised = max([fit.speed_offset.gain, *(one.gain for one in fit.teeth.values())])
+        if fit.chi_square[0] <= largest or HOPE * promised >= fit.cost * (1.0 - largest / fit.chi_square[0]):
+            return True
+    return False
+
+
+def _shifted(log: GreyBoxLog, plain: RippleFits, fitted: Fitted, largest: float) -> RippleFits | None:
+    """Return the fits of a log without what its speed is off by; None where residuals ask for none, or for much.
+
+    It ends where that leaves a log unexplained, and neither teeth nor more of an offset may explain the rest.
+    """
+    found, offset, wanted = plain, plain.log.speed_offset, OFFSET_SETTLED if plain.log.speed_offset else OFFSET_WORTH
+    for _ in range(ROUNDS):
+        likely = min(found.fits, key=lambda fit: fit.cost - fit.speed_offset.gain)  # each has an offset of its own
+        shown = likely.speed_offset
+        if shown.gain < wanted:
+            break
+        offset, wanted = offset + shown.value, OFFSET_SETTLED
+        if abs(offset - plain.log.speed_offset) > MOST_OFFSET:
+            return None
+        held = with_ripple(replace(log, counts=COUNTS), (), offset)
+        found = RippleFits(held, fitted(held))
+        if shown.gain > OFFSET_WORTH and found.best.cost > likely.cost - KEPT * shown.gain:
+            return None
+        if not _hopeful(found.fits, largest + CHANCE * (2.0 / len(log.drives)) ** 0.5):
+            return None
+    return None if found is plain else found
+
+
+def _with_teeth(log: GreyBoxLog, begun: RippleFits, fitted: Fitted) -> RippleFits | None:
+    """Return the fits with the teeth that others ask for, corrected until nothing is left; None if there are none."""
+    if (first := _asked_for(begun.best)) is None:
+        return None
+    found, taken, offset = None, [first.teeth], begun.log.speed_offset + first.offset
+    for _ in range(ROUNDS):
+        count = taken[0].count
+        if not _believable(taken, offset - begun.log.speed_offset):
+            return None
+        tried = with_ripple(replace(log, counts=(count, 2 * count)), taken, offset)
+        held = RippleFits(tried, fitted(tried))
+        left = held.best.teeth
+        worse = found is None and held.best.cost > begun.best.cost
+        if worse or any(one.count not in left for one in taken):
+            return found
+        if found is not None and held.best.cost > found.best.cost:  # an overtone that helps none
+            break
+        found = held._replace(remarks=_told(taken[0], offset, left[count]))
+        new = _corrected(taken, left)
+        if not new:
+            break
+        taken, offset = new, offset + (left[count].offset if offset != 0.0 else 0.0)
+    return found
+
+
+def _believable(teeth: Sequence[Ripple], offset: float) -> bool:
+    return abs(offset) <= MOST_OFFSET and all(one.amplitude < MOST_TEETH for one in teeth)
+
+
+def _felt(fit: GreyBoxFit) -> float:
+    """Return the shift of bulk modulus by a small pump ripple, in standard deviations."""
+    moved, value = fit.small_teeth[0].get("bulk_modulus", 0.0), fit.values.get("bulk_modulus", 1.0)
+    return abs(moved) * value / fit.std["bulk_modulus"] if moved else 0.0
+
+
+def _shown(fit: GreyBoxFit, *, small: bool = False) -> list[ShownRipple]:
+    """Return the teeth that a fit's residuals show, the likeliest first; none if their size does not matter.
+
+    ``small`` ones matter where they move bulk modulus.
+    """
+    ranked = sorted((one for one in fit.teeth.values() if _possible(one, fit)), key=lambda one: -one.gain)
+    if not ranked or ranked[0].gain < TEETH_WORTH:
+        return []
+    large = ranked[0].teeth.amplitude > LEAST_TEETH or ranked[0].offset != 0.0
+    return ranked if large or (small and _felt(fit) > MOST_LINEAR) else []
+
+
+def _possible(one: ShownRipple, fit: GreyBoxFit) -> bool:
+    """Return whether the flow shows the speed offset that comes with a ripple, or the ripple is surely large.
+
+    What a pump delivers tells an offset however its teeth stand, so that small ones which need another are chance.
+    """
+    differs = abs(one.offset - fit.speed_offset.value)
+    told = differs > max(CONTRADICTS * fit.speed_offset.std, KEPT * abs(one.offset))
+    return one.offset == 0.0 or not told or _surely_large(one)
+
+
+def _surely_large(one: ShownRipple) -> bool:
+    return one.teeth.amplitude - ONE_SIDED_95 * one.std > LEAST_TEETH
+
+
+def _asked_for(fit: GreyBoxFit) -> ShownRipple | None:
+    """Return the teeth that a fit's residuals ask for, if no other count does as well but their overtones."""
+    if not (ranked := _shown(fit, small=True)):
+        return None
+    count = ranked[0].teeth.count
+    apart = [one for one in ranked[1:] if one.teeth.count % count and count % one.teeth.count]
+    other = max((one.beside - BY_CHANCE for one in apart), default=0.0)
+    return ranked[0] if ranked[0].gain > TEETH_WORTH + STANDS_OUT * max(other, 0.0) else None
+
+
+def _left(found: RippleFits) -> tuple[Note, ...]:
+    """Return the note on a ripple left in residuals; none for a slow log, in which motor speed can imitate one.
+
+    Teeth that may be as small as any pump's are integrated out, so they are left only where they move bulk modulus.
+    """
+    likeliest = [] if found.log.course is not None else _shown(found.best)[:1]
+    felt = _felt(found.best) > MOST_LINEAR
+    shown = [one.teeth for one in likeliest if felt or one.offset != 0.0 or _surely_large(one)]
+    return tuple(EstimateCode.TEETH_LEFT.note(percent=100.0 * one.amplitude, teeth=one.count) for one in shown)
+
+
+def _corrected(taken: Sequence[Ripple], left: Mapping[int, ShownRipple]) -> list[Ripple]:
+    """Return the teeth with what residuals still ask for; none where that matters no more."""
+    held = {one.count for one in taken}
+    near = all(left[count].gain < OVERTONE_WORTH for count in held)  # else their own phase may look like an overtone
+    new = [one.teeth for one in left.values() if near and one.teeth.count not in held and one.gain > OVERTONE_WORTH]
+    if not new and all(left[count].gain < SETTLED for count in held):
+        return []
+    rest = [left[one.count].teeth for one in taken]
+    return [
+        *(Ripple(one.count, one.cosine + it.cosine, one.sine + it.sine) for one, it in zip(taken, rest, strict=True)),
+        *new,
+    ]
+
+
+def _told(teeth: Ripple, offset: float, left: ShownRipple) -> tuple[Note, ...]:
+    ripples = RigCode.PUMP_RIPPLES.note(
+        percent=100.0 * teeth.amplitude, half_width=100.0 * NORMAL_95 * left.std, teeth=teeth.count
+    )
+    return (ripples, *_told_offset(offset, left.offset_std))
+
+
+def _told_offset(offset: float, std: float) -> tuple[Note, ...]:
+    if abs(offset) < LEAST_OFFSET:
+        return ()
+    return (RigCode.SPEED_OFFSET.note(offset_rad_s=offset, half_width=NORMAL_95 * std),)

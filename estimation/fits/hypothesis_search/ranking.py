@@ -1,0 +1,200 @@
+"""Ranking of sets of hypotheses: optimum on few samples, refinement on all samples, final fit."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypothesis_search.coarse_search import coarsened, freed_at_end, search_coarsely
+from estimation.fits.hypothesis_search.decimation import NO_DECIMATION, Decimation, cost_over_noise
+from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.final_fits import CLOSE, LITTLE, REACHED, UNFINISHED, final_fit, is_hopeless
+from estimation.fits.hypothesis_search.screening import NEARLY, screen
+from estimation.fits.hypothesis_search.wide_log import usual_values
+from estimation.fits.hypothesis_search.wide_problem import freed
+
+FINALISTS, CARRIED = 3, 2
+"""Hypotheses that are carried on, and starts of each."""
+
+NEARLY_AS_GOOD = 1.1
+"""What the cost of a finished set is multiplied by before others are compared with it: their model steps are long, and
+have errors [dimensionless]."""
+
+STRAYED = 1.05
+"""How many times its cost on few samples a set costs with all of them that it has strayed into another valley
+[dimensionless]; the two differ by 1 % in most."""
+
+MUCH = 0.2
+"""What the best set of hypotheses leaves at most of what was left, to be searched anew with all samples [fraction]."""
+
+
+def likeliest(
+    log: GreyBoxLog,
+    tried: Iterable[Iterable[Trial]],
+    known: float = np.inf,
+    spared: Decimation = NO_DECIMATION,
+    useful: float = np.inf,
+) -> list[Trial]:
+    """Return the most likely sets of hypotheses, each searched from several starts, best first.
+
+    The first set is carried on in any case: a few steps from a start are no measure of what promises most. What cannot
+    come close to the best, or to what is known, is not followed to its optimum. Where few samples were ``spared``,
+    all of them count at the end. What leaves far more than any fit that explains a log is not fitted to the end.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    tried : iterable of iterable of Tried
+        The sets, each from its starts.
+    known : float
+        The least cost so far [dimensionless].
+    spared : Spared
+        What is spared.
+    useful : float
+        Cost above which a set is of no use [dimensionless].
+
+    Returns
+    -------
+    list of Tried
+        Those that were carried on and came near the best.
+    """
+    return refined(log, ranked_optima(log, tried, known, spared), known, spared, useful)
+
+
+def ranked_optima(
+    log: GreyBoxLog, tried: Iterable[Iterable[Trial]], known: float = np.inf, spared: Decimation = NO_DECIMATION
+) -> list[Trial]:
+    """Return the most likely sets of hypotheses at their optima, on a decimated log if decimation is allowed.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    tried : iterable of iterable of Tried
+        The sets, each from its starts.
+    known : float
+        The least cost so far [dimensionless].
+    spared : Spared
+        What is spared.
+
+    Returns
+    -------
+    list of Tried
+        Those that were carried on, the best first.
+    """
+    known *= NEARLY_AS_GOOD
+    first, *others = [ranked(one) for one in tried]
+    sets = [first, *sorted(others, key=lambda one: one[0].cost)[: FINALISTS - 1]]
+    carried = [[one[0], *(start for start in one[1:CARRIED] if start.cost < NEARLY * one[0].cost)] for one in sets]
+    ended: list[Trial] = []
+    for one in carried:
+        wanted = min((known, *(other.cost for other in ended))) + CLOSE
+        best = search_coarsely(log, one[0], wanted, spared.every)
+        for start in one[1:]:
+            if ended_apart(one[0], start):
+                best = min(best, search_coarsely(log, start, min(wanted, best.cost), spared.every), key=_cost)
+        ended.append(best)
+    return ranked(ended)
+
+
+def refined(
+    log: GreyBoxLog,
+    ended: Sequence[Trial],
+    known: float = np.inf,
+    spared: Decimation = NO_DECIMATION,
+    useful: float = np.inf,
+) -> list[Trial]:
+    """Return sets of hypotheses at their optima on all samples, the most likely with their final fit.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    ended : sequence of Tried
+        The sets, where few samples led if these are spared.
+    known : float
+        The least cost so far [dimensionless].
+    spared : Spared
+        What is spared.
+    useful : float
+        Cost above which a set is of no use [dimensionless].
+
+    Returns
+    -------
+    list of Tried
+        Those near the best, the best first.
+    """
+    known *= NEARLY_AS_GOOD
+    if spared.every > 1:
+        ended = [*_with_all(log, ended, known, spared)]
+    best = min((known, *(one.cost for one in ended)))
+    near = [one for one in ranked(ended) if one.cost <= best + CLOSE]
+    return ranked(one if is_hopeless(log, one.cost) else final_fit(log, one, useful) for one in near)
+
+
+def _with_all(log: GreyBoxLog, ended: Iterable[Trial], known: float, spared: Decimation) -> Iterator[Trial]:
+    """Yield sets of hypotheses led on where all samples count, as far as they may still explain the log.
+
+    Few samples may have a valley by themselves, and a search with all may end in another. So the best set is sought
+    anew with all, where it explains much, but not all yet, or less than on few samples.
+    """
+    for place, one in enumerate(ranked(ended)):
+        near = one.cost <= NEARLY_AS_GOOD * known + CLOSE
+        much = place == 0 and cost_over_noise(log, one.cost) < MUCH * spared.left
+        if near and (much or cost_over_noise(log, one.cost) < UNFINISHED):
+            problem = freed(coarsened(log, one.delays, one.together), one.together, *freed_at_end(one.together[:-1]))
+            theta = problem.model.theta({**usual_values(log), **one.values})
+            begun = replace(one, point=replace(one.point, theta=theta))
+            further = search_coarsely(log, begun, NEARLY_AS_GOOD * known + CLOSE)
+            fits = cost_over_noise(log, further.cost) < REACHED and further.cost < STRAYED * one.cost
+            if place == 0 and not fits and cost_over_noise(log, further.cost) < max(MUCH * spared.left, UNFINISHED):
+                again = ranked(screen(log, one.together, spared.starts))[:CARRIED]
+                again = [start for start in again if ended_apart(further, start)]
+                further = min([further, *(search_coarsely(log, start, further.cost) for start in again)], key=_cost)
+            known = min(known, further.cost)
+            yield further
+        else:
+            yield one
+
+
+def ended_apart(one: Trial, other: Trial) -> bool:
+    """Return whether two searches of one set ended at different optima, judged by the curvature of the cost.
+
+    Parameters
+    ----------
+    one, other : Tried
+        A set of hypotheses, from two starts.
+
+    Returns
+    -------
+    bool
+        Whether they did.
+    """
+    ours, theirs = ({name: delay for name, delay in tried.delays.items() if delay} for tried in (one, other))
+    unlike = len(one.point.theta) != len(other.point.theta) or ours != theirs
+    if unlike or abs(one.cost - other.cost) > LITTLE * one.cost:
+        return True
+    step = other.point.theta - one.point.theta
+    return bool(0.5 * step @ one.point.gram @ step > LITTLE * one.cost)
+
+
+def ranked(tried: Iterable[Trial]) -> list[Trial]:
+    """Return the trials, best first.
+
+    Parameters
+    ----------
+    tried : iterable of Tried
+        In any order.
+
+    Returns
+    -------
+    list of Tried
+        By cost.
+    """
+    return sorted(tried, key=_cost)
+
+
+def _cost(tried: Trial) -> float:
+    return tried.cost

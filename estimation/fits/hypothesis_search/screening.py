@@ -1,0 +1,127 @@
+"""Screening: a few steps from each start rank the hypotheses before any is brought to its optimum."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import product
+
+import numpy as np
+
+from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.parallel_descents import Way, descend_in_turn
+from estimation.fits.hypotheses import DELIVERY, Hypothesis
+from estimation.fits.hypothesis_search.coarse_search import NEAR, SLIGHT, coarsened, freed_at_end
+from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.wide_log import usual_values
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed, own_starts, worn_start
+
+SCREENING = 7
+"""Evaluations of the model for a start [count]."""
+
+NEARLY = 3.0
+"""Up to which share of the best start's cost others count [dimensionless]."""
+
+
+def screen(
+    log: GreyBoxLog,
+    together: tuple[Hypothesis, ...],
+    starts: Sequence[Mapping[str, float]],
+    wanted: float = np.inf,
+    every: int = 1,
+) -> Iterator[Trial]:
+    """Yield the best point from each start after a few steps; fewer steps if it cannot win.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    together : tuple of Hypothesis
+        The set of hypotheses, what is new last.
+    starts : sequence of Mapping[str, float]
+        Where searches begin [SI].
+    wanted : float
+        Cost above which a result is of no use [dimensionless].
+    every : int
+        How many samples are one, see `decimated` [count].
+    """
+    absent = usual_values(log)
+    asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
+    found = freed_at_end(together[:-1])
+    problems = [(delays, freed(coarsened(log, delays, together, every), together, *found)) for delays in asked]
+    begun = own_starts(log, together[-1])
+    ways: list[Way] = []
+    of_way: list[tuple[int, Mapping[str, float], FreedProblem]] = []
+    for place, start in enumerate(starts):
+        worn = worn_start(log, {**absent, **start}) if together[-1] == DELIVERY else ()
+        for (delays, problem), own in product(problems, (*begun, *worn)):
+            guess = problem.model.theta({**absent, **start, **own})
+            ways.append(Way(problem.at_each, guess, flow_bounds(problem.model, [guess], log)))
+            of_way.append((place, delays, problem))
+    tried: list[list[Trial]] = [[] for _ in starts]
+
+    def after(way: int, point: Point) -> float:
+        place, delays, problem = of_way[way]
+        tried[place].append(Trial(together, point, problem.model.values(point.theta), delays, absent))
+        return NEARLY * tried[place][-1].cost
+
+    descend_in_turn(ways, SCREENING, wanted, after, radius=NEAR, least_share=SLIGHT)
+    yield from (min(each, key=lambda one: one.cost) for each in tried)
+
+
+def promising_starts(
+    starts: Sequence[Mapping[str, float]], screened_each: Sequence[Sequence[Trial]]
+) -> list[Mapping[str, float]]:
+    """Return the starts from which a good hypothesis ended near its own best.
+
+    Parameters
+    ----------
+    starts : sequence of Mapping[str, float]
+        Where searches began [SI].
+    screened_each : sequence of sequence of Tried
+        What hypotheses came to from each.
+
+    Returns
+    -------
+    list of Mapping[str, float]
+        Some of the starts, or all.
+    """
+    bests = [min(one.cost for one in each) for each in screened_each]
+    near = [each for each, best in zip(screened_each, bests, strict=True) if best <= NEARLY * min(bests)]
+    kept = [any(each[i].cost <= NEARLY * min(one.cost for one in each) for each in near) for i in range(len(starts))]
+    return [start for start, keep in zip(starts, kept, strict=True) if keep]
+
+
+def nearing(
+    log: GreyBoxLog,
+    asked: Iterable[Hypothesis],
+    starts: Sequence[Mapping[str, float]],
+    likely: Sequence[Mapping[str, float]],
+    known: float,
+    every: int,
+) -> Iterator[Sequence[Trial]]:
+    """Yield hypotheses from their starts, first those without a predicted gain; none is followed far from the best.
+
+    Those begin from every start, the others from the ``likely`` ones. Where one of those comes lower than all that is
+    known, the others begin from where it did so.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    asked : iterable of Hypothesis
+        What is tried.
+    starts, likely : sequence of Mapping[str, float]
+        Where searches begin [SI].
+    known : float
+        The least cost so far [dimensionless].
+    every : int
+        How many samples are one, see `decimated` [count].
+    """
+    lower: list[Sequence[Trial]] = []
+    for one in sorted(asked, key=lambda each: not each.far):
+        from_these = starts if one.far else promising_starts(starts, lower) if lower else likely
+        found = [*screen(log, (one,), from_these, NEARLY * known, every)]
+        if one.far and min(each.cost for each in found) < known:
+            lower.append(found)
+        known = min(known, *(each.cost for each in found))
+        yield found

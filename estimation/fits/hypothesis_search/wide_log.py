@@ -1,0 +1,178 @@
+"""A log for the wide flow form, which has a parameter for every hypothesis, all at their neutral values."""
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.play_courses import crossings
+from estimation.fits.hypotheses import PRESUMED
+from estimation.log_checks.channel_names import POSITION
+from estimation.models.completed_flow import CRACKS
+from estimation.models.flow import FLOW_FORM, STIFFNESS
+from estimation.models.inner_circuit import BEND
+from estimation.models.wide_flow import COURSES, CROSSED, LINEAR, WIDE_FLOW_FORM, WideFlowParameters
+from plant.eha.model import EhaParameters
+from plant.solvers.steps import parameter_names, parameter_row
+
+START_LEVEL = "start_level"
+
+LEVEL_OPEN = 3.0**-0.5
+"""Root mean square of the level at which the lower side begins, over the most that it may be, before a log is seen: it
+is anywhere between none and that [fraction]."""
+
+LEAST_PEAK = 1.0
+"""Highest differential pressure taken of a log whose sensor is dead: the logarithm of none is no start [Pa]."""
+
+
+def widened(
+    log: GreyBoxLog, parameters: EhaParameters, found: Mapping[str, float] = MappingProxyType({})
+) -> GreyBoxLog:
+    """Return a log for the wide flow form: elapsed share, rate of position and courses of play are its drives.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    found : Mapping[str, float], optional
+        What the plain form found; of it `STIFFNESS`, `CRACKS` and `BEND` are held, as they would take up what is
+        strange [SI].
+
+    Returns
+    -------
+    GreyBoxLog
+        The log, with what is presumed.
+    """
+    samples, position = len(log.drives), log.drives[:, FLOW_FORM.drives.index(POSITION)]
+    courses = crossings(position, log.measured[:, 0], log.sample_time)
+    rate = np.gradient(position) / log.sample_time
+    known = {one.name: getattr(parameters, one.name) for one in fields(parameters)}
+    return replace(
+        log,
+        drives=np.column_stack([log.drives, np.arange(samples) / samples, rate, courses]),
+        drive_std=(*log.drive_std, *(0.0 for _ in WIDE_FLOW_FORM.drives[len(log.drive_std) :])),
+        parameters=parameter_row(
+            WideFlowParameters(
+                **known,
+                **{name: found.get(name, 0.0) for name in (STIFFNESS, *CRACKS, BEND)},
+                stated_pressure=usual_pressure(log, parameters),
+            )
+        ),
+        presumed={
+            **log.presumed,
+            **{name: (known[name], std) for name, std in PRESUMED.items()},
+            **dict.fromkeys(CROSSED, (0.0, 1.0)),
+            START_LEVEL: (0.0, LEVEL_OPEN * shut_in(log) / LINEAR[START_LEVEL]),
+        },
+    )
+
+
+def shut_in(log: GreyBoxLog) -> float:
+    """Return the largest volume that a loaded chamber passes on without make-up flow: half of what loaded it.
+
+    Returns
+    -------
+    float
+        Level over the inner circuit's pressure [Pa].
+    """
+    return max(0.5 * float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)
+
+
+def usual_pressure(log: GreyBoxLog, parameters: EhaParameters) -> float:
+    """Return the root-mean-square pressure of the loaded side of a log.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log.
+    parameters : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    float
+        Absolute [Pa].
+    """
+    return parameters.accumulator_pressure + float(np.sqrt(np.nanmean(log.measured**2)))
+
+
+def usual_values(log: GreyBoxLog) -> dict[str, float]:
+    """Return the parameters of a widened log by name.
+
+    Returns
+    -------
+    dict
+        What the rig file says, and what is strange absent [SI].
+    """
+    return dict(zip(parameter_names(WideFlowParameters), log.parameters.tolist(), strict=True))
+
+
+def balanced_by(log: GreyBoxLog, mass: float) -> GreyBoxLog:
+    """Return a log whose wide form balances mass (1), or volume (0).
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    mass : float
+        1 or 0 [dimensionless].
+    """
+    parameters = log.parameters.copy()
+    parameters[parameter_names(WideFlowParameters).index("by_mass")] = mass
+    return replace(log, parameters=parameters)
+
+
+def balances_mass(log: GreyBoxLog) -> bool:
+    """Return whether the wide form balances mass on a log.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+
+    Returns
+    -------
+    bool
+        Whether it does; else volume.
+    """
+    return bool(usual_values(log)["by_mass"])
+
+
+def delayed(log: GreyBoxLog, delays: Mapping[str, float]) -> GreyBoxLog:
+    """Return a log whose late channels are shifted forward in time.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    delays : Mapping[str, float]
+        How late channels come [s]; what is no drive is the output. A drive may be early: its time is negative, and it
+        is put back.
+
+    Returns
+    -------
+    GreyBoxLog
+        The log, its last outputs missing; its first where a drive is early.
+    """
+    measured, drives = log.measured, log.drives
+    for channel, delay in delays.items():
+        samples = round(delay / log.sample_time)
+        if samples == 0:
+            continue
+        late = slice(-samples, None) if samples > 0 else slice(None, -samples)
+        if channel in FLOW_FORM.drives:
+            names = (channel, "position_rate", *COURSES) if channel == POSITION else (channel,)
+            columns = [WIDE_FLOW_FORM.drives.index(name) for name in names]
+            drives, measured = drives.copy(), measured.copy()
+            if samples > 0:
+                drives[:-samples, columns] = log.drives[samples:, columns]
+            else:
+                drives[-samples:, columns] = log.drives[:samples, columns]
+            measured[late] = np.nan
+        else:
+            measured = np.vstack([measured[samples:], np.full_like(measured[late], np.nan)])
+    return replace(log, measured=measured, drives=drives)

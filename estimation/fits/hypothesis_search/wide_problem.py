@@ -1,0 +1,206 @@
+"""The least-squares problem of a log under hypotheses, its starts and its bounds."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.problem import search_bounds
+from estimation.fits.greybox.ridge import Ridge
+from estimation.fits.hypotheses import DELIVERY, LEAKAGE_TURBULENT, LEAST_DELIVERY, LIMITS, Hypothesis
+from estimation.fits.hypothesis_search.air_entry import likeliest_entry
+from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
+from estimation.fits.hypothesis_search.leakage_step import likeliest_step
+from estimation.fits.hypothesis_search.wide_log import LEAST_PEAK, START_LEVEL, shut_in, usual_values
+from estimation.log_checks.channel_names import POSITION, SPEED
+from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
+from estimation.models.greybox import GreyBoxModel
+from estimation.models.wide_flow import (
+    LINEAR,
+    TURBULENT_FLOW_FORM,
+    WIDE_FLOW_FORM,
+)
+from plant.arrays import Array
+from plant.solvers.steps import parameter_names
+
+RELIEF_START = 1e-10
+"""Slope of a relief valve that opens early, first guess [m^3/(s Pa)]."""
+
+SHARPEST_RELIEF = 3e-3
+"""Least rise of pressure over its setting within which a relief valve passes the largest flow of the log [fraction].
+Valves need 0.05 to 0.2. At a sharper corner, which no sensor resolves, the model chatters from open to closed: slopes
+are then so steep that the deviation of bulk modulus comes out twenty times too small."""
+
+FASTEST_MAKEUP = 0.5 * LONGEST_STEP
+"""Least time in which a wide open make-up valve fills a chamber [s]. At a fifth of a model step the model may chatter,
+as at a sharp relief valve: the deviation of bulk modulus came out nine times too small."""
+
+MOST_VOLUME = 2.0
+"""Factor by which a chamber's volume is sought above or below the rig file's [dimensionless]: 4.6 deviations of what is
+presumed. Volumes 4 and 80 times as large took the place of an encoder's zero."""
+
+ADIABATIC = 1.4
+"""Exponent of nitrogen that is compressed quickly [dimensionless]."""
+
+LEAST_GAS = 1.0
+"""Least gas of the inner circuit's accumulator, over the oil that both chambers take up from rest to relief pressure
+[dimensionless]: with as much it loses half its pressure then, and a designer gives it more. At most a chamber's volume
+counts, whatever the oil takes. With a chamber's volume for all rigs, those whose oil takes 3 % of it were told an
+encoder's zero that was not there, and bulk modulus three deviations off (decision 343)."""
+
+MOST_WORN = 0.2
+"""Most that a worn pump loses of its displacement where the search for it begins [fraction]; judged."""
+
+FLOW_BIAS = "flow_bias"
+
+POSITION_ZERO = "position_zero"
+
+AIR_ONSET, AIR_WIDTH = "air_onset", "air_width"
+
+START_PRESSURE = "start_pressure"
+
+LEVELS_TRIED = (0.0, 0.3)
+"""Levels over the accumulator's pressure with which both sides may begin, as shares of the most [fraction]."""
+
+MOST_BIASED = 2.0
+"""Factor by which position's noise may have put the first bulk modulus off [dimensionless]. Far above it there is a
+second valley, where all that the log shows is noise that the oil's stiffness makes large."""
+
+
+def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedProblem:
+    """Return the least-squares problem of a log under hypotheses.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    together : sequence of Hypothesis
+        What is freed beside the plain form's unknowns.
+    *more : str
+        Parameters that are freed in any case.
+
+    Returns
+    -------
+    FreedProblem
+        The problem; relief is free where the log reaches its setting. A channel whose lag is free is not asked about.
+    """
+    extra = [*(name for one in together for name in (*one.free, *one.beside)), *more]
+    relieved = reaches_relief(log.measured, usual_values(log)["relief_pressure"])
+    plain = relieving(FLOW_FORM) if relieved else FLOW_FORM
+    held = {name for one in together for name in one.instead}
+    known = [name for name in plain.unknowns if name not in held]
+    late = {one.late for one in together}
+    log = replace(log, timed=tuple(channel for channel in log.timed if channel not in late))
+    form = TURBULENT_FLOW_FORM if set(LEAKAGE_TURBULENT.free) <= set(extra) else WIDE_FLOW_FORM
+    free = tuple(dict.fromkeys((*known, *extra)))
+    ridge = Ridge(DELIVERY.free[0], FLOW_BIAS, flow_speed(log)) if DELIVERY.free[0] in free else None
+    return FreedProblem(form, log, free, LINEAR, ridge)
+
+
+def flow_speed(log: GreyBoxLog) -> float:
+    """Return the motor speed at which a worn pump loses as much flow as the flow bias.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+
+    Returns
+    -------
+    float
+        Least squares over the samples, weighted by speed [rad/s]; zero where the motor rests.
+    """
+    speed = np.abs(log.drives[:, WIDE_FLOW_FORM.drives.index(SPEED)])
+    total = float(np.nansum(speed))
+    return float(np.nansum(speed * speed)) / total if total > 0.0 else 0.0
+
+
+def worn_start(log: GreyBoxLog, plain: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
+    """Return a second start of the search for pump delivery: healthy flow bias, all other loss by wear.
+
+    At one speed the two nearly cancel, and a search along their ridge ends before it comes to a worn pump.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    plain : Mapping[str, float]
+        What the plain form found [SI].
+
+    Returns
+    -------
+    sequence of Mapping[str, float]
+        One first guess, none where the flow bias is hardly larger than a healthy one [SI].
+    """
+    usual = usual_values(log)
+    displacement, bias = usual[DELIVERY.free[0]], plain[FLOW_BIAS]
+    full = displacement * flow_speed(log)
+    lost = min((bias - usual[FLOW_BIAS]) / full, MOST_WORN) if full > 0.0 else 0.0
+    if lost <= LEAST_DELIVERY:
+        return []
+    return [{DELIVERY.free[0]: (1.0 - lost) * displacement, FLOW_BIAS: bias - lost * full}]
+
+
+def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]]:
+    """Return the starts of the search under a hypothesis.
+
+    Returns
+    -------
+    sequence of Mapping[str, float]
+        First guesses [SI].
+    """
+    if one.from_first_sample:
+        seen = log.measured[np.isfinite(log.measured[:, 0]), 0]
+        begun = float(seen[0]) if len(seen) else 0.0
+        if START_PRESSURE not in one.free:
+            return [{one.free[0]: begun}]
+        return [{START_PRESSURE: begun, START_LEVEL: share * shut_in(log)} for share in LEVELS_TRIED]
+    if one.from_change:
+        return [likeliest_step(log).first or one.starts[0]]
+    if one.from_entry:
+        return [{**start, AIR_ONSET: likeliest_entry(log).onset} for start in one.starts]
+    if one.from_mid_travel:
+        read = log.drives[:, WIDE_FLOW_FORM.drives.index(POSITION)]
+        return [*one.starts, {POSITION_ZERO: 0.5 * float(np.min(read) + np.max(read))}]
+    if not one.shares_of_peak:
+        return one.starts
+    peak = max(float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)
+    return [{"relief_pressure": share * peak, "relief_conductance": RELIEF_START} for share in one.shares_of_peak]
+
+
+def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) -> tuple[Array, Array]:
+    """Return the bounds of a search for the flow form's unknowns, plain or wide.
+
+    Parameters
+    ----------
+    model : GreyBoxModel
+        The flow form with its unknowns.
+    guesses : sequence of ndarray, shape (unknowns,)
+        Where it begins [dimensionless].
+    log : GreyBoxLog
+        The log, as the model sees it.
+
+    Returns
+    -------
+    tuple of ndarray, shape (unknowns,)
+        Lower and upper bounds [dimensionless].
+    """
+    rig = dict(zip(parameter_names(model.parameters), map(float, log.parameters), strict=True))
+    most = rig["pump_displacement"] * float(np.max(np.abs(log.drives[:, 0])))
+    relief = (0.0, max(most / (SHARPEST_RELIEF * rig["relief_pressure"]), rig["relief_conductance"]))
+    squeezed = min(4.0 * rig["relief_pressure"] / rig["bulk_modulus"], 1.0) * rig["chamber_volume"]
+    stiffest = ADIABATIC * rig["accumulator_pressure"] / (LEAST_GAS * squeezed)
+    latest = 0.0 if log.course is None else -log.sample_time
+    limits = {"speed_lead": (latest, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
+    limits[START_LEVEL] = (-rig["accumulator_pressure"], shut_in(log))
+    place = model.unknowns.index("bulk_modulus")  # fitted as a logarithm
+    softest, stiffest_guess = (float(np.exp(end(guess[place] for guess in guesses))) for end in (min, max))
+    stiff = max(rig["bulk_modulus"], stiffest_guess)
+    volume = rig["chamber_volume"]
+    limits["chamber_volume"] = (volume / MOST_VOLUME, MOST_VOLUME * volume)
+    limits["makeup_conductance"] = (0.0, 2.0 * rig["chamber_volume"] / (FASTEST_MAKEUP * stiff))
+    if log.passes_on:
+        limits["bulk_modulus"] = (softest / MOST_BIASED, MOST_BIASED * stiffest_guess)
+    return search_bounds(model, guesses, {**LIMITS, **limits})

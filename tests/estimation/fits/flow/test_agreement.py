@@ -1,0 +1,50 @@
+"""What straight lines between samples and turns that were read say of a slow log together."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from estimation.fits.flow.agreement import Answered, agreed, wanted_of
+from estimation.fits.hypothesis_search.explain import WORTH
+
+TURNS = 9.0
+"""How often the motor of these logs turns [count]."""
+
+
+def said(name: str, gain: float = 0.0, *, explained: bool = False) -> Answered:
+    log = SimpleNamespace(passes=TURNS, course=True)
+    plain: Any = SimpleNamespace(best=SimpleNamespace(cost=1000.0), log=log, explains=lambda _: explained)
+    strange: Any = SimpleNamespace(names=(name,), fit=SimpleNamespace(cost=1000.0 - gain, chi_square=(1.0,)))
+    return Answered(plain, (), (), strange if name else None)
+
+
+def test_what_both_ways_show_has_the_numbers_of_straight_lines() -> None:
+    straight = said("delivery", 51.0)
+    assert agreed(straight, said("delivery", 69.0)) is straight
+    plain = said("", explained=True)
+    assert agreed(plain, said("", explained=True)) is plain
+    refused, read = said(""), said("", explained=True)
+    assert agreed(refused, said("")) is refused
+    assert agreed(refused, read) is read
+
+
+@pytest.mark.parametrize("explained", [True, False])
+def test_what_straight_lines_alone_show_is_not_strange(explained: bool) -> None:
+    """A pump that compresses its oil gained 76 of them: leakage was 66 % low."""
+    straight, read = said("pump_compresses", 76.0, explained=explained), said("", explained=True)
+    told = agreed(straight, read)
+    assert told.strange is None
+    assert told.plain is (straight.plain if explained else read.plain)
+
+
+@pytest.mark.parametrize("gain", [0.9, 1.1])
+def test_what_shows_with_turns_read_alone_must_gain_at_each_turn(gain: float) -> None:
+    straight, read = said("air_midway", 173.0), said("single_rod", gain * TURNS * WORTH)
+    assert agreed(straight, read).names == (("single_rod",) if gain > 1.0 else ())
+
+
+@pytest.mark.parametrize(("told", "read", "turns"), [(True, False, 1.0), (False, True, 1.0), (False, False, TURNS)])
+def test_a_hypothesis_that_is_asked_both_ways_need_not_gain_at_each_turn(told: bool, read: bool, turns: float) -> None:
+    plain: Any = SimpleNamespace(turns_told=told, start=SimpleNamespace(turns_read=read), log=said("").plain.log)
+    assert wanted_of(plain) == turns * WORTH

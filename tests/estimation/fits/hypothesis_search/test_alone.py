@@ -1,0 +1,257 @@
+"""What is tried by itself, and in pairs, where little is left of a long log, or much."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from operator import attrgetter
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.fits.greybox.descent import Point
+from estimation.fits.hypotheses import DELIVERY, OFFSET, Hypothesis
+from estimation.fits.hypothesis_search import explain
+from estimation.fits.hypothesis_search.decimation import FAINT, FEW, Decimation
+from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.predicted_gains import PredictedGain
+
+COST = attrgetter("cost")
+
+LONG: Any = SimpleNamespace(drives=np.zeros((FEW, 1)), sample_time=1e-3)
+
+
+def hypothesis(name: str, *, far: bool = False) -> Hypothesis:
+    return Hypothesis(name, ("anything",), far=far)
+
+
+def tried(cost: float, place: float = 0.0, together: Any = ()) -> Trial:
+    return Trial(together, Point(np.full(1, place), cost, np.zeros(1), np.eye(1)), {}, {}, {})
+
+
+LIKELY, FAR, SOME, NONE = hypothesis("likely"), hypothesis("far", far=True), hypothesis("some"), hypothesis("none")
+
+
+@pytest.fixture(autouse=True)
+def reached(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(explain, "compatible_hypotheses", lambda _, __, asked: asked)
+    monkeypatch.setattr(explain, "decimation_limit", lambda _, __, every, *___: every)
+
+
+@pytest.mark.parametrize(("left", "asked"), [(1.5, "far some"), (5.0, "far some none")])
+def test_what_promises_too_little_is_not_tried_where_little_is_left(
+    left: float, asked: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[tuple[str, list[Any]]] = []
+
+    def nearing(_: Any, given: Any, starts: Any, *__: Any) -> Any:
+        told.append((" ".join(one.name for one in given), starts))
+        return [[tried(900.0)]]
+
+    ends = {"a": tried(800.0), "the same": tried(800.0, 0.1), "elsewhere": tried(9e3, 3.0)}
+    monkeypatch.setattr(explain, "screen", lambda _, __, starts, **___: [ends[one] for one in starts])
+    monkeypatch.setattr(explain, "nearing", nearing)
+    monkeypatch.setattr(explain, "ranked_optima", lambda *_, **__: [tried(800.0)])
+    monkeypatch.setattr(explain, "refined", lambda *_, **__: [tried(800.0)])
+    monkeypatch.setattr(explain, "likeliest", lambda *_, **__: [])
+    monkeypatch.setattr(explain, "cost_over_noise", lambda *_: 1.5)
+    starts: Any = [*ends]
+    # 120 are needed of 1000 to come as low as what is known
+    gains = {"far": 0.0, "some": 121.0 / explain.TRUSTED, "none": 119.0 / explain.TRUSTED}
+    spared = Decimation(1, left, starts)
+    explain._alone(LONG, 1000.0, ([LIKELY], [FAR, SOME, NONE], gains), spared, lambda _: False)  # pyright: ignore[reportPrivateUsage]
+    assert told == [(asked, ["a"] if left < FAINT else [*ends])]
+
+
+@pytest.mark.parametrize(("likely", "other", "order"), [(500.0, 50.0, [50.0, 500.0]), (50.0, 500.0, [50.0, 500.0])])
+def test_what_leaves_less_on_few_samples_is_led_on_first(
+    likely: float, other: float, order: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ends, led = [tried(likely), tried(other)], list[tuple[float, float]]()
+
+    def led_on(_: Any, ended: Any, known: float = np.inf, *__: Any, **___: Any) -> Any:
+        led.append((ended[0].cost, known))
+        return [tried(0.9 * ended[0].cost)]
+
+    monkeypatch.setattr(explain, "screen", lambda *_, **__: [tried(900.0)])
+    monkeypatch.setattr(explain, "nearing", lambda *_, **__: [])
+    monkeypatch.setattr(explain, "ranked_optima", lambda *_, **__: [ends.pop(0)])
+    monkeypatch.setattr(explain, "refined", led_on)
+    monkeypatch.setattr(explain, "cost_over_noise", lambda _, cost: cost / 10.0)
+    found = explain._alone(LONG, 900.0, ([LIKELY], [FAR], {}), Decimation(4, 90.0, [{}]), lambda _: False)  # pyright: ignore[reportPrivateUsage]
+    assert led == [(order[0], np.inf), (order[1], 0.9 * order[0])]
+    assert [one.cost for one in found] == [0.9 * cost for cost in order]
+
+
+def test_beside_what_leaves_little_no_pair_is_tried_that_cannot_explain_the_log(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[str] = []
+
+    def screened(_: Any, together: Any, *__: Any, **___: Any) -> Any:
+        asked.append(together[-1].name)
+        return [tried(990.0 if together[-1] is LIKELY else 9e3, together=together)] * 2
+
+    # the first leaves 1.8 times the noise of 1000, a pair that explains it at most 1.5
+    gains = {"some": 301.0 / explain.TRUSTED, "none": 299.0 / explain.TRUSTED}
+    monkeypatch.setattr(explain, "delayed", lambda log, _: log)
+    monkeypatch.setattr(explain, "by_predicted_gain", lambda *_: ([LIKELY], [FAR, SOME, NONE], gains))
+    monkeypatch.setattr(explain, "own_starts", lambda *_: [{}])
+    monkeypatch.setattr(explain, "_begun_again", lambda *_: {})
+    monkeypatch.setattr(explain, "decimation_for", lambda *_: 1)
+    monkeypatch.setattr(explain, "cost_over_noise", lambda _, cost: cost / 1000.0)
+    monkeypatch.setattr(explain, "screen", screened)
+    monkeypatch.setattr(explain, "ranked_optima", lambda *_: [])
+    monkeypatch.setattr(explain, "refined", lambda *_: [])
+    monkeypatch.setattr(explain, "likeliest", lambda *given, **_: [*map(list, given[1])] and [])
+    first = tried(1800.0, together=(hypothesis("first"),))
+    explain._paired(LONG, first, {}, lambda _: False)  # pyright: ignore[reportPrivateUsage]
+    assert asked == ["likely", "far", "some"]
+
+
+@pytest.mark.parametrize(("left", "asked"), [(1.1, ["far"]), (1.04, [])])
+def test_where_a_cause_explains_a_log_but_leaves_more_than_noise_what_slopes_do_not_see_is_tried_too(
+    left: float, asked: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+
+    def nearing(_: Any, given: Any, *__: Any) -> Any:
+        told.extend(one.name for one in given)
+        return [[tried(700.0)]]
+
+    monkeypatch.setattr(explain, "screen", lambda *_, **__: [tried(800.0)])
+    monkeypatch.setattr(explain, "nearing", nearing)
+    monkeypatch.setattr(explain, "ranked_optima", lambda *_, **__: [tried(800.0)])
+    monkeypatch.setattr(explain, "refined", lambda *_, **__: [replace(tried(800.0), fits=(LONG,))])
+    monkeypatch.setattr(explain, "likeliest", lambda *_, **__: [tried(700.0)])
+    monkeypatch.setattr(explain, "cost_over_noise", lambda *_: left)
+    gains = {"far": 0.0, "some": 900.0}
+    found = explain._alone(LONG, 1000.0, ([LIKELY], [FAR, SOME], gains), Decimation(1, left, [{}]), lambda _: True)  # pyright: ignore[reportPrivateUsage]
+    assert told == asked
+    assert [one.cost for one in found] == ([700.0, 800.0] if asked else [800.0])
+
+
+@pytest.mark.parametrize(("rivalled", "asked"), [(np.inf, ["far"]), (1700.0, [])])
+def test_beside_a_rival_nothing_is_tried_that_is_out_of_reach(
+    rivalled: float, asked: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: list[str] = []
+    monkeypatch.setattr(explain, "compatible_hypotheses", lambda _, __, asked: [one for one in asked if one.far][:1])
+    monkeypatch.setattr(explain, "delayed", lambda log, _: log)
+    monkeypatch.setattr(explain, "by_predicted_gain", lambda *_: ([], [FAR], {}))
+    monkeypatch.setattr(explain, "own_starts", lambda *_: [{}])
+    monkeypatch.setattr(explain, "_begun_again", lambda *_: {})
+    monkeypatch.setattr(explain, "decimation_for", lambda *_: 1)
+    monkeypatch.setattr(explain, "cost_over_noise", lambda _, cost: cost / 1000.0)
+
+    def screened(_: Any, together: Any, *__: Any, **___: Any) -> Any:
+        given.append(together[-1].name)
+        return [tried(9e3, together=together)]
+
+    monkeypatch.setattr(explain, "screen", screened)
+    first = tried(1800.0, together=(hypothesis("first"),))
+    assert not explain._paired(LONG, first, {}, lambda _: False, rivalled=rivalled)  # pyright: ignore[reportPrivateUsage]
+    assert given == asked
+
+
+Pairing = Callable[..., list[Trial]]
+
+
+@pytest.fixture
+def pairing(monkeypatch: pytest.MonkeyPatch) -> Pairing:
+    """Pairs beside a hypothesis that costs 5,000, of sets and searches that are given; the noise costs 1,000."""
+
+    def paired(every: int, screened: Any, led_on: Any, rivalled: float = np.inf) -> list[Trial]:
+        gains = {"far": 0.0, "some": 1e3, "none": 0.0}
+        monkeypatch.setattr(explain, "delayed", lambda log, _: log)
+        monkeypatch.setattr(explain, "by_predicted_gain", lambda *_: ([LIKELY], [FAR, SOME, NONE], gains))
+        monkeypatch.setattr(explain, "own_starts", lambda *_: [{}])
+        monkeypatch.setattr(explain, "_begun_again", lambda *_: {"from": 1.0})
+        monkeypatch.setattr(explain, "decimation_for", lambda *_: every)
+        monkeypatch.setattr(explain, "cost_over_noise", lambda _, cost: cost / 1000.0)
+        monkeypatch.setattr(explain, "screen", screened)
+        monkeypatch.setattr(explain, "ranked_optima", lambda _, ways, *__: [min(way, key=COST) for way in ways])
+        monkeypatch.setattr(explain, "refined", led_on)
+        monkeypatch.setattr(explain, "likeliest", lambda log, ways, *_: led_on(log, [next(iter(way)) for way in ways]))
+        first = tried(5000.0, together=(hypothesis("first"),))
+        return explain._paired(LONG, first, {}, lambda _: False, rivalled=rivalled)  # pyright: ignore[reportPrivateUsage]
+
+    return paired
+
+
+@pytest.mark.parametrize(("near", "swapped"), [(1400.0, False), (1600.0, True)])
+def test_pairs_that_few_samples_leave_unexplained_are_not_led_on_before_all_others_are_compared(
+    near: float, swapped: bool, pairing: Pairing
+) -> None:
+    led: list[str] = []
+
+    def screened(_: Any, together: Any, starts: Any, *__: Any, **___: Any) -> list[Trial]:
+        cost = near if together[-1] in (LIKELY, FAR) else 1500.0
+        return [tried(cost, together=together)] * len(starts)
+
+    def led_on(_: Any, ended: Sequence[Trial], *__: Any) -> list[Trial]:
+        led.append(" ".join(one.together[-1].name for one in ended))
+        return [*ended]
+
+    found = pairing(2, screened, led_on)
+    assert led == (["some none", "likely far"] if swapped else ["likely far", "some none"])
+    assert found[0].cost == min(near, 1500.0)
+
+
+def test_where_no_pair_that_was_compared_first_is_worth_leading_on_the_others_are_led_on(pairing: Pairing) -> None:
+    led: list[int] = []
+
+    def screened(_: Any, together: Any, starts: Any, *__: Any, **___: Any) -> list[Trial]:
+        return [tried(1600.0, together=together)] * len(starts)
+
+    def led_on(_: Any, ended: Sequence[Trial], *__: Any) -> list[Trial]:
+        led.append(len(ended))
+        return [*ended] if len(led) > 1 else []
+
+    assert [one.cost for one in pairing(2, screened, led_on)] == [1600.0, 1600.0]
+
+
+def test_a_pair_beside_a_rival_counts_only_below_what_is_known(pairing: Pairing) -> None:
+    useful: list[float] = []
+
+    def screened(_: Any, together: Any, starts: Any, *__: Any, **___: Any) -> list[Trial]:
+        return [tried(1450.0, together=together)] * len(starts)
+
+    def led_on(_: Any, ended: Sequence[Trial], *given: Any) -> list[Trial]:
+        useful.extend(given[2:])
+        return [*ended]
+
+    assert [one.cost for one in pairing(2, screened, led_on, 1461.0)] == [1450.0] * 4
+    assert not pairing(2, screened, led_on, 1459.0)
+    assert useful == [1461.0 - explain.WORTH, 1459.0 - explain.WORTH]
+
+
+def test_where_little_is_left_a_start_that_leads_a_pair_nowhere_is_not_used_again(pairing: Pairing) -> None:
+    begun: list[int] = []
+
+    def screened(_: Any, together: Any, starts: Any, *__: Any, **___: Any) -> list[Trial]:
+        begun.append(len(starts))
+        return [tried(1450.0 if "from" in start else 9e4, together=together) for start in starts]
+
+    pairing(1, screened, lambda _, ended, *__: [*ended])
+    assert begun == [2, 1, 1]
+
+
+def test_a_speed_that_is_late_and_one_that_is_early_are_one_where_they_came_to_one_place() -> None:
+    late, early = (Hypothesis(name, ("speed_lag",)) for name in ("speed_late", "speed_early"))
+    one = tried(800.0, together=(late,))
+    again = replace(tried(800.0, 0.1, together=(early,)), delays={"motor_speed_rad_s": 0.0})
+    assert explain._same(one, again)  # pyright: ignore[reportPrivateUsage]
+    assert not explain._same(one, replace(again, delays={"motor_speed_rad_s": -1e-3}))  # pyright: ignore[reportPrivateUsage]
+    assert not explain._same(one, replace(again, together=(OFFSET,)))  # pyright: ignore[reportPrivateUsage]
+
+
+@pytest.mark.parametrize(
+    ("one", "gain", "alone"), [(DELIVERY, 49.0, True), (DELIVERY, 51.0, False), (OFFSET, 51.0, True)]
+)
+def test_a_pump_that_delivers_less_beside_another_volume_may_be_a_wrong_area(
+    one: Any, gain: float, alone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(explain, "_explained", lambda *_: True)
+    monkeypatch.setattr(explain, "predicted_gain_beside", lambda *_: PredictedGain(gain, 1.0, 1.0))
+    assert explain._by_itself(LONG, tried(9.0, together=(one,)), lambda _: True) is alone  # pyright: ignore[reportPrivateUsage]

@@ -1,0 +1,49 @@
+"""Few samples stand for a log only while they cost what all of them do."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from estimation.fits.flow.log import flow_log, without_strays
+from estimation.fits.flow.search import flow_starts
+from estimation.fits.hypothesis_search import explain as explaining
+from estimation.fits.hypothesis_search.decimation import FEW, cost_over_noise, decimation_for
+from estimation.fits.hypothesis_search.decimation_limit import decimation_limit
+from estimation.fits.hypothesis_search.wide_log import widened
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from tests.estimation.fits.flow.test_other_rigs import PAPER, STIFF, log
+
+
+def kept(record: Record, p: EhaParameters, every: int) -> int:
+    """Return how many samples may be one where a search for a healthy actuator begins."""
+    cleaned, variances = without_strays(record)
+    return decimation_limit(widened(flow_log(cleaned, p, {}, variances), p), flow_starts(p, p.bulk_modulus)[0], every)
+
+
+def test_steps_of_4_ms_stay_on_the_papers_rig_and_not_where_small_chambers_hold_stiff_oil() -> None:
+    assert kept(log(PAPER, 1.0, 1e-3, duration=1.0), PAPER, 4) == 4
+    assert kept(log(STIFF, 1.0, 1e-3, duration=1.0), STIFF, 4) < 4
+
+
+class AskedError(Exception):
+    """A search that is not wanted."""
+
+
+def test_hypotheses_are_compared_by_steps_that_the_rig_allows(monkeypatch: pytest.MonkeyPatch) -> None:
+    record, variances = without_strays(log(STIFF, 1.0, 5e-4, duration=4.1))
+    told = replace(STIFF, pump_displacement=1.05 * STIFF.pump_displacement)
+    seen_by_form = flow_log(record, told, {}, variances)
+    start = flow_starts(told, STIFF.bulk_modulus)[0]
+    wide = widened(seen_by_form, told, start)
+    assert len(wide.drives) >= FEW
+
+    def asked(*given: Any) -> None:
+        raise AskedError(given[3].every)
+
+    monkeypatch.setattr(explaining, "_alone", asked)
+    with pytest.raises(AskedError) as found:
+        explaining.explain(seen_by_form, told, [start], lambda _: False)
+    left = cost_over_noise(wide, explaining._plain_point(wide, start).cost)  # pyright: ignore[reportPrivateUsage]
+    assert found.value.args[0] < decimation_for(wide, left)

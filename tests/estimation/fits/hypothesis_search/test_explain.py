@@ -1,0 +1,234 @@
+"""Searches of a set of hypotheses, carried to their end."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.fits.greybox.descent import Point
+from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
+from estimation.fits.hypothesis_search import coarse_search, explain, screening
+from estimation.fits.hypothesis_search import final_fits as finishing
+from estimation.fits.hypothesis_search import ranking as ranking
+from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.final_fits import CLOSE, NEVER, ROUNDS
+from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN
+from estimation.fits.hypothesis_search.pump_delivery import contradicted
+from plant.eha.model import EhaParameters
+from tests.estimation.fits.short_logs import made_fit
+
+HEALTHY = EhaParameters()
+
+FED = {"makeup_conductance": 1e-9}
+
+
+class _Made(Trial):
+    """What was tried, as the hypotheses say."""
+
+    @property
+    def meant(self) -> bool:
+        return True
+
+
+def ended(costs: Sequence[float], monkeypatch: pytest.MonkeyPatch) -> tuple[float, int]:
+    """Return the cost at which searches end that reach these, one after another, and how many there were."""
+    made: list[float] = []
+
+    def descended(*_: Any, **__: Any) -> Any:
+        made.append(costs[len(made)])
+        return SimpleNamespace(cost=made[-1], point=SimpleNamespace(theta=np.zeros(1)))
+
+    monkeypatch.setattr(finishing, "descended", descended)
+    monkeypatch.setattr(finishing, "cost_over_noise", lambda *_: 1.0)
+    monkeypatch.setattr(finishing, "spared", lambda one, _: one)
+    problem: Any = SimpleNamespace(log=SimpleNamespace(drives=(), steps=None))
+    begun: Any = SimpleNamespace(cost=np.inf)
+    return finishing._led_on(problem, begun, np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
+
+
+def test_a_search_goes_on_while_it_gains_what_tells_hypotheses_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    costs = [9.0 * CLOSE, 6.0 * CLOSE, 4.5 * CLOSE, 4.0 * CLOSE, 0.0]
+    assert ended(costs, monkeypatch) == (4.0 * CLOSE, 4)
+
+
+def test_a_search_that_gains_nothing_keeps_what_it_had_and_is_not_endless(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert ended([3.0 * CLOSE, 3.5 * CLOSE], monkeypatch) == (3.0 * CLOSE, 2)
+    assert ended([-2.0 * CLOSE * i for i in range(ROUNDS + 3)], monkeypatch)[1] == ROUNDS
+
+
+def test_what_promises_most_is_settled_even_where_its_starts_are_not_what_it_says(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def tried(cost: float) -> Any:
+        return SimpleNamespace(cost=cost, point=Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), delays={})
+
+    settled: list[float] = []
+    monkeypatch.setattr(ranking, "search_coarsely", lambda _, start, *__: settled.append(start.cost) or start)
+    monkeypatch.setattr(ranking, "final_fit", lambda _, one, __: one)
+    monkeypatch.setattr(ranking, "is_hopeless", lambda *_: False)
+    nothing: Any = SimpleNamespace(drives=())
+    found = ranking.likeliest(nothing, [[tried(np.inf), tried(np.inf)], [tried(9.0), tried(10.0), tried(90.0)]])
+    assert [one.cost for one in found] == [9.0]
+    assert settled == [np.inf, 9.0, 10.0]
+    alone = ranking.likeliest(nothing, [[tried(np.inf)]])
+    assert [one.cost for one in alone] == [np.inf]
+
+
+def relieved(setting: float, **more: Any) -> Any:
+    """Return a relief valve that opens at this, where the rig file has 3 MPa."""
+    (relief,) = (one for one in HYPOTHESES if one.name == "relief_low")
+    values, point = {"relief_pressure": setting}, Point(np.zeros(1), 50.0, np.zeros(1), np.eye(1))
+    return Trial((relief,), point, values, {}, {"relief_pressure": 3e6}, **more)
+
+
+def test_a_relief_valve_set_above_the_rig_files_is_not_set_low() -> None:
+    assert [relieved(setting).cost for setting in (2.9e6, 3e6, 4e6)] == [50.0, np.inf, np.inf]
+
+
+@pytest.mark.parametrize(("setting", "std", "void"), [(2e6, 1e3, False), (2e6, np.inf, True), (4e6, 1e3, True)])
+def test_what_is_set_above_the_rig_files_or_has_no_interval_is_void(
+    setting: float, std: float, void: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = SimpleNamespace(model=SimpleNamespace(theta=lambda _: np.zeros(1)))
+    fit = replace(made_fit(50.0, 2e8, 1e5), std={"bulk_modulus": 1e5, "relief_pressure": std})
+    monkeypatch.setattr(finishing, "delayed", lambda log, _: log)
+    monkeypatch.setattr(finishing, "balanced_by", lambda log, _: log)
+    monkeypatch.setattr(finishing, "freed", lambda *_: problem)
+    monkeypatch.setattr(finishing, "usual_values", lambda _: {})
+    monkeypatch.setattr(finishing, "_to_its_end", lambda _, tried, *__, **___: tried)
+    monkeypatch.setattr(finishing, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
+    monkeypatch.setattr(finishing, "concluded", lambda *_, **__: fit)
+    monkeypatch.setattr(finishing, "coarsened", lambda *_: None)
+    monkeypatch.setattr(finishing, "balances_mass", lambda _: False)
+    nothing: Any = None
+    found = finishing.final_fit(nothing, relieved(setting))
+    assert found.cost == (np.inf if void else 50.0)
+    assert found.fit.cost == (NEVER if void else 50.0)
+    assert found.void is void
+
+
+def test_starts_are_dropped_from_which_no_hypothesis_that_came_near_ended_near_its_best() -> None:
+    def each(*costs: float) -> Any:
+        return [SimpleNamespace(cost=cost) for cost in costs]
+
+    starts: Any = ["near", "near for one", "far", "near for what is far itself"]
+    found = [each(100.0, 400.0, 500.0, 900.0), each(250.0, 700.0, 900.0, 900.0), each(950.0, 950.0, 950.0, 950.0)]
+    assert screening.promising_starts(starts, found) == ["near", "near for one"]
+    vain = [each(np.inf, np.inf, np.inf, np.inf)]
+    assert screening.promising_starts(starts, vain) == starts
+
+
+@pytest.mark.parametrize(("explains", "asked"), [(True, "likely far"), (False, "likely far hidden")])
+def test_all_else_is_asked_beside_a_hypothesis_where_what_slopes_promise_does_not_explain_a_log(
+    explains: bool, asked: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def hypothesis(name: str, **more: Any) -> Any:
+        return SimpleNamespace(name=name, far=False, **more)
+
+    likely, far, hidden = hypothesis("likely"), SimpleNamespace(name="far", far=True), hypothesis("hidden")
+    begun: list[tuple[str, Any]] = []
+    costs = {"likely": 80.0, "far": 90.0, "hidden": 70.0, "first": 100.0}
+
+    def led(_: Any, together: Any, starts: Any, wanted: float = np.inf, *_more: Any, **__: Any) -> Any:
+        begun.append((together[-1].name, list(starts)))
+        return [SimpleNamespace(together=together, cost=costs[together[-1].name], wanted=wanted)]
+
+    def finished(_: Any, one: Any, *__: Any) -> Any:
+        point, void = Point(np.zeros(1), one.cost, np.zeros(1), np.eye(1)), False
+        return _Made(one.together, point, {}, {"late": 1e-3}, {}, (made_fit(one.cost, 2e8, 1e5),), void)
+
+    monkeypatch.setattr(explain, "delayed", lambda log, _: log)
+    monkeypatch.setattr(explain, "by_predicted_gain", lambda *_: ([likely], [far, hidden], {}))
+    monkeypatch.setattr(explain, "own_starts", lambda *_: [{"offset": 1e5}])
+    monkeypatch.setattr(
+        coarse_search, "usual_values", lambda _: {"leakage_coefficient": 5e-12, "flow_bias": 2e-6} | FED
+    )
+    monkeypatch.setattr(explain, "screen", led)
+    monkeypatch.setattr(explain, "decimation_for", lambda *_: 1)
+    monkeypatch.setattr(explain, "cost_over_noise", lambda *_: 1.0)
+    monkeypatch.setattr(ranking, "search_coarsely", lambda _, start, *__: start)
+    monkeypatch.setattr(ranking, "final_fit", finished)
+    monkeypatch.setattr(ranking, "is_hopeless", lambda *_: False)
+    nothing: Any = SimpleNamespace(drives=())
+    at_end = {"leakage_coefficient": 1e-12, "flow_bias": 1e-6, "offset": 3e4, **FED}
+    coarse = {"leakage_coefficient": 1e-29, "flow_bias": 3e-6, "offset": 4e4, **FED}
+    place = Point(np.zeros(1), 100.0, np.zeros(1), np.eye(1))
+    first = _Made(
+        (hypothesis("first"),), place, at_end, {"speed": 2e-3}, {}, (made_fit(100.0, 2e8, 1e5),), coarse=coarse
+    )
+    found = explain._paired(nothing, first, {"leakage_coefficient": 2e-12}, lambda _: explains)  # pyright: ignore[reportPrivateUsage]
+    assert [name for name, _ in begun] == asked.split()
+    # from where its search with long steps ended, leakage revived, and from where it began
+    revived = {"leakage_coefficient": 5e-12, "flow_bias": 3e-6, "offset": 4e4, **FED}
+    assert all(starts == [revived, {"leakage_coefficient": 2e-12, "offset": 1e5}] for _, starts in begun)
+    assert found[0].together[-1].name == asked.split()[-1 if not explains else 0]
+    assert found[0].delays == {"speed": 2e-3, "late": 1e-3}
+
+
+@pytest.mark.parametrize(
+    ("second", "least", "chi", "hopeless", "beside", "names", "rivals"),
+    [
+        (105.0, 60.0, 5.0, 101.0, "worn relief", ("worn", "late"), 2),
+        (120.0, 60.0, 2.0, 101.0, "relief", ("relief", "late"), 1),  # it is not about as good
+        (105.0, 40.0, 5.0, 101.0, "relief", ("relief", "late"), 1),  # nothing explains the log
+        (105.0, 40.0, 2.0, 101.0, "worn relief", ("worn", "late"), 2),  # nor here, but little is left
+        (105.0, 60.0, 2.0, 100.0, "", ("relief",), 0),  # the best alone takes up next to nothing
+    ],
+)
+def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
+    second: float,
+    least: float,
+    chi: float,
+    hopeless: float,
+    beside: str,
+    names: tuple[str, ...],
+    rivals: int,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def tried(cost: float, *together: str) -> Any:
+        point, fit = Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), made_fit(cost, 2e8, 1e5, chi=chi)
+        fit = replace(fit, std=dict.fromkeys(fit.values, 1.0))
+        return _Made(tuple(Hypothesis(name, (name,)) for name in together), point, {}, {}, {}, (fit,))
+
+    asked: list[str] = []
+
+    def paired(_: Any, first: Any, *__: Any, **___: Any) -> Any:
+        asked.append(first.together[0].name)
+        own = [tried(50.0, "relief", "late")] if asked[-1] == "relief" else [tried(48.0, "worn", "late")]
+        return [*own, tried(51.0, *(["relief", "worn"] if asked[-1] == "relief" else ["worn", "relief"]))]
+
+    monkeypatch.setattr(explain, "widened", lambda *_: None)
+    monkeypatch.setattr(explain, "balanced_by", lambda *_: None)
+    monkeypatch.setattr(explain, "by_predicted_gain", lambda *_: ([], [], {}))
+    monkeypatch.setattr(explain, "_alone", lambda *_, **__: [tried(100.0, "relief"), tried(second, "worn")])
+    monkeypatch.setattr(explain, "_plain_point", lambda *_: Point(np.zeros(1), 1.0, np.zeros(1), np.eye(1)))
+    monkeypatch.setattr(explain, "decimation_for", lambda *_: 1)
+    monkeypatch.setattr(explain, "cost_over_noise", lambda *_: chi)
+    monkeypatch.setattr(explain, "_paired", paired)
+    monkeypatch.setattr(explain, "weighed", lambda _: {})
+    monkeypatch.setattr(explain, "usual_pressure", lambda *_: 0.0)
+    monkeypatch.setattr(explain, "_delivery_open", lambda *_: NO_GAIN)
+    monkeypatch.setattr(explain, "ALIKE", 4.0)
+    nothing: Any = None
+    found = explain.explain(nothing, nothing, [{}], lambda fit: fit.cost < least, hopeless=hopeless)
+    assert found is not None
+    assert " ".join(sorted(asked, reverse=True)) == beside
+    assert found.names == names
+    # the pair of both firsts is found twice and counts once
+    assert found.rivals == rivals
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [(0.5, True), (0.59, True), (0.61, False), (0.8, False), (1.0, False), (1.24, False), (1.26, True), (2.0, True)],
+)
+def test_a_flow_that_no_worn_pump_and_no_rounded_rig_file_gives_is_objected_to(share: float, said: bool) -> None:
+    displacement = share * HEALTHY.pump_displacement
+    found: Any = SimpleNamespace(values={"pump_displacement": (displacement, 0.01 * displacement)})
+    objections = contradicted(found, HEALTHY)
+    assert [note.data["percent"] for note in objections] == pytest.approx([100.0 * share] * said)
+    other: Any = SimpleNamespace(values={"pressure_offset": (1e5, 1e3)})
+    assert contradicted(other, HEALTHY) == ()

@@ -1,0 +1,92 @@
+"""How sets of hypotheses are fitted to the end."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.fits.greybox.descent import Point
+from estimation.fits.hypotheses import OFFSET, PRESSURE_LATE
+from estimation.fits.hypothesis_search import final_fits as finishing
+from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.final_fits import ALIKE, CLOSE, FAR_BEHIND
+from tests.estimation.fits.short_logs import made_fit
+
+
+@pytest.mark.parametrize(("by_mass", "order"), [(True, [1.0, 0.0]), (False, [0.0, 1.0])])
+def test_the_balance_in_which_a_set_was_sought_comes_first_and_the_other_must_come_as_low(
+    by_mass: bool, order: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    led: list[tuple[float, float]] = []
+
+    def to_its_end(problem: Any, tried: Trial, *_: Any, useful: float = np.inf) -> Trial:
+        led.append((problem.share, useful))
+        return replace(tried, point=replace(tried.point, cost=50.0 * len(led)))
+
+    model = SimpleNamespace(theta=lambda _: np.zeros(1))
+    monkeypatch.setattr(finishing, "delayed", lambda log, _: log)
+    monkeypatch.setattr(finishing, "coarsened", lambda *_: None)
+    monkeypatch.setattr(finishing, "balances_mass", lambda _: by_mass)
+    monkeypatch.setattr(finishing, "balanced_by", lambda _, share: share)
+    monkeypatch.setattr(finishing, "freed", lambda share, *_: SimpleNamespace(model=model, share=share))
+    monkeypatch.setattr(finishing, "usual_values", lambda _: {})
+    monkeypatch.setattr(finishing, "_to_its_end", to_its_end)
+    monkeypatch.setattr(finishing, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
+    monkeypatch.setattr(finishing, "concluded", lambda *_, **__: made_fit(50.0, 2e8, 1e5))
+    nothing: Any = None
+    begun = Trial((), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {}, {}, {})
+    assert finishing.final_fit(nothing, begun).cost == 50.0
+    assert led == [(order[0], np.inf), (order[1], 50.0 + ALIKE)]
+
+
+@pytest.mark.parametrize(
+    ("lag", "delay", "asked"),
+    [(1.02e-3, 1e-3, (2e-3, 2e-5)), (0.9e-3, 0.0, (1e-3, 0.0)), (0.3e-3, 1e-3, None), (3e-3, 1e-3, None)],
+)
+def test_a_lag_that_lasts_as_long_as_a_step_of_delay_is_tried_as_one(
+    lag: float, delay: float, asked: tuple[float, float] | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    led: list[tuple[Trial, float]] = []
+    monkeypatch.setattr(finishing, "final_fit", lambda _, tried, useful: led.append((tried, useful)))
+    delays = {"differential_pressure_pa": delay} if delay else dict[str, float]()
+    late = Trial((PRESSURE_LATE,), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {"pressure_lag": lag}, delays, {})
+    nothing: Any = None
+    finishing.with_less_lag(nothing, late)
+    told = [(one.delays["differential_pressure_pa"], one.values["pressure_lag"]) for one, _ in led]
+    assert told == ([] if asked is None else [pytest.approx(asked)])
+    assert [useful for _, useful in led] == [90.0] * len(told)
+
+
+def test_what_has_no_lag_is_not_tried_later() -> None:
+    nothing: Any = None
+    offset = Trial((OFFSET,), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {"pressure_offset": 1e-3}, {}, {})
+    assert finishing.with_less_lag(nothing, offset) is None
+
+
+@pytest.mark.parametrize(("cost", "searches"), [(0.9, 2), (1.1, 1)])
+def test_what_stays_far_behind_is_given_up(cost: float, searches: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    useful = 100.0 * CLOSE
+    costs = [cost * FAR_BEHIND * useful] * 2
+
+    def descended(*_: Any, **__: Any) -> Any:
+        return SimpleNamespace(cost=costs.pop(), point=SimpleNamespace(theta=np.zeros(1)))
+
+    monkeypatch.setattr(finishing, "descended", descended)
+    nothing: Any = SimpleNamespace(drives=(), steps=None)
+    begun: Any = SimpleNamespace(cost=np.inf)
+    ended: list[Any] = []
+
+    def to_all_short_steps(at: Any, theta: Any, *_: Any, **__: Any) -> Any:
+        ended.append(at)
+        return SimpleNamespace(theta=theta)
+
+    problem: Any = SimpleNamespace(log=nothing, model=SimpleNamespace(values=lambda _: {}), at="all short steps")
+    monkeypatch.setattr(finishing, "spared", lambda one, _: one)
+    monkeypatch.setattr(finishing, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
+    monkeypatch.setattr(finishing, "descend", to_all_short_steps)
+    monkeypatch.setattr(finishing, "replace", lambda one, **_: one)
+    finishing._to_its_end(problem, begun, np.zeros(1), useful=useful)  # pyright: ignore[reportPrivateUsage]
+    assert len(costs) == 2 - searches
+    assert ended == [problem.at]

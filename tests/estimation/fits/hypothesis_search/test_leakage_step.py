@@ -1,0 +1,96 @@
+"""A seal that gives way within a log: bulk modulus, both leakages and when."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from estimation.eha.explanation_notes import notes_of
+from estimation.fits.flow.fit import fit_flow
+from estimation.fits.flow.log import flow_log, without_strays
+from estimation.fits.greybox.fit import concluded
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypotheses import LEAKAGE_STEP
+from estimation.fits.hypothesis_search.leakage_step import NO_STEP, likeliest_step
+from estimation.fits.hypothesis_search.predicted_gains import STEPPED
+from estimation.fits.hypothesis_search.wide_log import widened
+from estimation.fits.hypothesis_search.wide_problem import freed
+from estimation.log_checks.clean import clean_log
+from estimation.models.completed_flow import CRACKS
+from estimation.models.wide_flow import stepped_leakage
+from estimation.notes import RigCode
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.parameter_path import ParameterPath
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+HEALTHY = EhaParameters()
+
+
+@cache
+def stepping(factor: float, at: float = 2.0) -> Record:
+    """Return five seconds in which leakage steps by a factor."""
+    rng = np.random.default_rng(7)
+    leaking = replace(HEALTHY, leakage_coefficient=factor * HEALTHY.leakage_coefficient)
+    path = ParameterPath((0.0, at), (circuit_of(HEALTHY), circuit_of(leaking)))
+    return simulate(CIRCUIT, make_drive("multisine", 5.0, 1e-3, HEALTHY, rng), 1e-3, path, sensors=BENCH, rng=rng)
+
+
+def seen(record: Record) -> GreyBoxLog:
+    sound, variances = without_strays(record)
+    return widened(flow_log(sound, HEALTHY, {}, variances), HEALTHY)
+
+
+def test_lost_flow_tells_when_leakage_steps_and_by_how_much() -> None:
+    step = likeliest_step(seen(stepping(6.0)))
+    assert step.share > STEPPED
+    assert step.first["step_at"] == pytest.approx(0.4, abs=0.01)
+    assert step.first["leakage_before"] == pytest.approx(1.0 / 6.0 - 1.0, abs=0.3)
+    assert step.first["leakage_coefficient"] == pytest.approx(6.0 * HEALTHY.leakage_coefficient, rel=0.1)
+
+
+def test_a_leakage_that_stays_is_no_step() -> None:
+    assert likeliest_step(seen(stepping(1.0))).share < STEPPED
+
+
+def test_a_dead_pressure_sensor_shows_no_step() -> None:
+    log = seen(stepping(1.0))
+    assert likeliest_step(replace(log, measured=np.full_like(log.measured, np.nan))) == NO_STEP
+
+
+def test_a_seal_that_gives_way_is_named_and_bulk_modulus_is_right() -> None:
+    clean = clean_log(stepping(6.0), HEALTHY)
+    fit = fit_flow(clean.record, HEALTHY, HEALTHY.bulk_modulus, {}, clean.variances)
+    assert fit.explanation is not None
+    assert not fit.reasons
+    (note,) = notes_of(fit.explanation, HEALTHY)
+    assert note.code is RigCode.LEAKAGE_STEPS
+    assert note.data["percent_of_log"] == pytest.approx(40.0, abs=0.2)
+    assert note.data["within_percent"] < 1.0
+    assert note.data["last"] / note.data["first"] == pytest.approx(6.0, rel=0.05)
+    value, std = fit.parameters["bulk_modulus"]
+    assert abs(value - HEALTHY.bulk_modulus) < 3.0 * std
+
+
+def test_drops_at_which_make_up_valves_open_leave_bulk_modulus_open_beside_a_step() -> None:
+    """Held where the plain form had them, they made intervals too narrow."""
+    log = seen(stepping(6.0))
+    values = {"leakage_before": 1.0 / 6.0 - 1.0, "step_at": 0.4, "step_width": 1e-3, **dict.fromkeys(CRACKS, 0.0)}
+    values |= {"makeup_conductance": 1e-9, "makeup_opening": 1e3, "case_leakage": 1e-13, "speed_lead": 1e-5}
+    values |= {name: getattr(HEALTHY, name) for name in ("bulk_modulus", "flow_bias")}
+    values |= {"leakage_coefficient": 6.0 * HEALTHY.leakage_coefficient}
+    stds: list[float] = []
+    for one in (LEAKAGE_STEP, replace(LEAKAGE_STEP, beside=())):
+        problem = freed(log, (one,))
+        fit = concluded(problem, problem.at(problem.model.theta(values)), disturbed=False)
+        stds.append(fit.std["bulk_modulus"])
+    assert stds[0] > 1.2 * stds[1]
+
+
+def test_a_step_leaves_what_comes_after_it_and_runs_evenly() -> None:
+    elapsed = np.array([0.0, 0.3, 0.375, 0.4, 0.425, 0.5, 1.0])
+    assert stepped_leakage(elapsed, -0.8, 0.4, 0.1) == pytest.approx([0.2, 0.2, 0.4, 0.6, 0.8, 1.0, 1.0])

@@ -1,0 +1,54 @@
+"""What is tried first, by what the slopes promise."""
+
+import pytest
+
+from estimation.fits.flow.search import flow_starts
+from estimation.fits.greybox import freed_problem
+from estimation.fits.hypotheses import DELIVERY, MAKEUP_BLOCKED, MAY_HIDE, OFFSET
+from estimation.fits.hypothesis_search.predicted_gains import by_predicted_gain, predicted_gain, predicted_gain_beside
+from estimation.models.flow import STIFFNESS
+from tests.estimation.fits.short_logs import PAPER, at_one_speed, log, lost_in_bias, seen, wide
+
+FOUND = {**flow_starts(PAPER, PAPER.bulk_modulus)[2], STIFFNESS: 3e7, "case_leakage": 4e-13}
+"""What a plain fit may have found [SI]."""
+
+
+def test_what_slopes_say_nothing_of_is_not_tried_first() -> None:
+    likely, others, gains = by_predicted_gain(wide(), (), FOUND, [MAKEUP_BLOCKED, OFFSET])
+    assert (likely, others) == ([OFFSET], [MAKEUP_BLOCKED])
+    assert gains[OFFSET.name] == pytest.approx(predicted_gain_beside(wide().coarsened(), (), FOUND, OFFSET).gain)
+
+
+def test_behind_a_plain_form_that_explains_a_log_all_that_may_hide_is_tried_by_its_slopes() -> None:
+    assert not any(one.far for one in MAY_HIDE)
+    assert MAKEUP_BLOCKED.name in [one.name for one in MAY_HIDE]
+
+
+def test_beside_nothing_a_hypothesis_promises_what_it_does_alone() -> None:
+    alone = predicted_gain(seen(log(0.5), chamber_volume=0.1), PAPER, FOUND, OFFSET)
+    assert predicted_gain_beside(wide(), (), FOUND, OFFSET) == pytest.approx(alone, rel=1e-6)
+
+
+def test_what_is_taken_already_leaves_less_to_tell() -> None:
+    known = {**FOUND, "pressure_offset": 1e3}
+    alone, beside = (predicted_gain_beside(wide(), taken, known, DELIVERY) for taken in ((), (OFFSET,)))
+    assert beside.deviation > alone.deviation
+
+
+def test_what_a_worn_pump_at_one_speed_promises_does_not_hang_on_the_step_of_its_slopes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Forward slopes by delivery and flow bias hold curvature that does not cancel, which looked like knowledge."""
+    worn = seen(at_one_speed())
+    fine = predicted_gain(worn, PAPER, lost_in_bias(), DELIVERY)
+    monkeypatch.setattr(freed_problem, "NUDGE", 10.0 * freed_problem.NUDGE)
+    assert predicted_gain(worn, PAPER, lost_in_bias(), DELIVERY) == pytest.approx(fine, rel=0.02)
+
+
+def test_less_of_what_is_freed_is_promised_as_less() -> None:
+    pressure = log(0.5)["differential_pressure_pa"]
+    low, high = (
+        predicted_gain(seen(log(0.5).replace(differential_pressure_pa=pressure + off)), PAPER, FOUND, OFFSET)
+        for off in (-3e5, 3e5)
+    )
+    assert low.size < 0.0 < high.size

@@ -1,0 +1,354 @@
+"""When a pump's teeth are taken up, corrected, and left, by fits that are made up."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.fits.flow import asked_hypotheses
+from estimation.fits.flow import fit as flow_fit
+from estimation.fits.flow import plain as plain_flow
+from estimation.fits.flow.asked_hypotheses import ALWAYS_ASKED
+from estimation.fits.flow.fit import fit_flow
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.pump_ripple import COUNTS, MOST_OFFSET, Ripple, ShownOffset, ShownRipple
+from estimation.fits.hypothesis_search.predicted_gains import PredictedGain
+from estimation.fits.hypothesis_search.pump_ripple_fits import (
+    BY_CHANCE,
+    CHANCE,
+    KEPT,
+    LEAST_OFFSET,
+    LEAST_TEETH,
+    MOST_LINEAR,
+    MOST_TEETH,
+    OFFSET_SETTLED,
+    OFFSET_WORTH,
+    ONE_SIDED_95,
+    OVERTONE_WORTH,
+    ROUNDS,
+    SETTLED,
+    STANDS_OUT,
+    SURE,
+    TEETH_WORTH,
+    RippleFits,
+    with_pump_ripple,
+)
+from estimation.notes import EstimateCode, RigCode
+from plant.arrays import Array
+from plant.notes import Note
+from tests.estimation.fits.short_logs import PAPER, log, made_fit, noted, seen
+
+
+def shown(
+    count: int, gain: float, size: float = 0.1, offset: float = 0.0, *, beside: float | None = None
+) -> ShownRipple:
+    one = ShownRipple(Ripple(count, size, 0.0), gain, 0.01, np.zeros(2), offset, 1e-3)
+    return one._replace(beside=gain if beside is None else beside)
+
+
+def fit(cost: float, *teeth: ShownRipple, off: tuple[float, float] = (0.0, 0.0)) -> GreyBoxFit:
+    offset = ShownOffset(*off, 2e-3, np.zeros(2))
+    return replace(made_fit(cost, 2e8, 1e5), teeth={one.teeth.count: one for one in teeth}, speed_offset=offset)
+
+
+Asked = tuple[tuple[int, ...], tuple[int, ...]]
+
+
+def told(*fits: GreyBoxFit) -> tuple[Callable[[GreyBoxLog], Sequence[GreyBoxFit]], list[Asked]]:
+    """Return what fits logs in turn, and the counts that each log asks for and holds."""
+    asked: list[Asked] = []
+
+    def fitted(one: GreyBoxLog) -> Sequence[GreyBoxFit]:
+        asked.append((one.counts, tuple(each.count for each in one.teeth)))
+        return [fits[len(asked) - 1]]
+
+    return fitted, asked
+
+
+PLAIN = seen(log(0.2))
+
+
+def well(_: GreyBoxFit) -> bool:
+    return True
+
+
+def test_teeth_are_not_taken_up_where_the_log_stays_unexplained() -> None:
+    for explained in (True, False):
+        fitted, _ = told(fit(500.0, shown(12, 200.0)), fit(300.0, shown(12, 0.0)))
+        found = with_pump_ripple(PLAIN, fitted, lambda one, said=explained: said and one.cost == 300.0)
+        assert bool(found.remarks) is explained
+        assert bool(found.left) is not explained
+
+
+def test_teeth_are_taken_up_and_corrected_until_nothing_is_left() -> None:
+    rounds = [fit(500.0, shown(12, 200.0, 0.10)), fit(300.0, shown(12, 5.0, 0.02)), fit(290.0, shown(12, 0.1, 0.001))]
+    fitted, asked = told(*rounds)
+    found = with_pump_ripple(PLAIN, fitted, well)
+    assert asked == [(COUNTS, ()), ((12, 24), (12,)), ((12, 24), (12,))]
+    assert found.fits[0].cost == 290.0
+    assert noted(found.remarks) == [
+        {
+            "code": "pump_ripples",
+            "percent": pytest.approx(12.0),
+            "half_width": pytest.approx(1.96, abs=0.01),
+            "teeth": 12,
+        }
+    ]
+    assert not found.left
+    assert not np.array_equal(found.log.drives, PLAIN.drives)
+
+
+@pytest.mark.parametrize(("chi", "hopeless"), [(2.0, False), (1.2, False), (3.0, True)])
+@pytest.mark.parametrize("by_offset", [True, False])
+def test_a_log_that_neither_teeth_nor_an_offset_can_explain_is_fitted_once(
+    chi: float, hopeless: bool, by_offset: bool
+) -> None:
+    # it has to lose 500 of 1000 at a residual of 2, and 667 at 3, where 60 promised may gain ten times as much
+    off = (0.5, 60.0) if by_offset else (0.0, 0.0)
+    teeth = () if by_offset else (shown(12, 60.0),)
+    first = replace(fit(1000.0, *teeth, off=off), chi_square=(chi,))
+    fitted, asked = told(first, *(fit(900.0, shown(12, 0.0)) for _ in range(9)))
+    found = with_pump_ripple(PLAIN, fitted, well, 1.2 if chi < 3.0 else 1.0)
+    assert (len(asked) == 1) is hopeless
+    assert hopeless is not bool(found.remarks)
+    assert bool(found.left) is (hopeless and not by_offset)
+
+
+def test_corrections_end_after_so_many_rounds() -> None:
+    fitted, asked = told(fit(500.0, shown(12, 200.0)), *(fit(300.0, shown(12, SETTLED + 0.1, 0.01)) for _ in range(9)))
+    with_pump_ripple(PLAIN, fitted, well)
+    assert len(asked) == 1 + ROUNDS
+
+
+@pytest.mark.parametrize(
+    ("teeth", "wanted"),
+    [
+        ([shown(12, TEETH_WORTH + 0.1)], True),
+        ([shown(12, TEETH_WORTH - 0.1)], False),
+        ([shown(12, 50.0, LEAST_TEETH + 0.001)], True),
+        ([shown(12, 50.0, LEAST_TEETH - 0.001)], False),
+        ([shown(12, 50.0), shown(13, BY_CHANCE + 39.9 / STANDS_OUT)], True),
+        ([shown(12, 50.0), shown(13, 40.0, beside=BY_CHANCE + 39.9 / STANDS_OUT)], True),
+        ([shown(12, 50.0), shown(13, BY_CHANCE + 40.1 / STANDS_OUT)], False),
+        ([shown(13, 1.0), shown(12, 50.0), shown(6, 49.0)], True),  # each an overtone of the other
+        ([shown(6, 50.0), shown(12, 49.0)], True),
+        ([shown(12, 50.0), shown(18, 49.0)], False),
+        ([], False),
+    ],
+)
+def test_teeth_are_asked_for_by_gain_and_size_where_no_other_count_does_as_well(
+    teeth: list[ShownRipple], wanted: bool
+) -> None:
+    settled = [fit(100.0, *(shown(one.teeth.count, 0.0) for one in teeth)) for _ in range(2)]
+    fitted, asked = told(fit(500.0, *teeth), *settled)
+    found = with_pump_ripple(PLAIN, fitted, well)
+    assert bool(found.remarks) is wanted
+    assert len(asked) == 1 + wanted
+
+
+def test_an_overtone_is_taken_up_with_its_teeth_where_it_gains_enough() -> None:
+    for gain, held in ((OVERTONE_WORTH + 0.1, (12, 24)), (OVERTONE_WORTH - 0.1, (12,))):
+        rounds = fit(300.0, shown(12, 0.0), shown(24, gain, 0.05)), fit(290.0, shown(12, 0.0), shown(24, 0.0))
+        found = with_pump_ripple(PLAIN, told(fit(500.0, shown(12, 200.0)), *rounds)[0], well)
+        assert tuple(one.count for one in found.log.teeth) == held
+
+
+def left(notes: Sequence[Note]) -> list[tuple[object, object, object]]:
+    return [(note.code, note.data["teeth"], note.data["percent"]) for note in notes]
+
+
+def test_teeth_that_do_not_explain_the_log_or_do_not_stand_out_are_left() -> None:
+    useless, _ = told(fit(500.0, shown(12, 200.0)), fit(500.0 - TEETH_WORTH + 0.1, shown(12, 0.0)))
+    useful, _ = told(fit(500.0, shown(12, 200.0)), fit(500.0 - TEETH_WORTH - 0.1, shown(12, 0.0)))
+    several, _ = told(fit(500.0, shown(12, 50.0), shown(13, 40.0)))
+    unfelt, _ = told(fit(500.0, shown(12, 200.0)), fit(100.0))
+    for fitted in (useless, several, unfelt):
+        found = with_pump_ripple(PLAIN, fitted, well)
+        assert left(found.left) == [(EstimateCode.TEETH_LEFT, 12, pytest.approx(10.0))]
+        assert not found.remarks
+        assert found.log is PLAIN
+    assert not with_pump_ripple(PLAIN, useful, well).left
+    assert not with_pump_ripple(PLAIN, told(fit(500.0, shown(12, 9.0), shown(13, 8.0)))[0], well).left
+
+
+def test_teeth_that_may_be_as_small_as_any_pumps_are_left_only_where_they_move_bulk_modulus() -> None:
+    def doubted(size: float, moved: float, offset: float = 0.0) -> bool:
+        rivals = fit(500.0, shown(12, 50.0, size, offset), shown(13, 40.0), off=(offset, 0.0))
+        felt = rivals.std["bulk_modulus"] / rivals.values["bulk_modulus"] * moved
+        fitted, _ = told(replace(rivals, small_teeth=({"bulk_modulus": felt}, {"bulk_modulus": 0.0})))
+        return bool(with_pump_ripple(PLAIN, fitted, well).left)
+
+    most = LEAST_TEETH + 0.01 * ONE_SIDED_95  # their deviation is 0.01
+    assert not doubted(most - 1e-4, MOST_LINEAR - 0.01)
+    assert doubted(most - 1e-4, MOST_LINEAR + 0.01)
+    assert doubted(most + 1e-4, MOST_LINEAR - 0.01)
+    assert doubted(most - 1e-4, 0.0, offset=0.1)
+    assert not doubted(LEAST_TEETH - 1e-4, MOST_LINEAR + 0.01)
+
+
+def test_teeth_larger_than_any_are_not_believed_but_left() -> None:
+    for at_first, more, left_over in ((MOST_TEETH + 0.01, 0.0, True), (0.3, 0.12, True), (0.3, 0.08, False)):
+        first = fit(500.0, shown(12, 200.0, at_first))
+        fitted, asked = told(first, fit(300.0, shown(12, 5.0, more)), fit(290.0, shown(12, 0.0, 0.0)))
+        found = with_pump_ripple(PLAIN, fitted, well)
+        assert bool(found.left) is left_over
+        assert bool(found.remarks) is not left_over
+        assert len(asked) == (1 if at_first > MOST_TEETH else 2 if left_over else 3)
+
+
+def test_a_log_with_gaps_in_its_speed_is_not_asked() -> None:
+    fitted, asked = told(fit(500.0, shown(12, 200.0)))
+    holey = replace(PLAIN, gaps=np.array([[3.0, 9.0, 1.0]]))
+    assert with_pump_ripple(holey, fitted, well).log is holey
+    assert asked == [((), ())]
+
+
+@pytest.mark.parametrize(
+    ("chi", "code"), [(1.0, EstimateCode.TEETH_LEFT), (2.0, EstimateCode.PRESSURE_RESIDUALS_LARGE)]
+)
+def test_teeth_that_are_left_shut_the_gate_where_nothing_else_does(
+    monkeypatch: pytest.MonkeyPatch, chi: float, code: EstimateCode
+) -> None:
+    shows = replace(fit(500.0, shown(12, 50.0), shown(13, 40.0)), chi_square=(chi,))
+    monkeypatch.setattr(plain_flow, "balanced", lambda *_, **__: [shows])
+    monkeypatch.setattr(
+        flow_fit, "hypotheses_asked", lambda *_, **__: ((), (RigCode.WEAR_NOT_EXCLUDED.note(percent=3.0),))
+    )
+    found = fit_flow(log(0.2), PAPER, PAPER.bulk_modulus)
+    assert [note.code for note in found.reasons] == [code]
+    assert [note.code for note in found.remarks] == [RigCode.WEAR_NOT_EXCLUDED]
+
+
+def test_nothing_is_left_of_a_sound_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plain_flow, "balanced", lambda *_, **__: [fit(500.0, shown(12, 3.0))])
+    monkeypatch.setattr(
+        asked_hypotheses, "predicted_gains", lambda *_, **__: len(ALWAYS_ASKED) * [PredictedGain(0.0, 0.0, 0.01)]
+    )
+    found = fit_flow(log(0.2), PAPER, PAPER.bulk_modulus)
+    assert not found.reasons
+    assert not found.remarks
+
+
+def test_teeth_are_asked_for_by_chance_as_seldom_as_their_limits_say() -> None:
+    """Twice the gain of a cosine and a sine is chi-square distributed with two degrees of freedom."""
+    assert np.exp(TEETH_WORTH) / len(COUNTS) == pytest.approx(1500.0, rel=0.03)
+    assert np.exp(OVERTONE_WORTH) == pytest.approx(150.0, rel=0.02)
+
+
+def subtracted(found: RippleFits) -> Array:
+    return PLAIN.drives[:, 0] - found.log.drives[:, 0]
+
+
+def test_an_offset_of_speed_is_subtracted_corrected_and_told_where_the_log_is_explained_without_it() -> None:
+    rounds = [
+        fit(900.0, off=(0.2, 500.0)),
+        fit(420.0, off=(0.04, 2.0 * OFFSET_SETTLED)),
+        fit(410.0, off=(0.01, 0.9 * OFFSET_SETTLED)),
+    ]
+    fitted, asked = told(*rounds)
+    found = with_pump_ripple(PLAIN, fitted, lambda one: one.cost < 900.0)
+    assert asked == 3 * [(COUNTS, ())]
+    assert subtracted(found) == pytest.approx(0.24)
+    assert found.log.speed_offset == pytest.approx(0.24)
+    assert not found.log.counts  # hypotheses on this log do not look for teeth again
+    assert found.best.cost == 410.0
+    assert noted(found.remarks) == [
+        {
+            "code": "speed_offset",
+            "offset_rad_s": pytest.approx(0.24),
+            "half_width": pytest.approx(1.96 * 2e-3, rel=1e-3),
+        }
+    ]
+
+
+@pytest.mark.parametrize(
+    ("rounds", "explained"),
+    [
+        ([fit(900.0, off=(0.2, OFFSET_WORTH - 0.1))], True),
+        ([fit(900.0, off=(1.01 * MOST_OFFSET, 500.0))], True),
+        ([fit(900.0, off=(0.2, 500.0)), fit(900.0 - KEPT * 500.0 + 0.1)], True),
+        ([fit(900.0, off=(0.2, 500.0)), fit(900.0 - KEPT * 500.0 - 0.1)], False),
+    ],
+)
+def test_an_offset_that_gains_little_or_breaks_its_promise_or_leaves_the_log_unexplained_is_none(
+    rounds: list[GreyBoxFit], *, explained: bool
+) -> None:
+    found = with_pump_ripple(PLAIN, told(*rounds)[0], lambda _: explained)
+    assert found.log is PLAIN
+    assert found.best.cost == 900.0
+    assert not found.remarks
+
+
+def test_an_offset_that_leaves_more_than_the_noise_of_sensors_is_none() -> None:
+    """A piston with a rod on one side looks like one, and passed with bulk modulus 39 % too low."""
+    most = SURE * 0.2 + CHANCE * np.sqrt(2.0 / len(PLAIN.drives))
+    for left, taken in ((0.95 * most, True), (1.05 * most, False)):
+        after = replace(fit(400.0), chi_square=(1.0 + left,))
+        found = with_pump_ripple(PLAIN, told(fit(900.0, off=(0.2, 500.0)), after)[0], well, 1.2)
+        assert bool(found.remarks) is taken
+
+
+def test_the_offset_is_that_of_the_balance_which_is_likeliest_with_an_offset_of_its_own() -> None:
+    fits = [[fit(900.0, off=(0.2, 500.0))], [fit(400.0), fit(405.0, off=(0.05, 50.0))], [fit(410.0), fit(355.0)]]
+    found = with_pump_ripple(PLAIN, lambda _: fits.pop(0), well)
+    assert subtracted(found) == pytest.approx(0.25)
+    assert found.best.cost == 355.0
+
+
+@pytest.mark.parametrize("left", [0.9 * OFFSET_SETTLED, 1.1 * OFFSET_SETTLED])
+def test_a_first_guess_of_the_offset_is_corrected_and_told_however_large(left: float) -> None:
+    settled = left < OFFSET_SETTLED
+    fitted, asked = told(fit(420.0, off=(0.04, left)), fit(419.0))
+    found = with_pump_ripple(PLAIN, fitted, well, offset=3.0 * MOST_OFFSET)
+    assert len(asked) == (1 if settled else 2)
+    offset = 3.0 * MOST_OFFSET + (0.0 if settled else 0.04)
+    assert subtracted(found) == pytest.approx(offset)
+    (note,) = found.remarks
+    assert note.data["offset_rad_s"] == found.log.speed_offset == pytest.approx(offset)
+
+
+def test_a_small_offset_is_subtracted_and_not_told() -> None:
+    for size, said in ((0.9 * LEAST_OFFSET, False), (1.1 * LEAST_OFFSET, True)):
+        found = with_pump_ripple(PLAIN, told(fit(900.0, off=(size, 500.0)), fit(400.0))[0], well)
+        assert subtracted(found) == pytest.approx(size)
+        assert bool(found.remarks) is said
+
+
+def test_teeth_are_looked_for_without_the_offset_and_tell_what_is_left_of_it() -> None:
+    rounds = [
+        fit(9000.0, off=(0.2, 8000.0)),
+        fit(600.0, shown(12, 90.0, 0.1, 0.03)),
+        fit(500.0, shown(12, 5.0, 0.02, 0.01)),
+        fit(490.0, shown(12, 0.0, 0.0, 0.0)),
+    ]
+    fitted, asked = told(*rounds)
+    found = with_pump_ripple(PLAIN, fitted, lambda one: one.cost < 600.0)
+    assert asked == [(COUNTS, ()), (COUNTS, ()), ((12, 24), (12,)), ((12, 24), (12,))]
+    assert found.log.speed_offset == pytest.approx(0.24)
+    assert noted(found.remarks)[1] == {
+        "code": "speed_offset",
+        "offset_rad_s": pytest.approx(0.24),
+        "half_width": pytest.approx(1.96e-3, rel=1e-3),
+    }
+
+
+def test_teeth_however_small_that_tell_an_offset_are_taken_up() -> None:
+    for offset, wanted in ((0.1, True), (0.0, False)):
+        one = shown(12, 60.0, 0.5 * LEAST_TEETH, offset)
+        fits = fit(900.0, one, off=(offset, 0.0)), fit(800.0, shown(12, 0.0))
+        assert bool(with_pump_ripple(PLAIN, told(*fits)[0], well).remarks) is wanted
+
+
+def test_overtones_are_asked_once_the_teeth_have_settled_and_dropped_where_they_help_none() -> None:
+    rounds = [
+        fit(900.0, shown(12, 200.0)),
+        fit(700.0, shown(12, OVERTONE_WORTH + 0.1), shown(24, 50.0)),
+        fit(690.0, shown(12, 0.0), shown(24, 50.0)),
+        fit(695.0, shown(12, 0.0), shown(24, 0.0)),
+    ]
+    fitted, asked = told(*rounds)
+    found = with_pump_ripple(PLAIN, fitted, well)
+    assert [held for _, held in asked] == [(), (12,), (12,), (12, 24)]
+    assert (found.best.cost, len(found.log.teeth)) == (690.0, 1)

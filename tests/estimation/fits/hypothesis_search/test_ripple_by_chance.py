@@ -1,0 +1,63 @@
+"""Teeth that show by chance: with an offset of speed which the flow does not have, or at the edge of what counts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.fits.greybox.pump_ripple import Ripple, ShownOffset, ShownRipple
+from estimation.fits.hypothesis_search.pump_ripple_fits import (
+    CONTRADICTS,
+    KEPT,
+    LEAST_TEETH,
+    ONE_SIDED_95,
+    TEETH_WORTH,
+    with_pump_ripple,
+)
+from tests.estimation.fits.short_logs import log, made_fit, seen
+
+STD = 0.01
+LARGEST_SMALL = LEAST_TEETH + ONE_SIDED_95 * STD
+
+
+@pytest.mark.parametrize(
+    ("size", "flow", "std", "left"),
+    [
+        (LARGEST_SMALL - 1e-4, 1.0 - KEPT - 1e-3, 1e-3, False),  # another offset: chance
+        (LARGEST_SMALL - 1e-4, KEPT + 1e-3, 1e-3, True),  # nearly the same
+        (LARGEST_SMALL - 1e-4, 0.0, 1.01 / CONTRADICTS, True),  # the flow does not tell
+        (LARGEST_SMALL - 1e-4, 0.0, np.inf, True),
+        (LARGEST_SMALL + 1e-4, 0.0, 1e-3, True),  # no chance, and no small ones
+    ],
+)
+def test_small_teeth_that_need_an_offset_of_speed_which_the_flow_contradicts_shut_no_gate(
+    size: float, flow: float, std: float, left: bool
+) -> None:
+    wandering = ShownRipple(Ripple(14, size, 0.0), 12.0, STD, np.zeros(2), offset=-1.0, offset_std=1e-3)
+    rival = ShownRipple(Ripple(13, 0.02, 0.0), 6.0, STD, np.zeros(2), beside=6.0)
+    offset = ShownOffset(-flow, 0.0, std, np.zeros(2))
+    fit = replace(made_fit(500.0, 2e8, 1e5), teeth={14: wandering, 13: rival}, speed_offset=offset)
+    found = with_pump_ripple(seen(log(0.2)), lambda _: [fit], lambda _: False)
+    assert bool(found.left) is left
+
+
+@pytest.mark.parametrize(
+    ("promised", "gained", "left"),
+    [
+        (TEETH_WORTH + 0.5, TEETH_WORTH - 1.0, False),  # a simulated chirp was unknown for it
+        (TEETH_WORTH + 0.5, KEPT * TEETH_WORTH, True),  # the search with teeth ended short
+        (10.0 * TEETH_WORTH, TEETH_WORTH - 1.0, True),
+    ],
+)
+def test_teeth_that_a_fit_tried_and_that_gain_what_chance_does_shut_no_gate(
+    promised: float, gained: float, left: bool
+) -> None:
+    large = ShownRipple(Ripple(19, LARGEST_SMALL + 0.02, 0.0), promised, STD, np.zeros(2))
+    offset = ShownOffset(0.0, 0.0, 1e-3, np.zeros(2))
+    fits = [
+        replace(made_fit(cost, 2e8, 1e5), teeth={19: one}, speed_offset=offset)
+        for cost, one in ((500.0, large), (500.0 - gained, large._replace(gain=0.0)))
+    ]
+    found = with_pump_ripple(seen(log(0.2)), lambda one: [fits[bool(one.teeth)]], lambda _: True)
+    assert not found.remarks
+    assert bool(found.left) is left

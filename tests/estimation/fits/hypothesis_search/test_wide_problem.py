@@ -1,0 +1,144 @@
+"""Where the searches for what is strange about a log begin."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.diagnosis.rig_draws import draw_bench
+from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from estimation.fits.greybox import freed_problem
+from estimation.fits.greybox.deviations import believed
+from estimation.fits.greybox.log import greybox_log
+from estimation.fits.hypotheses import BEGUN, ENCODER_ZERO, HYPOTHESES, LIMITS, OFFSET_AT_REST, Hypothesis
+from estimation.fits.hypothesis_search.wide_log import START_LEVEL, usual_values, widened
+from estimation.fits.hypothesis_search.wide_problem import (
+    MOST_WORN,
+    POSITION_ZERO,
+    flow_bounds,
+    flow_speed,
+    freed,
+    own_starts,
+    worn_start,
+)
+from estimation.models.flow import FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
+from estimation.models.flow_parameters import flow_parameters
+from estimation.models.wide_flow import grown_leakage
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from tests.estimation.fits.short_logs import PAPER, at_one_speed, lost_in_bias, seen, wide
+
+RIG = EhaParameters()
+VARIANCES = {"differential_pressure_pa": 1e6}
+
+
+@pytest.mark.parametrize("one", HYPOTHESES, ids=[one.name for one in HYPOTHESES])
+def test_every_search_of_a_log_with_a_dead_pressure_sensor_begins_at_a_number(one: Hypothesis) -> None:
+    still = dict.fromkeys((*FLOW_FORM.drives, *FLOW_FORM.outputs), np.zeros(20))
+    log = widened(
+        greybox_log(FLOW_FORM, Record(1e-3, still), flow_parameters(RIG), longest_step=1e-3, variances=VARIANCES), RIG
+    )
+    model = freed(log, (one,)).model
+    known = dict.fromkeys(model.unknowns, 1.0)
+    for start in own_starts(log, one):
+        assert np.all(np.isfinite(model.theta({**known, **start})))
+
+
+@pytest.mark.parametrize("factor", [2.0, 10.0, 1e6])
+def test_leakage_that_grows_with_time_squared_is_within_bounds(factor: float) -> None:
+    """It begins flat. Growth was held to twice its value halfway, and logs with such a leak were refused."""
+    halfway, elapsed = 1.0 + 0.25 * (factor - 1.0), np.linspace(0.0, 1.0, 5)
+    of_halfway = (factor - 1.0) / halfway  # both in time and in its square, each from halfway
+    for name in ("leakage_growth", "leakage_bend"):
+        least, most = LIMITS[name]
+        assert least <= of_halfway <= most
+    grown = halfway * grown_leakage(elapsed, of_halfway, of_halfway, 0.0)
+    np.testing.assert_allclose(grown, 1.0 + (factor - 1.0) * elapsed**2, rtol=1e-9, atol=1e-9 * factor)
+
+
+def test_an_encoder_is_first_taken_to_read_zero_in_mid_travel() -> None:
+    moved = wide()
+    drives = moved.drives.copy()
+    drives[:, 1] = np.linspace(0.1, 0.16, len(drives))
+    last = own_starts(replace(moved, drives=drives), ENCODER_ZERO)[-1]
+    assert last[POSITION_ZERO] == pytest.approx(0.13)
+
+
+def test_an_offset_at_rest_is_first_taken_to_be_what_the_sensor_reads_there() -> None:
+    log = wide()
+    measured = np.full_like(log.measured, 1e5)
+    measured[0] = np.nan
+    assert list(own_starts(replace(log, measured=measured), OFFSET_AT_REST)) == [{"pressure_offset": 1e5}]
+
+
+def test_what_the_flow_bias_holds_beyond_a_healthy_one_is_first_taken_for_wear() -> None:
+    log = widened(seen(at_one_speed()), PAPER)
+    assert flow_speed(log) == pytest.approx(100.0, rel=3e-2)  # of means about each sample
+    (start,) = worn_start(log, lost_in_bias())
+    assert start["pump_displacement"] == pytest.approx(0.85 * PAPER.pump_displacement, rel=1e-2)
+    assert start["flow_bias"] == pytest.approx(PAPER.flow_bias)
+    (most,) = worn_start(log, lost_in_bias(0.5))
+    assert most["pump_displacement"] == pytest.approx((1.0 - MOST_WORN) * PAPER.pump_displacement)
+    assert most["flow_bias"] > PAPER.flow_bias
+    assert worn_start(log, lost_in_bias(1.0)) == []
+    still = replace(log, drives=np.zeros_like(log.drives))
+    assert worn_start(still, lost_in_bias()) == []
+
+
+@pytest.mark.parametrize("opening", [1e2, 1e4])
+@pytest.mark.parametrize("modulus", [5e7, 2e8, 1.5e9])
+def test_slopes_of_the_widest_make_up_valve_are_those_of_the_model_and_no_chatter(
+    modulus: float, opening: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = wide()
+    problem = freed(log, (BEGUN,))
+    values = {**usual_values(log), "bulk_modulus": modulus, "makeup_opening": opening, "case_leakage": 1e-13}
+    theta = problem.model.theta({**values, "leakage_coefficient": 2e-11, "speed_lead": 1e-5})
+    place = problem.model.unknowns.index("makeup_conductance")
+    theta[place] = flow_bounds(problem.model, [theta], log)[1][place]
+
+    def effects(nudge: float) -> np.ndarray:
+        monkeypatch.setattr(freed_problem, "NUDGE", nudge)
+        slopes = freed(log, (BEGUN,)).linearised(theta)[1]
+        return np.sqrt(np.einsum("ij,ij->j", slopes, slopes))
+
+    # a valve that opens within 100 Pa has a corner narrower than a nudge of 1e-3; chatter would grow tenfold here
+    assert effects(1e-6) == pytest.approx(effects(1e-5), rel=0.1, abs=1.0)
+
+
+def test_an_offset_at_rest_is_first_taken_to_be_none_where_no_pressure_was_read() -> None:
+    log = wide()
+    blind = replace(log, measured=np.full_like(log.measured, np.nan))
+    assert list(own_starts(blind, OFFSET_AT_REST)) == [{"pressure_offset": 0.0}]
+
+
+def test_the_level_at_which_chambers_begin_is_presumed_anywhere_up_to_half_of_what_loads_them() -> None:
+    log = wide()
+    problem, most = freed(log, (BEGUN,)), 0.5 * float(np.max(np.abs(log.measured)))
+    place = problem.model.unknowns.index(START_LEVEL)
+    known = dict.fromkeys(problem.model.unknowns, 1.0)
+    unit = problem.model.values(problem.model.theta(known) + 1.0)[START_LEVEL] - 1.0
+    levels = np.linspace(0.0, most, 1001)
+    assert unit * believed(problem)[place] ** -0.5 == pytest.approx(np.sqrt(np.mean(levels**2)), rel=1e-3)
+
+
+@pytest.mark.slow
+def test_a_level_that_a_loaded_log_hardly_tells_is_in_the_deviation_of_bulk_modulus() -> None:
+    bench = draw_bench(1004)  # the level took on half of the load's pressure: 0.45 % high, at 4.9 deviations
+    found = estimate_bulk_modulus(bench.record, bench.healthy)
+    assert found.gate.passed
+    assert found.value is not None
+    assert found.std is not None
+    assert abs(found.value - bench.true.bulk_modulus) < 2.0 * found.std < 0.01 * bench.true.bulk_modulus
+
+
+@pytest.mark.parametrize(("softer", "gas"), [(1.0, 4.0 * RIG.relief_pressure / RIG.bulk_modulus), (100.0, 1.0)])
+def test_an_accumulator_may_be_as_small_as_the_oil_it_takes_and_a_chamber_at_most(softer: float, gas: float) -> None:
+    """With a chamber of gas for all rigs, an encoder's zero took up what a smaller one does."""
+    still = dict.fromkeys((*FLOW_FORM.drives, *FLOW_FORM.outputs), np.zeros(20))
+    rig = replace(RIG, bulk_modulus=RIG.bulk_modulus / softer)
+    log = greybox_log(FLOW_FORM, Record(1e-3, still), flow_parameters(rig), longest_step=1e-3, variances=VARIANCES)
+    guess = np.zeros(len(MASS_FLOW_FORM.unknowns))
+    most = flow_bounds(MASS_FLOW_FORM, [guess], log)[1][MASS_FLOW_FORM.unknowns.index(STIFFNESS)]
+    least_gas = gas * rig.chamber_volume
+    assert most * dict(MASS_FLOW_FORM.linear)[STIFFNESS] == pytest.approx(1.4 * rig.accumulator_pressure / least_gas)

@@ -1,0 +1,48 @@
+"""An end that nearly explains a log is left under larger noise, under which the pits of its misfit are not there."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.fits.greybox.descent import Point
+from estimation.fits.motion.noise_annealing import LARGER_WALK, annealed
+from plant.arrays import Array
+
+BOUNDS = (np.full(1, -9.0), np.full(1, 9.0))
+PIT = Point(np.array([3.0]), 50.0, np.zeros(1), np.eye(1))
+
+
+def valley(theta: Array, *, rough: bool) -> Point:
+    """The misfit of a valley about 0; a rough one has a pit wherever a search stands, but near its bottom."""
+    away = theta if not rough or abs(theta[0]) < 0.5 else np.zeros(1)
+    return Point(theta, 5.0 + 5.0 * float(theta @ theta), 10.0 * away, 10.0 * np.eye(1))
+
+
+def problem(asked: list[str]) -> Any:
+    """Return a problem that is smooth under a larger walk of the noise alone."""
+
+    def softened(variance: float, walk: float) -> str:
+        assert (variance, walk) == (1.0, LARGER_WALK)
+        return "softened"
+
+    def at(theta: Array, log: str = "own") -> Point:
+        asked.append(log)
+        return valley(theta, rough=log == "own")
+
+    soft = SimpleNamespace(at=lambda theta: at(theta, "softened"))
+    return SimpleNamespace(at=at, log=SimpleNamespace(softened=softened), on=lambda _: soft)
+
+
+def test_a_pit_is_left_for_the_bottom_and_that_is_not_left_again() -> None:
+    asked: list[str] = []
+    found = annealed(problem(asked), PIT, BOUNDS, 1e-3, 1.0)
+    assert found.cost == pytest.approx(5.0, abs=1e-3)
+    assert asked.index("own") > asked.index("softened")
+    assert len([one for one, last in zip(asked, ["own", *asked[:-1]], strict=True) if one != last == "own"]) == 2
+
+
+def test_an_end_is_kept_that_no_way_back_comes_below() -> None:
+    low = Point(np.array([3.0]), 4.0, np.zeros(1), np.eye(1))
+    assert annealed(problem([]), low, BOUNDS, 1e-3, 1.0) is low
