@@ -45,10 +45,8 @@ ADIABATIC = 1.4
 """Exponent of nitrogen that is compressed quickly [dimensionless]."""
 
 LEAST_GAS = 1.0
-"""Least gas of the inner circuit's accumulator, over the oil that both chambers take up from rest to relief pressure
-[dimensionless]: with as much it loses half its pressure then, and a designer gives it more. At most a chamber's volume
-counts, whatever the oil takes. With a chamber's volume for all rigs, those whose oil takes 3 % of it were told an
-encoder's zero that was not there, and bulk modulus three deviations off (decision 343)."""
+"""Least gas of the inner circuit's accumulator, in chamber volumes; judged. With less its pressure would follow every
+stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
 
 MOST_WORN = 0.2
 """Most that a worn pump loses of its displacement where the search for it begins [fraction]; judged."""
@@ -190,8 +188,7 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     rig = dict(zip(parameter_names(model.parameters), map(float, log.parameters), strict=True))
     most = rig["pump_displacement"] * float(np.max(np.abs(log.drives[:, 0])))
     relief = (0.0, max(most / (SHARPEST_RELIEF * rig["relief_pressure"]), rig["relief_conductance"]))
-    squeezed = min(4.0 * rig["relief_pressure"] / rig["bulk_modulus"], 1.0) * rig["chamber_volume"]
-    stiffest = ADIABATIC * rig["accumulator_pressure"] / (LEAST_GAS * squeezed)
+    stiffest = ADIABATIC * rig["accumulator_pressure"] / (LEAST_GAS * rig["chamber_volume"])
     latest = 0.0 if log.course is None else -log.sample_time
     limits = {"speed_lead": (latest, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
     limits[START_LEVEL] = (-rig["accumulator_pressure"], shut_in(log))

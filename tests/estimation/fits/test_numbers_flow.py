@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.flow.fit import fit_flow
-from estimation.fits.flow.log import _swept_share, speed_gaps, usual_leakage, without_strays
+from estimation.fits.flow.log import _swept_share, leakage_guess, speed_gaps, without_strays
 from estimation.fits.flow.search import balanced, flow_starts
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
@@ -53,7 +53,7 @@ def logs_of_the_flow_form() -> dict[str, Any]:
         "gaps that a quiet sensor feels": len(speed_gaps(holey, PAPER, 30.0)),
         "within gaps of position": int(np.count_nonzero(within_gaps(position))),
         "swept share": [_swept_share(one, p) for one in (position[:40], np.array([0.0, 0.9])) for p in (PAPER, SINGLE)],
-        "usual leakage [m^3/(s Pa)]": [usual_leakage(one) for one in (PAPER, replace(PAPER, leakage_coefficient=0.0))],
+        "usual leakage [m^3/(s Pa)]": [leakage_guess(one) for one in (PAPER, replace(PAPER, leakage_coefficient=0.0))],
         "starts": flow_starts(PAPER, 4e8)[::5],
         "starts without leakage": flow_starts(replace(PAPER, leakage_coefficient=0.0, flow_bias=0.0), 2e8)[0],
         "count of starts": len(flow_starts(PAPER, 4e8)),

@@ -268,7 +268,7 @@ def test_a_play_that_is_shown_is_asked_for_and_believed_where_no_more_than_noise
     assert asked.explanation is not None
     assert not asked.reasons
     moved = 0.05  # of it a share is left open
-    assert asked_hypotheses.parameters["bulk_modulus"][1] == pytest.approx(
+    assert asked.parameters["bulk_modulus"][1] == pytest.approx(
         np.hypot(PLAY_STRUCTURE, PLAY_OPEN * moved) * 2.1e8, rel=0.01
     )
 

@@ -41,9 +41,7 @@ from plant.notes import Note
 from tests.estimation.fits.short_logs import PAPER, log, made_fit, noted, seen
 
 
-def shown(
-    count: int, gain: float, size: float = 0.1, offset: float = 0.0, *, beside: float | None = None
-) -> ShownRipple:
+def shown(count: int, gain: float, size: float = 0.1, offset: float = 0.0, beside: float | None = None) -> ShownRipple:
     one = ShownRipple(Ripple(count, size, 0.0), gain, 0.01, np.zeros(2), offset, 1e-3)
     return one._replace(beside=gain if beside is None else beside)
 
@@ -213,9 +211,8 @@ def test_teeth_that_are_left_shut_the_gate_where_nothing_else_does(
 ) -> None:
     shows = replace(fit(500.0, shown(12, 50.0), shown(13, 40.0)), chi_square=(chi,))
     monkeypatch.setattr(plain_flow, "balanced", lambda *_, **__: [shows])
-    monkeypatch.setattr(
-        flow_fit, "hypotheses_asked", lambda *_, **__: ((), (RigCode.WEAR_NOT_EXCLUDED.note(percent=3.0),))
-    )
+    open_ends = (RigCode.WEAR_NOT_EXCLUDED.note(percent=3.0),)
+    monkeypatch.setattr(flow_fit, "hypotheses_asked", lambda *_, **__: ((), open_ends))
     found = fit_flow(log(0.2), PAPER, PAPER.bulk_modulus)
     assert [note.code for note in found.reasons] == [code]
     assert [note.code for note in found.remarks] == [RigCode.WEAR_NOT_EXCLUDED]
@@ -223,9 +220,8 @@ def test_teeth_that_are_left_shut_the_gate_where_nothing_else_does(
 
 def test_nothing_is_left_of_a_sound_log(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plain_flow, "balanced", lambda *_, **__: [fit(500.0, shown(12, 3.0))])
-    monkeypatch.setattr(
-        asked_hypotheses, "predicted_gains", lambda *_, **__: len(ALWAYS_ASKED) * [PredictedGain(0.0, 0.0, 0.01)]
-    )
+    gains = len(ALWAYS_ASKED) * [PredictedGain(0.0, 0.0, 0.01)]
+    monkeypatch.setattr(asked_hypotheses, "predicted_gains", lambda *_, **__: gains)
     found = fit_flow(log(0.2), PAPER, PAPER.bulk_modulus)
     assert not found.reasons
     assert not found.remarks

@@ -21,7 +21,7 @@ from estimation.fits.hypothesis_search.wide_problem import (
     own_starts,
     worn_start,
 )
-from estimation.models.flow import FLOW_FORM, MASS_FLOW_FORM, STIFFNESS
+from estimation.models.flow import FLOW_FORM
 from estimation.models.flow_parameters import flow_parameters
 from estimation.models.wide_flow import grown_leakage
 from plant.eha.model import EhaParameters
@@ -130,15 +130,3 @@ def test_a_level_that_a_loaded_log_hardly_tells_is_in_the_deviation_of_bulk_modu
     assert found.value is not None
     assert found.std is not None
     assert abs(found.value - bench.true.bulk_modulus) < 2.0 * found.std < 0.01 * bench.true.bulk_modulus
-
-
-@pytest.mark.parametrize(("softer", "gas"), [(1.0, 4.0 * RIG.relief_pressure / RIG.bulk_modulus), (100.0, 1.0)])
-def test_an_accumulator_may_be_as_small_as_the_oil_it_takes_and_a_chamber_at_most(softer: float, gas: float) -> None:
-    """With a chamber of gas for all rigs, an encoder's zero took up what a smaller one does."""
-    still = dict.fromkeys((*FLOW_FORM.drives, *FLOW_FORM.outputs), np.zeros(20))
-    rig = replace(RIG, bulk_modulus=RIG.bulk_modulus / softer)
-    log = greybox_log(FLOW_FORM, Record(1e-3, still), flow_parameters(rig), longest_step=1e-3, variances=VARIANCES)
-    guess = np.zeros(len(MASS_FLOW_FORM.unknowns))
-    most = flow_bounds(MASS_FLOW_FORM, [guess], log)[1][MASS_FLOW_FORM.unknowns.index(STIFFNESS)]
-    least_gas = gas * rig.chamber_volume
-    assert most * dict(MASS_FLOW_FORM.linear)[STIFFNESS] == pytest.approx(1.4 * rig.accumulator_pressure / least_gas)
