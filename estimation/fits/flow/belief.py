@@ -25,7 +25,12 @@ def hopeless_cost(swinging: GreyBoxFit, asked: Sequence[Hypothesis]) -> float:
     swinging : GreyBoxFit
         The plain form's fit with volumes that swing.
     asked : sequence of Hypothesis
-        What the log was asked; infinite unless all were.
+        What the log was asked.
+
+    Returns
+    -------
+    float
+        Infinite unless all hypotheses were asked [dimensionless].
     """
     if len(asked) < len(HYPOTHESES):
         return np.inf
@@ -54,6 +59,11 @@ def wanted_cost(
         Whether the pressure was filtered.
     worth : float
         What they must gain in log-likelihood [dimensionless].
+
+    Returns
+    -------
+    float
+        Half the sum of squares, as the fits have it [dimensionless].
     """
     if PLAY.name in names and len(names) > 1:
         return -np.inf

@@ -71,7 +71,7 @@ class GreyBoxFit:
     covariance : ndarray, shape (unknowns, unknowns)
         Of the fitted coordinates from noise alone, with what is presumed; infinite variances where nothing is known
         [dimensionless].
-    teeth : Mapping[int, ShownTeeth]
+    teeth : Mapping[int, ShownRipple]
         What they say of the pump's teeth, by their count in a turn, where a fit was asked.
     speed_offset : ShownOffset
         What they say of an offset of the logged speed, the same.

@@ -95,7 +95,7 @@ class IntersampleDoubt:
 
         Examples
         --------
-        >>> Course(np.array([0.0, 0.0, 3.0, 4.0]), 2.0).walk(4, 1).tolist()
+        >>> IntersampleDoubt(np.array([0.0, 0.0, 3.0, 4.0]), 2.0).walk(4, 1).tolist()
         [0.0, 36.0, 64.0]
         """
         begins = _begins(samples, block)[1:]
@@ -116,7 +116,7 @@ class IntersampleDoubt:
 
         Examples
         --------
-        >>> Course(np.array([0.0, 0.0, 3.0, 4.0]), passing=2.0).beside(4, 1).tolist()
+        >>> IntersampleDoubt(np.array([0.0, 0.0, 3.0, 4.0]), passing=2.0).beside(4, 1).tolist()
         [0.0, 36.0, 64.0, 64.0]
         """
         near = np.maximum(self.turns, np.append(self.turns[1:], 0.0))[:samples]

@@ -38,7 +38,7 @@ def likeliest(problem: Problem, theta: Array, course: IntersampleDoubt) -> tuple
         The problem.
     theta : ndarray, shape (unknowns,)
         Its solution [dimensionless].
-    course : Course
+    course : IntersampleDoubt
         Its turns count, and what leakage keeps.
 
     Returns

@@ -134,7 +134,7 @@ class GreyBoxLog:
         Driving channels of which a fit asks whether they come late.
     counts : tuple of int
         Counts of a pump's teeth that a fit asks for, see `estimation.fits.greybox.pump_ripple`.
-    teeth : tuple of Teeth
+    teeth : tuple of Ripple
         Those whose delivery the drives hold; how large it is stays open.
     speed_offset : float
         What was subtracted from motor speed [rad/s]; where it is not 0, it stays open too.

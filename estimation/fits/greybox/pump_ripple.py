@@ -73,7 +73,7 @@ class Turning(NamedTuple):
 
     Parameters
     ----------
-    teeth : tuple of Teeth
+    teeth : tuple of Ripple
         What is in its flow.
     offset : float
         By how much the logged speed exceeds the shaft's [rad/s].
@@ -92,7 +92,7 @@ class ShownRipple(NamedTuple):
 
     Parameters
     ----------
-    teeth : Teeth
+    teeth : Ripple
         What the log asks for beside what its drives hold, to first order.
     gain : float
         In log-likelihood, Rao's score statistic over two, less what the search for an offset costs [dimensionless].
@@ -130,7 +130,7 @@ def with_ripple(log: GreyBoxLog, teeth: Sequence[Ripple], offset: float = 0.0) -
     ----------
     log : GreyBoxLog
         The log, motor speed its first drive.
-    teeth : sequence of Teeth
+    teeth : sequence of Ripple
         What is in the flow.
     offset : float
         By how much the logged speed exceeds the shaft's [rad/s].
@@ -138,7 +138,7 @@ def with_ripple(log: GreyBoxLog, teeth: Sequence[Ripple], offset: float = 0.0) -
     Examples
     --------
     >>> log = GreyBoxLog(np.full((3, 1), 0.1), np.zeros((3, 1)), np.zeros(0), 0.01, np.ones(3, dtype=int), ())
-    >>> with_teeth(log, [Teeth(12, 0.1, 0.0)]).drives[:, 0].round(3).tolist()
+    >>> with_ripple(log, [Ripple(12, 0.1, 0.0)]).drives[:, 0].round(3).tolist()
     [0.11, 0.11, 0.11]
     """
     drives = log.drives.copy()
@@ -153,7 +153,7 @@ def delivering(speed: Array, teeth: Sequence[Ripple], offset: float, sample_time
     ----------
     speed : ndarray, shape (n,)
         As it is logged [rad/s].
-    teeth : sequence of Teeth
+    teeth : sequence of Ripple
         What is in the flow.
     offset : float
         By how much the logged speed exceeds the shaft's [rad/s].
@@ -219,7 +219,7 @@ def shown_ripple(
 
     Returns
     -------
-    tuple of Mapping[int, ShownTeeth] and ShownOffset
+    tuple of Mapping[int, ShownRipple] and ShownOffset
         By their count in a turn, `opened` of the unknowns that are felt; a count that is not felt is left out.
     """
     log = problem.log

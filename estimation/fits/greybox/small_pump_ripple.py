@@ -39,7 +39,7 @@ def small_pump_ripple(
 
     Parameters
     ----------
-    shown : Mapping[int, ShownTeeth]
+    shown : Mapping[int, ShownRipple]
         What residuals say of each, by their count in a turn.
     names : sequence of str
         The unknowns that are felt.
@@ -84,7 +84,7 @@ def with_small_ripple(
 
     Examples
     --------
-    >>> with_small_teeth({"bulk_modulus": (2e8, 3e5)}, ({"bulk_modulus": 0.0}, {"bulk_modulus": 4e-6}))
+    >>> with_small_ripple({"bulk_modulus": (2e8, 3e5)}, ({"bulk_modulus": 0.0}, {"bulk_modulus": 4e-6}))
     {'bulk_modulus': (200000000.0, 500000.0)}
     """
     moved, variance = small

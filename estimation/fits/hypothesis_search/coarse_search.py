@@ -44,7 +44,7 @@ def search_coarsely(log: GreyBoxLog, tried: Trial, wanted: float = np.inf, every
     ----------
     log : GreyBoxLog
         The log, widened.
-    tried : Tried
+    tried : Trial
         The set, from where it has come.
     wanted : float
         Cost above which it is of no use, so that it is not followed there [dimensionless].
@@ -145,7 +145,7 @@ def descended(
     ----------
     log : GreyBoxLog
         The log, widened.
-    tried : Tried
+    tried : Trial
         The set.
     start : ndarray, shape (unknowns,)
         Fitted coordinates [dimensionless].
@@ -160,7 +160,7 @@ def descended(
 
     Returns
     -------
-    Tried
+    Trial
         The set where the search ended.
     """
     problem = freed(log, tried.together, *more)

@@ -43,7 +43,7 @@ def compatible_hypotheses(log: GreyBoxLog, tried: Trial, asked: Sequence[Hypothe
     ----------
     log : GreyBoxLog
         The log, widened.
-    tried : Tried
+    tried : Trial
         The best set so far, from which all are led on.
     asked : sequence of Hypothesis
         What else is asked.

@@ -79,7 +79,7 @@ class Explanation:
         How many other sets of hypotheses explain the log about as well.
     stated_pressure : float
         Absolute pressure that bulk modulus is stated at, where the oil holds air [Pa].
-    delivery_open : Promise
+    delivery_open : PredictedGain
         What another delivery of the pump promises beside them; nothing where that is part of the explanation.
     """
 

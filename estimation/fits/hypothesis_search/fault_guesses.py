@@ -69,7 +69,7 @@ def faulty_coefficient(p: EhaParameters, name: str, healthy: float, factor: floa
 
     Examples
     --------
-    >>> round(worse(EhaParameters(), "flow_bias", 2.413e-6, 6.0), 12)
+    >>> round(faulty_coefficient(EhaParameters(), "flow_bias", 2.413e-6, 6.0), 12)
     1.4478e-05
     """
     scales = {**leakage_scales(p), **friction_scales(p)}

@@ -59,14 +59,14 @@ def final_fit(log: GreyBoxLog, tried: Trial, useful: float = np.inf) -> Trial:
     ----------
     log : GreyBoxLog
         The log, widened.
-    tried : Tried
+    tried : Trial
         The set, where long model steps led.
     useful : float
         Cost above which it is of no use [dimensionless].
 
     Returns
     -------
-    Tried
+    Trial
         The set where short model steps lead, with its fits; one that is not what it says has the cost `NEVER`.
     """
     row = delayed(log, tried.delays)
@@ -99,12 +99,12 @@ def with_less_lag(log: GreyBoxLog, tried: Trial) -> Trial | None:
     ----------
     log : GreyBoxLog
         The log, widened.
-    tried : Tried
+    tried : Trial
         The set, fitted to the end.
 
     Returns
     -------
-    Tried or None
+    Trial or None
         The set; none where its last hypothesis has no delays, or no lag to give.
     """
     last = tried.together[-1]

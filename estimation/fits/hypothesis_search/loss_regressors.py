@@ -84,7 +84,7 @@ class LossSignals(NamedTuple):
 
         Parameters
         ----------
-        course : Course
+        course : LossRegressor
             What it goes with [SI].
 
         Returns
@@ -112,7 +112,7 @@ class LossSignals(NamedTuple):
 
         Returns
         -------
-        list of Course
+        list of LossRegressor
             A score only where the piston moves by several of its least widths.
         """
         low, high = float(np.min(self.position)), float(np.max(self.position))
@@ -134,7 +134,7 @@ class LossSignals(NamedTuple):
 
         Parameters
         ----------
-        course : Course
+        course : LossRegressor
             What a loss goes with [SI].
 
         Returns
@@ -163,7 +163,7 @@ def loss_signals(log: GreyBoxLog, parameters: EhaParameters) -> LossSignals:
 
     Returns
     -------
-    Measured
+    LossSignals
         Pressure is interpolated where it is missing, and none where it is missing throughout.
     """
     speed, position, pressure = log.drives[:, 0], log.drives[:, 1], log.measured[:, 0]
@@ -188,7 +188,7 @@ def shifted(course: LossRegressor, step: Mapping[str, float], share: float) -> L
 
     Parameters
     ----------
-    course : Course
+    course : LossRegressor
         What a loss goes with [SI].
     step : Mapping[str, float]
         By how much, by field [SI].
@@ -197,13 +197,13 @@ def shifted(course: LossRegressor, step: Mapping[str, float], share: float) -> L
 
     Returns
     -------
-    Course
+    LossRegressor
         No width changes by more than a factor of two, nor leaves its bounds.
 
     Examples
     --------
-    >>> moved(Course(BORE, 0.01, 0.004), {"at": 0.002, "width": 0.1}, 0.5)
-    Course(kind='bore', at=0.011, width=0.008)
+    >>> shifted(LossRegressor(BORE, 0.01, 0.004), {"at": 0.002, "width": 0.1}, 0.5)
+    LossRegressor(kind='bore', at=0.011, width=0.008)
     """
     changed = {name: getattr(course, name) + share * by for name, by in step.items()}
     if course.kind in (FILLING, LIFTING):

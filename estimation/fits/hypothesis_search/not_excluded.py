@@ -98,7 +98,7 @@ def open_wear_note(delivery: PredictedGain, most: float = math.inf) -> tuple[Not
 
     Parameters
     ----------
-    delivery : Promise
+    delivery : PredictedGain
         What a delivery of its own promises beside all that is fitted.
     most : float
         How far the logarithm of the delivery may lie below that of a sound pump at most, see `share_lost`

@@ -129,7 +129,7 @@ def with_pump_ripple(
 
     Returns
     -------
-    Toothed
+    RippleFits
         The log, its fits, and notes on what was taken up.
     """
     if log.gaps.size:

@@ -46,18 +46,18 @@ def likeliest(
     ----------
     log : GreyBoxLog
         The log, widened.
-    tried : iterable of iterable of Tried
+    tried : iterable of iterable of Trial
         The sets, each from its starts.
     known : float
         The least cost so far [dimensionless].
-    spared : Spared
+    spared : Decimation
         What is spared.
     useful : float
         Cost above which a set is of no use [dimensionless].
 
     Returns
     -------
-    list of Tried
+    list of Trial
         Those that were carried on and came near the best.
     """
     return refined(log, ranked_optima(log, tried, known, spared), known, spared, useful)
@@ -72,16 +72,16 @@ def ranked_optima(
     ----------
     log : GreyBoxLog
         The log, widened.
-    tried : iterable of iterable of Tried
+    tried : iterable of iterable of Trial
         The sets, each from its starts.
     known : float
         The least cost so far [dimensionless].
-    spared : Spared
+    spared : Decimation
         What is spared.
 
     Returns
     -------
-    list of Tried
+    list of Trial
         Those that were carried on, the best first.
     """
     known *= NEARLY_AS_GOOD
@@ -112,18 +112,18 @@ def refined(
     ----------
     log : GreyBoxLog
         The log, widened.
-    ended : sequence of Tried
+    ended : sequence of Trial
         The sets, where few samples led if these are spared.
     known : float
         The least cost so far [dimensionless].
-    spared : Spared
+    spared : Decimation
         What is spared.
     useful : float
         Cost above which a set is of no use [dimensionless].
 
     Returns
     -------
-    list of Tried
+    list of Trial
         Those near the best, the best first.
     """
     known *= NEARLY_AS_GOOD
@@ -164,7 +164,7 @@ def ended_apart(one: Trial, other: Trial) -> bool:
 
     Parameters
     ----------
-    one, other : Tried
+    one, other : Trial
         A set of hypotheses, from two starts.
 
     Returns
@@ -185,12 +185,12 @@ def ranked(tried: Iterable[Trial]) -> list[Trial]:
 
     Parameters
     ----------
-    tried : iterable of Tried
+    tried : iterable of Trial
         In any order.
 
     Returns
     -------
-    list of Tried
+    list of Trial
         By cost.
     """
     return sorted(tried, key=_cost)

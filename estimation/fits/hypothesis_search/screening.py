@@ -77,7 +77,7 @@ def promising_starts(
     ----------
     starts : sequence of Mapping[str, float]
         Where searches began [SI].
-    screened_each : sequence of sequence of Tried
+    screened_each : sequence of sequence of Trial
         What hypotheses came to from each.
 
     Returns

@@ -77,7 +77,7 @@ class VaryingLoss(NamedTuple):
 
     Parameters
     ----------
-    course : Course
+    course : LossRegressor
         What it goes with [SI].
     size, std : float
         Its size, and standard deviation of it [units of `Measured.of`].
@@ -85,7 +85,7 @@ class VaryingLoss(NamedTuple):
         The fit with it.
     opened : float
         Relative standard deviation of bulk modulus from where the loss lies and how wide it is [fraction].
-    measured : Measured
+    measured : LossSignals
         What its course is made of.
     """
 
@@ -124,7 +124,7 @@ def varying_loss(
 
     Returns
     -------
-    UnevenLoss or None
+    VaryingLoss or None
         The likeliest of those that explain the log.
     """
     search = _Search(log, parameters)

@@ -24,10 +24,11 @@ def inputs_alike(data: Channels) -> list[Note]:
     data : Channels
         In any scale.
     """
-    together = np.concatenate(data.u)
-    scaled = (together - together.mean(axis=0)) / together.std(axis=0)
     notes: list[Note] = []
-    for k in range(1, len(data.inputs)):
+    together = np.concatenate(data.u)
+    spread = together.std(axis=0)
+    scaled = (together - together.mean(axis=0)) / np.where(spread > 0.0, spread, 1.0)
+    for k in np.flatnonzero(spread > 0.0)[1:]:  # what is constant is no function of another
         before, own = scaled[:, :k], scaled[:, k]
         shares = np.linalg.lstsq(before, own, rcond=1e-6)[0]
         if np.mean((own - before @ shares) ** 2) < ALIKE:

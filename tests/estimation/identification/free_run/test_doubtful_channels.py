@@ -38,6 +38,7 @@ def test_an_input_that_follows_others_exactly_is_told_and_one_with_noise_is_not(
     assert told(u[:, 0] - 2.0 * u[:, 1] + 5.0) == [("sum", "'a' and 'b'")]
     assert told(3.0 * u[:, 1]) == [("sum", "'b'")]
     assert told(u[:, 0] + 1e-3 * u[:, 2]) == []
+    assert told(np.full(300, 2.0)) == []  # what is constant is no function of another
 
 
 @pytest.mark.parametrize("size", [30.0, 1e6])

@@ -12,6 +12,7 @@ from estimation.identification.free_run.data import Channels, channels_from, sca
 from estimation.identification.free_run.saved import load_models, save_models
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
+from estimation.identification.state_space import identify
 from estimation.identification.state_space.choose import chosen_state, state_candidates
 from estimation.identification.state_space.identify import _judged, identify_outputs, identify_state_space
 from estimation.identification.state_space.joint import joined
@@ -155,7 +156,11 @@ def test_a_model_no_better_than_the_mean_is_not_sound() -> None:
 
 
 @pytest.mark.parametrize(("radius", "slowest"), [(0.9, -0.02 / np.log(0.9)), (1.0, np.inf), (1.2, np.inf)])
-def test_a_time_constant_that_a_log_is_too_short_for_is_told_in_seconds(radius: float, slowest: float) -> None:
+def test_a_time_constant_that_a_log_is_too_short_for_is_told_in_seconds(
+    radius: float, slowest: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(identify, "inputs_alike", lambda *_: [])
+    monkeypatch.setattr(identify, "outputs_that_stand_out", lambda *_: [])
     a = np.array([[radius, 1.0], [0.0, 0.3]])
     best: Any = SimpleNamespace(doubt="time_constant", fit=SimpleNamespace(a=a, size=SimpleNamespace(n=2)))
     data: Any = SimpleNamespace(u=[], y=[], sample_time=0.02, duration=5.0, output="y")
