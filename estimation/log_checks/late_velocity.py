@@ -87,8 +87,10 @@ def _fastest(velocity: Array, sample_time: float) -> float:
 def _compared(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array]:
     """Return the excess of position's gain over integrated velocity, and velocity's change, for each stretch."""
     rows = max(1, round(STRETCH / sample_time))
-    swept = np.concatenate([[0.0], np.cumsum(0.5 * sample_time * (velocity[1:] + velocity[:-1]))])
+    gone = 0.5 * sample_time * (velocity[1:] + velocity[:-1])
+    unknown = np.concatenate([[0], np.cumsum(np.isnan(gone))])
+    swept = np.concatenate([[0.0], np.cumsum(np.nan_to_num(gone))])
     ends = np.arange(0, len(position), rows)
     apart, change = np.diff((position - swept)[ends]), np.diff(velocity[ends])
-    there = np.isfinite(apart) & np.isfinite(change)
+    there = np.isfinite(apart) & np.isfinite(change) & (np.diff(unknown[ends]) == 0)
     return apart[there], change[there]

@@ -39,7 +39,7 @@ def strays_unusually(record: Record, stretch: slice, resolved: float) -> bool:
     """
     position, velocity = bridged(record[POSITION]), bridged(record[VELOCITY])
     went = np.cumsum(velocity) * record.sample_time + velocity_lateness(record) * velocity
-    rows = min(stretch.stop - stretch.start, round(LONGEST / record.sample_time))
+    rows = min(stretch.stop - stretch.start, max(2, round(LONGEST / record.sample_time)))
     moving = [one for one in _windows(0, len(went), rows) if np.ptp(position[one]) > resolved]
     usual = sorted(float(np.ptp(went[one] - position[one])) for one in moving)
     here = max(float(np.ptp(went[one])) for one in _windows(stretch.start, stretch.stop, rows))

@@ -74,7 +74,7 @@ def agreed(straight: Answered, read: Answered) -> Answered:
         With what each turn pumps read off the samples after it, see `with_turns_read`.
     """
     if read.ended:
-        return read
+        return straight._replace(strange=None, ended=True)
     if read.names != straight.names and not _gains_at_each_turn(read):
         read = read._replace(strange=None)
     by_lines, by_turns = (one.plain.explains(one.plain.best) for one in (straight, read))
@@ -86,7 +86,7 @@ def agreed(straight: Answered, read: Answered) -> Answered:
 
 
 def _gains_at_each_turn(answer: Answered) -> bool:
-    """Return whether what is strange gains over the plain form as much as if it were seen once."""
+    """Return whether what is strange gains `WORTH` over the plain form at each turn."""
     if answer.strange is None:
         return False
     gain = answer.plain.best.cost - answer.strange.fit.cost

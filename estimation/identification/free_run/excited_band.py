@@ -29,7 +29,7 @@ def band_end(data: Channels) -> float:
     Returns
     -------
     float
-        Angle from one sample to the next [rad].
+        Angle from one sample to the next [rad]; that of half the sample rate if no input moves.
 
     Examples
     --------
@@ -38,8 +38,10 @@ def band_end(data: Channels) -> float:
     >>> round(band_end(Channels(("u",), "y", 1.0, (slow,), (t,))), 1)
     0.2
     """
-    n = data.longest
-    windowed = [(u - u.mean(axis=0)) * np.hanning(len(u))[:, None] for u in data.u]
+    n, moves = data.longest, np.any([np.ptp(u, axis=0) > 0.0 for u in data.u], axis=0)
+    if not np.any(moves):
+        return np.pi
+    windowed = [(u - u.mean(axis=0))[:, moves] * np.hanning(len(u))[:, None] for u in data.u]
     power = np.sum([np.abs(np.fft.rfft(u, n, axis=0)) ** 2 for u in windowed], axis=0)
     width = max(len(power) // SMOOTHED, 1)
     smooth = [np.convolve(one, np.full(width, 1.0 / width), "same") for one in power.T]

@@ -57,6 +57,13 @@ def unsigned(log: Record) -> Record:
     return log.replace(**{SPEED: np.abs(log[SPEED])})
 
 
+@pytest.mark.parametrize("speed", [0.0, 50.0])
+def test_a_stuck_piston_under_a_steady_motor_is_no_speed_without_its_sign(speed: float) -> None:
+    noise = 2e-6 * np.random.default_rng(0).normal(size=6000)
+    log = Record(1e-3, {SPEED: np.full(6000, speed), POSITION: noise})
+    assert channel_mistakes(log, HEALTHY) == ()
+
+
 @pytest.mark.parametrize("leakage", thinned([1.0, 8.0], [8.0]))
 @pytest.mark.parametrize("drive", list(DRIVES))
 @pytest.mark.parametrize(

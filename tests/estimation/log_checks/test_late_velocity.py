@@ -93,3 +93,11 @@ def test_a_gain_that_is_wrong_is_no_lateness() -> None:
 def test_without_both_channels_nothing_is_told() -> None:
     alone = RECORD.replace(**{POSITION: None})
     assert without_late_velocity(alone) == (alone, ())
+
+
+def test_a_velocity_that_is_late_is_left_out_though_a_sample_of_it_is_missing() -> None:
+    record = moving()
+    late = lagged(record[VELOCITY], 10e-3)
+    late[10] = np.nan
+    (note,) = without_late_velocity(record.replace(velocity_m_s=late))[1]
+    assert note.code is SensorCode.VELOCITY_LATE

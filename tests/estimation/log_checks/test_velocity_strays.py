@@ -50,3 +50,10 @@ def test_an_encoder_that_freezes_beside_a_filtered_velocity_misses_motion(lag: f
 def test_where_position_moves_nowhere_else_velocity_is_believed() -> None:
     record = log(3e-3, 1)
     assert strays_unusually(record.replace(position_m=np.zeros(len(record))), SLIDES, 5e-6)
+
+
+@pytest.mark.parametrize("sample_time", [0.4, 1.0, 2.0])
+def test_a_log_whose_samples_are_farther_apart_than_the_window_is_compared_by_two_of_them(sample_time: float) -> None:
+    place = np.repeat(np.cumsum(MOVING[::40]) * sample_time, 2)
+    record = Record(sample_time, {"position_m": place, "velocity_m_s": np.gradient(place, sample_time)})
+    assert not strays_unusually(record, slice(40, 44), 5e-6)

@@ -38,6 +38,12 @@ def test_what_straight_lines_alone_show_is_not_strange(explained: bool) -> None:
     assert told.plain is (straight.plain if explained else read.plain)
 
 
+def test_where_the_search_with_turns_read_was_ended_nothing_is_strange_and_straight_lines_have_the_numbers() -> None:
+    straight = said("delivery", 51.0)
+    told = agreed(straight, said("")._replace(ended=True))
+    assert (told.plain, told.strange, told.ended) == (straight.plain, None, True)
+
+
 @pytest.mark.parametrize("gain", [0.9, 1.1])
 def test_what_shows_with_turns_read_alone_must_gain_at_each_turn(gain: float) -> None:
     straight, read = said("air_midway", 173.0), said("single_rod", gain * TURNS * WORTH)

@@ -121,3 +121,8 @@ def test_what_looks_strange_is_believed_where_it_gains_with_turns_read_too(
     assert (answer.explanation is not None) == gains
     if not gains:  # the log that nothing is strange about keeps its number
         assert answer.parameters["bulk_modulus"][0] == pytest.approx(2e8)
+
+
+def test_a_turn_whose_next_samples_take_it_back_is_not_read() -> None:
+    rises = [0.0, 0.0, 100.0, 50.0, 25.0, 12.5, *4 * [0.0], 100.0, -50.0, -25.0, -12.0, *4 * [0.0]]
+    assert not turned_beside(np.cumsum(rises), 0.01, 0.01)[9:].any()

@@ -80,3 +80,11 @@ def test_what_answers_beyond_has_to_pay_within(
     assert rings_beyond(models["wild"], data, band_end(data))
     assert believable(list(models.values()), data, by)[0] is models[taken]
     assert believable([models["wild"]], data, by)[0] is models["wild"]
+
+
+def test_the_band_of_inputs_is_that_of_those_that_move() -> None:
+    t = np.arange(640.0)
+    slow, still = np.sin(0.2 * t), np.ones(640)
+    alone = band_end(Channels(("u",), "y", 1.0, (slow[:, None],), (t,)))
+    assert band_end(Channels(("u", "v"), "y", 1.0, (np.column_stack([slow, still]),), (t,))) == alone
+    assert band_end(Channels(("v",), "y", 1.0, (still[:, None],), (t,))) == np.pi
