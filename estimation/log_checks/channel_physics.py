@@ -55,7 +55,7 @@ velocities, and what is pumped meanwhile [fraction]; judged."""
 
 MOVES_ON = 0.5
 """Correlation of a moving piston's speed from block to block, at the least [dimensionless]: it is 0.81 to 0.99 in the
-nine conditions under steps and binary signals. That of an encoder's noise is -0.5, and that of a velocity sensor's 0."""
+nine conditions under steps and binary signals. An encoder's noise has -0.5, a velocity sensor's 0."""
 
 FARTHEST = 3.0
 """Times the pumped flow that no piston moves, whatever is wrong in the rig file [dimensionless]."""
