@@ -71,6 +71,13 @@ def test_one_input_gives_a_transfer_function_with_its_uncertainty(logs: list[Pat
     assert "heat" in run(logs[0], "--input", "load", "--output", "heat", "--order", 1).stdout
 
 
+def test_a_test_log_that_is_too_short_is_named(logs: list[Path], tmp_path: Path) -> None:
+    short = tmp_path / "short.csv"
+    pd.read_csv(logs[1]).head(12).to_csv(short, index=False)
+    ran = run(logs[0], "--input", "Valve [%],load", "--output", "flow", "--order", 1, "--validate", short)
+    assert "short.csv: output 'flow' needs 20 samples or more, got 12" in " ".join(ran.output.split())
+
+
 def test_a_reference_is_what_a_loop_is_identified_from(logs: list[Path]) -> None:
     form = ("--input", "flow", "--output", "heat", "--order", 1, "--delay", 1)
     ran = run(logs[0], *form, "--reference", "Valve [%],load", "--json")
