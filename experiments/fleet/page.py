@@ -228,7 +228,7 @@ def row_cells(row: ActuatorRow) -> list[Any]:
         found_in(last),
         worst_in(last) if last.shown else "",
         share,
-        words if told else untold_since(row),
+        words if told else f"no verdict {untold_since(row)}".strip(),
         left,
         last.named.day,
         len(row.logs),

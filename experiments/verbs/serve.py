@@ -80,6 +80,8 @@ def serve(
     load_actuator(plant, rig)
     require_rigs(plant, rigs, rig)
     streams = _streams(watch or [])
+    if streams and plant not in (None, "eha"):
+        raise HydrostateError(f"--watch works for the gear-pump actuator (eha) only, got --plant {plant}")
     for name in streams:
         require_rig_of_stream(name, rigs, rig)
     if pattern is not None:

@@ -20,7 +20,7 @@ _MONTHS = {
     for month, names in enumerate(
         (
             *("jan jän ene", "feb fév fev", "mar mär mae mrz", "apr avr abr", "may mai", "jun juin"),
-            *("jul juil", "aug aoû aou ago", "sep", "oct okt", "nov", "dec déc dez dic"),
+            *("jul juil", "aug aoû aou ago", "sep set", "oct okt", "nov", "dec déc dez dic"),
         ),
         start=1,
     )
@@ -197,7 +197,7 @@ def _day(part: "dict[str, Any]", *, months_first: bool) -> int:
         found = date(year, 1, 1) + timedelta(days=_day_of_year(part["N"]))
     else:
         word = part.get("word")
-        month, day = part.get("M") if word is None else _MONTHS[word.lower()], part.get("D")
+        month, day = part.get("M") if word is None else _MONTHS[word.casefold()], part.get("D")
         if month is None or day is None:
             month, day = (part["one"], part["two"]) if months_first else (part["two"], part["one"])
         found = date(year, int(month), int(day))

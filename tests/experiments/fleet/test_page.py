@@ -32,6 +32,15 @@ def test_the_page_says_how_many_are_sick_and_with_which_to_begin() -> None:
     assert "Start with P-5, P-1." in page
 
 
+def test_an_actuator_that_is_named_like_an_erratum_is_no_link_to_one() -> None:
+    files = ["P1_1.csv", "E9_1.csv"]
+    rows = log_rows([store_row(file, 4.0) for file in files], by_pattern(files, "{actuator}_{date}.csv"), {})
+    page = fleet_page(actuator_rows(rows), {}, "hall")
+    assert "Start with" in page
+    assert 'href="#P1"' not in page
+    assert 'id="errata"' not in page
+
+
 def test_actuators_that_near_a_limit_are_in_the_title_and_named_where_none_is_past_one() -> None:
     def row(name: str, state: str) -> ActuatorRow:
         (log,) = log_rows([store_row(f"{name}.csv", 1.0)], {}, {})
@@ -92,7 +101,7 @@ def test_an_outlook_is_no_better_known_than_the_last_log() -> None:
     rows.append(store_row(files[5], 3.6, outcome="mismatch", found_condition=None, reason="the pump is worn"))
     (row,) = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {}))
     _, state, _, _, _, outlook, left, *_ = row_cells(row)
-    assert (state, outlook, left) == ("unknown", "since 5", None)
+    assert (state, outlook, left) == ("unknown", "no verdict since 5", None)
 
 
 def test_what_cannot_be_read_is_no_actuator_within_limits() -> None:

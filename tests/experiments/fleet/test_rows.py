@@ -68,7 +68,7 @@ def test_a_circuit_beside_the_nine_has_no_verdict_but_is_shown_and_named_if_few_
         "leakage minor to major, if the rig file is right",
         "leakage 4.00 L/min",
         None,
-        "since 2",
+        "no verdict since 2",
     ]
     assert "No verdict since 2; leakage 4.00 L/min now, if the rig file is right" in actuator_page(row, {}).replace(
         "\N{NO-BREAK SPACE}", " "

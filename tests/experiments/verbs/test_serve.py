@@ -68,3 +68,9 @@ def test_a_system_without_locks_is_told_apart_from_a_missing_package(monkeypatch
         monkeypatch.delitem(sys.modules, f"experiments.serve.{name}", raising=False)
     monkeypatch.setitem(sys.modules, "fcntl", None)
     assert "serve runs on Linux and macOS, this system has no fcntl" in refused()
+
+
+def test_a_stream_is_refused_where_the_plant_is_another_kind_of_actuator(tmp_path: Path) -> None:
+    told = refused(tmp_path / "kept", "--plant", "piezo-stack", "--watch", "x=tcp://127.0.0.1:1")
+    assert "--watch works for the gear-pump actuator (eha) only, got --plant piezo-stack" in told
+    assert not (tmp_path / "kept").exists()
