@@ -34,6 +34,7 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
     from experiments.page.tables import Column
 
     rows = compared(first, second)
+    title, *changes = headings(first, second, rows)
     logs = [
         {
             "file": one["file"],
@@ -46,8 +47,8 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
         "logs": logs,
         "links": None if identities is None else [f"logs/{one}" for one in identities],
         "turned": identities and f"compare?first={identities[1]}&second={identities[0]}",
-        "title": conditions_of(first, second) or title_of(rows),
-        "changes": title_of(rows) if conditions_of(first, second) else "",
+        "title": title,
+        "changes": changes,
         "quantities": quantities_shown(rows),
         "probabilities": _probabilities_shown(first.get("probabilities"), second.get("probabilities")),
     }
@@ -236,14 +237,21 @@ def plain_words(result: Mapping[str, Any]) -> str:
     return said if result["unknown"] else f"{said} {how_sure(result)}"
 
 
-def conditions_of(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
-    """Return the conditions of two logs, in the order of the logs; empty where one of them was not diagnosed.
+def headings(first: Mapping[str, Any], second: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the sentences that open a comparison: conditions, if both logs were diagnosed, and what changed.
 
     Parameters
     ----------
     first, second : Mapping
-        Their entries of the JSON contract.
+        Entries of the logs in the JSON contract.
+    rows : sequence of Mapping
+        From `compared`.
     """
+    return [one for one in (_conditions_of(first, second), title_of(rows)) if one]
+
+
+def _conditions_of(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
+    """Return the conditions of two logs, in the order of the logs; empty where one of them was not diagnosed."""
     if not all(one.get("condition") and one.get("probabilities") for one in (first, second)):
         return ""
     one, other = ("no verdict" if each.get("unknown") else in_words(each["condition"]) for each in (first, second))

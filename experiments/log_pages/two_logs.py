@@ -16,10 +16,9 @@ from experiments.command.terminal import emit, note, rendered, short_names, tabl
 from experiments.log_pages.comparison import (
     compare_view,
     compared,
-    conditions_of,
+    headings,
     plain_words,
     quantities_shown,
-    title_of,
 )
 from plant.errors import HydrostateError
 
@@ -89,5 +88,4 @@ def _shown(first: Mapping[str, Any], second: Mapping[str, Any]) -> "list[Rendera
     shown = table("quantity", "verdict", first["file"], second["file"], "difference", "95 % interval of the difference")
     for row in quantities_shown(rows).to_dict("records"):
         shown.add_row(*(row[name] for name in ("quantity", "says", "first", "second", "difference", "interval")))
-    heading = [one for one in (conditions_of(first, second), title_of(rows)) if one]
-    return [*heading, "", *said, shown]
+    return [*headings(first, second, rows), "", *said, shown]

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from operator import attrgetter
 
 import numpy as np
@@ -121,7 +121,7 @@ class PlainFits:
     teeth_left: tuple[Note, ...]
     turning: Turning
 
-    @property
+    @cached_property
     def turns_told(self) -> bool:
         """Whether what a slow log's turns pump can be read off the samples after them, and is not yet."""
         log = self.unturned

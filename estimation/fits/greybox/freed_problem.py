@@ -18,7 +18,7 @@ from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.normal_loops import fill_differences
 from estimation.fits.greybox.problem import OUTLIER, Problem, weighed
 from estimation.fits.greybox.ridge import Ridge
-from estimation.fits.greybox.side_by_side import LANES, MANY, ResidualsRun, compile_side_by_side, side_by_side
+from estimation.fits.greybox.side_by_side import LANES, MANY, ResidualsRun, compile_side_by_side, lanes_for
 from estimation.fits.greybox.work_limit import spend
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
@@ -206,7 +206,7 @@ class FreedProblem(Problem):
             return
         waiting = iter(drives)
         while some := list(islice(waiting, MANY)):
-            lanes = side_by_side(len(some))
+            lanes = lanes_for(len(some))
             found = self.disturbed_together(theta, np.stack([*some, *some[-1:] * (lanes - len(some))], axis=-1))
             yield from (found[..., i] for i in range(len(some)))
 
@@ -301,12 +301,12 @@ class FreedProblem(Problem):
             return [self._alone(rows[0], drives, variance)[..., None]]
         most, shared = min(most, self._most), (self.log.drives if drives is None else drives)[..., None]
         groups = [rows[first : first + most] for first in range(0, len(rows), most)]
-        spend(self.log, sum(side_by_side(len(some)) for some in groups))
+        spend(self.log, sum(lanes_for(len(some)) for some in groups))
         return each(lambda some: self._side_by_side(some, shared, variance), groups)
 
     def _side_by_side(self, rows: Array, drives: Array, variance: Array) -> Array:
         """Return the normalised residuals of up to `MANY` runs, shape (outputs, blocks, lanes)."""
-        lanes = side_by_side(len(rows))
+        lanes = lanes_for(len(rows))
         found = self._room(lanes)
         filled = rows if len(rows) == lanes else np.concatenate([rows, np.repeat(rows[-1:], lanes - len(rows), axis=0)])
         with np.errstate(all="ignore"):  # a try that runs away is stepped back from

@@ -37,8 +37,8 @@ ResidualsRun: TypeAlias = Callable[..., None]
 errors; of a model that bears gaps, these come before the errors."""
 
 
-def side_by_side(runs: int) -> int:
-    """Return how many runs a kernel makes where so many are wanted, up to `MANY` [count]."""
+def lanes_for(runs: int) -> int:
+    """Return the number of lanes of the kernel that makes so many runs, `MANY` at most [count]."""
     return LANES if runs <= LANES else MANY
 
 

@@ -131,7 +131,7 @@ def _unexplained(data: Channels, index: int, delays: Sequence[int], most: int) -
             # what an input does where the output is missing tells nothing; beyond the log's end none is missing
             there = np.concatenate([known, np.ones(size - n)])
             power += _met(there, driven**2, size)[: most + 2]
-            beside[:] += _met(there[1:], driven[1:] * driven[:-1], size)[: most + 1]
+            beside += _met(there[1:], driven[1:] * driven[:-1], size)[: most + 1]
         least = np.minimum(least, np.maximum(told - _gained(crossed, power, beside), 0.0))
     return least
 

@@ -16,6 +16,19 @@ MOST_OF_IT = 0.5
 """Share of a model's squared error above which a few outputs decide what is fitted, and not the others [fraction]."""
 
 
+def doubtful_channels(model: FreeRunModel, data: Channels) -> list[Note]:
+    """Return notes on inputs that are alike, and on outputs that stand out.
+
+    Parameters
+    ----------
+    model : FreeRunModel
+        Fitted to the logs.
+    data : Channels
+        In units of the channels.
+    """
+    return [*inputs_alike(data), *outputs_that_stand_out(model, data)]
+
+
 def inputs_alike(data: Channels) -> list[Note]:
     """Return a note on each input that is a linear function of those before it.
 

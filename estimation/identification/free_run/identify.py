@@ -42,7 +42,7 @@ from estimation.identification.free_run.data import (
     section,
 )
 from estimation.identification.free_run.dense_polynomial import Asked
-from estimation.identification.free_run.doubtful_channels import inputs_alike, outputs_that_stand_out
+from estimation.identification.free_run.doubtful_channels import doubtful_channels
 from estimation.identification.free_run.fallback import Fallback
 from estimation.identification.free_run.fewer_samples import on_fewer
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
@@ -161,7 +161,7 @@ def identify_channels(
     require_room(data, order, delay, n_numerator)
     with threadpool_limits(limits=1, user_api="blas"):
         found = _identified(data, structure, order, delay, n_numerator)
-    found = replace(found, notes=(*found.notes, *inputs_alike(data), *outputs_that_stand_out(found.model, data)))
+    found = replace(found, notes=(*found.notes, *doubtful_channels(found.model, data)))
     for note in found.notes:
         if note.code in WARNED:
             warnings.warn(LogWarning(note), stacklevel=2)

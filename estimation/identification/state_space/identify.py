@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from estimation.identification.free_run.choose_linear import CLEARLY
 from estimation.identification.free_run.data import Channels, require_room, require_size, scaled, section
-from estimation.identification.free_run.doubtful_channels import inputs_alike, outputs_that_stand_out
+from estimation.identification.free_run.doubtful_channels import doubtful_channels
 from estimation.identification.free_run.held_back import pooled
 from estimation.identification.free_run.identify import (
     MOST_CHOSEN,
@@ -165,5 +165,5 @@ def _judged(
         )
     if not quality.fit_percent > 0.0 or not held_back < 1.0:
         notes.append(IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent))
-    doubtful = (*inputs_alike(data), *outputs_that_stand_out(model, data))
+    doubtful = doubtful_channels(model, data)
     return Identified(model, quality, 100.0 * (1.0 - held_back), rows, (*notes, *doubtful), not notes)

@@ -159,8 +159,7 @@ def test_a_model_no_better_than_the_mean_is_not_sound() -> None:
 def test_a_time_constant_that_a_log_is_too_short_for_is_told_in_seconds(
     radius: float, slowest: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(identify, "inputs_alike", lambda *_: [])
-    monkeypatch.setattr(identify, "outputs_that_stand_out", lambda *_: [])
+    monkeypatch.setattr(identify, "doubtful_channels", lambda *_: [])
     a = np.array([[radius, 1.0], [0.0, 0.3]])
     best: Any = SimpleNamespace(doubt="time_constant", fit=SimpleNamespace(a=a, size=SimpleNamespace(n=2)))
     data: Any = SimpleNamespace(u=[], y=[], sample_time=0.02, duration=5.0, output="y")
