@@ -85,6 +85,7 @@ class ClassCode(Code):
         "less than {limit:.0f} % of its displacement, which is none of the nine conditions"
     )
     MODELS_DIVERGED = "the models of all conditions diverged; check units and rig file"
+    CHANNEL_ZERO = "no class: every sample of {channels} is 0; check the column, or log again while the piston moves"
     MODELS_ALIKE = "no class: the models of all conditions move alike under this drive; drive the actuator in steps"
     NO_CIRCUIT = "no circuit can be fitted with this rig file, so there are scores but no probabilities: {reason}"
     NO_PROBABILITIES = "no probabilities: {reason}"

@@ -113,12 +113,12 @@ class ControlledRun:
         Returns
         -------
         float
-            Time [s]; infinity if it never does.
+            Time [s]; infinity if it never does, or there is no sample between the two times.
         """
         here = (self.time > since) & (self.time <= until)
         off = np.abs(self.velocity[here] - self.wanted[here]) > band * np.abs(self.wanted[here])
         time = self.time[here]
-        if off[-1]:
+        if not len(off) or off[-1]:
             return np.inf
         return float(time[np.flatnonzero(off)[-1] + 1] - since) if off.any() else 0.0
 

@@ -23,6 +23,7 @@ TOLD_APART = 1.001
 """Least ratio of the best class's probability to the runner-up's at which a class is named [dimensionless]."""
 
 WHY_NONE = {
+    ClassCode.CHANNEL_ZERO,
     ClassCode.MODELS_ALIKE,
     ClassCode.MODELS_DIVERGED,
     ClassCode.NO_CIRCUIT,

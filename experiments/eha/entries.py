@@ -47,7 +47,7 @@ COSTS = frozenset(
 )
 """Codes of what an absent channel costs, or a rig that is not well known: of all logs alike, so said once."""
 
-NO_CLASS = frozenset({"models_alike", "models_diverged"})
+NO_CLASS = frozenset({"channel_zero", "models_alike", "models_diverged"})
 """Codes of why a log is in no class: said as its message, not beside it."""
 
 

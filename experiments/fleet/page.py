@@ -203,7 +203,7 @@ def rig_hint(rows: Sequence[ActuatorRow], *, served: bool = False) -> str:
         else "move their logs into a folder of their own, with their rig file in it as rig.toml."
     )
     return (
-        f"{len(unknown)} of {len(rows)} actuators fit none of the nine conditions. If they are of another size than "
+        f"{len(unknown)} of {len(rows)} actuators have no verdict. If they are of another size than "
         f"the rig file says, {remedy}"
     )
 

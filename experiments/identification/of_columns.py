@@ -136,11 +136,12 @@ def _answer(
     records, tests = read
     test = None
     if tests:
+        named = f"--validate {', '.join(map(str, fit.validate))}"
         try:
             held = channels_of(tests, fit.inputs, output, found.model.sample_time, split=True)
         except HydrostateError as wrong:
-            raise HydrostateError(f"--validate {', '.join(map(str, fit.validate))}: {wrong}") from wrong
-        test = {"files": [str(one) for one in fit.validate], **quality_of(found.model, held)}
+            raise HydrostateError(f"{named}: {wrong}") from wrong
+        test = {"files": [str(one) for one in fit.validate], **quality_of(found.model, held, named)}
     if not (fit.figure or fit.simulated or fit.response):
         return {**BLANK, **column_entries(found), "test": test, "frequency_response": None}
     data = channels_of(records, fit.inputs, output, fit.resampled)

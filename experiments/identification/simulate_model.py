@@ -117,18 +117,24 @@ def record_of(log: Path, wanted: Sequence[str], sample_time: float | None, *, as
     return sent_once(record, wanted)
 
 
-def quality_of(model: "FreeRunModel", data: "Channels") -> dict[str, Any]:
+def quality_of(model: "FreeRunModel", data: "Channels", named: str = "the log") -> dict[str, Any]:
     """Return the fit of a model to its outputs, by the names of the JSON contract.
+
+    Parameters
+    ----------
+    named : str
+        What the reader calls the logs.
 
     Warns
     -----
     LogWarning
-        If inputs lie beyond those that a polynomial model was fitted to, or do not determine it.
+        If inputs lie beyond those that a polynomial model was fitted to or do not determine it, or no log is longer
+        than its dead time.
     """
     from estimation.identification.free_run.input_range import doubts_about_inputs
 
     quality, judged = model.judged_quality(data.u, data.y)
-    for note in doubts_about_inputs(model, data, judged):
+    for note in doubts_about_inputs(model, data, judged, named):
         warnings.warn(LogWarning(note), stacklevel=2)
     return vars(quality)
 

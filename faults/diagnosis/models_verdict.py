@@ -1,11 +1,13 @@
 """Verdict by the errors of nine nominal models alone: outcome, ranking, and whether any model fits."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from estimation.finding import Outcome
+from estimation.log_checks.channel_names import VELOCITY
 from faults.diagnosis.rmse import Scores, measured_velocity
 from faults.notes import AgainstCode, ClassCode
 from plant.log.record import Record
@@ -24,7 +26,7 @@ class ModelsVerdict(NamedTuple):
     Parameters
     ----------
     outcome : Outcome
-        Not observable where all models move alike.
+        Not observable where a channel is 0 throughout, or all models move alike.
     notes : tuple of Note
         Why there is no class, where there is none.
     against : tuple of Note
@@ -79,6 +81,8 @@ def models_verdict(scores: Scores, record: Record) -> ModelsVerdict:
     ModelsVerdict
         The outcome, and why.
     """
+    if unmeasured := _zero_throughout(scores.channels, record):
+        return ModelsVerdict(Outcome.NOT_OBSERVABLE, (ClassCode.CHANNEL_ZERO.note(channels=unmeasured),), ())
     ratio = margin(scores)
     if math.isnan(ratio):
         return ModelsVerdict(Outcome.DIVERGED, (ClassCode.MODELS_DIVERGED.note(),), ())
@@ -93,3 +97,9 @@ def models_verdict(scores: Scores, record: Record) -> ModelsVerdict:
     if ratio < TOLD_APART:
         return ModelsVerdict(Outcome.NOT_OBSERVABLE, (ClassCode.MODELS_ALIKE.note(),), ())
     return ModelsVerdict(Outcome.OK, (), (AgainstCode.NONE_FITS.note(percent=100.0 * unexplained),) if poor else ())
+
+
+def _zero_throughout(channels: Sequence[str], record: Record) -> str:
+    """Return the channels that are 0 in every sample, in words; empty where there is none."""
+    values = {name: measured_velocity(record) if name == VELOCITY else record[name] for name in channels}
+    return " and ".join(name for name, one in values.items() if not np.any(np.nan_to_num(one)))

@@ -82,8 +82,8 @@ def score_mathematical(record: Record, bank: Mapping[str, EhaParameters], *, pre
 
     Where one channel counts, the score is its RMSE in SI. Where velocity and differential pressure both count, each
     RMSE is divided by the channel's own root mean square in the log and the score is the root mean square of the
-    two [dimensionless]: friction shows in pressure, leakage in velocity. Position does not count: it
-    drifts with every error in velocity.
+    two [dimensionless]: friction shows in pressure, leakage in velocity. A channel that is 0 in every sample has no
+    size, and no part in the score. Position does not count: it drifts with every error in velocity.
 
     Parameters
     ----------
@@ -204,13 +204,7 @@ def _scored(rows: Mapping[str, Mapping[str, float]], measured: Mapping[str, Arra
     errors = {channel: {name: row[channel] for name, row in rows.items()} for channel in measured}
     if len(measured) == 1:
         return Scores(next(iter(errors.values())), errors)
-    shares = [np.array(list(errors[channel].values())) / _size(values) for channel, values in measured.items()]
-    scores = np.sqrt(np.sum(np.square(shares), axis=0) / len(measured))
+    sizes = {channel: _root_mean_square(values) for channel, values in measured.items()}
+    shares = [np.array(list(errors[channel].values())) / size for channel, size in sizes.items() if size > 0.0]
+    scores = np.sqrt(np.sum(np.square(shares), axis=0) / len(shares)) if shares else np.zeros(len(rows))
     return Scores(dict(zip(rows, scores.tolist(), strict=True)), errors)
-
-
-def _size(values: Array) -> float:
-    size = _root_mean_square(values)
-    if size == 0.0:
-        raise LogError("a channel that is zero throughout cannot be scored: nothing was measured")
-    return size

@@ -66,6 +66,9 @@ class LogCode(Code):
     SAMPLE_TIME_LONG = (
         "the sample time is {sample_time_s:.3g} s, which is unusually long: check the unit (ms read as s?)"
     )
+    NOTHING_MEASURED = (
+        "every channel is constant, so nothing was measured: check the columns, or log again while the actuator moves"
+    )
     SPEED_CONSTANT = (
         "motor_speed_rad_s is constant, so the log can show little: check its column, or log again while the speed "
         "changes"

@@ -136,6 +136,8 @@ def _span(values: Array) -> float:
 
 
 def _still(channels: Mapping[str, Array]) -> Note | None:
+    if channels and all(_span(values) == 0.0 for values in channels.values()):
+        return LogCode.NOTHING_MEASURED.note()
     if "motor_speed_rad_s" in channels and _span(channels["motor_speed_rad_s"]) == 0.0:
         return LogCode.SPEED_CONSTANT.note()
     motion = [name for name in ("position_m", "velocity_m_s") if name in channels]

@@ -1,6 +1,7 @@
 """Whether a polynomial model is asked about inputs that it never saw, and whether a linear one stands in there."""
 
 from collections.abc import Sequence
+from itertools import count
 
 import numpy as np
 
@@ -87,7 +88,10 @@ def linear_instead(
 
 
 def doubts_about_inputs(
-    model: FreeRunModel, data: Channels, judged: Sequence[tuple[float, float]] | None = None
+    model: FreeRunModel,
+    data: Channels,
+    judged: Sequence[tuple[float, float]] | None = None,
+    named: str = "the log",
 ) -> list[Note]:
     """Return the notes on a run with these inputs.
 
@@ -99,6 +103,8 @@ def doubts_about_inputs(
         In units of the channels; inputs in the model's order.
     judged : sequence of tuple of float, optional
         As `linear_instead` takes it [dimensionless].
+    named : str
+        What the reader calls the logs.
 
     Returns
     -------
@@ -106,5 +112,7 @@ def doubts_about_inputs(
         That no log is longer than the dead time, or a linear model stands in; else one on each input beyond its range.
     """
     if all(model.dynamics.unanswered(y.size) == y.size for y in data.y):
-        return [IdentificationCode.NOTHING_ANSWERED.note(output=data.output, longest=data.longest)]
+        dead_time = next(n for n in count(data.longest) if model.dynamics.unanswered(n + 1) == n)
+        told = {"logs": named, "output": data.output, "longest": data.longest, "dead_time": dead_time}
+        return [IdentificationCode.NOTHING_ANSWERED.note(**told)]
     return linear_instead(model, data, judged) or inputs_beyond(model, data)

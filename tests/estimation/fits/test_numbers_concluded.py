@@ -8,7 +8,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from estimation.fits.flow import asked_hypotheses as asking
+from estimation.fits.flow import asked_hypotheses
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import plain as plain_flow
 from estimation.fits.flow.belief import wanted_cost
@@ -65,7 +65,7 @@ def concluded(
     promises = [*(2 * [PredictedGain(40.0, 0.2, 0.05)]), *(len(MAY_HIDE) * [PredictedGain(0.0, 0.0, 0.05)])]
     with (
         patch.multiple(
-            asking,
+            asked_hypotheses,
             predicted_gains=lambda *_, **__: promises,
             predicted_gain=lambda *_, **__: PredictedGain(0.0, 0.0, 0.05),
         ),

@@ -21,10 +21,7 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.parallel_descents import Way
 from estimation.fits.greybox.spared_steps import LAST
 from estimation.fits.hypotheses import HYPOTHESES
-from estimation.fits.hypothesis_search import coarse_search, screening
-from estimation.fits.hypothesis_search import explain as explaining
-from estimation.fits.hypothesis_search import final_fits as finishing
-from estimation.fits.hypothesis_search import predicted_gains as promising
+from estimation.fits.hypothesis_search import coarse_search, explain, final_fits, predicted_gains, screening
 from estimation.fits.motion import fit as motion_fit
 from estimation.fits.motion import force_scale
 from estimation.fits.motion import search as motion_search
@@ -142,7 +139,7 @@ def plan_of_explanations() -> dict[str, Any]:
     told: dict[str, Any] = {}
     short = seen(log(0.5))
     asked = [one for one in HYPOTHESES if one.name in ("pressure_late", "pressure_offset", "relief_low", "volume")]
-    promises = [promising.PredictedGain(float(gain), 1.0, 1.0) for gain in range(len(HYPOTHESES))]
+    promises = [predicted_gains.PredictedGain(float(gain), 1.0, 1.0) for gain in range(len(HYPOTHESES))]
     costs = {
         "all alike": lambda _: 1000.0,
         "one is better": lambda k: 1000.0 - 10.0 * (k % 7 == 0),
@@ -158,13 +155,13 @@ def plan_of_explanations() -> dict[str, Any]:
 
     for name, cost in costs.items():
         with (
-            planned(cost, explaining, screening, coarse_search, finishing) as plan,
-            patch.object(promising, "_promises", promised),
-            patch.object(finishing, "concluded", concluded),
+            planned(cost, explain, screening, coarse_search, final_fits) as plan,
+            patch.object(predicted_gains, "_promises", promised),
+            patch.object(final_fits, "concluded", concluded),
         ):
             for paired in (False, True):
                 plan.clear()
-                found = explaining.explain(
+                found = explain.explain(
                     short, PAPER, flow_starts(PAPER, 2e8)[:3], lambda _: False, asked=asked, paired=paired
                 )
                 assert found is not None

@@ -90,7 +90,7 @@ def test_many_actuators_without_a_verdict_put_the_rig_file_in_doubt() -> None:
         )
 
     assert rig_hint(rows(2)) == ""
-    assert "3 of 8 actuators fit none of the nine conditions" in rig_hint(rows(3))
+    assert "3 of 8 actuators have no verdict. If" in rig_hint(rows(3))
     assert rig_hint(rows(3)) in fleet_page(rows(3), {}, "hall")
     assert title_of(rows(3)) == "None of 8 actuators is past a limit; 3 have no verdict."
 

@@ -50,6 +50,16 @@ def test_models_that_differ_by_less_than_a_thousandth_are_alike(runner_up: float
     assert found.against == ()
 
 
+def test_channels_that_are_0_throughout_are_named_and_tell_no_class() -> None:
+    still, moved = np.zeros(100), RECORD["velocity_m_s"]
+    pressure = "differential_pressure_pa"
+    for velocity, named in ((still, f"velocity_m_s and {pressure}"), (moved, pressure)):
+        log = RECORD.replace(velocity_m_s=velocity, differential_pressure_pa=still)
+        found = models_verdict(scored(0.01, channels=2), log)
+        assert found.outcome is Outcome.NOT_OBSERVABLE
+        assert found.notes == (ClassCode.CHANNEL_ZERO.note(channels=named),)
+
+
 @pytest.mark.parametrize(("share", "said"), [(0.45, False), (0.55, True)])
 @pytest.mark.parametrize("channels", [1, 2])
 def test_a_best_model_that_leaves_more_than_half_of_the_signal_fits_none(

@@ -115,11 +115,14 @@ def test_two_channels_are_weighed_by_their_own_size() -> None:
     np.testing.assert_allclose(table["score"], np.sqrt(0.5 * (shares[0] ** 2 + shares[1] ** 2)))
 
 
-def test_a_log_in_which_nothing_was_measured_cannot_be_scored() -> None:
-    log = bench_log("normal", 0)
-    silent = log.replace(differential_pressure_pa=np.zeros(len(log)))
-    with pytest.raises(LogError, match="zero throughout"):
-        score_mathematical(silent, BANK)
+def test_a_channel_that_is_0_throughout_has_no_part_in_the_score() -> None:
+    log = bench_log("normal", 0).slice(0, 200)
+    still = np.zeros(len(log))
+    table = score_mathematical(log.replace(differential_pressure_pa=still), BANK).table
+    size = np.sqrt(np.mean(log["velocity_m_s"] ** 2))
+    np.testing.assert_allclose(table["score"], table["rmse_velocity_m_s"] / size)
+    nothing = log.replace(differential_pressure_pa=still, velocity_m_s=still)
+    assert not score_mathematical(nothing, BANK).table["score"].any()
 
 
 def test_a_log_without_motion_is_refused() -> None:

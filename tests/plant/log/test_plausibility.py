@@ -90,6 +90,8 @@ def test_a_log_in_which_nothing_moves_says_so() -> None:
     assert note.data["channels"] == "position_m and velocity_m_s"
     (note,) = implausible(T, {**LOG, "motor_speed_rad_s": still})
     assert note.code == LogCode.SPEED_CONSTANT
+    (note,) = implausible(T, dict.fromkeys(LOG, still))
+    assert note.code == LogCode.NOTHING_MEASURED
 
 
 def test_missing_samples_do_not_hide_a_slip() -> None:

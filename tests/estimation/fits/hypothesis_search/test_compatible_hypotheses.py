@@ -10,7 +10,7 @@ from estimation.fits.flow.log import flow_log
 from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, LEAKAGE_RISE, OFFSET, PRESSURE_LATE, VOLUME
-from estimation.fits.hypothesis_search import compatible_hypotheses as reaching
+from estimation.fits.hypothesis_search import compatible_hypotheses as module
 from estimation.fits.hypothesis_search.coarse_search import FINEST_DELAY, search_coarsely
 from estimation.fits.hypothesis_search.compatible_hypotheses import MUCH, compatible_hypotheses
 from estimation.fits.hypothesis_search.decimation import FEW, cost_over_noise
@@ -31,9 +31,9 @@ def names(found: Any) -> set[str]:
 
 def asked_beside(left: float, together: float, lag: float, monkeypatch: pytest.MonkeyPatch, samples: int = FEW) -> Any:
     """Return what is asked where the best set leaves this over the noise, and all hypotheses together that."""
-    monkeypatch.setattr(reaching, "cost_over_noise", lambda *_: left)
+    monkeypatch.setattr(module, "cost_over_noise", lambda *_: left)
     lags = {"pressure_lag": lag, "speed_lag": 0.0, "position_lag": 0.0}
-    monkeypatch.setattr(reaching, "_all_together", lambda *_: (together, lags))
+    monkeypatch.setattr(module, "_all_together", lambda *_: (together, lags))
     point = Point(np.zeros(1), left, np.zeros(1), np.eye(1))
     made: Any = SimpleNamespace(drives=np.zeros((samples, 1)), gaps=np.zeros(0))
     return compatible_hypotheses(made, Trial((VOLUME,), point, {}, {}, {}), [*HYPOTHESES])
@@ -70,7 +70,7 @@ def test_a_short_log_is_asked_all(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def beside_leakage_that_rises(added: Array, monkeypatch: pytest.MonkeyPatch) -> tuple[float, set[str]]:
     """Return what rising leakage leaves of a log with this added to its pressure, and what is asked beside it."""
-    monkeypatch.setattr(reaching, "FEW", 0)
+    monkeypatch.setattr(module, "FEW", 0)
     record = log(1.0)
     shifted, variances = record.replace(**{PRESSURE: record[PRESSURE] + added}), {**VARIANCES, PRESSURE: 2.4e7}
     row = widened(flow_log(shifted, PAPER, {}, variances), PAPER, {STIFFNESS: 3e7})

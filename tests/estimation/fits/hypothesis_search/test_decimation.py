@@ -10,8 +10,7 @@ from estimation.fits.flow.log import flow_log, without_strays
 from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.hypothesis_search import final_fits as finishing
-from estimation.fits.hypothesis_search import ranking as ranking
+from estimation.fits.hypothesis_search import final_fits, ranking
 from estimation.fits.hypothesis_search.coarse_search import coarsened
 from estimation.fits.hypothesis_search.decimation import FEW, Decimation, cost_over_noise, decimated, decimation_for
 from estimation.fits.hypothesis_search.explanation import Trial
@@ -136,9 +135,9 @@ def test_a_set_that_leaves_more_than_on_few_samples_is_sought_anew(
 def test_what_leaves_far_too_much_is_not_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     finished: list[float] = []
     monkeypatch.setattr(ranking, "search_coarsely", lambda _, one, *__: one)
-    monkeypatch.setattr(finishing, "FEW", 0)
+    monkeypatch.setattr(final_fits, "FEW", 0)
     monkeypatch.setattr(ranking, "final_fit", lambda _, one, __: finished.append(one.cost) or one)
-    monkeypatch.setattr(finishing, "cost_over_noise", lambda _, cost: cost)
+    monkeypatch.setattr(final_fits, "cost_over_noise", lambda _, cost: cost)
     for cost in (9.0, 11.0):
         tried = Trial((), Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), {}, {}, {})
         ranking.likeliest(seen(), [[tried]])

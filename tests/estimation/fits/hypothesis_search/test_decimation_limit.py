@@ -7,7 +7,7 @@ import pytest
 
 from estimation.fits.flow.log import flow_log, without_strays
 from estimation.fits.flow.search import flow_starts
-from estimation.fits.hypothesis_search import explain as explaining
+from estimation.fits.hypothesis_search import explain
 from estimation.fits.hypothesis_search.decimation import FEW, cost_over_noise, decimation_for
 from estimation.fits.hypothesis_search.decimation_limit import decimation_limit
 from estimation.fits.hypothesis_search.wide_log import widened
@@ -42,8 +42,8 @@ def test_hypotheses_are_compared_by_steps_that_the_rig_allows(monkeypatch: pytes
     def asked(*given: Any) -> None:
         raise AskedError(given[3].every)
 
-    monkeypatch.setattr(explaining, "_alone", asked)
+    monkeypatch.setattr(explain, "_alone", asked)
     with pytest.raises(AskedError) as found:
-        explaining.explain(seen_by_form, told, [start], lambda _: False)
-    left = cost_over_noise(wide, explaining._plain_point(wide, start).cost)  # pyright: ignore[reportPrivateUsage]
+        explain.explain(seen_by_form, told, [start], lambda _: False)
+    left = cost_over_noise(wide, explain._plain_point(wide, start).cost)  # pyright: ignore[reportPrivateUsage]
     assert found.value.args[0] < decimation_for(wide, left)

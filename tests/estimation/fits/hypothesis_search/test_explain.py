@@ -10,9 +10,7 @@ import pytest
 
 from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
-from estimation.fits.hypothesis_search import coarse_search, explain, screening
-from estimation.fits.hypothesis_search import final_fits as finishing
-from estimation.fits.hypothesis_search import ranking as ranking
+from estimation.fits.hypothesis_search import coarse_search, explain, final_fits, ranking, screening
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.final_fits import CLOSE, NEVER, ROUNDS
 from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN
@@ -41,12 +39,12 @@ def ended(costs: Sequence[float], monkeypatch: pytest.MonkeyPatch) -> tuple[floa
         made.append(costs[len(made)])
         return SimpleNamespace(cost=made[-1], point=SimpleNamespace(theta=np.zeros(1)))
 
-    monkeypatch.setattr(finishing, "descended", descended)
-    monkeypatch.setattr(finishing, "cost_over_noise", lambda *_: 1.0)
-    monkeypatch.setattr(finishing, "spared", lambda one, _: one)
+    monkeypatch.setattr(final_fits, "descended", descended)
+    monkeypatch.setattr(final_fits, "cost_over_noise", lambda *_: 1.0)
+    monkeypatch.setattr(final_fits, "spared", lambda one, _: one)
     problem: Any = SimpleNamespace(log=SimpleNamespace(drives=(), steps=None))
     begun: Any = SimpleNamespace(cost=np.inf)
-    return finishing._led_on(problem, begun, np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
+    return final_fits._led_on(problem, begun, np.zeros(1)).cost, len(made)  # pyright: ignore[reportPrivateUsage]
 
 
 def test_a_search_goes_on_while_it_gains_what_tells_hypotheses_apart(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -94,17 +92,17 @@ def test_what_is_set_above_the_rig_files_or_has_no_interval_is_void(
 ) -> None:
     problem = SimpleNamespace(model=SimpleNamespace(theta=lambda _: np.zeros(1)))
     fit = replace(made_fit(50.0, 2e8, 1e5), std={"bulk_modulus": 1e5, "relief_pressure": std})
-    monkeypatch.setattr(finishing, "delayed", lambda log, _: log)
-    monkeypatch.setattr(finishing, "balanced_by", lambda log, _: log)
-    monkeypatch.setattr(finishing, "freed", lambda *_: problem)
-    monkeypatch.setattr(finishing, "usual_values", lambda _: {})
-    monkeypatch.setattr(finishing, "_to_its_end", lambda _, tried, *__, **___: tried)
-    monkeypatch.setattr(finishing, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
-    monkeypatch.setattr(finishing, "concluded", lambda *_, **__: fit)
-    monkeypatch.setattr(finishing, "coarsened", lambda *_: None)
-    monkeypatch.setattr(finishing, "balances_mass", lambda _: False)
+    monkeypatch.setattr(final_fits, "delayed", lambda log, _: log)
+    monkeypatch.setattr(final_fits, "balanced_by", lambda log, _: log)
+    monkeypatch.setattr(final_fits, "freed", lambda *_: problem)
+    monkeypatch.setattr(final_fits, "usual_values", lambda _: {})
+    monkeypatch.setattr(final_fits, "_to_its_end", lambda _, tried, *__, **___: tried)
+    monkeypatch.setattr(final_fits, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
+    monkeypatch.setattr(final_fits, "concluded", lambda *_, **__: fit)
+    monkeypatch.setattr(final_fits, "coarsened", lambda *_: None)
+    monkeypatch.setattr(final_fits, "balances_mass", lambda _: False)
     nothing: Any = None
-    found = finishing.final_fit(nothing, relieved(setting))
+    found = final_fits.final_fit(nothing, relieved(setting))
     assert found.cost == (np.inf if void else 50.0)
     assert found.fit.cost == (NEVER if void else 50.0)
     assert found.void is void

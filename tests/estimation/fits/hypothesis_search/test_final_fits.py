@@ -9,7 +9,7 @@ import pytest
 
 from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import OFFSET, PRESSURE_LATE
-from estimation.fits.hypothesis_search import final_fits as finishing
+from estimation.fits.hypothesis_search import final_fits
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.final_fits import ALIKE, CLOSE, FAR_BEHIND
 from tests.estimation.fits.short_logs import made_fit
@@ -26,18 +26,18 @@ def test_the_balance_in_which_a_set_was_sought_comes_first_and_the_other_must_co
         return replace(tried, point=replace(tried.point, cost=50.0 * len(led)))
 
     model = SimpleNamespace(theta=lambda _: np.zeros(1))
-    monkeypatch.setattr(finishing, "delayed", lambda log, _: log)
-    monkeypatch.setattr(finishing, "coarsened", lambda *_: None)
-    monkeypatch.setattr(finishing, "balances_mass", lambda _: by_mass)
-    monkeypatch.setattr(finishing, "balanced_by", lambda _, share: share)
-    monkeypatch.setattr(finishing, "freed", lambda share, *_: SimpleNamespace(model=model, share=share))
-    monkeypatch.setattr(finishing, "usual_values", lambda _: {})
-    monkeypatch.setattr(finishing, "_to_its_end", to_its_end)
-    monkeypatch.setattr(finishing, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
-    monkeypatch.setattr(finishing, "concluded", lambda *_, **__: made_fit(50.0, 2e8, 1e5))
+    monkeypatch.setattr(final_fits, "delayed", lambda log, _: log)
+    monkeypatch.setattr(final_fits, "coarsened", lambda *_: None)
+    monkeypatch.setattr(final_fits, "balances_mass", lambda _: by_mass)
+    monkeypatch.setattr(final_fits, "balanced_by", lambda _, share: share)
+    monkeypatch.setattr(final_fits, "freed", lambda share, *_: SimpleNamespace(model=model, share=share))
+    monkeypatch.setattr(final_fits, "usual_values", lambda _: {})
+    monkeypatch.setattr(final_fits, "_to_its_end", to_its_end)
+    monkeypatch.setattr(final_fits, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
+    monkeypatch.setattr(final_fits, "concluded", lambda *_, **__: made_fit(50.0, 2e8, 1e5))
     nothing: Any = None
     begun = Trial((), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {}, {}, {})
-    assert finishing.final_fit(nothing, begun).cost == 50.0
+    assert final_fits.final_fit(nothing, begun).cost == 50.0
     assert led == [(order[0], np.inf), (order[1], 50.0 + ALIKE)]
 
 
@@ -49,11 +49,11 @@ def test_a_lag_that_lasts_as_long_as_a_step_of_delay_is_tried_as_one(
     lag: float, delay: float, asked: tuple[float, float] | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     led: list[tuple[Trial, float]] = []
-    monkeypatch.setattr(finishing, "final_fit", lambda _, tried, useful: led.append((tried, useful)))
+    monkeypatch.setattr(final_fits, "final_fit", lambda _, tried, useful: led.append((tried, useful)))
     delays = {"differential_pressure_pa": delay} if delay else dict[str, float]()
     late = Trial((PRESSURE_LATE,), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {"pressure_lag": lag}, delays, {})
     nothing: Any = None
-    finishing.with_less_lag(nothing, late)
+    final_fits.with_less_lag(nothing, late)
     told = [(one.delays["differential_pressure_pa"], one.values["pressure_lag"]) for one, _ in led]
     assert told == ([] if asked is None else [pytest.approx(asked)])
     assert [useful for _, useful in led] == [90.0] * len(told)
@@ -62,7 +62,7 @@ def test_a_lag_that_lasts_as_long_as_a_step_of_delay_is_tried_as_one(
 def test_what_has_no_lag_is_not_tried_later() -> None:
     nothing: Any = None
     offset = Trial((OFFSET,), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {"pressure_offset": 1e-3}, {}, {})
-    assert finishing.with_less_lag(nothing, offset) is None
+    assert final_fits.with_less_lag(nothing, offset) is None
 
 
 @pytest.mark.parametrize(("cost", "searches"), [(0.9, 2), (1.1, 1)])
@@ -73,7 +73,7 @@ def test_what_stays_far_behind_is_given_up(cost: float, searches: int, monkeypat
     def descended(*_: Any, **__: Any) -> Any:
         return SimpleNamespace(cost=costs.pop(), point=SimpleNamespace(theta=np.zeros(1)))
 
-    monkeypatch.setattr(finishing, "descended", descended)
+    monkeypatch.setattr(final_fits, "descended", descended)
     nothing: Any = SimpleNamespace(drives=(), steps=None)
     begun: Any = SimpleNamespace(cost=np.inf)
     ended: list[Any] = []
@@ -83,10 +83,10 @@ def test_what_stays_far_behind_is_given_up(cost: float, searches: int, monkeypat
         return SimpleNamespace(theta=theta)
 
     problem: Any = SimpleNamespace(log=nothing, model=SimpleNamespace(values=lambda _: {}), at="all short steps")
-    monkeypatch.setattr(finishing, "spared", lambda one, _: one)
-    monkeypatch.setattr(finishing, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
-    monkeypatch.setattr(finishing, "descend", to_all_short_steps)
-    monkeypatch.setattr(finishing, "replace", lambda one, **_: one)
-    finishing._to_its_end(problem, begun, np.zeros(1), useful=useful)  # pyright: ignore[reportPrivateUsage]
+    monkeypatch.setattr(final_fits, "spared", lambda one, _: one)
+    monkeypatch.setattr(final_fits, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
+    monkeypatch.setattr(final_fits, "descend", to_all_short_steps)
+    monkeypatch.setattr(final_fits, "replace", lambda one, **_: one)
+    final_fits._to_its_end(problem, begun, np.zeros(1), useful=useful)  # pyright: ignore[reportPrivateUsage]
     assert len(costs) == 2 - searches
     assert ended == [problem.at]

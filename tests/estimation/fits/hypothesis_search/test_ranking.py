@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.greybox.descent import Point
-from estimation.fits.hypothesis_search import ranking as ranking
+from estimation.fits.hypothesis_search import ranking
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.final_fits import CLOSE
 

@@ -10,7 +10,7 @@ import pytest
 
 from estimation.fits.flow.log import flow_log, without_strays
 from estimation.fits.flow.search import flow_starts
-from estimation.fits.hypothesis_search import varying_loss as uneven
+from estimation.fits.hypothesis_search import varying_loss as module
 from estimation.fits.hypothesis_search.loss_regressors import (
     BORE,
     FILLING,
@@ -119,7 +119,7 @@ def test_a_loss_that_leaves_far_more_than_noise_is_not_fitted_with_short_steps(
         followed_from=lambda *_: (course, SimpleNamespace(cost=0.5 * left * samples)),
         concluded=lambda *_: concluded.append(left) or SimpleNamespace(size=1.0, fit=fit, course=course),
     )
-    monkeypatch.setattr(uneven, "_Search", lambda *_: search)
+    monkeypatch.setattr(module, "_Search", lambda *_: search)
     nothing: Any = None
-    assert bool(uneven.varying_loss(log, nothing, [{}], lambda _: True, 1e9, 1.2)) is fitted
+    assert bool(varying_loss(log, nothing, [{}], lambda _: True, 1e9, 1.2)) is fitted
     assert bool(concluded) is fitted

@@ -64,7 +64,8 @@ def test_a_log_no_longer_than_the_dead_time_has_no_fit_and_says_why(model: FreeR
     brief = channels(DELAY + 1)
     brief = replace(brief, u=(brief.u[0][:DELAY],), y=(brief.y[0][:DELAY],))
     assert np.isnan(model.quality(brief.u, brief.y).fit_percent)
-    assert [note.code for note in doubts_about_inputs(model, brief)] == ["nothing_answered"]
+    (note,) = doubts_about_inputs(model, brief)
+    assert (note.code, note.data["longest"], note.data["dead_time"]) == ("nothing_answered", DELAY, DELAY)
     assert doubts_about_inputs(model, channels()) == []
 
 
