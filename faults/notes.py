@@ -44,9 +44,9 @@ class AgainstCode(Code):
         "none of the nine conditions"
     )
     OUTSIDE_CONDITIONS = (
-        "the circuit that fits the log is in none of the nine conditions, nor between them: its leakage is "
-        "{leakage:.3g} and its friction {friction:.3g} (0 is none, 1 is minor, 2 is major or more), but its {part} is "
-        "{ratio:.2g} times what goes with them"
+        "the log fits none of the nine conditions, and nothing between them: leakage is {leakage:.3g} and friction "
+        "{friction:.3g} (0 is none, 1 is minor, 2 is major or more), but {part} is {ratio:.2g} times what it should be "
+        "at these levels"
     )
     BETWEEN_CONDITIONS = (
         "the fault lies between the nine conditions: to the nearest quarter, leakage {leakage:.3g} and friction "

@@ -10,6 +10,19 @@ from typing import Any
 LARGEST = 1 << 20
 """Bytes of the largest one that is read."""
 
+_SLIPS = {
+    "has a minus sign that is none of TOML, write a hyphen (-)": re.compile("[\u2212\u2013\u2014]"),
+    'has quotes that are none of TOML, write "': re.compile("[\u201c\u201d\u201e\u00ab\u00bb\u2018\u2019]"),
+    "has a decimal comma, write a point": re.compile(r"=\s*[-+]?\d+,\d+(?:[eE][-+]?\d+)?$"),
+    "has commas, write nothing between thousands": re.compile(r"=\s*[-+]?\d+(?:,\d+){2,}"),
+    "has a unit, write the number and its unit in quotes": re.compile(
+        r"=\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE][-+]?\d)[^\W\d_]"
+    ),
+    "has a space in its name, write an underscore (_)": re.compile(r"^[^\W\d]\w*\s+\w[\w\s]*="),
+    "has a colon, write an equals sign (=)": re.compile(r"^\w+\s*:"),
+}
+"""Slips in a line of TOML, and how to tell them."""
+
 SHOWN = 120
 """Characters that an error shows of an entry [count]."""
 
@@ -48,16 +61,23 @@ def small_toml(path: Path) -> dict[str, Any]:
     OSError
         As of `small_file`.
     ValueError
-        If it is no TOML; a number with a decimal comma is named.
+        If it is no TOML; a sign, a quote or a comma that is none of TOML is named.
     """
     text = ""
     try:
         text = small_file(path).decode("utf-8-sig")
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        commas = re.search(r"^\s*(\w+)\s*=\s*([-+]?\d+,\d+(?:[eE][-+]?\d+)?)\s*(?:#|$)", text, re.MULTILINE)
-        hint = f"; {commas[1]} = {commas[2]} has a decimal comma, write a point" if commas else ""
+        place = re.search(r"at line (\d+)", str(error))
+        hint = _slip(text.splitlines()[int(place[1]) - 1]) if place else ""
         raise ValueError(f"{error}{hint}") from error
+
+
+def _slip(line: str) -> str:
+    """Return what is wrong with a line that is no TOML, where it is a slip that a person makes; else empty."""
+    entry = line.partition("#")[0].strip()
+    slip = next((slip for slip, form in _SLIPS.items() if form.search(entry)), "")
+    return f"; {entry[:SHOWN]} {slip}" if slip else ""
 
 
 def shown(entry: object) -> str:

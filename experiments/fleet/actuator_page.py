@@ -13,7 +13,7 @@ from estimation.finding import interval_95
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.outlook import Outlook, outlook_of
 from experiments.fleet.page import IF_RIGHT, amount_in, found_in, untold_since, worst_in
-from experiments.fleet.rows import STATES
+from experiments.fleet.rows import STATES, LogRow
 from experiments.page.charts import Charts
 from experiments.page.names_shown import SHOWN
 from experiments.page.numbers import MISSING, decimals_of, fixed, number, shop_unit
@@ -48,7 +48,7 @@ MOST_LOGS = 30
 
 FORECASTS = (
     "severity",
-    Column("level", "level now, 95 % interval"),
+    Column("level", "level of the trend, 95 % interval", words=whole_dates),
     "limit",
     Column("growth", "growth per log"),
     Column("half", "limit reached, 50 %", words=whole_dates),
@@ -88,7 +88,7 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
         "log": pages.get(row.last.file),
         "fleet": fleet,
         "apart": _apart(outlooks),
-        "forecasts": pd.DataFrame([_forecast(one) for one in outlooks]),
+        "forecasts": pd.DataFrame([_forecast(one, row.last) for one in outlooks]),
         "logs": pd.DataFrame(
             [
                 (
@@ -158,7 +158,8 @@ def _apart(outlooks: Sequence[Outlook]) -> str:
     return f", {told}"
 
 
-def _forecast(one: Outlook) -> dict[str, str]:
+def _forecast(one: Outlook, newest: LogRow) -> dict[str, str]:
+    """Return the cells of a severity; its level has its date where newer logs do not tell it."""
     scale, unit = shop_unit(one.unit)
     (level, std), (growth, growth_std) = one.trend.level, one.trend.growth
     ends = interval_95(scale * level, scale * std)
@@ -169,13 +170,18 @@ def _forecast(one: Outlook) -> dict[str, str]:
     places = decimals_of(0.0, 5.0 * growth_std, 6)  # one digit of the deviation, two of one below 0.2 of a digit
     return {
         "severity": SHOWN[one.name],
-        "level": f"{shown} {unit} ({low} to {high})",
+        "level": f"{shown} {unit} ({low} to {high}){_as_of(one, newest)}",
         "limit": f"{number(scale * one.series.limit, 3)} {unit}",
         "growth": f"{fixed(growth, places)}\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}{fixed(growth_std, places)} {unit}",
         "half": one.when(1, 3) or MISSING,
         "most": one.when(0, 4) or MISSING,
         "outlook": one.words,
     }
+
+
+def _as_of(one: Outlook, newest: LogRow) -> str:
+    last = one.logs[-1]
+    return "" if last is newest else f", as of {last.named.shown or 'an earlier log'}"
 
 
 def _ahead(outlooks: Sequence[Outlook]) -> int:

@@ -38,6 +38,10 @@ EHA = "eha"
 UNNAMED = "paper"
 """Name of the rig without a rig file, and of a rig file until its owner gives another."""
 
+MOST_UNCERTAIN = 2.0
+"""Largest relative standard deviation [fraction]: twice what is known within a factor of two, and less than the least
+that is written in percent by mistake."""
+
 UNEQUAL_SIDES = (*PAIRS.values(), "pilot_share")
 """Entries that two numbers for sides A and B set: a template has them as comments, so that they do not contradict."""
 
@@ -88,8 +92,11 @@ class Rig(Generic[P]):
         _known(self.uncertainties, dict.fromkeys((*_names(type(self.parameters)), *doubted)), "uncertainty")
         _known(self.measured, doubted, "measured")
         for name, value in self.uncertainties.items():
-            if not 0.0 <= value < float("inf"):
-                raise RigError(f"uncertainty.{name} must be 0 or more and finite, got {value!r}")
+            if not 0.0 <= value <= MOST_UNCERTAIN:
+                raise RigError(
+                    f"uncertainty.{name} must be 0 or more and at most {MOST_UNCERTAIN:g} (a fraction: 0.05 is 5 %), "
+                    f"got {value!r}"
+                )
             if name in self.measured:
                 raise RigError(f"uncertainty.{name} and measured both say how well it is known, give one")
         object.__setattr__(self, "uncertainties", MappingProxyType(dict(self.uncertainties)))
@@ -166,6 +173,7 @@ def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> 
 
     if misplaced := [name for name in content if name in _names(parameter_class)]:
         raise RigError(f"{misplaced[0]} must stand below a line [parameters]")
+    _require_on_top(content)
     _known(content, RigEntries.model_fields, "")
     file = RigEntries.model_validate(content)
     if file.plant not in (None, plant):
@@ -177,6 +185,15 @@ def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> 
     if isinstance(parameters, EhaParameters):
         require_si(parameters)
     return Rig(file.name, parameters, file.uncertainty, file.columns, file.measured, plant)
+
+
+def _require_on_top(content: Mapping[str, Any]) -> None:
+    """Refuse an entry of the whole file that stands below the line of a section, of which TOML makes it a part."""
+    for section in ("parameters", "uncertainty", "columns"):
+        entries = content.get(section)
+        for name in ("name", "plant", "measured"):
+            if isinstance(entries, dict) and name in entries:
+                raise RigError(f"{name} must stand above the first line in square brackets, got it below [{section}]")
 
 
 def _pairs_of(parameter_class: type[Any]) -> Mapping[str, str]:

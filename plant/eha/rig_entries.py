@@ -74,6 +74,6 @@ def wrong_kinds() -> Generator[None]:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        wanted = first["msg"].removeprefix("Input should be ")
+        wanted = first["msg"].removeprefix("Input should be ").replace("a valid tuple", "a list in square brackets")
         wanted += " (a fraction: 0.15 is 15 %)" if first["loc"][0] == "uncertainty" and len(first["loc"]) > 1 else ""
         raise RigError(f"{where} must be {wanted}, got {shown(first['input'])}") from error

@@ -4,11 +4,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from plant.errors import RigError
-from plant.log.formats.cell_texts import parted
+from plant.log.formats.cell_texts import NUMBER, parted
 from plant.log.formats.cells import number
 from plant.small_file import shown
 from plant.unit_text import GAUGE
 from plant.units import conversion_to
+
+PLAIN = "write a decimal point, and nothing between thousands"
 
 
 def numbers_with_units(given: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, Any]:
@@ -45,15 +47,16 @@ def _in_si(name: str, value: Any, unit: str) -> Any:
         return [_in_si(name, one, unit) for one in value]
     if not isinstance(value, str):
         return value
-    text, given = parted(value.strip())
+    whole = value.strip()
+    text, given = (whole, "") if NUMBER.fullmatch(whole) else parted(whole)
     wanted = "a number without quotes" if unit == "1" else f"a number in {unit}, or a number and its unit in quotes"
     wrong = f"parameters.{name} must be {wanted}, got {shown(value)}"
     if not given:
-        raise RigError(wrong)
+        raise RigError(f"{wrong}: {PLAIN}" if unit == "1" and "," in text else wrong)
     try:
         amount = number(text)
     except ValueError as error:
-        raise RigError(f"{wrong}: write a decimal point, and nothing between thousands") from error
+        raise RigError(f"{wrong}: {PLAIN}") from error
     try:
         factor, offset = conversion_to(given, unit)
     except ValueError as error:

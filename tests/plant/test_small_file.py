@@ -40,6 +40,25 @@ def test_a_decimal_comma_is_named_in_rig_and_study_files(tmp_path: Path) -> None
             read(path)
 
 
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("flow_bias = \u22121e-6", "has a minus sign that is none of TOML, write a hyphen (-)"),
+        ("stroke = \u201c200 mm\u201d", 'has quotes that are none of TOML, write "'),
+        ("bulk_modulus = 1,400,000,000", "has commas, write nothing between thousands"),
+        ("bulk_modulus = 1.4 GPa", "has a unit, write the number and its unit in quotes"),
+        ("bulk_modulus = 1.4e9 Pa", "has a unit, write the number and its unit in quotes"),
+        ("bulk modulus = 1.4e9", "has a space in its name, write an underscore (_)"),
+        ("bulk_modulus: 1.4e9", "has a colon, write an equals sign (=)"),
+    ],
+)
+def test_a_slip_in_a_line_is_named(tmp_path: Path, line: str, said: str) -> None:
+    (path := tmp_path / "rig.toml").write_text(f"[parameters]\n{line}\n", encoding="utf-8")
+    with pytest.raises(RigError) as error:
+        read_rig(path)
+    assert str(error.value).endswith(f"; {line} {said}")
+
+
 @pytest.mark.parametrize("name", ["../up", "a/b", ".", "..", "a\x1b[2J", "a\\b", "", "x" * 200])
 def test_a_study_is_called_what_a_folder_may_be(name: str) -> None:
     content = {"name": name, "runs": [{"seeds": 1, "methods": [{"verb": "diagnose"}]}]}

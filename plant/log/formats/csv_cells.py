@@ -256,7 +256,8 @@ class _Body:
                 raise one.error
         reasons: list[tuple[int, LogError]] = []
         if (count := len(self.strange) + len(self.timeless) - spared) > allowed:
-            more = f"; {count} rows cannot be read, at most 1 % of {len(self.rows)} may be so"
+            total = len(self.rows) + len(self.strange)
+            more = f"; {count} of {total} rows cannot be read, at most 1 % may be so"
             reasons += [(one.line, LogError(f"{one.error.message}{more}", self.source)) for one in self.strange[:1]]
         for column in found:
             bad = self.columns[column].bad

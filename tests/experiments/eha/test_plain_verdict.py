@@ -86,8 +86,8 @@ def test_a_circuit_beside_the_nine_is_told_by_its_levels_and_by_what_does_not_go
     note = AgainstCode.OUTSIDE_CONDITIONS.note(leakage=1.25, friction=0.0, part="flow bias", ratio=0.19)
     result = said_of("normal", unknown=True, notes=[note.to_dict()], reasons=[str(note)])
     assert verdict(result) == "The actuator leaks more inside than a healthy one, or the rig file or a sensor is wrong."
-    assert "its leakage is 1.25 and its friction 0 " in sureness(result)
-    assert sureness(result).endswith("but its flow bias is 0.19 times what goes with them.")
+    assert "leakage is 1.25 and friction 0 " in sureness(result)
+    assert sureness(result).endswith("but flow bias is 0.19 times what it should be at these levels.")
     assert work_on(result)[0].startswith("If rig file and sensors are right: plan a check of pump and piston seal.")
 
 

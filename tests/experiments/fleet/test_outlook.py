@@ -136,6 +136,15 @@ def test_a_page_tells_logs_that_have_no_place_in_the_trend() -> None:
     assert "relied on" not in actuator_page(actuator(GROWING), {})
 
 
+def test_the_level_of_a_trend_has_its_date_where_the_newest_log_has_no_place_in_it() -> None:
+    logs = actuator(GROWING[:5]).logs
+    lost = replace(logs[-1], state="unknown")
+    assert ", as of 4" not in actuator_page(ActuatorRow("P-1", logs), {})
+    page = actuator_page(ActuatorRow("P-1", (*logs[:-1], lost)), {})
+    assert "level of the trend, 95 % interval" in page
+    assert page.count(", as of 3") == 2  # of leakage and of oil
+
+
 def test_an_actuator_without_any_severity_has_a_page_that_says_why() -> None:
     page = actuator_page(actuator(GROWING[:5], outcome="failed", found_condition=None, reason="no time"), {})
     assert page.count("no time") == 5

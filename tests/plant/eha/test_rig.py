@@ -110,7 +110,13 @@ def test_every_parameter_refuses_text(tmp_path: Path, field: str) -> None:
         ("[uncertainty]\nbulk_modulus = nan", r"uncertainty\.bulk_modulus must be 0 or more"),
         ('measured = ["chamber_volum"]', r"measured\.chamber_volum is unknown, did you mean 'chamber_volume'"),
         ('measured = ["stroke"]', r"measured\.stroke is unknown, wanted one of pump_displacement, piston_area"),
-        ('measured = "chamber_volume"', r"measured must be a valid tuple, got 'chamber_volume'"),
+        ('measured = "chamber_volume"', r"measured must be a list in square brackets, got 'chamber_volume'"),
+        (
+            '[parameters]\npiston_area = 1e-3\nmeasured = ["piston_area"]',
+            r"measured must stand above the first line in square brackets, got it below \[parameters\]",
+        ),
+        ('[columns]\nplant = "eha"', r"plant must stand above .* below \[columns\]"),
+        ("[uncertainty]\npiston_area = 5", r"at most 2 \(a fraction: 0\.05 is 5 %\), got 5"),
         ("measured = [3]", r"measured\.0 must be a valid string, got 3"),
         (
             'measured = ["moving_mass"]\n[uncertainty]\nmoving_mass = 0.1',

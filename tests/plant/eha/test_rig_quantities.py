@@ -26,6 +26,7 @@ def read(tmp_path: Path, entries: str) -> object:
         ('motor_speed_per_volt = "300 rpm/V"', 31.41593),
         ('stroke = "2e2 mm"', 0.2),
         ('load_force = "-1 kN"', -1000.0),
+        ('load_force = "\u22121 kN"', -1000.0),
     ],
 )
 def test_a_quantity_is_converted(tmp_path: Path, entry: str, value: float) -> None:
@@ -46,6 +47,8 @@ def test_two_sides_may_differ_in_their_units(tmp_path: Path) -> None:
         ('accumulator_pressure = "2 barg"', "got '2 barg', a pressure above the atmosphere: add 1.013 bar"),
         ('relief_pressure = "bar"', "must be a number in Pa, or a number and its unit in quotes, got 'bar'"),
         ('moving_mass = "30"', "must be a number in kg, or a number and its unit in quotes, got '30'"),
+        ('bulk_modulus = "1.4e9"', "must be a number in Pa, or a number and its unit in quotes, got '1.4e9'"),
+        ('pilot_share = "0,5"', "a number without quotes, got '0,5': write a decimal point, and nothing between"),
         ('chamber_volume = "1,08 L"', "got '1,08 L': write a decimal point, and nothing between thousands"),
         ('piston_area = "1 520 mm^2"', "got '1 520 mm^2': write a decimal point"),
         ('piston_area = "1e999 cm^2"', "must be a finite number"),

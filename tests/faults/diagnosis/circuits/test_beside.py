@@ -29,7 +29,7 @@ def test_leakage_that_grows_without_the_flow_bias_of_the_tables_is_told_by_its_s
     place[bias] = healthy
     note = told_of(place)
     assert note.data == {"leakage": 1.25, "friction": 0.0, "part": "flow bias", "ratio": pytest.approx(ratio, rel=0.02)}
-    assert str(note).endswith("but its flow bias is 0.17 times what goes with them")
+    assert str(note).endswith("but flow bias is 0.17 times what it should be at these levels")
 
 
 def test_what_lies_beyond_the_last_level_is_told_as_that_level_and_so_many_times_it() -> None:
