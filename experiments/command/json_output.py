@@ -14,7 +14,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from experiments.command.output_paths import require_no_log
+from experiments.command.output_paths import OF_FILES, require_no_log
 from experiments.running.refusal import refused
 from plant.atomic import replacing
 from plant.errors import HydrostateError
@@ -100,9 +100,6 @@ def _harmless(value: Any) -> Any:
     return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
 
 
-_OF_FILES = (".csv", ".txt", ".xml", ".xlsx", ".html", ".png", ".pdf", ".toml", ".parquet", ".mat")
-"""Endings of files: a folder of such a name would be a slip."""
-
 _IN_FOLDER = ("results.json", "results.csv")
 """What is written into a folder."""
 
@@ -124,7 +121,7 @@ def prepare_output(out: Path | None, logs: Iterable[Path] = ()) -> None:
     """
     if out is None:
         return
-    if out.suffix.lower() in _OF_FILES and not out.is_dir():
+    if out.suffix.lower() in OF_FILES and not out.is_dir():
         raise HydrostateError(f"--out must be a folder, or a file that ends in .json, got {str(out)!r}")
     folder = _folder(out)
     with refused(f"--out {out}: the folder cannot be made"):

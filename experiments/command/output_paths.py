@@ -10,6 +10,9 @@ from plant.errors import HydrostateError
 PAGES = (".html", ".htm", "")
 """What the name of a page ends in."""
 
+OF_FILES = (".csv", ".txt", ".xml", ".xlsx", ".html", ".htm", ".png", ".pdf", ".toml", ".parquet", ".mat")
+"""Endings of files: a folder of such a name would be a slip."""
+
 Owner = TypeVar("Owner", Path, str)
 
 
@@ -99,6 +102,29 @@ def require_place(option: str, path: Path | None, ending: str = "", logs: Iterab
     require_no_log(option, [path], logs)
 
 
+def require_folder(option: str, folder: Path | None) -> None:
+    """Refuse a folder that is a file, or has the name of one, before the work and not after it.
+
+    Parameters
+    ----------
+    option : str
+        As the command line has it.
+    folder : Path or None
+        Where files go; None, not given, passes.
+
+    Raises
+    ------
+    HydrostateError
+        If it is a file, or is not there and has an ending of files.
+    """
+    if folder is None or folder.is_dir():
+        return
+    if folder.exists():
+        raise HydrostateError(f"{option} must be a folder, got the file {str(folder)!r}")
+    if folder.suffix.lower() in (*OF_FILES, ".json"):
+        raise HydrostateError(f"{option} must be a folder, got {str(folder)!r}, a name as a file has it")
+
+
 def page_place(report: Path | None) -> Path | None:
     """Return the path of the page of ``--report``, with the ending ``.html`` whatever is given.
 
@@ -129,8 +155,10 @@ def with_page_ending(what: str, page: Path) -> Path:
     Raises
     ------
     HydrostateError
-        If it ends as no page does.
+        If it ends as no page does, or is a folder.
     """
+    if page.is_dir():
+        raise HydrostateError(f"{what} must be a file, got the folder {str(page)!r}")
     if page.suffix.lower() not in PAGES:
         print_it = "; a browser prints the page as PDF" if page.suffix.lower() == ".pdf" else ""
         raise HydrostateError(f"{what} must end in .html, got {page.name!r}{print_it}")

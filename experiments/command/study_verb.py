@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias, TypeVar
 
 from experiments.command.json_output import json_text
 from experiments.command.options import option
+from experiments.command.output_paths import require_folder
 from experiments.command.terminal import emit
 
 if TYPE_CHECKING:
@@ -19,12 +20,19 @@ Folder: TypeAlias = Annotated[Path, option("DIR", "Folder of the report.", "--ou
 
 
 def finish_study(study: "Study[Settings]", settings: Settings, out: Path, *, as_json: bool) -> None:
-    """Run a study with progress on standard error, and say where its result is."""
+    """Run a study with progress on standard error, and say where its result is.
+
+    Raises
+    ------
+    HydrostateError
+        If the folder is a file, or cannot be written.
+    """
     from rich.console import Console
 
     from experiments.running.study import run_study
     from experiments.streams.endings import stop_at_signals
 
+    require_folder("--out", out)
     stop_at_signals()
     begin = perf_counter()
     written = run_study(study, settings, out, Console(stderr=True))

@@ -110,6 +110,7 @@ def _entries(
     for facts in tables:
         stamps = None if time is None else facts.numbers.get(time.guess.place)
         clock = None if stamps is None else clock_facts(stamps)
+        unit = "s" if time is None or stamps is None or stamps.dtype.kind == "M" else time.guess.unit or "s"
         rows = [
             {"number": number, **_column_entries(one, by_name.get(one.heading.name))}
             for number, one in enumerate(facts.columns, start=1)
@@ -119,7 +120,7 @@ def _entries(
                 "label": facts.table.label,
                 "rows": facts.rows,
                 "step_s": facts.table.step,
-                "clock": None if clock is None else vars(clock),
+                "clock": None if clock is None else {**vars(clock), "unit": unit},
                 "columns": rows,
             }
         )

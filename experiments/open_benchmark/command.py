@@ -7,6 +7,7 @@ import typer
 
 from experiments.command.json_output import json_text
 from experiments.command.options import Json, option, require_positive
+from experiments.command.output_paths import require_folder
 from experiments.command.study_verb import Folder, finish_study
 from experiments.command.terminal import emit
 
@@ -30,6 +31,7 @@ def make(
     The same options write the same files. The simulator shares no model of physics, sensors or loggers with the methods
     that estimate and diagnose here.
     """
+    require_folder("--out", out)
     from experiments.open_benchmark.folders import write_set
     from experiments.open_benchmark.kinds import KINDS, VERSION
 

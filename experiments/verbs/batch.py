@@ -10,6 +10,7 @@ import typer
 from experiments.batch.run_on_terminal import RunSettings, duration, run_plan
 from experiments.command.json_output import json_text
 from experiments.command.options import Json, argument, flag, option
+from experiments.command.output_paths import require_folder
 from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, emit, note
 from plant.errors import HydrostateError
 
@@ -56,6 +57,7 @@ def batch(
     from experiments.batch.part_store import open_store
     from experiments.batch.study_file import SHIPPED, read_study, shipped_studies, study_path
 
+    require_folder("--out", None if out is None else Path(out))
     chosen = _with_logs(read_study(study), logs)
     shipped = study in shipped_studies() and not Path(study).exists()
     folder = Path() if shipped or logs is not None else study_path(study).parent

@@ -7,6 +7,7 @@ import typer
 
 from experiments.command.json_output import json_text, write_whole
 from experiments.command.options import SEED, Columns, Json, Plant, RigFile, Seed, argument, option
+from experiments.command.output_paths import with_page_ending
 from experiments.command.terminal import emit, note, rendered, table
 
 commands = typer.Typer()
@@ -35,6 +36,8 @@ def compare(
     from experiments.batch.summary import frame_of
     from plant.errors import HydrostateError
 
+    if out is not None:
+        out = with_page_ending("--out", out)
     files = [place for place in (first, second) if Path(place).is_file()]
     if len(files) == 2:
         from experiments.log_pages.two_logs import compare_logs

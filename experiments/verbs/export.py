@@ -20,6 +20,7 @@ from experiments.command.options import (
     option,
     require_positive,
 )
+from experiments.command.output_paths import require_folder
 from experiments.command.terminal import emit, note
 from experiments.running.refusal import refused
 from plant.errors import HydrostateError
@@ -86,6 +87,7 @@ def c(
     The C code does the same arithmetic as Python, line by line. It allocates nothing, every loop is bounded, and the
     header states the largest number of operations per step.
     """
+    require_folder("--out", out)
     prepare_output(out)
     require_positive("--sample-time", sample_time, "s")
     bench = load_rig(rig)
@@ -180,6 +182,7 @@ def model(
     called = "model" if name is None else name
     files: Mapping[str, str | bytes]
     files = model_in_c(found, name=called, precision=precision) if to == "c" else model_in_mat(found, name=called)
+    require_folder("--out", out)
     prepare_output(out)
     written = write_files(out, files)
     emit(

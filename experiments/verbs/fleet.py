@@ -9,6 +9,7 @@ import typer
 
 from experiments.command.json_output import write_whole
 from experiments.command.options import Columns, Plant, RigFile, argument, load_actuator, load_columns, option
+from experiments.command.output_paths import require_folder
 from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, emit, note
 from experiments.command.visible_text import spelt
 from plant.errors import HydrostateError, require_known
@@ -73,6 +74,7 @@ def fleet(
     from experiments.fleet.page import fleet_page, rig_hint, sickest_of, title_of
     from experiments.fleet.rows import log_rows
 
+    require_folder("--out", out)
     limits, repairs = limits_of_options(limit or []), read_maintenance(maintenance)
     _names((), pattern, names)  # what is wrong there, and in names of files, is said before any log is diagnosed
     if Path(place).is_file():

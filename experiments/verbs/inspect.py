@@ -131,4 +131,4 @@ def _clock_sentence(one: Mapping[str, Any]) -> str:
         flaws.append(f"{clock['backward']} steps back")
     if clock["jitter"] > 1e-3:
         flaws.append(f"jitter of {100.0 * clock['jitter']:.2g} % of a step")
-    return f"clock: steps of {clock['step']:.6g} in the column's unit; {', '.join(flaws) or 'no gaps'}"
+    return f"clock: steps of {clock['step']:.6g} {clock['unit']}; {', '.join(flaws) or 'no gaps'}"

@@ -1,10 +1,12 @@
 """`hydrostate report STORE`: the report of a batch study, written from its store."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from experiments.command.options import argument, option
+from experiments.command.output_paths import require_folder
 from experiments.command.terminal import emit
 
 commands = typer.Typer()
@@ -25,4 +27,5 @@ def report(
     from experiments.batch.part_store import open_store
     from experiments.batch.report import write_report
 
+    require_folder("--out", None if out is None else Path(out))
     emit(write_report(open_store(store), open_folder(out or store)))

@@ -109,9 +109,13 @@ def serve(
         streams=streams,
         false_alarms=false_alarms,
     )
-    elsewhere = "; to keep them elsewhere: hydrostate serve FOLDER" if folder == FOLDER else ""
-    note(f"logs, pages and results are kept in {folder.resolve()}{elsewhere}")
-    run_server(settings, emit)
+
+    def say(address: str) -> None:
+        elsewhere = "; to keep them elsewhere: hydrostate serve FOLDER" if folder == FOLDER else ""
+        note(f"logs, pages and results are kept in {folder.resolve()}{elsewhere}")
+        emit(address)
+
+    run_server(settings, say)
 
 
 def _streams(texts: list[str]) -> dict[str, str]:

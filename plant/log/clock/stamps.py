@@ -13,26 +13,29 @@ from plant.log.formats.cells import MISSING
 
 Stamps = NDArray[np.datetime64]
 
-_CLOCK = r"(?P<h>\d{1,2}):(?P<m>\d{2})(?::(?P<s>\d{2})(?:[.,:](?P<f>\d{1,12}))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
+_CLOCK = (
+    r"(?P<h>\d{1,2})(?::|\s?h\s?)(?P<m>\d{2})(?:(?::|\s?m(?:in)?\s?)(?P<s>\d{2})(?:[.,:](?P<f>\d{1,12}))?(?:\s?s)?)?"
+    r"\s*(?P<half>[AaPp]\.?\s?[Mm]\.?)?(?:\s*Uhr)?"
+)
 _ZONE = r"\s*(?P<zone>Z|UTC|GMT|[A-Z]{3,4}|[-+]\d{2}(?::?\d{2})?)?(?:\[[\w/+-]{1,40}\])?"
 _MONTHS = {
     begun: month
     for month, names in enumerate(
         (
-            *("jan jän ene", "feb fév fev", "mar mär mae mrz", "apr avr abr", "may mai", "jun juin"),
-            *("jul juil", "aug aoû aou ago", "sep set", "oct okt", "nov", "dec déc dez dic"),
+            *("jan jän ene gen", "feb fév fev", "mar mär mae mrz", "apr avr abr", "may mai mag", "jun juin giu"),
+            *("jul juil lug", "aug aoû aou ago", "sep set", "oct okt ott", "nov", "dec déc dez dic"),
         ),
         start=1,
     )
     for begun in names.split()
 }
-"""How names of months begin in English, German, French and Spanish, in lower case."""
+"""How names of months begin in English, German, French, Spanish and Italian, in lower case."""
 
 _WORD = rf"(?P<word>(?i:{'|'.join(_MONTHS)}))[^\W\d_]{{0,7}}\.?"
 _WEEKDAY = r"(?:[^\W\d_]{2,10}\.?,?\s+)?"
-_OF = r"(?:\.?[- ]\s?|\s+de\s+)"
+_OF = r"(?:(?:er|[°º])?\.?[-/ ]\s?|\s+del?\s+)"
 _COMPACT = r"[T_ -](?P<h>\d{2})(?P<m>\d{2})(?P<s>\d{2})(?:[.,_](?P<f>\d{1,12}))?(?P<half>)"
-_AFTER_DAY = rf"(?:[ T,_-]\s*){_CLOCK}"
+_AFTER_DAY = rf"(?:[ T,_:-]\s*(?:(?:à|a las|alle|ore|um|at)\s+)?){_CLOCK}"
 _EITHER = re.compile(rf"(?P<one>\d{{1,2}})[/-](?P<two>\d{{1,2}})[/-](?P<Y>\d{{4}}|\d{{2}}){_AFTER_DAY}{_ZONE}")
 _PATTERNS = (
     *(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.command.output_paths import own_paths, page_place, require_place
+from experiments.command.output_paths import own_paths, page_place, require_folder, require_place, with_page_ending
 from plant.errors import HydrostateError
 
 
@@ -68,3 +68,16 @@ def test_a_place_that_is_not_there_is_refused_first(tmp_path: Path) -> None:
         require_place("--figure", tmp_path)
     with pytest.raises(HydrostateError, match="there is no such folder"):
         require_place("--report", tmp_path / "pages" / "a.html")
+
+
+def test_a_folder_is_no_file_and_has_no_name_of_one(tmp_path: Path) -> None:
+    (file := tmp_path / "afile").write_text("")
+    (folder := tmp_path / "pages.html").mkdir()
+    for fine in (None, tmp_path / "new", folder, tmp_path / "v1.2"):
+        require_folder("--out", fine)
+    with pytest.raises(HydrostateError, match=r"--out must be a folder, got the file '.*afile'"):
+        require_folder("--out", file)
+    with pytest.raises(HydrostateError, match=r"--out must be a folder, got '.*fleet\.html', a name as a file has it"):
+        require_folder("--out", tmp_path / "fleet.html")
+    with pytest.raises(HydrostateError, match="--out must be a file, got the folder"):
+        with_page_ending("--out", folder)

@@ -65,6 +65,14 @@ def test_two_logs_are_compared_on_the_terminal_on_a_page_and_for_a_program(tmp_p
     assert (same.exit_code, "twice" in same.output) == (2, True)
 
 
+def test_a_page_of_another_ending_is_refused_before_any_work(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("")
+    both = [str(tmp_path / "a.csv"), str(tmp_path / "b.csv")]
+    done = CliRunner().invoke(app, ["compare", *both, "--out", str(tmp_path / "x.pdf")])
+    assert done.exit_code == 2
+    assert "--out must end in .html, got 'x.pdf'; a browser prints the page as PDF" in " ".join(done.output.split())
+
+
 def test_a_log_that_is_not_there_is_told_as_such(tmp_path: Path) -> None:
     (tmp_path / "before.csv").touch()
     done = CliRunner().invoke(app, ["compare", str(tmp_path / "before.csv"), str(tmp_path / "after.csv")])

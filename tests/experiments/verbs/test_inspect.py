@@ -133,7 +133,7 @@ def test_each_channel_is_the_surest_column_of_all_files_of_a_test(tmp_path: Path
         assert found["columns"]["position_m"] == "position [mm]:mm"
 
 
-def test_what_a_clock_lacks_is_said_in_the_column_s_own_unit(tmp_path: Path) -> None:
+def test_what_a_clock_lacks_is_said_in_the_unit_of_its_column(tmp_path: Path) -> None:
     steps = np.ones(40)
     steps[7] = 5.0  # three are missing
     steps[20] = 0.0
@@ -145,10 +145,13 @@ def test_what_a_clock_lacks_is_said_in_the_column_s_own_unit(tmp_path: Path) -> 
     clock = found["tables"][0]["clock"]
     assert (clock["step"], clock["gaps"], clock["repeats"], clock["backward"]) == (1.0, 1, 1, 1)
     told = " ".join(invoke(path).stdout.split())
-    assert "clock: steps of 1 in the column's unit; 1 gaps, 1 repeats, 1 steps back" in told
+    assert "clock: steps of 1 ms; 1 gaps, 1 repeats, 1 steps back" in told
     even = tmp_path / "even.csv"
     even.write_text("time_ms,speed_rpm\n" + "".join(f"{k + 0.1 * (k % 2):.3f},{100 + k}\n" for k in range(40)))
     assert "jitter of" in " ".join(invoke(even).stdout.split())
+    dated = tmp_path / "dated.csv"
+    dated.write_text("time,speed_rpm\n" + "".join(f"2026-03-01 12:00:0{k / 10},{100 + k}\n" for k in range(40)))
+    assert "clock: steps of 0.1 s; no gaps" in " ".join(invoke(dated).stdout.split())
 
 
 def test_a_log_without_a_clock_or_a_known_column_is_told_what_to_give(tmp_path: Path) -> None:

@@ -44,13 +44,15 @@ def test_a_stream_of_another_kind_of_actuator_is_refused_before_anything_is_serv
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
     assert "the server's folder cannot be made" in refused(tmp_path / "file" / "kept", "--port", "0")
-    assert "file: a folder is needed, got a file" in refused(tmp_path / "file", "--port", "0")
+    said = refused(tmp_path / "file", "--port", "0")
+    assert "file: a folder is needed, got a file" in said
+    assert "are kept in" not in said
 
 
 @pytest.mark.parametrize("named", [True, False])
 def test_the_folder_that_keeps_everything_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: bool) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("experiments.serve.server.run_server", lambda *_: None)
+    monkeypatch.setattr("experiments.serve.server.run_server", lambda _, say: say("http://here"))
     done = CliRunner().invoke(app, ["serve", *(["kept"] if named else [])])
     assert done.exit_code == 0, done.output
     folder = tmp_path / ("kept" if named else "hydrostate-server")

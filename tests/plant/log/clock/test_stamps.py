@@ -35,6 +35,15 @@ def read(*cells: str) -> list[str]:
         "dim. 1 mars 2026 12:00:00,25",
         "1 de marzo de 2026 12:00:00,25",
         "Mar 01, 2026 12:00:00.250 PM",
+        "01/Mar/2026:12:00:00.250 +0000",
+        "dimanche 1er mars 2026 à 12:00:00,25",
+        "1 mars 2026 à 12 h 00 min 00,25 s",
+        "01.03.2026 à 12h00:00,250",
+        "1 de marzo del 2026, 12:00:00.25 p. m.",
+        "01-mar.-2026 a las 12:00:00,25",
+        "domenica 1° marzo 2026 alle 12:00:00,25",
+        "1 marzo 2026, 12:00:00,25",
+        "1. März 2026 um 12:00:00,25 Uhr",
         "Sun Mar 1 12:00:00.250 2026",
         "Sun, 01 Mar 2026 12:00:00.25 +0000",
         "01.03.2026-12:00:00.250",
@@ -105,18 +114,18 @@ def test_minutes_and_seconds_alone_are_a_time() -> None:
 @pytest.mark.parametrize(
     ("names", "month"),
     [
-        ("Jänner janv. enero", 1),
+        ("Jänner janv. enero gennaio gen", 1),
         ("févr. fevrier Feb.", 2),
         ("avril abril", 4),
-        ("Mai mayo", 5),
-        ("juin Juni junio", 6),
-        ("juil. Juli julio", 7),
+        ("Mai mayo maggio", 5),
+        ("juin Juni junio giugno", 6),
+        ("juil. Juli julio luglio", 7),
         ("août aout agosto", 8),
         ("septiembre setiembre \u017fept Sept.", 9),
-        ("Oktober octubre", 10),
+        ("Oktober octubre ottobre", 10),
         ("Dezember déc. diciembre", 12),
     ],
 )
-def test_months_are_read_in_german_french_and_spanish(names: str, month: int) -> None:
+def test_months_are_read_in_german_french_spanish_and_italian(names: str, month: int) -> None:
     stamps = read_stamps([f"1 {name} 2026 12:00:00" for name in names.split()], lambda _, text: ValueError(text))
     assert set(stamps.astype("M8[D]").tolist()) == {date(2026, month, 1)}
