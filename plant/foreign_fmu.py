@@ -116,7 +116,8 @@ def _description(path: Path) -> Any:
     try:
         return fmpy.read_model_description(str(path))
     except Exception as error:  # whatever is wrong with a file of others
-        raise HydrostateError(f"{path}: an FMU is needed: {error}") from error
+        reason = (error.strerror if isinstance(error, OSError) else None) or error
+        raise HydrostateError(f"{path}: an FMU is needed: {reason}") from error
 
 
 def _package() -> Any:

@@ -10,7 +10,7 @@ from plant.errors import HydrostateError
 PAGES = (".html", ".htm", "")
 """What the name of a page ends in."""
 
-OF_FILES = (".csv", ".txt", ".xml", ".xlsx", ".html", ".htm", ".png", ".pdf", ".toml", ".parquet", ".mat")
+OF_FILES = (".csv", ".txt", ".xml", ".xlsx", ".html", ".htm", ".png", ".pdf", ".toml", ".parquet", ".mat", ".c", ".h")
 """Endings of files: a folder of such a name would be a slip."""
 
 Owner = TypeVar("Owner", Path, str)

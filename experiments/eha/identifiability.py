@@ -111,7 +111,7 @@ def checked_experiment(options: Mapping[str, Any]) -> dict[str, str]:
     seconds, rate = options["seconds"], options["rate"]
     require_known("--noise", options["noise"], [name for name in SENSORS if name != "ideal"])
     require_known("--drive", options["drive"], list(DRIVES))
-    require_positive("--seconds", seconds, "s")
+    require_positive("--seconds (--duration)", seconds, "s")
     require_positive("--rate", rate, "Hz")
     if not 2.0 <= seconds * rate <= MOST_SAMPLES:
         raise HydrostateError(f"--seconds times --rate must be 2 to {MOST_SAMPLES} samples, got {seconds * rate:g}")

@@ -250,7 +250,7 @@ class Log(Shown):
         from experiments.python_user.relation import identified
 
         if not {"input", "output"} <= options.keys():
-            refuse(f"input and output are needed, channels among {', '.join(self.channels)}")
+            refuse(f"input=NAME and output=NAME are needed, channels among {', '.join(self.channels)}")
         inputs, outputs = options.pop("input"), options.pop("output")
         asked = {"input": inputs, "output": outputs, "reference": options.get("reference") or ()}
         names = [name for option, given in asked.items() for name in names_of(option, given)]

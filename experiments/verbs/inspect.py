@@ -73,7 +73,9 @@ def inspect(
     if (write is not None or beside) and len(logs) > 1:
         raise HydrostateError("--write and --with go with one file, got several")
     pages = Pages(own_paths(page_place(report), logs))
-    require_place("--write", write)
+    require_place("--write", write, ".toml")
+    if write is not None and write.exists():
+        raise HydrostateError(f"--write {write}: the file exists already and is not overwritten; give another name")
     prepare_output(out, logs)
     batch = run_logs(logs, work, BLANK, "looking")
     pages.tell()

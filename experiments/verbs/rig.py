@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from experiments.command.options import load_actuator, option
+from experiments.command.output_paths import require_place
 from experiments.command.terminal import emit
 
 commands = typer.Typer(no_args_is_help=True, help="Write a file that describes your own actuator.")
@@ -26,5 +27,6 @@ def rig_init(
 
     kind, _ = load_actuator(plant, None)
     columns = {name: f"NAME:{unit}" for name, unit in kind.channels.items()}
+    require_place("PATH", path, ".toml")
     write_rig_template(path, None if kind.name == EHA else rig_template(kind.parameters, kind.name, columns))
     emit(f"{path}: fill in your actuator's parameters, then pass it as --rig {path}")

@@ -264,6 +264,7 @@ def test_rig_init_writes_a_file_once(tmp_path: Path) -> None:
         f"hydrostate: {path}: the file exists already and is not overwritten; give another name"
     ]
     assert path.read_text() == "# mine"
+    assert "PATH must end in .toml, got" in invoke("rig", "init", tmp_path / "rig.csv").stderr
 
 
 def test_the_help_begins_with_what_a_log_says_and_ends_with_the_papers() -> None:

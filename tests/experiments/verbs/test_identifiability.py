@@ -74,7 +74,7 @@ def test_results_are_written_too(tmp_path: Path) -> None:
         (("--noise", "paper"), "these sensors give differential_pressure_pa no noise"),
         (("--drive", "ramp"), "--drive must be one of"),
         (("--rate", "-1"), "--rate must be positive"),
-        (("--seconds", "nan"), "--seconds must be positive"),
+        (("--seconds", "nan"), "--seconds (--duration) must be positive"),
         (("--seconds", "1e9"), "must be 2 to 2000000 samples"),
         (("--condition", "odd"), "condition must be one of normal"),
         (("--drive", "sine", "--rate", "12"), "frequency"),

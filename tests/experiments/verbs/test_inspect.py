@@ -46,7 +46,7 @@ def test_the_rig_file_that_it_writes_reads_the_log(strange: Path, tmp_path: Path
     assert read_rig(rig).columns["motor_speed_rad_s"] == "Drehzahl [U/min]:U/min"
     assert tomllib.loads(rig.read_text())["columns"].keys() >= {"time_s", "position_m"}
     again = invoke(strange, "--write", rig)
-    assert "is not overwritten" in again.stderr
+    assert again.stderr.startswith(f"hydrostate: --write {rig}: the file exists already and is not overwritten")
 
 
 def test_a_page_that_cannot_be_written_costs_nothing_that_was_found(
