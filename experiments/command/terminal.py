@@ -271,7 +271,7 @@ def guarded(run: Callable[[], object]) -> int:
         return USAGE
     except OSError as error:
         _to_nowhere(sys.stdout)
-        note(f"hydrostate: {error}")
+        note(f"hydrostate: {error.filename or 'standard output'}: {error.strerror or error}")
         return SOME_FAILED
     except Exception as error:
         said = _usage_sentence(error)

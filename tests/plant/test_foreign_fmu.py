@@ -86,7 +86,7 @@ def test_what_is_no_plant_is_refused(fmu: Path, tmp_path: Path) -> None:
     (tmp_path / "no.fmu").write_text("none")
     with pytest.raises(HydrostateError, match="an FMU is needed"):
         simulate_fmu(tmp_path / "no.fmu", DRIVE, T)
-    with pytest.raises(HydrostateError, match="absent.fmu: an FMU is needed: No such file or directory"):
+    with pytest.raises(HydrostateError, match=r"absent\.fmu: an FMU is needed: No such file or directory"):
         simulate_fmu(tmp_path / "absent.fmu", DRIVE, T)
     with pytest.raises(HydrostateError, match="has no variable 'stiffness'"):
         simulate_fmu(fmu, DRIVE, T, parameters={"stiffness": 1.0})
