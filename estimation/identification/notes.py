@@ -97,7 +97,7 @@ class IdentificationCode(Code):
         "gain is shared between them means nothing; leave one out, or log inputs that differ"
     )
     NOTHING_ANSWERED = (
-        "{logs} has at most {longest} samples in one piece, and the model of {output!r} a dead time of {dead_time}: all "
-        "outputs answer inputs from before the log, so there is no fit"
+        "{logs} has at most {longest} samples in one piece, and the model of {output!r} a dead time of {dead_time}: "
+        "all outputs answer inputs from before the log, so there is no fit"
     )
     NO_FIT = "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): do not rely on it"
