@@ -12,12 +12,15 @@ from faults.diagnosis.rmse import Scores
 from faults.notes import AgainstCode, ClassCode
 from plant.log.record import Record
 
-RECORD = Record(1e-3, {"motor_speed_rad_s": np.ones(100), "velocity_m_s": np.full(100, 0.1)})
+PRESSURE = "differential_pressure_pa"
+RECORD = Record(
+    1e-3, {"motor_speed_rad_s": np.ones(100), "velocity_m_s": np.full(100, 0.1), PRESSURE: np.full(100, 1e5)}
+)
 
 
 def scored(*least: float, channels: int = 1, rest: float = 0.09) -> Scores:
     values = dict(zip(CONDITIONS, [*least, *[rest] * (len(CONDITIONS) - len(least))], strict=True))
-    names = ("velocity_m_s", "differential_pressure_pa")[:channels]
+    names = ("velocity_m_s", PRESSURE)[:channels]
     return Scores(values, dict.fromkeys(names, values))
 
 
@@ -52,8 +55,7 @@ def test_models_that_differ_by_less_than_a_thousandth_are_alike(runner_up: float
 
 def test_channels_that_are_0_throughout_are_named_and_tell_no_class() -> None:
     still, moved = np.zeros(100), RECORD["velocity_m_s"]
-    pressure = "differential_pressure_pa"
-    for velocity, named in ((still, f"velocity_m_s and {pressure}"), (moved, pressure)):
+    for velocity, named in ((still, f"velocity_m_s and {PRESSURE}"), (moved, PRESSURE)):
         log = RECORD.replace(velocity_m_s=velocity, differential_pressure_pa=still)
         found = models_verdict(scored(0.01, channels=2), log)
         assert found.outcome is Outcome.NOT_OBSERVABLE
