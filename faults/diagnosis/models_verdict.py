@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.finding import Outcome
-from estimation.log_checks.channel_names import VELOCITY
+from estimation.log_checks.channel_names import POSITION, VELOCITY
 from faults.diagnosis.rmse import Scores, measured_velocity
 from faults.notes import AgainstCode, ClassCode
 from plant.log.record import Record
@@ -102,4 +102,5 @@ def models_verdict(scores: Scores, record: Record) -> ModelsVerdict:
 def _zero_throughout(channels: Sequence[str], record: Record) -> str:
     """Return the channels that are 0 in every sample, in words; empty where there is none."""
     values = {name: measured_velocity(record) if name == VELOCITY else record[name] for name in channels}
-    return " and ".join(name for name, one in values.items() if not np.any(np.nan_to_num(one)))
+    silent = [name for name, one in values.items() if not np.any(np.nan_to_num(one))]
+    return " and ".join(name if name in record else f"the velocity from {POSITION}" for name in silent)

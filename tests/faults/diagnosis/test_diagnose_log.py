@@ -151,7 +151,7 @@ def test_a_drive_that_is_nothing_tells_no_class() -> None:
     found = diagnose_log(still, RIG)
     assert found.outcome is Outcome.NOT_OBSERVABLE
     assert found.condition is None
-    assert ClassCode.MODELS_ALIKE in codes(found)
+    assert ClassCode.CHANNEL_ZERO.note(channels="the velocity from position_m") in found.notes
 
 
 def test_nominal_models_of_a_plain_log_are_run_beside_the_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
