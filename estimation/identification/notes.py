@@ -51,8 +51,8 @@ class IdentificationCode(Code):
         "nothing"
     )
     SLOW_MODELS_PASSED_OVER = (
-        "models with a time constant longer than the record or the period of its inputs ({duration_s:.3g} s): {count}; "
-        "a simpler one was chosen instead"
+        "a simpler model was chosen: {count} others had a time constant longer than the record or the period of its "
+        "inputs ({duration_s:.3g} s)"
     )
     INTEGRATES = (
         "{output!r} integrates its input over the whole record: the model has a pole close to 1, so its steady gain "

@@ -10,7 +10,7 @@ from experiments.diaphragm_motor.control import averaged_course, control_runs
 from experiments.diaphragm_motor.figures import MOTOR_FIGURES
 from experiments.diaphragm_motor.quoted import claimed_speeds, not_reproduced, reproduced, root_efficiency
 from experiments.page.frames import parameter_table
-from experiments.page.numbers import number
+from experiments.page.numbers import MINUS, number
 from experiments.page.tables import Column, Columns, spaced
 from experiments.running.progress import Track
 from experiments.running.study import Found, Seeded, Study
@@ -71,7 +71,7 @@ def _seconds(value: float) -> str:
 
 
 def _change(value: float) -> str:
-    return f"{value:+.1f}"
+    return f"{value:+.1f}".replace("-", MINUS)
 
 
 def _parameters() -> pd.DataFrame:

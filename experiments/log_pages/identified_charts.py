@@ -121,16 +121,16 @@ def residual_charts(view: IdentifiedView, stem: str) -> Charts:
     """Return the correlations of the residual with itself and with each input, between limits of chance."""
     lags = np.arange(-DEFAULT_LAGS, DEFAULT_LAGS + 1)
     reach = NORMAL_95 / np.sqrt(max(np.count_nonzero(np.isfinite(view.residual)), 1))
-    chance = (Mark("y", reach, "95 % of chance"), Mark("y", -reach, ""))
+    chance = (Mark("y", reach, "95 % of white noise"), Mark("y", -reach, ""))
 
     def panel(label: str, values: Array) -> Panel:
         curve = Curve("correlation", values, "blue", "dots")
         return Panel(label, "ratio", (curve,), chance, ends=_ends(values, -2.0 * reach, 2.0 * reach))
 
     own = np.where(lags > 0, correlations(view.residual, view.residual, lags), np.nan)
-    panels = [panel("residual, itself", own)]
+    panels = [panel("residual with itself", own)]
     for k, one in enumerate(view.inputs):
-        label = "residual, input" if len(view.inputs) == 1 else f"residual, {one.name}"
+        label = "residual with input" if len(view.inputs) == 1 else f"residual with {one.name}"
         panels.append(panel(label, correlations(view.residual, view.u[:, k], lags)))
     return Charts(lags.astype(np.float64), "lag [samples]", panels, f"{stem}-residual", "lags")
 

@@ -82,7 +82,7 @@ def _step_words(view: IdentifiedView) -> str:
     if view.linear is not None:
         return "Shaded: 95 % interval, if the model's structure is right."
     if view.is_linear:
-        return "The fit has no covariance by which an interval could be told."
+        return "Without an interval: the fit gives no covariance."
     return "The model is not linear: another height of the step has another shape."
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from estimation.identification.notes import IdentificationCode
 from experiments.identification.of_channels import INPUT, OUTPUT
 from experiments.log_pages.identified_charts import MeasuredCurve
-from experiments.log_pages.identified_view import IdentifiedView, Signal
+from experiments.log_pages.identified_view import AS_LOGGED, IdentifiedView, Signal
 from experiments.page.numbers import number
 from experiments.page.sentences import sentence
 
@@ -89,7 +89,12 @@ def answer_of(view: IdentifiedView) -> str:
     error = _held_back_error(view)
     if error is None:
         return said.rstrip()
-    return f"{said}The error is about {view.output.amount(number(error, 2))} (rms)."
+    return f"{said}The error is about {view.output.amount(number(error, 2))}{_unit_of(view.output)} (rms)."
+
+
+def _unit_of(output: Signal) -> str:
+    """Return what stands for the unit of a column that names none."""
+    return f" in the unit of {output.name}" if output.unit == AS_LOGGED else ""
 
 
 def _held_back_error(view: IdentifiedView) -> float | None:
@@ -163,7 +168,7 @@ def uses_of(view: IdentifiedView, measured: MeasuredCurve | None) -> tuple[list[
             bad.append(f"Frequencies beyond {said}: the log does not tell the response there.")
         else:
             bad.append(
-                f"Controller design: between {said}, it differs from the measured response by "
+                f"Controller design: from {said}, it differs from the measured response by "
                 f"{100.0 * apart:.0f} % (median)."
             )
     elif usable and view.is_linear and len(view.inputs) == 1:

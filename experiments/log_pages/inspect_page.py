@@ -10,8 +10,10 @@ from matplotlib.figure import Figure
 from experiments.page.figure_files import svg_of
 from experiments.page.numbers import MISSING, number
 from experiments.page.render import render_page
+from experiments.page.sentences import sentence
 from experiments.page.style import BLUE, Margins, panels, styled
 from experiments.page.tables import Column
+from plant.log.columns import TIME
 
 if TYPE_CHECKING:
     from plant.log.inspection import ColumnFacts, TableFacts
@@ -30,23 +32,25 @@ def inspect_page(result: Mapping[str, Any], tables: "Sequence[TableFacts]") -> s
     tables : sequence of TableFacts
         The tables of the log.
     """
-    from experiments.log_pages.inspected import block_of
+    from experiments.log_pages.inspected import block_of, clock_sentence
 
-    drawn = [one for facts in tables for one in facts.columns if len(one.present) > 1][:MOST_COLUMNS]
-    with styled():
-        figure = _draw(drawn)
     rows = [row for one in result["tables"] for row in one["columns"]]
+    told = [row for row in rows if row["channel"] == TIME]
+    drawn = [(one, _time_of(facts, told)) for facts in tables for one in facts.columns if len(one.present) > 1]
+    with styled():
+        figure = _draw([pair for pair in drawn if pair[0] is not pair[1]][:MOST_COLUMNS])
+    units = ["unit"] if any(row["unit"] for row in rows) else []
     facts = {
         "result": result,
-        "title": "What the log contains",
+        "title": "This log can be read." if result["reads"] else "This log cannot be read yet.",
         "message": f"{result['message'][:1].upper()}{result['message'][1:]}.",
         "block": block_of(result["columns"]),
+        "clocks": [sentence(clock_sentence(one)) for one in result["tables"]],
         "most": MOST_COLUMNS,
         "columns": pd.DataFrame([_row(row) for row in rows]),
     }
-    shown = {
-        "columns": ("number", "column", "unit", "range", "missing", "channel", Column("sure", "sure", "%"), "because")
-    }
+    sure = Column("sure", "sure", "%")
+    shown = {"columns": ("number", "column", *units, "range", "missing", "channel", sure, "because")}
     return render_page("log_pages/inspect.html", facts, shown, {"figures/columns.svg": svg_of(figure)})
 
 
@@ -64,16 +68,35 @@ def _row(row: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def _draw(columns: "Sequence[ColumnFacts]") -> Figure:
+def _time_of(facts: "TableFacts", told: Sequence[Mapping[str, Any]]) -> "ColumnFacts | None":
+    """Return the column of a table that holds the time, if it rises from row to row."""
+    names = {row["name"] for row in told}
+    for one in facts.columns:
+        if one.heading.name in names and one.values is not None and one.span is not None:
+            return one if bool(np.all(np.diff(one.values) > 0.0)) else None
+    return None
+
+
+def _draw(columns: "Sequence[tuple[ColumnFacts, ColumnFacts | None]]") -> Figure:
+    """Draw columns of numbers, each by its table's time, else by its row."""
     count = max(1, len(columns))
-    figure, axes = panels("Columns", count, 1, 0.9 + 1.45 * count, Margins(left=0.9, down=0.6))
-    for axis, one in zip(axes, columns, strict=False):
+    figure, axes = panels("", count, 1, 0.9 + 1.45 * count, Margins(left=0.9, down=0.6))
+    for place, (axis, (one, time)) in enumerate(zip(axes, columns, strict=False)):
         values = one.values if one.values is not None else np.empty(0)
-        places = np.linspace(0, len(values) - 1, min(len(values), MOST_POINTS)).astype(int)
+        rows = np.linspace(0, len(values) - 1, min(len(values), MOST_POINTS)).astype(int)
         finite = np.where(np.isfinite(values), np.clip(values, -1e300, 1e300), np.nan)
-        axis.plot(places, finite[places], color=BLUE, lw=0.8)
-        axis.set_title(one.heading.name[:80].replace("$", r"\$"))
-        unit = (one.heading.unit or "").replace("$", "")
-        axis.set_ylabel(f"[{unit}]" if unit else "")
-    axes[-1].set_xlabel("row")
+        timed = time is not None and time.values is not None and len(time.values) == len(values)
+        axis.plot(time.values[rows] if timed else rows, finite[rows], color=BLUE, lw=0.8)
+        axis.set_title(_plain(one.heading.name[:80]))
+        axis.set_ylabel(_bracketed(one.heading.unit))
+        if place == count - 1 or columns[place + 1][1] is not time:
+            axis.set_xlabel(f"{_plain(time.heading.name)} {_bracketed(time.heading.unit)}".rstrip() if timed else "row")
     return figure
+
+
+def _bracketed(unit: str | None) -> str:
+    return f"[{_plain(unit)}]" if unit else ""
+
+
+def _plain(text: str) -> str:
+    return text.replace("$", r"\$")

@@ -167,3 +167,24 @@ def block_of(columns: Mapping[str, str]) -> str:
     return "\n".join(
         ["[columns]", *(f"{channel} = {json.dumps(spec, ensure_ascii=True)}" for channel, spec in columns.items())]
     )
+
+
+def clock_sentence(one: Mapping[str, Any]) -> str:
+    """Return what is known of the time of a table, as one sentence.
+
+    Parameters
+    ----------
+    one : Mapping
+        An entry of ``tables``.
+    """
+    clock = one["clock"]
+    if clock is None:
+        step = one["step_s"]
+        without = "no column holds the time: give the time between rows with --sample-time S"
+        return f"the file gives a step of {step:g} s" if step else without
+    flaws = [f"{clock[name]} {said}" for name, said in (("gaps", "gaps"), ("repeats", "repeats")) if clock[name]]
+    if clock["backward"]:
+        flaws.append(f"{clock['backward']} steps back")
+    if clock["jitter"] > 1e-3:
+        flaws.append(f"jitter of {100.0 * clock['jitter']:.2g} % of a step")
+    return f"clock: steps of {clock['step']:.6g} {clock['unit']}; {', '.join(flaws) or 'no gaps'}"

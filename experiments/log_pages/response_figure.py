@@ -21,11 +21,13 @@ def _draw_response(found: MeasuredResponse, title: str) -> Figure:
     gain, radius = np.abs(one.response), one.radius()
     low, high = (_decibels(np.maximum(gain + side * radius, TINY) ** 2) for side in (-1.0, 1.0))
     axes[0].fill_between(one.frequency, np.maximum(low, _decibels(gain**2) - 40.0), high, color=BLUE, alpha=0.2, lw=0)
-    axes[0].semilogx(one.frequency, _decibels(gain**2), color=BLUE, lw=0.9, label="gain, 95 % of the circle")
+    axes[0].semilogx(one.frequency, _decibels(gain**2), color=BLUE, lw=0.9, label="gain, 95 % interval shaded")
     axes[0].set(ylabel="gain [dB]")
     if told is None:
-        axes[1].semilogx(one.frequency, np.degrees(np.unwrap(np.angle(one.response))), color=BLUE, lw=0.9)
-        axes[1].set(ylabel="phase [degrees]", xlabel="frequency [Hz]")
+        known, phase = radius < gain, np.full(gain.size, np.nan)
+        phase[known] = np.degrees(np.unwrap(np.angle(one.response[known])))
+        axes[1].semilogx(one.frequency, phase, color=BLUE, lw=0.9, marker=".", ms=2)
+        axes[1].set(ylabel="phase, where it is known [degrees]", xlabel="frequency [Hz]", xlim=axes[0].get_xlim())
     else:
         for name, marker, colour, where in (
             ("driven", ".", GREY, told.excited),

@@ -98,7 +98,8 @@ def _estimate(rows: pd.DataFrame, key: Experiment) -> Cell:
         return Cell(f"{outcome} (bound {number(bound, 2)} %)" if math.isfinite(bound) else outcome, "none")
     digits = 4 if key.form in {"pressure", "flow"} or key.plant == "reduced" else 2
     low, high = (number(MEGAPASCAL * value, digits) for value in (values.min(), values.max()))
-    worst = number(float(rows["error_percent"].astype(float).abs().max()), 2)
+    error = float(rows["error_percent"].astype(float).abs().max())
+    worst = "< 0.001" if error < 1e-3 else number(error, 2)
     spread = low if low == high else f"{low} to {high}"
     return Cell(f"{spread}, {worst} %", "" if bool(rows["gate_passed"].all()) else "bad")
 
@@ -226,11 +227,11 @@ COLUMNS: Mapping[str, Columns] = {
     "validation_on_circuit": (
         CONDITION,
         Column("rmse_transfer_function_m_s", "transfer function", digits=3),
-        Column("least_transfer_function_m_s", "its least of a circuit", digits=3),
-        Column("largest_transfer_function_m_s", "its largest", digits=3),
+        Column("least_transfer_function_m_s", "best circuit", digits=3),
+        Column("largest_transfer_function_m_s", "worst circuit", digits=3),
         Column("rmse_mathematical_m_s", "mathematical model", digits=3),
-        Column("least_mathematical_m_s", "its least of a circuit", digits=3),
-        Column("largest_mathematical_m_s", "its largest", digits=3),
+        Column("least_mathematical_m_s", "best circuit", digits=3),
+        Column("largest_mathematical_m_s", "worst circuit", digits=3),
     ),
     "class accuracies": (
         Column("bank", "models", words=bank_in_words),

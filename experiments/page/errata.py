@@ -11,12 +11,17 @@ _LINES = files("experiments.page").joinpath("errata.txt").read_text(encoding="ut
 ERRATA: Mapping[str, str] = dict(line.split(": ", 1) for line in _LINES)
 """One sentence an erratum, by number."""
 
-_NUMBER_OR_TAG = re.compile(r"<script\b.*?</script>|<[^>]*>|\b[EPM]\d{1,2}\b", re.DOTALL)
+_CITED_OR_TAG = re.compile(
+    r"<script\b.*?</script>|<[^>]*>|\berrat(?:a|um)(?:(?:,|\s+and|\s+to)?\s+[EPM]\d{1,2}\b)+", re.DOTALL
+)
+_NUMBER = re.compile(r"[EPM]\d{1,2}")
 _LINK = re.compile(r'href="#([EPM]\d{1,2})"')
 
 
 def linked(text: str) -> Markup:
-    """Return a text or a part of a page with its errata numbers linked to the report's list.
+    """Return a text or a part of a page with the errata that it cites linked to the report's list.
+
+    A number counts after the word "errata" alone: columns and actuators of a log may have names such as P1.
 
     Parameters
     ----------
@@ -30,15 +35,30 @@ def linked(text: str) -> Markup:
 
     Examples
     --------
-    >>> linked("sticks (errata E9) & stays")
-    Markup('sticks (errata <a href="#E9">E9</a>) &amp; stays')
+    >>> linked("P1 sticks (errata E9) & stays")
+    Markup('P1 sticks (errata <a href="#E9">E9</a>) &amp; stays')
+    """
+
+    def cited(found: re.Match[str]) -> str:
+        return found[0] if found[0].startswith("<") else numbers_linked(found[0])
+
+    return Markup(_CITED_OR_TAG.sub(cited, str(escape(text))))  # noqa: S704 - escaped just before, or markup
+
+
+def numbers_linked(text: str) -> Markup:
+    """Return a list of errata with each number of `ERRATA` a link.
+
+    Examples
+    --------
+    >>> numbers_linked("E9, E99")
+    Markup('<a href="#E9">E9</a>, E99')
     """
 
     def link(found: re.Match[str]) -> str:
         number = found[0]
         return f'<a href="#{number}">{number}</a>' if number in ERRATA else number
 
-    return Markup(_NUMBER_OR_TAG.sub(link, str(escape(text))))  # noqa: S704 - escaped just before, or markup
+    return Markup(_NUMBER.sub(link, str(escape(text))))  # noqa: S704 - escaped just before
 
 
 def linked_errata(html: str) -> Mapping[str, str]:

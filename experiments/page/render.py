@@ -17,7 +17,10 @@ from experiments.page.sentences import rig_in_words, whole_dates
 from experiments.page.tables import Columns, folded_tables, html_table
 
 _HEADING = re.compile(r'<section id="([^"]+)"[^>]*>\s*<h2>([^:<]*)')
-_BEFORE_UNIT = re.compile(r"(?<=\d) (?=%|(?:V|Hz|kHz|mm|ms|psi|MPa|MB|rpm|bar|N|s|L/min)\b)")
+_KEPT_TOGETHER = re.compile(
+    r"(?<=\d) (?=%|\N{MULTIPLICATION SIGN} 10|(?:V|Hz|kHz|mm|ms|psi|MPa|MB|rpm|bar|N|s|L/min)\b)"
+    r"|(?<=\d \N{MULTIPLICATION SIGN}) (?=10)"
+)
 
 
 def render_page(
@@ -63,7 +66,7 @@ def render_page(
     made = {"table": table, "folded": folded, "figure": figure, "chart": chart}
     made |= {"headings_of": _headings_of, "errata_of": linked_errata}
     page = _templates().get_template(template).render({**facts, **made})
-    return with_scripts(_BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", visible_page(page)))
+    return with_scripts(_KEPT_TOGETHER.sub("\N{NO-BREAK SPACE}", visible_page(page)))
 
 
 @cache

@@ -1,5 +1,6 @@
 """Tables for a reader: columns with their units in the header, cells by what they hold."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
@@ -55,6 +56,8 @@ class Column:
         Unit as shown, after scaling; that of the name's ending in `UNITS` unless told.
     scale : float, optional
         Factor from the name's unit to the unit shown [dimensionless]; goes with `unit`.
+    digits : int, optional
+        Digits of a number; unless told, four, and a number that three digits give exactly stands as it was given.
     words : callable, optional
         From a value to what is written, instead of a number.
     of_row : callable, optional
@@ -65,7 +68,7 @@ class Column:
     header: str | None = None
     unit: str | None = None
     scale: float = 1.0
-    digits: int = 4
+    digits: int | None = None
     words: Callable[[Any], Shown] | None = None
     of_row: Callable[[Row], Shown] | None = None
 
@@ -212,4 +215,7 @@ def _by_type(column: Column, value: Any) -> Shown:
         return _yes_or_no(value)
     if isinstance(value, int) and column.scale == 1.0:
         return right(str(value).replace("-", MINUS))
-    return right(number(None if value is None else column.scale * float(value), column.digits))
+    shown = None if value is None else column.scale * float(value)
+    if column.digits is None and shown is not None and math.isclose(shown, float(f"{shown:.3g}"), rel_tol=1e-12):
+        return as_given(shown)  # it was set, not measured: 275, not 275.0
+    return right(number(shown, column.digits or 4))

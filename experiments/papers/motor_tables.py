@@ -76,7 +76,7 @@ def _relations(ours: pd.DataFrame) -> Iterator[Row]:
         ("blocking_force_fmax", "force_ratio", "kg/m²", "(9) blocking force, a tenth of Table 5's", "M23"),
     )
     notes = {
-        "efficiency": "h_31 is deformation over voltage, with a factor of 1000; row 1's diameter is its area's (M17).",
+        "efficiency": "h_31 is deformation over voltage, times 1000; row 1's diameter is its area's (errata M17).",
         "piston_area_cm2": "Row 3's velocity read as 0.002585 (errata M18, M24).",
         "d31_pm_v": "The median of the six d_31; no one ceramic does it.",
     }

@@ -9,8 +9,9 @@ from typing import Any
 import pandas as pd
 
 from experiments.diaphragm_motor.sweeps import bent_plate, mode_shapes
+from experiments.page.errata import numbers_linked
 from experiments.page.frames import Rows, Tables, tabled
-from experiments.page.numbers import MINUS, MISSING, exact, number
+from experiments.page.numbers import MINUS, MISSING, SUPERSCRIPTS, TIMES, exact, number
 from experiments.page.tables import Cell, Column, Columns, Row, right
 from experiments.papers.claims import PAPERS, all_rows, figure_table, row_table
 from experiments.papers.figures import PAPERS_FIGURES
@@ -86,6 +87,15 @@ def _verdict(word: str) -> Cell:
     return Cell(word, TONES[word])
 
 
+def _in_powers(text: str) -> str:
+    """Return a number such as -4.1e-6 with signs and powers of ten as a reader has them; other texts as they are."""
+    found = re.fullmatch(r"(-?[\d.]+)(?:e(-?\d+))?", text)
+    if found is None:
+        return text
+    power = f"{TIMES}10{found[2].translate(SUPERSCRIPTS)}" if found[2] else ""
+    return found[1].replace("-", MINUS) + power
+
+
 def _ours(row: Row) -> Cell:
     value = row["ours"]
     if isinstance(value, str):
@@ -95,7 +105,7 @@ def _ours(row: Row) -> Cell:
     powers = re.fullmatch(r"-?\d\.?(\d*)e(-?\d+)", str(row["printed"]))
     if powers is not None:  # in the power of ten that is printed, with one digit more, so that both can be compared
         decimals, exponent = len(powers[1]) + 1, int(powers[2])
-        return right(f"{value / float(f'1e{exponent}'):.{decimals}f}e{exponent}".replace("-", MINUS, int(value < 0.0)))
+        return right(_in_powers(f"{value / float(f'1e{exponent}'):.{decimals}f}e{exponent}"))
     # one digit more than is printed, so that both can be compared
     digits = max(5, 1 + len(re.sub(r"e.*|\D", "", str(row["printed"])).lstrip("0")))
     return right(exact(float(f"{value:.{min(digits, 10)}g}")))
@@ -119,18 +129,14 @@ def _tolerance(accept: str) -> str:
     return accept
 
 
-def _errata(text: str) -> str:
-    return text
-
-
 _ROWS: Columns = (
     *("where", "claim"),
-    Column("printed", words=right),
+    Column("printed", words=lambda printed: right(_in_powers(printed))),
     Column("ours", of_row=_ours),
     "unit",
     Column("accept", "tolerance or interval", of_row=_limits),
     Column("verdict", words=_verdict),
-    Column("errata", words=_errata),
+    Column("errata", words=numbers_linked),
     Column("shown_by", "command"),
     "note",
 )

@@ -14,7 +14,7 @@ from experiments.command.output_paths import own_paths, page_place, require_plac
 from experiments.command.pages import Pages
 from experiments.command.terminal import note, table
 from experiments.command.visible_text import visible, visible_name
-from experiments.log_pages.inspected import BLANK, block_of, looked_into
+from experiments.log_pages.inspected import BLANK, block_of, clock_sentence, looked_into
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
         yield visible_name(result["file"])
         for one in result["tables"]:
             yield _shown(one)
-            yield _clock_sentence(one)
+            yield clock_sentence(one)
         yield ""
         yield (
             visible(block_of(result["columns"]))
@@ -120,17 +120,3 @@ def _shown(one: Mapping[str, Any]) -> "RenderableType":
         cells = (row["name"][:60], row["unit"] or "", low, high, str(row["missing"] or ""), row["plot"])
         made.add_row(str(row["number"]), *map(visible, cells), row["channel"] or "", sure, visible(why))
     return made
-
-
-def _clock_sentence(one: Mapping[str, Any]) -> str:
-    clock = one["clock"]
-    if clock is None:
-        step = one["step_s"]
-        without = "no column holds the time: give the time between rows with --sample-time S"
-        return f"the file gives a step of {step:g} s" if step else without
-    flaws = [f"{clock[name]} {said}" for name, said in (("gaps", "gaps"), ("repeats", "repeats")) if clock[name]]
-    if clock["backward"]:
-        flaws.append(f"{clock['backward']} steps back")
-    if clock["jitter"] > 1e-3:
-        flaws.append(f"jitter of {100.0 * clock['jitter']:.2g} % of a step")
-    return f"clock: steps of {clock['step']:.6g} {clock['unit']}; {', '.join(flaws) or 'no gaps'}"

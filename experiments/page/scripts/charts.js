@@ -78,7 +78,7 @@
   }
 
   function series(curve) {
-    const look = { label: curve.name, stroke: css(curve.colour), width: 1.3, spanGaps: false, points: { show: false } };
+    const look = { label: curve.name, stroke: css(curve.colour), width: 1.3, spanGaps: false, pxAlign: 0, points: { show: false } };
     if (curve.look === "dots") return { ...look, paths: () => null, points: { show: true, size: 6, fill: css(curve.colour) } };
     if (curve.look === "edge") return { ...look, width: 0.6 };
     return look;

@@ -153,7 +153,11 @@ def columns(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("arguments", "names", "words"),
     [
-        (("--input", "a,b", "--output", "y"), ["page.html"], ("steady gain from b", "no covariance")),
+        (
+            ("--input", "a,b", "--output", "y"),
+            ["page.html"],
+            ("steady gain from b", "in the unit of y (rms)"),
+        ),
         (
             ("--input", "a,b", "--output", "y,z", "--structure", "state-space", "--order", "1"),
             ["page-y.html", "page-z.html"],

@@ -14,7 +14,15 @@ def test_every_erratum_of_the_documents_has_its_line() -> None:
 
 
 def test_numbers_without_an_erratum_stay_plain() -> None:
-    assert "<a" not in linked("E99 of 1E8")
+    assert "<a" not in linked("errata E99 of 1E8")
+
+
+def test_columns_and_actuators_that_are_named_like_an_erratum_are_no_links() -> None:
+    assert "<a" not in linked("P1 follows M1 (correlation 0.97); start with E9, P2")
+
+
+def test_every_number_of_a_list_is_linked_over_a_line_break_too() -> None:
+    assert list(linked_errata(linked("(errata\n  E2, E8 and E17)"))) == ["E2", "E8", "E17"]
 
 
 def test_only_what_is_linked_is_listed() -> None:

@@ -75,3 +75,9 @@ def test_a_long_table_is_folded_by_group_with_its_counts_and_without_the_column_
     lines = [one.split("</summary>")[0] for one in html.split("<summary>")[1:]]
     assert lines == ["T 1: 2 rows (1 yes, 1 no)", "T 2: 1 row (1 no)"]
     assert html.count("<td") == 2 * len(frame)
+
+
+def test_a_number_that_was_set_has_no_noughts_behind_it_unless_digits_are_told() -> None:
+    frame = pd.DataFrame({"frequency_hz": [275.0], "bias_pressure_pa": [6e5], "flow": [1.1304], "ratio": [0.7]})
+    table = html_table(frame, ("frequency_hz", "bias_pressure_pa", "flow", Column("ratio", digits=2)), "Settings.")
+    assert "".join(f'<td class="number">{cell}</td>' for cell in ("275", "0.6", "1.130", "0.70")) in table

@@ -2,6 +2,7 @@ import math
 
 import pytest
 
+from experiments.page.numbers import MINUS, TIMES
 from experiments.papers.study import _ours, _tolerance
 from experiments.papers.verdict import Basis, Ours, Row, accepted, agrees, drawn_as, excluded, verdict_of
 from experiments.published.digits import digits_half
@@ -120,7 +121,11 @@ def test_an_interval_that_excludes_the_printed_value_is_said() -> None:
 
 @pytest.mark.parametrize(
     ("printed", "value", "shown"),
-    [("5.57e-7", 5.57e-7, "5.570e-7"), ("-7.440e3", -7451.0, "\N{MINUS SIGN}7.4510e3"), ("58", 62.11, "62.11")],
+    [
+        ("5.57e-7", 5.57e-7, f"5.570{TIMES}10⁻⁷"),
+        ("-7.440e3", -7451.0, f"{MINUS}7.4510{TIMES}10³"),
+        ("58", 62.11, "62.11"),
+    ],
 )
 def test_ours_stands_in_the_power_of_ten_that_is_printed(printed: str, value: float, shown: str) -> None:
     cell = _ours({"ours": value, "printed": printed})

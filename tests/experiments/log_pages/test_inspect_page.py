@@ -1,0 +1,51 @@
+"""The page of `hydrostate inspect`: whether the log can be read, its clock, and columns drawn by time."""
+
+from base64 import b64decode
+from pathlib import Path
+
+import numpy as np
+
+from experiments.log_pages.inspect_page import inspect_page
+from experiments.log_pages.inspected import looked_into
+
+
+def page_of(folder: Path, names: str, *columns: np.ndarray) -> str:
+    path = folder / "E9_1.csv"
+    np.savetxt(path, np.column_stack(columns), header=names, delimiter=",", comments="")
+    found, tables = looked_into(path, None)
+    return inspect_page({"file": path.name, **found}, tables)
+
+
+TIME = 1e-3 * np.arange(400.0)
+SPEED = 100.0 * np.sign(np.sin(12.0 * TIME))
+WAY = 1e-6 * np.cumsum(SPEED)
+
+
+def test_the_page_says_first_whether_the_log_can_be_read(tmp_path: Path) -> None:
+    page = page_of(tmp_path, "time_s,motor_speed_rad_s,position_m", TIME, SPEED, WAY)
+    assert "<h1>This log can be read.</h1>" in page
+    assert "no gaps" in page
+    assert "<h1>This log cannot be read yet.</h1>" in page_of(tmp_path, "time_s,M1", TIME, SPEED)
+
+
+def drawing(page: str) -> str:
+    return b64decode(page.split("base64,")[1].split('"')[0]).decode()
+
+
+def test_columns_are_drawn_by_time_or_by_row_where_time_does_not_rise(tmp_path: Path) -> None:
+    by_time = drawing(page_of(tmp_path, "time_s,motor_speed_rad_s", TIME, SPEED))
+    assert by_time.count("<!-- time_s -->") == 1  # it is the axis, not a drawing of its own
+    assert "<!-- row -->" not in by_time
+    assert "<!-- row -->" in drawing(page_of(tmp_path, "time_s,motor_speed_rad_s", np.round(TIME, 2), SPEED))
+
+
+def test_a_column_that_is_named_like_an_erratum_is_no_link(tmp_path: Path) -> None:
+    page = page_of(tmp_path, "time_s,M1,position_m,P1", TIME, SPEED, WAY, SPEED)
+    assert "P1" in page
+    assert 'id="errata"' not in page
+
+
+def test_a_file_without_units_has_no_column_for_them(tmp_path: Path) -> None:
+    page = page_of(tmp_path, "time_s,motor_speed_rad_s,position_m", TIME, SPEED, WAY)
+    assert ">unit<" not in page
+    assert ">unit<" in page_of(tmp_path, "time [s],speed [rpm]", TIME, SPEED)
