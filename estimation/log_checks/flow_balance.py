@@ -165,11 +165,11 @@ def _whatever_the_bias(
     weights = (np.min(share) / share) ** (0.5 * len(flow) / repeats)
     weights /= np.sum(weights)
 
-    open_by = np.where(absent, np.inf, np.maximum(np.diag(inverse), 0.0))  # of what stands still nothing is known
-    variance = repeats * open_by[:2, None] * left + (second[:2] @ without) ** 2
+    variance = repeats * np.maximum(np.diag(inverse)[:2, None], 0.0) * left + (second[:2] @ without) ** 2
     told = factors[:2] @ without
     mean = told @ weights
     std = np.sqrt((variance + (told - mean[:, None]) ** 2) @ weights)
+    std[absent[:2]] = np.inf  # of what stands still nothing is known
     (swept, compressed), (swept_std, compressed_std) = ((one / sizes[:2]).tolist() for one in (mean, std))
     explained = 1.0 - float(left @ weights) / float(np.var(flow))
     moving = float(np.std(parts[0])) / float(np.std(flow))

@@ -22,7 +22,8 @@
     }
     if (column.kind === "state") return element("td", { class: `fleet-${value}`, role: "cell" }, column.words[value]);
     if (column.kind === "name") {
-      return element("th", { scope: "row", role: "rowheader", title: value }, link ? element("a", { href: link }, value) : value);
+      const name = link ? element("a", { href: link }, value) : value;
+      return element("th", { scope: "row", role: "rowheader", title: value }, element("span", { class: "two-lines" }, name));
     }
     const lines = value ? [element("span", { class: "two-lines" }, value)] : [];
     return element("td", { title: value, role: "cell", "data-head": column.label }, ...lines);

@@ -86,7 +86,7 @@
       const [value, unit] = part === null ? ["learning", ""] : [digits(Math.round(part)), "%"];
       tiles.push(tile(`${balanceWords(balance)}: how close to an alarm`, value, unit, "an alarm is raised at 100 %"));
     }
-    tiles.push(tile("rows", String(point.rows), "", `${point.gaps} gaps, ${point.left_out} left out, ${digits(point.time_s)} s`));
+    tiles.push(tile("rows", String(point.rows), "", `${point.gaps} gaps, ${point.left_out} left out, ${digits(point.time_s)}\u00a0s`));
     gauges.replaceChildren(...tiles);
   }
 

@@ -285,7 +285,7 @@ def test_axe_finds_nothing_serious_and_the_page_fits_a_phone(page: Any) -> None:
 def test_a_long_condition_and_a_reason_are_read_whole(browser: Any, tmp_path: Path, width: int) -> None:
     reason = "differential_pressure_pa is missing in 900 of 1000 samples"
     rows = [
-        store_row("a.csv", 4.0, found_condition="minor_leakage_minor_friction"),
+        store_row("P-12_2026-11-22.csv", 4.0, found_condition="minor_leakage_minor_friction"),
         store_row("b.csv", 1.0, outcome="failed", quantities=None, found_condition=None, reason=reason),
     ]
     path = tmp_path / "index.html"
@@ -295,8 +295,10 @@ def test_a_long_condition_and_a_reason_are_read_whole(browser: Any, tmp_path: Pa
     page.wait_for_selector("html.table-drawn", state="attached")
     lines = page.locator('td[data-head="found"] .two-lines')
     assert lines.all_inner_texts() == ["minor leakage + minor friction", reason]
-    whole = lines.evaluate_all("all => all.map(one => one.scrollHeight <= one.clientHeight + 1)")
-    assert whole == [True, True]
+    whole = page.locator(":is(th, td[data-head=found]) .two-lines").evaluate_all(
+        "all => all.map(one => one.scrollHeight <= one.clientHeight + 1 && one.scrollWidth <= one.clientWidth + 1)"
+    )
+    assert whole == [True] * 4
     page.close()
 
 

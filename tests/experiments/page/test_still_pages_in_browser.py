@@ -75,6 +75,23 @@ def test_a_still_page_is_quiet_dark_and_as_wide_as_a_phone(browser: Any, pages: 
     page.close()
 
 
+def test_paper_has_the_colours_of_paper_whatever_the_screen_has(browser: Any, pages: dict[str, Path]) -> None:
+    """Marks of states were printed in the pale colours of dark pages."""
+    found: list[Any] = []
+    for scheme in ("light", "dark"):
+        page = browser.new_page(color_scheme=scheme)
+        page.goto(pages["study"].as_uri())
+        page.emulate_media(media="print")
+        names = "['ink', 'paper', 'vermilion', 'orange', 'green', 'purple', 'grey']"
+        found.append(
+            page.evaluate(
+                f"{names}.map(one => getComputedStyle(document.documentElement).getPropertyValue('--' + one))"
+            )
+        )
+        page.close()
+    assert found[0] == found[1]
+
+
 def test_rows_that_a_click_opens_are_closed_on_a_screen_and_open_on_paper(browser: Any, tmp_path: Path) -> None:
     style = (Path(__file__).parents[3] / "experiments/page/templates/report.css").read_text(encoding="utf-8")
     frame = pd.DataFrame({"where": ["Table 1"] * 40, "claim": ["a claim"] * 40, "verdict": ["reproduced"] * 40})
