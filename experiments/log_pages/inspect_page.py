@@ -85,12 +85,14 @@ def _draw(columns: "Sequence[tuple[ColumnFacts, ColumnFacts | None]]") -> Figure
         values = one.values if one.values is not None else np.empty(0)
         rows = np.linspace(0, len(values) - 1, min(len(values), MOST_POINTS)).astype(int)
         finite = np.where(np.isfinite(values), np.clip(values, -1e300, 1e300), np.nan)
-        timed = time is not None and time.values is not None and len(time.values) == len(values)
-        axis.plot(time.values[rows] if timed else rows, finite[rows], color=BLUE, lw=0.8)
+        by, label = rows, "row"
+        if time is not None and time.values is not None and len(time.values) == len(values):
+            by, label = time.values[rows], f"{_plain(time.heading.name)} {_bracketed(time.heading.unit)}".rstrip()
+        axis.plot(by, finite[rows], color=BLUE, lw=0.8)
         axis.set_title(_plain(one.heading.name[:80]))
         axis.set_ylabel(_bracketed(one.heading.unit))
         if place == count - 1 or columns[place + 1][1] is not time:
-            axis.set_xlabel(f"{_plain(time.heading.name)} {_bracketed(time.heading.unit)}".rstrip() if timed else "row")
+            axis.set_xlabel(label)
     return figure
 
 
