@@ -5,6 +5,10 @@ from pathlib import Path
 
 from experiments.page.errata import ERRATA, linked, linked_errata
 
+UNKNOWN = "E99"
+"""A number that no erratum has."""
+
+
 ROOT = Path(__file__).resolve().parents[3]
 
 
@@ -14,7 +18,7 @@ def test_every_erratum_of_the_documents_has_its_line() -> None:
 
 
 def test_numbers_without_an_erratum_stay_plain() -> None:
-    assert "<a" not in linked("errata E99 of 1E8")
+    assert "<a" not in linked(f"errata {UNKNOWN} of 1E8")
 
 
 def test_columns_and_actuators_that_are_named_like_an_erratum_are_no_links() -> None:
