@@ -78,6 +78,9 @@ def identify_columns(logs: Sequence[Path], fit: ColumnFit, *, as_json: bool, out
         raise HydrostateError("--input and --output go together and need at least one column each")
     if twice := set(fit.inputs) & set(fit.outputs):
         raise HydrostateError(f"--input and --output must be different channels, got {min(twice)!r} for both")
+    for option, named in (("--input", fit.inputs), ("--output", fit.outputs)):
+        if len(set(named)) < len(named):
+            raise HydrostateError(f"{option} must name each column once, got {', '.join(named)}")
     require_known("--structure", fit.structure, (*FREE_STRUCTURES, STATE_SPACE))
     require_positive("--sample-time", fit.sample_time, "s")
     require_positive("--resample", fit.resampled, "s")

@@ -62,7 +62,7 @@ def channels_of(
     Raises
     ------
     HydrostateError
-        If a channel is missing, input and output are one, or a channel does not vary.
+        If a channel is missing or named twice, input and output are one, or a channel does not vary.
 
     Warns
     -----
@@ -71,6 +71,8 @@ def channels_of(
     """
     if output in inputs:
         raise HydrostateError(f"input and output must be different channels, got {output!r} for both")
+    if len(set(inputs)) < len(inputs):
+        raise HydrostateError(f"each input must be named once, got {', '.join(inputs)}")
     wanted = max(one.sample_time for one in records) if sample_time is None else sample_time
     u, y = list[Array](), list[Array]()
     for record in records:

@@ -123,6 +123,8 @@ def test_a_state_space_is_one_model_of_all_outputs(logs: list[Path], tmp_path: P
         (("--input", "load"), "--input and --output go together"),
         (("--input", "lod", "--output", "heat"), "did you mean 'load'?"),
         (("--input", "load", "--output", "load"), "must be different channels"),
+        (("--input", "load,load", "--output", "heat"), "--input must name each column once, got load, load"),
+        (("--input", "load", "--output", "heat,heat"), "--output must name each column once, got heat, heat"),
         (("--input", "load", "--output", "heat", "--structure", "oe"), "--structure must be one of"),
         (("--input", "load", "--output", "heat", "--resample", 0), "--resample must be positive"),
         ((), "--input COLUMN --output COLUMN relates any others"),

@@ -84,6 +84,8 @@ def test_a_model_of_a_log_with_gaps_is_that_of_the_whole_log() -> None:
 def test_one_channel_is_not_both_input_and_output() -> None:
     with pytest.raises(HydrostateError, match="input and output must be different channels, got 'u' for both"):
         channels_of([log(binary())], ["u"], "u")
+    with pytest.raises(HydrostateError, match="each input must be named once, got u, u"):
+        channels_of([log(binary())], ["u", "u"], "y")
 
 
 def test_an_input_of_which_nothing_or_nothing_but_a_level_is_known_is_not_split() -> None:
