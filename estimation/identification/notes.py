@@ -72,9 +72,9 @@ class IdentificationCode(Code):
         "(--structure output-error) may do better"
     )
     LINEAR_STANDS_IN = (
-        "these inputs do not determine the polynomial model of {output!r}: its run is uncertain by {undetermined:.0%} "
+        "these inputs do not determine the nonlinear model of {output!r}: its run is uncertain by {undetermined:.0%} "
         "of the output's deviation in the fitted logs, and a linear model errs by {linear:.0%}, so the linear model "
-        "was simulated instead; fit a log with inputs like these, or see the polynomial run with --structure narx"
+        "was simulated instead; fit a log with inputs like these, or see the nonlinear run with --structure {structure}"
     )
     NO_NONLINEARITY = (
         "neither dead zone nor saturation nor backlash at the input predicts {output!r} better on held-back data: the "
@@ -87,6 +87,11 @@ class IdentificationCode(Code):
     UNRELATED = (
         "the inputs explain {output!r} no better than the same inputs in a shuffled order: the output drifts by itself,"
         " and a slow model imitates the drift; do not rely on the model"
+    )
+    RANDOM_WALK = (
+        "{output!r} wanders by itself like a random walk, by {rmse:.3g} (root mean square): the model was fitted to "
+        "changes from sample to sample, which the walk leaves its gain and poles to; its offset and the fit of its "
+        "free run say nothing of other logs"
     )
     OUTLIERS = (
         "{count} of {total} samples of {output!r} stand out from their neighbours and decide what is fitted: if the "

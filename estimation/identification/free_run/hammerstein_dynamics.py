@@ -9,6 +9,7 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Scaling
 from estimation.identification.free_run.dynamics import OutputErrorDynamics
+from estimation.identification.free_run.fallback import Fallback
 from estimation.identification.free_run.hammerstein_fit import HammersteinFit
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
@@ -29,12 +30,15 @@ class HammersteinDynamics(OutputErrorDynamics):
         What it was fitted to be, and standard deviations, scaled.
     linear : LinearDynamics
         What follows.
+    fallback : Fallback, optional
+        What is run on inputs that do not determine this model.
     """
 
     at_input: str
     values: Array
     std: Array
     linear: LinearDynamics
+    fallback: Fallback | None = None
     kind: ClassVar[str] = "hammerstein"
 
     @property
@@ -47,7 +51,7 @@ class HammersteinDynamics(OutputErrorDynamics):
         return self.linear.form.unanswered(length)
 
     def run(self, u: Array, y: Array) -> Array:
-        """Return the free run, its initial state by least squares of the outputs that are there.
+        """Return the free run, or that of the linear model where it stands in.
 
         Parameters
         ----------
@@ -61,6 +65,28 @@ class HammersteinDynamics(OutputErrorDynamics):
         ndarray, shape (n,)
             Output, scaled.
         """
+        return self.judged_run(u, y)[0]
+
+    def judged_run(self, u: Array, y: Array) -> tuple[Array, tuple[float, float] | None]:
+        """Return the same with the errors to be expected of both models.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n, 1)
+            Input, scaled.
+        y : ndarray, shape (n,)
+            Output, scaled; NaN where missing.
+
+        Returns
+        -------
+        tuple of ndarray, shape (n,), and tuple of float or None
+            Output, scaled, and what `Fallback.errors` returns; None where no linear model may stand in.
+        """
+        own = self._own_run(u, y)
+        return (own, None) if self.fallback is None else self.fallback.judged(u, y, own)
+
+    def _own_run(self, u: Array, y: Array) -> Array:
+        """Return the free run, its initial state by least squares of the outputs that are there."""
         kind, known = NONLINEARITIES[self.at_input], np.isfinite(y)
         begun = u[0, 0] + self.values[0] * np.linspace(-1.0, 1.0, PLACES) if kind.remembers else np.zeros(1)
         if not known.any():
@@ -84,7 +110,9 @@ class HammersteinDynamics(OutputErrorDynamics):
     def to_dict(self) -> dict[str, Any]:
         """Return JSON values."""
         std = [float(one) if np.isfinite(one) else None for one in self.std]
-        return {"bend": self.at_input, "values": self.values.tolist(), "std": std, "linear": self.linear.to_dict()}
+        other = {} if self.fallback is None else {"fallback": self.fallback.to_dict()}
+        linear = self.linear.to_dict()
+        return {"bend": self.at_input, "values": self.values.tolist(), "std": std, "linear": linear, **other}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> "HammersteinDynamics":
@@ -93,7 +121,9 @@ class HammersteinDynamics(OutputErrorDynamics):
         if values["bend"] not in NONLINEARITIES:
             raise ValueError(f"a nonlinearity among {', '.join(NONLINEARITIES)} is needed, got {values['bend']!r}")
         linear = LinearDynamics.from_dict(values["linear"])
-        return cls(str(values["bend"]), np.array(values["values"], dtype=np.float64), np.array(std), linear)
+        other = values.get("fallback")
+        fallback = None if other is None else Fallback.from_dict(other, cls.from_dict)
+        return cls(str(values["bend"]), np.array(values["values"], dtype=np.float64), np.array(std), linear, fallback)
 
     @classmethod
     def of(cls, fit: HammersteinFit, std: Array) -> "HammersteinDynamics":

@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -48,11 +48,14 @@ from estimation.identification.free_run.fewer_samples import on_fewer
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.hammerstein_fit import deviations, finished, refitted
 from estimation.identification.free_run.held_back import BLOCKS
+from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.integrating import refitted_linear
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
-from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
+from estimation.identification.free_run.linear_fit import COARSE
+from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
+from estimation.identification.free_run.random_walk import from_changes, wandering
 from estimation.identification.free_run.transfer_function import linear_model
 from estimation.identification.free_run.unrelated import bend_explains, linear_explains, polynomial_explains
 from estimation.identification.notes import IdentificationCode
@@ -72,6 +75,7 @@ WARNED = (
     IdentificationCode.FEEDBACK,
     IdentificationCode.INPUTS_ALIKE,
     IdentificationCode.OUTLIERS,
+    IdentificationCode.RANDOM_WALK,
 )
 """Notes that are raised as warnings too; the others say only what was passed over."""
 
@@ -92,32 +96,6 @@ CLEAR_MARGIN = 0.15
 """Share by which a nonlinear model must do better than the linear one on what was held back."""
 
 
-@dataclass(frozen=True, eq=False)
-class Identified:
-    """A model with what it was chosen by.
-
-    Parameters
-    ----------
-    quality : FreeRunQuality
-        On the data that it was fitted to.
-    held_back_percent : float
-        Fit of the free run on blocks held back, each by a fit to the others; NaN where there were none.
-    candidates : tuple of dict
-        Everything that was compared: structure, order, delays, held-back fit and information criteria.
-    notes : tuple of Note
-        What was passed over, or is doubtful.
-    sound : bool
-        Whether the model may be believed.
-    """
-
-    model: FreeRunModel
-    quality: FreeRunQuality
-    held_back_percent: float
-    candidates: tuple[dict[str, Any], ...]
-    notes: tuple[Note, ...]
-    sound: bool
-
-
 def identify_channels(
     data: Channels,
     *,
@@ -134,7 +112,8 @@ def identify_channels(
         One log or several.
     structure : str
         ``"output-error"``: linear; ``"narx"``: polynomial, its terms chosen by the free run; ``"auto"``: linear,
-        unless the polynomial one is clearly better on blocks held back, or of one input the next. Of one input also
+        unless the polynomial one is clearly better on blocks held back, or of one input the next. Both are fitted to
+        changes from sample to sample, and linear, where the output wanders by itself (`random_walk`). Of one input also
         ``"hammerstein"``: a dead zone, saturation or backlash in front of a linear model, where one of them is better
         there than none; and the keys of `other_structures.ADOPTED`, at the order that output error is given.
         ``"wiener"``: linear, its output measured without a sign; of outputs that may be, ``"auto"`` tries it too.
@@ -175,6 +154,10 @@ def _identified(
     part = section(whole, MOST_CHOSEN)
     orders = range(1, HIGHEST + 1) if order is None else (order,)
     delays = None if delay is None else (delay,) * len(data.inputs)
+    if structure in ("output-error", "auto"):
+        walk = wandering(whole, part, list(orders), delays, n_numerator)
+        if walk is not None:
+            return from_changes(walk, data, by)
     linear = linear_candidates(part, list(orders), delays, n_numerator)
     best, notes = believable(linear, part, by)
     rows = [linear_row(one) for one in linear]
@@ -220,7 +203,8 @@ def _identified(
             raise HydrostateError(f"no polynomial model of {data.output!r} runs free without growing beyond bounds")
         taken = better is not None and (structure == "narx" or not sound or _clearly_better(better, straight))
         if nonlinear is not None and not (taken and better is not None and better.price < nonlinear.held_back):
-            return _nonlinear(nonlinear, data, whole, rows)
+            stands_in = _fallback(nonlinear, own, compared, whole) if structure == "auto" and sound else None
+            return _nonlinear(nonlinear, data, whole, rows, stands_in)
         if taken and better is not None:
             dynamics, held_back, named = _refitted(better, whole), better.held_back, "narx"
             if structure == "auto" and sound:
@@ -266,12 +250,18 @@ def _worthwhile_nonlinearity(
     return worthwhile(found, linear, best, surely=surely)
 
 
-def _nonlinear(taken: HammersteinCandidate, data: Channels, whole: Channels, rows: list[dict[str, Any]]) -> Identified:
+def _nonlinear(
+    taken: HammersteinCandidate,
+    data: Channels,
+    whole: Channels,
+    rows: list[dict[str, Any]],
+    fallback: Fallback | None = None,
+) -> Identified:
     """Return a model with a nonlinearity at its input, fitted to all data."""
     part = section(whole, MOST_FITTED)
     # on the data of the comparison a start elsewhere might lead to a model that no block has judged
     fit = finished(taken.fit, whole) if section(whole, MOST_COMPARED) is whole else refitted(taken.fit, part)
-    dynamics = HammersteinDynamics.of(fit, deviations(fit, part))
+    dynamics = replace(HammersteinDynamics.of(fit, deviations(fit, part)), fallback=fallback)
     model = FreeRunModel(data.inputs, data.output, data.sample_time, "hammerstein", scaled(data)[1], dynamics)
     return _told(model, data, taken.held_back, rows)
 
@@ -336,9 +326,16 @@ def _refitted(found: PolynomialCandidate, whole: Channels) -> PolynomialDynamics
     return PolynomialDynamics.of(found.refit(section(whole, MOST_FITTED)) or found.fit)
 
 
-def _fallback(taken: PolynomialCandidate, linear: Candidate, part: Channels, whole: Channels) -> Fallback:
-    """Return the fallback for inputs that do not determine a polynomial model."""
-    others = tuple(LinearDynamics.of(refitted_linear(linear.fit, part.without(mask))) for mask in blocks(part, BLOCKS))
-    parts = tuple(PolynomialDynamics.of(one) for one in taken.parts)
+def _fallback(
+    taken: PolynomialCandidate | HammersteinCandidate, linear: Candidate, part: Channels, whole: Channels
+) -> Fallback:
+    """Return the fallback for inputs that do not determine a nonlinear model."""
+    masks = blocks(part, BLOCKS)
+    others = tuple(LinearDynamics.of(refitted_linear(linear.fit, part.without(mask))) for mask in masks)
     share = part.n_samples / max(part.n_samples, section(whole, MOST_FITTED).n_samples)
-    return Fallback(LinearDynamics.of(refitted_linear(linear.fit, whole)), others, parts, linear.held_back, share)
+    straight = LinearDynamics.of(refitted_linear(linear.fit, whole))
+    if isinstance(taken, PolynomialCandidate):
+        return Fallback(straight, others, tuple(map(PolynomialDynamics.of, taken.parts)), linear.held_back, share)
+    fits = [refitted(taken.fit, part.without(mask), COARSE) for mask in masks]
+    parts = tuple(HammersteinDynamics.of(fit, np.full(fit.values.size, np.nan)) for fit in fits)
+    return Fallback(straight, others, parts, linear.held_back, share, taken.held_back)

@@ -6,6 +6,7 @@ from itertools import count
 import numpy as np
 
 from estimation.identification.free_run.data import Channels, in_scale
+from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_variables import BEYOND
@@ -58,7 +59,7 @@ def inputs_beyond(model: FreeRunModel, data: Channels) -> list[Note]:
 def linear_instead(
     model: FreeRunModel, data: Channels, judged: Sequence[tuple[float, float]] | None = None
 ) -> list[Note]:
-    """Return a note if a linear model stands in for a polynomial one that these inputs do not determine.
+    """Return a note if a linear model stands in for a nonlinear one that these inputs do not determine.
 
     Parameters
     ----------
@@ -72,10 +73,10 @@ def linear_instead(
     Returns
     -------
     list of Note
-        One at most, of the log on which the polynomial model is determined least.
+        One at most, of the log on which the nonlinear model is determined least.
     """
     dynamics = model.dynamics
-    if not isinstance(dynamics, PolynomialDynamics) or dynamics.fallback is None:
+    if not isinstance(dynamics, PolynomialDynamics | HammersteinDynamics) or dynamics.fallback is None:
         return []
     if judged is None:
         one = in_scale(data, model.scaling)
@@ -84,7 +85,11 @@ def linear_instead(
     undetermined, linear = max([(0.0, 1.0), *judged], key=lambda pair: pair[0] / pair[1])
     if undetermined < linear:
         return []
-    return [IdentificationCode.LINEAR_STANDS_IN.note(output=data.output, undetermined=undetermined, linear=linear)]
+    return [
+        IdentificationCode.LINEAR_STANDS_IN.note(
+            output=data.output, structure=model.structure, undetermined=undetermined, linear=linear
+        )
+    ]
 
 
 def doubts_about_inputs(

@@ -130,7 +130,7 @@ class FreeRunModel:
         """
         inputs, outputs = self._scaled(u, y)
         errors: tuple[float, float] | None = None
-        if isinstance(self.dynamics, PolynomialDynamics):
+        if isinstance(self.dynamics, PolynomialDynamics | HammersteinDynamics):
             run, errors = self.dynamics.judged_run(inputs, outputs)
         else:
             run = self.dynamics.run(inputs, outputs)

@@ -9,7 +9,6 @@ import numpy as np
 from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels, Scaling
 from estimation.identification.free_run.fallback import Fallback
-from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_problem import unanswered
 from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs
@@ -238,12 +237,7 @@ class PolynomialDynamics:
         for row, term in zip(terms, values["terms"], strict=True):
             row[: len(term)] = term
         other = values.get("fallback")
-        fallback = None
-        if other is not None:
-            straight = tuple(LinearDynamics.from_dict(one) for one in other["linear_parts"])
-            parts = tuple(cls.from_dict(one) for one in other["parts"])
-            error, share = float(other["error"]), float(other.get("share", 1.0))
-            fallback = Fallback(LinearDynamics.from_dict(other["linear"]), straight, parts, error, share)
+        fallback = None if other is None else Fallback.from_dict(other, cls.from_dict)
         return cls(variables, terms, np.array(values["values"], dtype=np.float64), friction, fallback)
 
     @classmethod

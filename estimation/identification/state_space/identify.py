@@ -83,7 +83,9 @@ def identify_outputs(
     rows = [(*one.candidates, *other.candidates) for one, other in zip(single, together, strict=True)]
     fewer = together[0].model.n_values < sum(one.model.n_values for one in single)
     bar = _left(single) * (1.0 if fewer else 1.0 - CLEARLY)
-    related = not any(note.code == IdentificationCode.UNRELATED for one in single for note in one.notes)
+    # what wanders by itself a state space would follow with slow poles
+    alone = (IdentificationCode.UNRELATED, IdentificationCode.RANDOM_WALK)
+    related = not any(note.code in alone for one in single for note in one.notes)
     better = related and all(one.sound for one in together) and _left(together) < bar
     return [replace(one, candidates=row) for one, row in zip(together if better else single, rows, strict=True)]
 

@@ -1,5 +1,6 @@
-"""A linear model stands in for a polynomial one where inputs do not determine the latter, and that is said."""
+"""A linear model stands in for a nonlinear one where inputs do not determine the latter, and that is said."""
 
+import json
 from dataclasses import replace
 from typing import Any
 
@@ -7,8 +8,9 @@ import numpy as np
 import pytest
 
 from estimation.arrays import Array
-from estimation.identification.free_run.data import Channels, channels_from
+from estimation.identification.free_run.data import Channels, Scaling, channels_from
 from estimation.identification.free_run.fallback import Fallback, jackknife
+from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.identify import Identified, identify_channels
 from estimation.identification.free_run.input_range import linear_instead
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
@@ -23,6 +25,11 @@ N = 400
 def gain(value: float) -> LinearDynamics:
     """Return ``y = value u``."""
     return LinearDynamics(Form(0, (1,), (0,)), np.array([value, 0.0]))
+
+
+def bend(value: float) -> HammersteinDynamics:
+    """Return ``y = value u`` up to the end of a saturation."""
+    return HammersteinDynamics("saturation", np.array([-5.0, 5.0]), np.full(2, np.nan), gain(value))
 
 
 class Fails:
@@ -64,6 +71,27 @@ def test_what_is_fitted_to_more_samples_is_better_determined() -> None:
     assert many.errors(u, y, own) == pytest.approx((0.06, 0.1))
     assert np.array_equal(few.judged(u, y, own)[0], np.ones(9))
     assert np.array_equal(many.judged(u, y, own)[0], own)
+
+
+@pytest.mark.parametrize(("own_error", "apart", "taken"), [(0.05, 0.04, "own"), (0.05, 0.08, "linear")])
+def test_what_a_bend_leaves_of_held_back_blocks_is_counted_beside(own_error: float, apart: float, taken: str) -> None:
+    parts = tuple(bend(2.0 + sign * apart / 2.0) for sign in (1, -1, 1, -1))
+    fallback = Fallback(gain(1.0), (gain(1.0),) * 4, parts, 0.085, own_error=own_error)
+    whole = replace(bend(2.0), fallback=fallback)
+    u, y = np.ones((9, 1)), np.full(9, np.nan)
+    run, errors = whole.judged_run(u, y)
+    assert errors == pytest.approx((np.hypot(own_error, apart), 0.085))
+    assert run == pytest.approx(np.full(9, 2.0 if taken == "own" else 1.0))
+    by = Scaling(np.zeros(1), np.ones(1), 0.0, 1.0)
+    model = FreeRunModel(("u",), "y", 1.0, "hammerstein", by, whole)
+    again = FreeRunModel.from_dict(json.loads(json.dumps(model.to_dict())))
+    assert again.simulate(u) == pytest.approx(run)
+    near = 1.0 + 1e-3 * np.arange(20.0)
+    notes = linear_instead(again, channels_from([near[:, None]], [near], 1.0, ["u"], "y"))
+    assert [note.code for note in notes] == ([] if taken == "own" else ["linear_stands_in"])
+    assert all("--structure hammerstein" in str(note) for note in notes)
+    # one that was asked for is run as it is
+    assert replace(whole, fallback=None).run(u, y) == pytest.approx(np.full(9, 2.0))
 
 
 def test_a_run_that_has_no_end_is_replaced() -> None:

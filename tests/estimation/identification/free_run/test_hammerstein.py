@@ -22,7 +22,7 @@ from estimation.identification.free_run.choose_linear import linear_candidates
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.hammerstein_fit import HammersteinFit, HammersteinProblem, fit_hammerstein
-from estimation.identification.free_run.held_back import pooled
+from estimation.identification.free_run.held_back import BLOCKS, pooled
 from estimation.identification.free_run.identify import Identified, identify_channels
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES, play
 from estimation.identification.free_run.linear_problem import Form, LinearFit
@@ -138,6 +138,11 @@ def test_auto_takes_a_bend_where_it_is_better_than_every_other_on_blocks_held_ba
     assert found.model.dynamics.at_input == bent.kind
     rest = [row["held_back_percent"] for row in found.candidates if row["structure"] != "hammerstein"]
     assert found.held_back_percent > max(rest)
+    # the linear model that was judged beside it stands in on inputs that do not determine it
+    fallback = found.model.dynamics.fallback
+    assert fallback is not None
+    assert len(fallback.parts) == len(fallback.linear_parts) == BLOCKS
+    assert fallback.own_error == pytest.approx(1.0 - found.held_back_percent / 100.0)
 
 
 def test_a_saved_model_of_an_unknown_kind_is_refused() -> None:

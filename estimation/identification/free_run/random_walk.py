@@ -1,0 +1,279 @@
+"""Outputs that wander by themselves, as a random walk: linear models fitted to changes from sample to sample.
+
+What adds up at an output, such as the drift of a sensor, is no noise that a free run averages out: the fit follows it
+with slow poles, and its gain is anything. Changes from sample to sample obey the same transfer function, and a walk's
+own changes are white there (Box and Jenkins 1970). Whether there is a walk is told by what such a fit leaves: summed,
+it does not come back to its trend (Dickey and Fuller 1979), and its changes have no memory beyond one sample. What a
+plant's nonlinearity or a pole too few leave comes back, or is smooth. White noise of a sensor beside the walk adds to
+neighbouring changes with opposite signs, so these may be unlike.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.arrays import Array, BoolArray
+from estimation.identification.fit.residual_tests import DEFAULT_LAGS
+from estimation.identification.fit.validate import estimate_initial_state
+from estimation.identification.free_run.believable import believable
+from estimation.identification.free_run.candidate_rows import linear_row
+from estimation.identification.free_run.choose_linear import Candidate, linear_candidates
+from estimation.identification.free_run.data import Channels, Scaling, blocks, in_scale, scaled
+from estimation.identification.free_run.dead_times import ORDER, estimate_delays
+from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled
+from estimation.identification.free_run.identified import Identified
+from estimation.identification.free_run.integrating import refitted_linear
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
+from estimation.identification.free_run.linear_fit import COARSE, fit_linear
+from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
+from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.transfer_function import linear_model
+from estimation.identification.notes import IdentificationCode
+from estimation.stretches import stretches
+from estimation.trust.chi_square import chi_square_tail
+
+FEWEST = 200
+"""Outputs in a row below which a walk is not told from slow noise; of white noise the statistic is -7 there."""
+
+COMES_BACK = -3.96
+"""Statistic of Dickey and Fuller, with a trend, that a walk falls below in 1 % of all long records (their table)."""
+
+LAGS_SHARE = 50
+"""Changes that the test allows for are at most one in so many samples, so that white noise has a statistic of about
+-7, the root of this number; and at most as many as Schwert (1989) takes for noise beside a walk."""
+
+REMEMBERED = 1e-3
+"""Probability, were changes white beyond one sample, below which they are held to remember: a walk is missed as
+often."""
+
+ALIKE = 3.0
+"""Correlation of neighbouring changes from which they are smooth, not white [standard errors]: the same probability."""
+
+SMOOTH = 0.1
+"""Share of the power of changes that those two samples ago or more explain, from which no more poles than `ORDER` are
+asked whether it is a walk: poles that are missing leave less, and bends more (0.2 to 4; judged)."""
+
+MATERIAL = 0.15
+"""Least root mean square by which the output wanders on blocks held back, over its deviation: bends leave up to 0.12
+behind a linear model that looks like a walk and white noise (five of 99 logs without one), and less moves a gain by
+little."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wandering:
+    """A linear model that was fitted to changes, brought to the levels of its data.
+
+    Parameters
+    ----------
+    fit : LinearFit
+        Scaled as the levels are; its offset and initial states by least squares of the levels.
+    changes, by : Channels, Scaling
+        What it was fitted to, scaled, and how.
+    of_changes : LinearFit
+        The fit in their scale.
+    held_back : float
+        Free-run error on blocks held back, over the output's deviation [dimensionless].
+    candidates : tuple of Candidate
+        What was compared, on changes.
+    """
+
+    fit: LinearFit
+    changes: Channels
+    by: Scaling
+    of_changes: LinearFit
+    held_back: float
+    candidates: tuple[Candidate, ...]
+
+
+def wandering(
+    data: Channels, part: Channels, orders: Sequence[int], delays: tuple[int, ...] | None, sizes: int | None
+) -> Wandering | None:
+    """Return the linear model of changes of an output that wanders by itself; None where it does not.
+
+    Parameters
+    ----------
+    data, part : Channels
+        Levels, scaled: all, and those on which models are compared.
+    orders : sequence of int
+        As `linear_candidates` takes them.
+    delays : tuple of int or None
+        Dead time of each input [samples]; None estimates it.
+    sizes : int, optional
+        Numerator coefficients of each input.
+    """
+    if part.n_samples < FEWEST:
+        return None
+    changed, by = scaled(changes_of(part))
+    late = estimate_delays(changed) if delays is None else delays
+    first = fit_linear(Form(ORDER, (ORDER + 1,) * len(late), late), changed, least_gain=COARSE)
+    rest = _longest_rest(first, changed)
+    if rest.size < FEWEST or returns(rest) <= COMES_BACK or np.sum(_correlations(rest)[1:] ** 2) > SMOOTH:
+        return None
+    candidates = linear_candidates(changed, orders, delays, sizes)
+    best, _ = believable(candidates, changed, by)
+    settles = not (best.doubt or best.fit.integrates or best.outlasts_block(changed))
+    if not settles or not best.held_back < 1.0 or not walks(best.fit, changed):
+        return None
+    whole = in_scale(changes_of(data), by)
+    found = refitted_linear(best.fit, whole)
+    errors = [_error_held_back(best.fit, part, masks, by) for masks in blocks(part, BLOCKS)]
+    left = pooled(errors)
+    return Wandering(at_levels(found, data, by), whole, by, found, left, tuple(candidates)) if left > MATERIAL else None
+
+
+def from_changes(walk: Wandering, data: Channels, by: Scaling) -> Identified:
+    """Return the model of an output that wanders, its covariance that of the changes.
+
+    Parameters
+    ----------
+    data : Channels
+        Levels, in units of the channels.
+    by : Scaling
+        Of the levels.
+    """
+    dynamics = LinearDynamics.of(walk.fit)
+    model = FreeRunModel(data.inputs, data.output, data.sample_time, "output-error", by, dynamics)
+    quality = model.quality(data.u, data.y)
+    if len(data.inputs) == 1:
+        units = Scaling(walk.by.u_mean, by.u_std * walk.by.u_std, walk.by.y_mean, by.y_std * walk.by.y_std)
+        linear = linear_model(walk.of_changes, walk.changes, units)
+        simulated = model.simulate(data.u[0], data.y[0])
+        linear = replace(linear, offset=model.offset, fit_percent=quality.fit_percent, rmse=quality.rmse)
+        linear = replace(linear, initial_state=estimate_initial_state(linear, data.u[0][:, 0], simulated))
+        model = replace(model, linear=linear)
+    note = IdentificationCode.RANDOM_WALK.note(output=data.output, rmse=quality.rmse)
+    rows = tuple(map(linear_row, walk.candidates))
+    return Identified(model, quality, 100.0 * (1.0 - walk.held_back), rows, (note,), sound=True)
+
+
+def changes_of(data: Channels) -> Channels:
+    """Return how much each channel changes from the sample before; of the first one, inputs by nothing.
+
+    Parameters
+    ----------
+    data : Channels
+        Levels.
+    """
+    return replace(
+        data,
+        u=tuple(np.diff(u, axis=0, prepend=u[:1]) for u in data.u),
+        y=tuple(np.diff(y, prepend=np.nan) for y in data.y),
+    )
+
+
+def walks(fit: LinearFit, changes: Channels) -> bool:
+    """Return whether what a model leaves of changes is white beyond one sample, and its sum does not come back.
+
+    Parameters
+    ----------
+    fit : LinearFit
+        Of these changes.
+    changes : Channels
+        Scaled.
+    """
+    left = _longest_rest(fit, changes)
+    return left.size >= FEWEST and returns(left) > COMES_BACK and not remembers(left)
+
+
+def returns(changes: Array) -> float:
+    """Return the statistic of Dickey and Fuller of the sum of changes: how surely it comes back to its trend.
+
+    Parameters
+    ----------
+    changes : ndarray, shape (n,)
+        No gaps.
+
+    Returns
+    -------
+    float
+        Negative where it comes back [standard errors].
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(0).standard_normal(1000)
+    >>> returns(noise) > COMES_BACK, returns(np.diff(noise)) > COMES_BACK
+    (True, False)
+    """
+    n = changes.size
+    lags = min(int(12.0 * (n / 100.0) ** 0.25), n // LAGS_SHARE)
+    level = np.cumsum(changes) - changes
+    past = [changes[lags - k : n - k] for k in range(1, lags + 1)]
+    columns = np.column_stack([level[lags:], np.ones(n - lags), np.arange(n - lags) / n, *past])
+    values, *_ = np.linalg.lstsq(columns, changes[lags:], rcond=None)
+    left = changes[lags:] - columns @ values
+    variance = float(left @ left) / (left.size - columns.shape[1])
+    spread = float(np.linalg.pinv(columns.T @ columns)[0, 0]) * variance
+    return float(values[0]) / float(np.sqrt(spread)) if spread > 0.0 else -np.inf
+
+
+def remembers(changes: Array) -> bool:
+    """Return whether changes depend on earlier ones otherwise than white noise beside a walk makes them.
+
+    Neighbours may be unlike, and not alike; those two samples ago or more are asked as Box and Pierce (1970) do.
+
+    Parameters
+    ----------
+    changes : ndarray, shape (n,)
+        No gaps.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(0).standard_normal(1000)
+    >>> remembers(noise), remembers(np.diff(noise)), remembers(noise[2:] + noise[1:-1] + noise[:-2])
+    (False, False, True)
+    """
+    found = _correlations(changes)
+    # correlations of a moving average of one term have this variance at the lags that it has none at (Bartlett 1946)
+    spread = (1.0 + 2.0 * float(found[0]) ** 2) / changes.size
+    if found[0] > ALIKE / np.sqrt(changes.size):
+        return True
+    return chi_square_tail(float(np.sum(found[1:] ** 2)) / spread, DEFAULT_LAGS - 1) < REMEMBERED
+
+
+def at_levels(fit: LinearFit, data: Channels, by: Scaling) -> LinearFit:
+    """Return a fit of changes as one of levels, offset and initial states by least squares.
+
+    Parameters
+    ----------
+    data : Channels
+        Levels, scaled; the changes are theirs.
+    by : Scaling
+        Of the changes.
+    """
+    form = fit.form
+    b = [one * by.y_std / std for one, std in zip(fit.numerators, by.u_std, strict=True)]
+    problem = Problem(form, data)
+    columns, used = problem.linear_columns(fit.f), problem.used
+    driven = columns[:, : form.n_b] @ np.concatenate(b)
+    free = columns[:, form.n_b :]
+    values = np.linalg.lstsq(free[used], (problem.y - driven)[used], rcond=None)[0]
+    left = (problem.y - driven - free @ values)[used]
+    return LinearFit(form, np.concatenate([*b, fit.f[1:], values]), problem.share * float(left @ left))
+
+
+def _correlations(changes: Array) -> Array:
+    """Return how changes are correlated with those one sample ago, two, and so on [dimensionless]."""
+    centred = changes - changes.mean()
+    power = max(float(centred @ centred), 1e-300)
+    return np.array([centred[k:] @ centred[:-k] for k in range(1, DEFAULT_LAGS + 1)]) / power
+
+
+def _longest_rest(fit: LinearFit, changes: Channels) -> Array:
+    """Return what a model leaves of the longest row of changes without gaps."""
+    problem = Problem(fit.form, changes)
+    left = np.where(problem.used, problem.y - problem.jacobian(fit.theta)[0], np.nan)
+    rows = [
+        part[begin:end]
+        for part in np.split(left, problem.bounds[1:-1])
+        for begin, end in zip(*stretches(np.isfinite(part)), strict=True)
+    ]
+    return max(rows, key=lambda row: row.size, default=np.zeros(0))
+
+
+def _error_held_back(fit: LinearFit, part: Channels, masks: Sequence[BoolArray], by: Scaling) -> float:
+    """Return the free-run error on a block of levels by a fit to changes outside it."""
+    outside = part.without(masks)
+    found = at_levels(refitted_linear(fit, in_scale(changes_of(outside), by), least_gain=COARSE), outside, by)
+    problem = Problem(found.form, part)
+    return block_error(problem.jacobian(found.theta)[0] - problem.y, np.concatenate(masks) & problem.used)

@@ -1,0 +1,119 @@
+"""What wanders by itself is told from what a plant does, and its gain is read off changes from sample to sample."""
+
+import warnings
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from estimation.arrays import Array
+from estimation.identification.free_run.data import Channels, channels_from, scaled
+from estimation.identification.free_run.identify import Identified, identify_channels
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_problem import Form
+from estimation.identification.free_run.random_walk import (
+    COMES_BACK,
+    at_levels,
+    changes_of,
+    remembers,
+    returns,
+    wandering,
+)
+from plant.errors import LogWarning
+
+N, POLE, GAIN = 1200, 0.8, 2.0
+LEVELS: Array = np.repeat(np.random.default_rng(16800).standard_normal(N // 10), 10)
+
+
+def log(seed: int, step: float = 0.1, noise: float = 0.0, gain: float = GAIN) -> Channels:
+    """Return a plant of the first order whose output has a walk and white noise on it."""
+    rng, y = np.random.default_rng(seed), np.zeros(N)
+    for t in range(1, N):
+        y[t] = POLE * y[t - 1] + (1.0 - POLE) * gain * LEVELS[t - 1]
+    y += np.cumsum(step * rng.standard_normal(N)) + noise * rng.standard_normal(N) + 7.0
+    return channels_from([LEVELS[:, None]], [y], 0.1, ["u"], "y")
+
+
+@cache
+def identified(seed: int, step: float = 0.1, noise: float = 0.0, structure: str = "output-error") -> Identified:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        return identify_channels(log(seed, step, noise), structure=structure, order=1, delay=1)
+
+
+@pytest.mark.parametrize(("seed", "noise"), [(16801, 0.0), (16802, 0.1)])
+def test_the_gain_of_an_output_that_wanders_is_within_its_interval(seed: int, noise: float) -> None:
+    found = identified(seed, noise=noise)
+    assert [note.code for note in found.notes] == ["random_walk"]
+    assert found.sound
+    linear = found.model.linear
+    assert linear is not None
+    assert abs(linear.dc_gain - GAIN) < 2.6 * linear.dc_gain_std
+    assert linear.dc_gain_std < 0.05 * GAIN
+    assert linear.offset == pytest.approx(found.model.offset)
+    assert linear.rmse == pytest.approx(found.quality.rmse)
+    assert -found.model.transfer_functions()[0][1][1] == pytest.approx(POLE, abs=0.03)
+
+
+def test_it_is_warned_of() -> None:
+    with pytest.warns(LogWarning, match="'y' wanders by itself like a random walk"):
+        identify_channels(log(16801), order=1, delay=1)
+
+
+def test_white_noise_is_no_walk() -> None:
+    assert identified(16801, 0.0, 0.3).notes == ()
+
+
+def test_an_automatic_choice_looks_for_no_bends_where_the_output_wanders() -> None:
+    found = identified(16801, structure="auto")
+    assert [note.code for note in found.notes] == ["random_walk"]
+    assert found.model.structure == "output-error"
+
+
+def test_logs_and_gaps_and_two_inputs() -> None:
+    one = log(16803)
+    y = np.where(np.arange(N) % 400 == 399, np.nan, one.y[0])
+    second = np.random.default_rng(16804).standard_normal((N, 1))
+    two = replace(one, inputs=("u", "v"), u=(np.hstack([one.u[0], second]),), y=(y + second[:, 0],))
+    parts = (slice(0, 600), slice(600, N))
+    cut = replace(two, u=tuple(two.u[0][p] for p in parts), y=tuple(two.y[0][p] for p in parts))
+    with pytest.warns(LogWarning):
+        found = identify_channels(cut, order=1, delay=0)
+    assert "random_walk" in [note.code for note in found.notes]
+    gains = [float(b.sum() / f.sum()) for b, f in found.model.transfer_functions()]
+    assert gains == pytest.approx([GAIN, 1.0], abs=0.15)
+
+
+def test_a_walk_that_is_small_beside_the_output_moves_nothing() -> None:
+    whole, _ = scaled(log(16801, 0.003))
+    assert wandering(whole, whole, [1], (1,), None) is None
+
+
+def test_a_plant_that_integrates_does_not_wander() -> None:
+    one = log(16805, 0.0, 0.05)
+    summed = replace(one, y=(np.cumsum(0.1 * one.y[0]) + np.random.default_rng(1).standard_normal(N),))
+    whole, _ = scaled(summed)
+    assert wandering(whole, whole, [2], (1,), None) is None
+
+
+def test_sums_that_come_back_and_changes_that_are_smooth_are_no_walk() -> None:
+    white = np.random.default_rng(16806).standard_normal((40, 600))
+    walks = np.array([returns(one) > COMES_BACK for one in white])
+    noise = np.array([returns(np.diff(one)) > COMES_BACK for one in white])
+    assert walks.sum() >= 37
+    assert noise.sum() == 0
+    smooth = white[:, 2:] + white[:, 1:-1] + white[:, :-2]
+    beside = white[:, 1:] + 2.0 * np.diff(np.random.default_rng(16807).standard_normal((40, 600)))
+    assert sum(map(remembers, smooth)) == 40
+    assert sum(map(remembers, white)) + sum(map(remembers, beside)) <= 1
+
+
+def test_a_fit_of_changes_runs_at_the_levels() -> None:
+    plain = log(16808, 0.0)
+    whole, _ = scaled(plain)
+    changed, by = scaled(changes_of(whole))
+    fit = fit_linear(Form(1, (1,), (1,)), changed)
+    found = at_levels(fit, whole, by)
+    assert found.cost < 1e-9
+    assert found.f[1] == pytest.approx(-POLE, abs=1e-6)
