@@ -88,9 +88,10 @@ def state_candidates(data: Sequence[Channels], orders: Sequence[int], delay: int
     """
     together, found, best, idle = joined(data), list[StateCandidate](), np.inf, 0
     refused: HydrostateError | None = None
+    forms = _forms(data, delay)
     for order in orders:
         tried = list[StateCandidate]()
-        for direct, delays in _forms(data, delay):
+        for direct, delays in forms:
             part = together.delayed(delays)
             try:
                 fit = fit_state_space(Size(order, part.u[0].shape[1], len(data), direct), part, effort=COMPARING)

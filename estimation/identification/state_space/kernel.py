@@ -44,26 +44,21 @@ def answers(a: Array, c: Array, source: Array, room: Array, out: Array) -> None:
         Outputs of states.
     source : ndarray, shape (samples,)
         The series.
-    room : ndarray, shape (n, r)
-        Zeros, twice as many columns as rows: state i of the run in which the source pushes state j, now and next.
+    room : ndarray, shape (r, n)
+        Zeros, twice as many rows as outputs: now and next.
     out : ndarray, shape (samples, k)
         Room for the outputs: output o of the run in which the source pushes state j stands at ``o n + j``.
     """
+    # a row for each output, ``w[t + 1] = w[t] A + source[t] c``, and not a state for each push: the sums are the same
     n, p = a.shape[0], c.shape[0]
     for t in range(source.size):
         for o in range(p):
             for j in range(n):
-                total = 0.0
+                out[t, o * n + j] = room[o, j]
+                total = source[t] * c[o, j]
                 for i in range(n):
-                    total += c[o, i] * room[i, j]
-                out[t, o * n + j] = total
-        for j in range(n):
-            for i in range(n):
-                total = 0.0
-                for k in range(n):
-                    total += a[i, k] * room[k, j]
-                room[i, n + j] = total
-            room[j, n + j] += source[t]
-        for i in range(n):
+                    total += room[o, i] * a[i, j]
+                room[p + o, j] = total
+        for o in range(p):
             for j in range(n):
-                room[i, j] = room[i, n + j]
+                room[o, j] = room[p + o, j]

@@ -102,7 +102,7 @@ class Problem:
         n, p = self.size.n, self.size.p
         out = np.zeros((len(source), p * n))
         for part in self.data.slices:
-            answers(a, c, np.ascontiguousarray(source[part]), np.zeros((n, 2 * n)), out[part])
+            answers(a, c, np.ascontiguousarray(source[part]), np.zeros((2 * p, n)), out[part])
         return out.reshape(-1, p, n).transpose(1, 0, 2)
 
     def linear_columns(self, a: Array, c: Array) -> Array:
@@ -130,11 +130,12 @@ class Problem:
             if size.direct:
                 by_d[o, :, o * size.m : (o + 1) * size.m] = self.u
         for k, part in enumerate(self.data.slices):
-            length = part.stop - part.start
-            powers = np.empty((length, size.n))
-            for i in range(size.n):
-                run_states(a, np.zeros((length, size.n)), np.eye(size.n)[i], powers)
-                by_start[:, part, k * size.n + i] = c @ powers.T
+            # a state at the first sample is one that was pushed by 1 a sample before
+            push = np.zeros(part.stop - part.start + 1)
+            push[0] = 1.0
+            powers = np.zeros((push.size, size.p * size.n))
+            answers(a, c, push, np.zeros((2 * size.p, size.n)), powers)
+            by_start[:, part, k * size.n : (k + 1) * size.n] = powers[1:].reshape(-1, size.p, size.n).transpose(1, 0, 2)
         return np.concatenate([by_b, by_d, by_level, by_start], axis=2)
 
     def jacobian(self, theta: Array) -> tuple[Array, Array]:

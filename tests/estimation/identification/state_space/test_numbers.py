@@ -64,7 +64,7 @@ def loops() -> dict[str, Any]:
     states, out = np.empty((40, 2)), np.empty((40, 4))
     with loops_in_python():
         run_states(A, U[:40] @ B.T, np.array([0.3, -0.2]), states)
-        answers(A, C, np.ascontiguousarray(U[:40, 0]), np.zeros((2, 4)), out)
+        answers(A, C, np.ascontiguousarray(U[:40, 0]), np.zeros((4, 2)), out)
     return {"states": [some(one, 7) for one in states.T], "answers": [some(one, 7) for one in out.T]}
 
 

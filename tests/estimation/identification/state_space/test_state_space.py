@@ -12,7 +12,7 @@ from estimation.identification.free_run.data import Channels, channels_from, sca
 from estimation.identification.free_run.saved import load_models, save_models
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
-from estimation.identification.state_space import identify
+from estimation.identification.state_space import choose, identify
 from estimation.identification.state_space.choose import chosen_state, state_candidates
 from estimation.identification.state_space.identify import _judged, identify_outputs, identify_state_space
 from estimation.identification.state_space.joint import joined
@@ -76,6 +76,19 @@ def test_the_number_of_states_is_chosen_on_blocks_held_back() -> None:
     assert (best.fit.size.n, best.fit.size.direct, best.doubt) == (3, False, "")
     assert best.price < 0.1
     assert candidates[0].price > 2.0 * best.price
+
+
+def test_dead_times_are_looked_for_once_and_not_at_every_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = list[str]()
+
+    def found(data: Channels) -> tuple[int, ...]:
+        asked.append(data.output)
+        return (0, 0)
+
+    monkeypatch.setattr(choose, "estimate_delays", found)
+    data = in_scale(200)
+    assert {one.fit.size.n for one in state_candidates(data, [1, 2])} == {1, 2}
+    assert asked == [one.output for one in data]
 
 
 def test_outputs_share_one_model_that_is_saved_with_its_covariance(tmp_path_factory: pytest.TempPathFactory) -> None:
