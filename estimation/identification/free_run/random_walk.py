@@ -247,7 +247,7 @@ def at_levels(fit: LinearFit, data: Channels, by: Scaling) -> LinearFit:
     columns, used = problem.linear_columns(fit.f), problem.used
     driven = columns[:, : form.n_b] @ np.concatenate(b)
     free = columns[:, form.n_b :]
-    values = np.linalg.lstsq(free[used], (problem.y - driven)[used], rcond=None)[0]
+    values: Array = np.linalg.lstsq(free[used], (problem.y - driven)[used], rcond=None)[0].astype(np.float64)
     left = (problem.y - driven - free @ values)[used]
     return LinearFit(form, np.concatenate([*b, fit.f[1:], values]), problem.share * float(left @ left))
 
