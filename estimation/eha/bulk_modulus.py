@@ -124,7 +124,8 @@ def estimate_bulk_modulus(
     Returns
     -------
     BulkModulusEstimate
-        Value, interval, bound and verdict; a filter's value is its mean over the last 20 % of the log.
+        Value, interval, bound and verdict; a filter's value is its mean over the last 20 % of the log, or that after
+        the last sample where its noise levels are tuned.
 
     Raises
     ------

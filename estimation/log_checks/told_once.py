@@ -1,7 +1,8 @@
-"""`told_once(record) -> Record`: a reading that an encoder repeats at rest counts once, not in every row.
+"""`told_once(record) -> Record`: a reading that an encoder repeats counts where it changes, and once at rest.
 
-An encoder rounds. While the piston moves, what it is off by changes from row to row and cancels over each of its steps.
-While it rests, all rows are off by the same, and a filter that takes them for samples of their own believes their mean.
+An encoder rounds. Where its reading changes, the piston is halfway between the two readings, and their errors cancel.
+Between changes all rows are off alike: a filter that takes them for samples of their own believes their mean. While the
+piston slows down before a rest or a reversal, that mean lies behind it, and more so the faster the samples.
 """
 
 import numpy as np
@@ -16,12 +17,17 @@ ROUNDED = 2.0
 """Noise over that of rounding alone below which equal readings are one, and no chance [dimensionless]."""
 
 REST = 10
-"""Rows of one reading that are a rest [samples]. Of two rows, as at 10 kHz, neither is the middle: with the first of
-them alone bulk modulus was 15 deviations off."""
+"""Rows of one reading that are a rest [samples], of which the middle counts. Of two rows neither is the middle: with
+the first of them alone bulk modulus was 15 deviations off at 10 kHz."""
+
+SLOW = 2
+"""Rows of a reading from which its changes are slow [samples]: the piston then moves half a step a row at most, and the
+rows beside a change are off by half a step, one up and one down. After a faster change it may rest at once, as far off
+as in the middle of the rest, and would count twice: at 1 kHz bulk modulus was half a deviation high."""
 
 
 def told_once(record: Record) -> Record:
-    """Return a log in which position stands once where it is repeated, if it is rounded more than it is noisy.
+    """Return a log in which a repeated position is told once, if it is rounded more than it is noisy.
 
     Returns
     -------
@@ -38,14 +44,14 @@ def told_once(record: Record) -> Record:
         return record
     resolved = quantum(record[POSITION])
     noisy = not 0.0 < resolved < np.inf or position_variance(record[POSITION]) > ROUNDED * resolved**2 / 12.0
-    return record if noisy else record.replace(**{POSITION: middles(record[POSITION])})
+    return record if noisy else record.replace(**{POSITION: changes_and_rests(record[POSITION])})
 
 
-def middles(values: Array) -> Array:
-    """Return values of which each that is repeated for long stands in the middle of its rows alone.
+def changes_and_rests(values: Array) -> Array:
+    """Return values without the rows in which they repeat themselves, but for the middle of each rest.
 
-    That is where a slow motion is nearest to it: at both ends it is half a step away. The first row stays: there a
-    filter begins.
+    The rows before and after a change stay, unless a rest lies beside a fast motion. A rest counts in its middle, where
+    a slow motion is nearest to the reading. The first row stays: there a filter begins.
 
     Parameters
     ----------
@@ -59,8 +65,10 @@ def middles(values: Array) -> Array:
     """
     first = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
     after = np.append(first[1:], len(values))
-    rests = after - first >= REST
-    once = np.where(np.repeat(rests, after - first), np.nan, values)
-    rows = np.append((first + after - 1)[rests] // 2, 0)
-    once[rows] = values[rows]
-    return once
+    count = after - first
+    rests, slow = count >= REST, np.pad(count >= SLOW, 1)
+    begins, ends, middles = first[~rests | slow[:-2]], after[~rests | slow[2:]] - 1, (first + after - 1)[rests] // 2
+    kept = np.concatenate([[0], begins, ends, middles])
+    told = np.full(len(values), np.nan)
+    told[kept] = values[kept]
+    return told

@@ -5,17 +5,37 @@ import pytest
 
 from benchmarks.diagnosis.coverage import Case, logged
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
-from estimation.log_checks.told_once import REST, middles, told_once
+from estimation.log_checks.told_once import REST, changes_and_rests, told_once
+from plant.arrays import Array
 from plant.log.record import Record
 
 NAN = np.nan
 
 
-def test_a_repeated_value_stands_in_the_middle_of_its_rows_and_what_is_missing_stays_so() -> None:
-    told = middles(np.repeat([3.0, NAN, 4.0, 5.0], [REST + 1, 2, REST, REST - 1]))
-    at_rest = np.full(2 * REST + 3, NAN)
-    at_rest[[0, REST // 2, REST + 3 + (REST - 1) // 2]] = 3.0, 3.0, 4.0
-    np.testing.assert_array_equal(told, np.append(at_rest, np.full(REST - 1, 5.0)))
+def test_a_rest_stands_in_its_middle_and_what_is_missing_stays_so() -> None:
+    rest = np.full(2 * REST + 3, NAN)
+    rest[[0, REST // 2, REST + 3 + (REST - 1) // 2]] = 3.0, 3.0, 4.0
+    told = changes_and_rests(np.repeat([3.0, NAN, 4.0, 5.0], [REST + 1, 2, REST, 1]))
+    np.testing.assert_array_equal(told, np.append(rest, 5.0))
+
+
+def test_rows_beside_a_slow_change_stay_and_those_between_do_not() -> None:
+    told = changes_and_rests(np.repeat([1.0, 2.0, 3.0, 4.0, 5.0], [1, 2, 4, REST, 1]))
+    rest = np.full(REST, NAN)
+    rest[[0, (REST - 1) // 2]] = 4.0  # its last row is off by half a step only if the piston was slow
+    np.testing.assert_array_equal(told, np.concatenate([[1.0, 2.0, 2.0, 3.0, NAN, NAN, 3.0], rest, [5.0]]))
+
+
+def test_what_is_told_of_a_turn_lies_neither_before_nor_behind_it() -> None:
+    time = 1e-4 * np.arange(-200, 501)
+    turning = -1e6 * np.maximum(np.maximum(-time, time - 0.03), 0.0) ** 2  # rests for 30 ms [um]
+    assert abs(mean_error(turning)) < 0.3  # -1.3 with all rows of motion and one of the rest
+
+
+def mean_error(position: Array) -> float:
+    """Return the sum of the errors that are told, on average over where the encoder's steps lie [steps]."""
+    true = position + np.linspace(-0.495, 0.495, 100)[:, None]
+    return float(np.mean([np.nansum(changes_and_rests(np.round(one))[1:] - one[1:]) for one in true]))
 
 
 def test_readings_that_are_equal_by_chance_all_count() -> None:
