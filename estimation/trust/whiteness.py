@@ -36,6 +36,9 @@ DRIVEN_SHARE, DRIVEN_REACH = 0.95, 10.0
 lies: friction answers a drive with harmonics, and what is learnt is learnt there."""
 
 
+MOSTLY = 0.5
+"""Share of a channel's predicted variance from which its noise is mostly rounding [fraction]."""
+
 OFTEN = 1e-3
 """A channel that repeats itself in this share of its samples or more is quantised [fraction]."""
 
@@ -51,7 +54,8 @@ class Whiteness:
     excess : float
         Largest power of the innovations within the band that counts, over that of white noise of the predicted
         variance, less what the channel's quantum can explain [dimensionless]; 1 on average where the filter is
-        consistent.
+        consistent. Beside the drive, an encoder's innovations of less than half a step do not count: at a constant
+        speed its rounding beats with the clock.
     threshold : float
         Excess that white innovations stay below but with probability `FALSE_ALARMS` [dimensionless].
     frequency : float
@@ -110,11 +114,19 @@ def whiteness(estimate: Estimate, record: Record) -> tuple[Whiteness, ...]:
     push = bridged(record[estimate.model.drives[0]])[first:]
     drive = np.mean(np.abs(_spectra(push - np.mean(push), length)) ** 2, axis=0)
     band, concentration = _band(drive), float(np.max(drive) / max(np.sum(drive), np.finfo(float).tiny))
+    around = np.max([np.roll(np.pad(drive, 1), shift)[1:-1] for shift in (-1, 0, 1)], axis=0)
+    driven = (around >= 0.1 * np.max(drive)) & bool(np.max(drive) > 0.0)
+    beside = ~driven[:band]
+    beside[0] = False  # a mean is no beat
     quantile = float(chdtri(2 * SEGMENTS, FALSE_ALARMS / (len(kept) * band)))
     found: list[Whiteness] = []
     for c in kept:
         values, count = normal[:, c], int(np.count_nonzero(present[:, c]))
         power = np.mean(np.abs(_spectra(values, length)) ** 2, axis=0)[:band] * (len(values) / count)
+        steps = _whole_steps(estimate, first, c, quantum(record[estimate.channels[c]]))
+        if steps is not None:
+            unrounded = np.mean(np.abs(_spectra(steps, length)) ** 2, axis=0)[:band] * (len(values) / count)
+            power = np.where(beside, np.minimum(power, unrounded), power)
         power[0] *= 0.5  # a mean is real, with half the degrees of freedom, and is held to the same threshold
         peak = int(np.argmax(power))
         lags = _autocorrelations(values)
@@ -128,7 +140,7 @@ def whiteness(estimate: Estimate, record: Record) -> tuple[Whiteness, ...]:
                 excess=max(0.0, float(power[peak]) - concentration * pattern * length / 2.0),
                 threshold=quantile / (2 * SEGMENTS),
                 frequency=peak / (length * record.sample_time),
-                driven=bool(0.0 < 0.1 * np.max(drive) <= np.max(drive[max(0, peak - 1) : peak + 2])),
+                driven=bool(driven[peak]),
                 ljung_box=_ljung_box(lags, count),
                 autocorrelation=float(lags[np.argmax(np.abs(lags))]),
                 crosses=max((_correlation(values, normal[:, o]) for o in kept if o != c), default=0.0, key=abs),
@@ -144,6 +156,14 @@ def _normalised(estimate: Estimate, first: int) -> tuple[Array, BoolArray]:
     present = ~np.isnan(residuals)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # a filter that diverged gives no numbers
         return np.where(present, residuals / np.sqrt(variances), 0.0), present
+
+
+def _whole_steps(estimate: Estimate, first: int, channel: int, quantum: float) -> Array | None:
+    """Return normalised innovations in whole steps of a channel whose noise is mostly rounding, None for others."""
+    residuals, variances = estimate.residuals[first:, channel], estimate.residual_variances[first:, channel]
+    if not MOSTLY * float(np.nanmedian(variances)) <= quantum**2 / 12.0 < np.inf:
+        return None
+    return np.where(np.isnan(residuals), 0.0, quantum * np.round(residuals / quantum) / np.sqrt(variances))
 
 
 def _spectra(values: Array, length: int) -> Array:

@@ -89,6 +89,16 @@ def test_a_disturbance_beside_the_drive_is_said_to_be_so(linear: ProcessModel) -
     assert not velocity.driven
 
 
+@pytest.mark.parametrize(("missed", "exceeded"), [(0.0, False), (0.8, True)])  # steps
+def test_rounding_that_beats_with_the_clock_is_no_misfit(linear: ProcessModel, missed: float, exceeded: bool) -> None:
+    step = 12.0**0.5  # its rounding has a variance of 1
+    true = np.cumsum(np.where(np.arange(SAMPLES) < 1000, 0.3, 40.043))  # steps
+    residuals = white(9)
+    residuals[:, 0] = step * (np.round(true) - true + missed * np.sin(2.0 * np.pi * 17.0 * TIME))
+    found = judged(linear, residuals, position=step * np.round(true))[0]
+    assert found.exceeded is exceeded
+
+
 def test_what_lies_far_above_the_drives_band_does_not_count(linear: ProcessModel) -> None:
     residuals = white(4)
     residuals[:, 0] += 0.5 * np.sin(2.0 * np.pi * 480.0 * TIME)
