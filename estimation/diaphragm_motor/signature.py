@@ -13,6 +13,7 @@ from math import ceil, pi
 
 import numpy as np
 
+from estimation.log_checks.longest_hold import require_live
 from plant.arrays import Floats, Tones
 from plant.diaphragm_motor.flow import operate
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
@@ -171,7 +172,7 @@ def logged_signature(record: Record, start: float = SETTLED) -> Signature:
     Raises
     ------
     LogError
-        If a channel or samples are missing, the drive is no steady sine, or the log is too short.
+        If a channel or samples are missing, the drive is no steady sine, the log is too short, or position holds still.
     """
     require_channels(record)
     settled = ceil(start / record.sample_time)
@@ -298,7 +299,7 @@ def whole_cycles(samples: int, sample_time: float, frequency: float) -> int:
 
 
 def require_channels(record: Record) -> None:
-    """Refuse a log that lacks a channel or samples, or ends before the motor has settled.
+    """Refuse a log that lacks a channel or samples, ends before the motor has settled, or whose position stands still.
 
     Raises
     ------
@@ -314,6 +315,7 @@ def require_channels(record: Record) -> None:
     length = len(record) * record.sample_time
     if length <= SETTLED:
         raise LogError(f"a log must be longer than the {SETTLED:g} s in which the motor settles, got {length:.3g} s")
+    require_live(record, [POSITION])  # of an electrode that is dead, a gain is told
 
 
 _REFINEMENTS = 4

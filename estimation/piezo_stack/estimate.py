@@ -8,15 +8,17 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import sqrt
 from types import MappingProxyType, SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.arrays import Array
 from estimation.finding import interval_95
+from estimation.piezo_stack.channel_mistakes import channel_mistakes
 from estimation.piezo_stack.runs import COARSE_SLOPE_STEP, COARSE_STEP, STACK_CHANNELS, StackRuns, prepared
 from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, told
+from plant.errors import LogError
 from plant.log.record import Record
 from plant.piezo_stack.parameters import LONGEST_STEP, PiezoStackParameters
 from plant.piezo_stack.run import BENCH_SENSORS, StackSensors, checked_voltage
@@ -38,6 +40,8 @@ class StackEstimate:
         Root mean square of each channel's residual over its noise; 1 for the right model [dimensionless].
     parameters : PiezoStackParameters or namespace
         The actuator with the estimates in it.
+    samples : int
+        Samples of each channel [count].
     """
 
     values: Mapping[str, float]
@@ -46,6 +50,7 @@ class StackEstimate:
     misfit: Mapping[str, float]
     evaluations: int
     parameters: PiezoStackParameters | SimpleNamespace
+    samples: int
 
     def interval(self, name: str) -> tuple[float, float]:
         """Return a quantity's 95 % interval.
@@ -64,7 +69,6 @@ def estimate_stack(
     *,
     unknowns: Collection[str] = DEFAULT_UNKNOWNS,
     channels: Collection[str] = STACK_CHANNELS,
-    sensors: StackSensors = BENCH_SENSORS,
     starts: Sequence[Mapping[str, float]] = STARTS,
 ) -> StackEstimate:
     """Estimate what is wrong inside the actuator from a run that began at rest.
@@ -85,22 +89,35 @@ def estimate_stack(
     Raises
     ------
     LogError
-        If the drive or every channel is missing, or samples are.
+        If the drive or every channel is missing, or samples are, or a channel has another sign, unit or name.
     HydrostateError
         If an unknown is not known, or no first guess is made of them.
     """
-    runs, measured = prepared(record, healthy, tuple(unknowns), channels, sensors)
-    guesses = runs.ordered(measured, starts)
-
-    theta, residuals, slopes = _descended(runs, measured, guesses[0])
-    for guess in guesses[1:_MOST_GUESSES]:
-        if _spread(residuals, theta) < _UNEXPLAINED:
+    runs = prepared(record, healthy, tuple(unknowns), channels)
+    part = runs.beginning(max(round(_COARSE_SECONDS / runs.sample_time), round(_COARSE_SHARE * len(runs.voltage))))
+    first, *others = _first_guesses(part, starts)[:_MOST_GUESSES]
+    theta, lowest = _coarsely_descended(part, first)
+    best = _descended(runs, theta)
+    for guess in others:
+        if best.spread < _UNEXPLAINED:
             break
-        other = _descended(runs, measured, guess)
-        if float(other[1] @ other[1]) < float(residuals @ residuals):
-            theta, residuals, slopes = other
-    spread = max(1.0, _spread(residuals, theta))
-    return _concluded(runs, theta, residuals, spread * covariance(slopes))
+        theta, left = _coarsely_descended(part, guess)
+        if left < lowest:
+            lowest, best = left, min(best, _descended(runs, theta), key=_cost)
+    if _UNEXPLAINED <= best.spread < _HOPELESS:  # what is slow shows in the whole log alone
+        theta, _ = _coarsely_descended(runs, best.theta)
+        best = min(best, _descended(runs, theta), key=_cost)
+    return _concluded(runs, best, runs.count + part.count)
+
+
+def _first_guesses(runs: StackRuns, starts: Sequence[Mapping[str, float]]) -> list[Array]:
+    """Return the first guesses, the one that fits best first; refuse channels of another sign, unit or name."""
+    guesses, found = runs.first(starts)
+    mistakes = channel_mistakes(runs.channels(runs.measured), [runs.channels(row) for row in found])
+    if mistakes:
+        raise LogError(f"{'; '.join(mistakes)}: say so in the rig file's [columns] or by --columns")
+    misfits = np.sum((found - runs.measured) ** 2, axis=1)
+    return [guesses[place] for place in np.argsort(misfits, kind="stable")]
 
 
 def covariance(slopes: Array) -> Array:
@@ -159,7 +176,7 @@ def stack_bounds(
         Standard deviation by name [SI]; of factors, relative.
     """
     noise = {name: value for name, value in asdict(sensors).items() if name in channels}
-    runs = StackRuns(checked_voltage(voltage), sample_time, parameters, tuple(unknowns), noise)
+    runs = StackRuns(checked_voltage(voltage), sample_time, parameters, tuple(unknowns), noise, np.zeros(0))
     deviations = np.sqrt(np.diag(covariance(runs.around(np.zeros(len(runs.names)), LONGEST_STEP)[1])))
     return {
         name: (UNKNOWNS[name].scale or 1.0) * float(deviation)
@@ -167,49 +184,73 @@ def stack_bounds(
     }
 
 
-def _descended(runs: StackRuns, measured: Array, start: Array) -> tuple[Array, Array, Array]:
-    """Descend by Levenberg and Marquardt in coarse runs, then by Gauss and Newton in exact ones.
+class _Optimum(NamedTuple):
+    """Where a descent ended: unknowns, residuals over noise, and their slopes."""
+
+    theta: Array
+    residuals: Array
+    slopes: Array
+
+    @property
+    def cost(self) -> float:
+        return float(self.residuals @ self.residuals)
+
+    @property
+    def spread(self) -> float:
+        """Variance of the residuals over that of the noise [dimensionless]."""
+        return self.cost / (len(self.residuals) - len(self.theta))
+
+
+def _cost(one: _Optimum) -> float:
+    return one.cost
+
+
+def _descended(runs: StackRuns, theta: Array) -> _Optimum:
+    """Descend by Gauss and Newton in exact runs.
 
     It ends where a step is a tenth of the standard deviations, which no reader could tell from none.
     """
-    theta = _coarsely_descended(runs, measured, start)
     found, slopes = runs.around(theta, LONGEST_STEP)
     known, shown = covariance(slopes), _shown(slopes)
-    residuals = found - measured
+    residuals = found - runs.measured
     for _ in range(_MOST_EXACT):
         changes = np.outer(_SHORTENED, -shown @ (slopes.T @ residuals))
-        change, tried = _best(runs, measured, theta, changes, LONGEST_STEP)
+        change, tried = _best(runs, theta, changes, LONGEST_STEP)
         if float(tried @ tried) >= float(residuals @ residuals):
             break
         theta, residuals = theta + change, tried
         if _share(change, known) < _DONE:
             break
-    return theta, residuals, slopes
+    return _Optimum(theta, residuals, slopes)
 
 
-def _coarsely_descended(runs: StackRuns, measured: Array, start: Array) -> Array:
-    """Descend by Levenberg and Marquardt, several dampings tried side by side."""
+def _coarsely_descended(runs: StackRuns, start: Array) -> tuple[Array, float]:
+    """Descend by Levenberg and Marquardt in coarse runs, several dampings side by side; return what is left too."""
     theta = start
     found, slopes = runs.around(theta, COARSE_STEP, COARSE_SLOPE_STEP)
-    residuals = found - measured
+    residuals = found - runs.measured
+    left = float(residuals @ residuals)
     for _ in range(_MOST_STEPS):
         normal = slopes.T @ slopes
         own = np.diag(np.diag(normal) + 1e-12)
         changes = np.array([np.linalg.solve(normal + d * own, -slopes.T @ residuals) for d in _DAMPINGS])
         if _share(changes[0], covariance(slopes)) < _NEAR:
             break
-        change, tried = _best(runs, measured, theta, np.asarray(changes, dtype=np.float64), COARSE_STEP)
-        if float(tried @ tried) >= float(residuals @ residuals):
+        change, tried = _best(runs, theta, np.asarray(changes, dtype=np.float64), COARSE_STEP)
+        before, left = left, min(left, float(tried @ tried))
+        if left >= before:
             break
         theta = theta + change
+        if before - left < _LEAST_SHARE * before and left > _HOPELESS * len(tried):
+            break
         found, slopes = runs.around(theta, COARSE_STEP, COARSE_SLOPE_STEP)
-        residuals = found - measured
-    return theta
+        residuals = found - runs.measured
+    return theta, left
 
 
-def _best(runs: StackRuns, measured: Array, theta: Array, changes: NDArray[Any], step: float) -> tuple[Array, Array]:
+def _best(runs: StackRuns, theta: Array, changes: NDArray[Any], step: float) -> tuple[Array, Array]:
     """Return the change, of several run side by side, that leaves the least, and what it leaves."""
-    tried = runs.scaled([*(theta + changes)], step) - measured
+    tried = runs.scaled([*(theta + changes)], step) - runs.measured
     best = int(np.argmin(np.sum(tried**2, axis=1)))
     return changes[best], tried[best]
 
@@ -222,7 +263,14 @@ def _share(change: NDArray[Any], known: Array) -> float:
 _LEAST_KNOWN = 1e-14
 """Least information along a combination of unknowns, over the largest, that is more than rounding [dimensionless]."""
 
+_COARSE_SECONDS, _COARSE_SHARE = 0.04, 0.25
+"""Coarse descents look at the beginning of a log, eleven cycles of 275 Hz or more [s], and at least at this share."""
+
 _MOST_STEPS = 30
+_LEAST_SHARE, _HOPELESS = 0.01, 10.0
+"""Share of the misfit that a step must take off where the mean square is so many times the noise's: no actuator of
+these explains the log [dimensionless]."""
+
 _NEAR = 3.0
 _DONE = 0.1
 _SHORTENED = (1.0, 0.5, 0.2)
@@ -232,20 +280,18 @@ _UNEXPLAINED = 1.1
 _MOST_GUESSES = 4
 
 
-def _spread(residuals: Array, theta: Array) -> float:
-    return float(residuals @ residuals) / (len(residuals) - len(theta))
-
-
-def _concluded(runs: StackRuns, theta: Array, residuals: Array, scaled: Array) -> StackEstimate:
-    p = runs.actuator(theta)
+def _concluded(runs: StackRuns, best: _Optimum, evaluations: int) -> StackEstimate:
+    scaled = max(1.0, best.spread) * covariance(best.slopes)
+    p = runs.actuator(best.theta)
     deviations = np.sqrt(np.diag(scaled))
     found = {name: told(p, runs.healthy, name, float(one)) for name, one in zip(runs.names, deviations, strict=True)}
-    parts = np.split(residuals, len(runs.noise))
+    parts = np.split(best.residuals, len(runs.noise))
     return StackEstimate(
         MappingProxyType({name: value for name, (value, _) in found.items()}),
         MappingProxyType({name: deviation for name, (_, deviation) in found.items()}),
         scaled / np.outer(deviations, deviations),
         {name: sqrt(float(np.mean(part**2))) for name, part in zip(runs.noise, parts, strict=True)},
-        runs.count,
+        evaluations,
         p,
+        len(parts[0]),
     )

@@ -1,6 +1,7 @@
 """`stack_finding(record, healthy) -> Finding`: what a log of the piezo-stack actuator says, and what it does not."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +11,16 @@ from estimation.piezo_stack.estimate import StackEstimate, estimate_stack, stack
 from estimation.piezo_stack.runs import STACK_CHANNELS
 from estimation.piezo_stack.unknowns import UNKNOWNS
 from plant.log.record import Record
-from plant.notes import Code
+from plant.notes import Code, Note
 from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.trajectory import NAME
 
-MOST_MISFIT = 1.1
-"""Residual over noise above which the model does not describe a log; with 1000 samples chance leaves 1.05 at most."""
+MOST_MISFIT = 1.05
+"""Residual over noise above which the model does not describe a log, beside what chance leaves [dimensionless]."""
+
+BY_CHANCE = 4.0
+"""What chance leaves, over one by the root of the samples: three deviations of noise that was read off the log, which
+scatters by 1.3 of that [dimensionless]."""
 
 MOST_DEVIATION = 0.30
 """Standard deviation over the healthy value, or over a small fault's, above which no number is given."""
@@ -28,6 +33,9 @@ class StackCode(Code):
     """Notes on an estimate of the piezo-stack actuator."""
 
     CHANNEL_MISSED = "the model misses {channel} by {ratio:.3g} times its noise"
+    CHANNEL_DISAGREES = (
+        "{channel} alone disagrees: without it the model explains the log; inspect that sensor, its scale and its delay"
+    )
     QUANTITIES_NOT_TOLD = "these sensors do not determine {names}"
 
 
@@ -58,6 +66,7 @@ def stack_finding(
     lost = [name for name, one in quantities.items() if one.value is None]
     reasons = tuple(StackCode.CHANNEL_MISSED.note(channel=name, ratio=ratio) for name, ratio in missed(found).items())
     if reasons:
+        reasons += channel_disagrees(record, healthy, tuple(found.misfit))
         quantities = {name: Quantity(None, one.unit, None, one.std) for name, one in quantities.items()}
     told = Outcome.NOT_OBSERVABLE if len(lost) == len(quantities) else Outcome.OK
     return Finding(
@@ -110,7 +119,33 @@ def missed(found: StackEstimate) -> Mapping[str, float]:
     Mapping[str, float]
         Residual over noise, by channel [dimensionless].
     """
-    return {name: ratio for name, ratio in found.misfit.items() if ratio > MOST_MISFIT}
+    most = MOST_MISFIT + BY_CHANCE / sqrt(found.samples)
+    return {name: ratio for name, ratio in found.misfit.items() if ratio > most}
+
+
+def channel_disagrees(record: Record, healthy: PiezoStackParameters, channels: Collection[str]) -> tuple[Note, ...]:
+    """Return which channel of a log that the model misses is alone to blame.
+
+    Parameters
+    ----------
+    record : Record
+        A run that began at rest, and that the model misses.
+    healthy : PiezoStackParameters
+        The actuator as it should be, at the run's bias pressure and load.
+    channels : collection of str
+        What was used of what is logged.
+
+    Returns
+    -------
+    tuple of Note
+        None where the model misses the log without any one of them, or explains it without this one or that one, or
+        fewer than two would be left.
+    """
+    others = [tuple(name for name in channels if name != left) for left in channels] if len(channels) > 2 else []
+    explained = [not missed(estimate_stack(record, healthy, channels=some)) for some in others]
+    if sum(explained) != 1:
+        return ()
+    return (StackCode.CHANNEL_DISAGREES.note(channel=tuple(channels)[explained.index(True)]),)
 
 
 def stack_quantities(found: StackEstimate, healthy: PiezoStackParameters) -> dict[str, Quantity]:

@@ -6,7 +6,7 @@ from math import log
 
 from estimation.finding import Finding, Gate, Outcome
 from estimation.piezo_stack.estimate import StackEstimate, estimate_stack
-from estimation.piezo_stack.finding import missed, stack_quantities
+from estimation.piezo_stack.finding import channel_disagrees, missed, stack_quantities
 from estimation.piezo_stack.runs import STACK_CHANNELS
 from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS
 from faults.conditions import CONDITIONS
@@ -71,6 +71,7 @@ class StackFaultCode(Code):
     AIR_IN_OIL = "air in the oil: {percent:.2f} %, {ratio:.3g} times the healthy share"
     CHAMBER_LEAKS = "the pump chamber leaks: {leakage:.2g|L/(min bar)} L/(min bar)"
     STACK_DEPOLARISED = "the stack is depolarised: {percent:.0f} % of its stroke is lost"
+    STROKE_LARGE = "the stack moves {percent:.0f} % more than by the rig file"
     REED_SOFT = "{reed} reed soft: {ratio:.3g} times the healthy stiffness"
     REED_STIFF = "{reed} reed stiff or jammed: {ratio:.3g} times the healthy stiffness"
     REED_OPEN = "{reed} reed does not shut: a gap of {gap_um:.0f} um"
@@ -83,6 +84,9 @@ class StackAdviceCode(Code):
     BLEED_OIL = "bleed the oil, then find where air gets in"
     LOOK_AT_CHAMBER = "inspect the joints and the membrane of the pump chamber"
     POLARISE = "polarise the stack again; replace it if the stroke stays short"
+    CHECK_SCALE = (
+        "check the scale of the drive voltage, then the stroke in the rig file; calibrate on a healthy run (--healthy)"
+    )
     REPLACE_REED = "inspect the {reed} reed for a crack, and replace it"
     FREE_REED = "clean the {reed} reed and its stop"
     CLEAN_SEAT = "clean the seat of the {reed} reed; replace the reed if the gap stays"
@@ -120,6 +124,8 @@ def diagnose_stack(
     against = tuple(
         StackFaultCode.ANOTHER_ACTUATOR.note(channel=name, ratio=ratio) for name, ratio in missed(found).items()
     )
+    if against:
+        against += channel_disagrees(record, healthy, tuple(found.misfit))
     leakage = _level(found, "crossport_leakage", healthy.crossport_leakage, CROSSPORT_LEAKAGE)
     friction = _level(found, "coulomb_friction", healthy.coulomb_friction, ADDED_FRICTION)
     condition = next((n for n, c in CONDITIONS.items() if (c.leakage, c.friction) == (leakage, friction)), None)
@@ -156,6 +162,8 @@ def _remedy(fault: Note) -> Note:
             return StackAdviceCode.LOOK_AT_CHAMBER.note()
         case StackFaultCode.STACK_DEPOLARISED:
             return StackAdviceCode.POLARISE.note()
+        case StackFaultCode.STROKE_LARGE:
+            return StackAdviceCode.CHECK_SCALE.note()
         case StackFaultCode.REED_SOFT:
             return StackAdviceCode.REPLACE_REED.note(reed=fault.data["reed"])
         case StackFaultCode.REED_STIFF:
@@ -185,6 +193,8 @@ def _fault(name: str, found: StackEstimate, healthy: PiezoStackParameters) -> No
         return StackFaultCode.CHAMBER_LEAKS.note(leakage=value)
     if name == "polarisation" and base - value > max(LEAST_DEPOLARISED, sure):
         return StackFaultCode.STACK_DEPOLARISED.note(percent=100.0 * (1.0 - value))
+    if name == "polarisation" and value - base > max(LEAST_DEPOLARISED, sure):
+        return StackFaultCode.STROKE_LARGE.note(percent=100.0 * (value - 1.0))
     if part == "stiffness" and abs(value - base) > max(REED_CHANGED * base, sure):
         code = StackFaultCode.REED_SOFT if value < base else StackFaultCode.REED_STIFF
         return code.note(reed=reed, ratio=value / base)

@@ -104,13 +104,15 @@ def sine_drive(
     return checked_voltage(voltage)
 
 
-def checked_voltage(voltage: Array) -> Array:
+def checked_voltage(voltage: Array, overshoot: float = 0.0) -> Array:
     """Return a drive that the stack withstands. Source: output performance section.
 
     Parameters
     ----------
     voltage : ndarray, shape (n,)
         Drive at the samples [V].
+    overshoot : float
+        What it may leave its range by, as a measured one does by its noise [V].
 
     Returns
     -------
@@ -124,7 +126,7 @@ def checked_voltage(voltage: Array) -> Array:
     """
     drive = checked_series(voltage)
     low, high = float(drive.min()), float(drive.max())
-    slack = 1e-9 * HIGHEST_VOLTAGE
+    slack = max(overshoot, 1e-9 * HIGHEST_VOLTAGE)
     if low < -slack or high > HIGHEST_VOLTAGE + slack:
         raise DriveError(f"the stack takes 0 to {HIGHEST_VOLTAGE:g} V, got a drive from {low:g} to {high:g} V")
     return drive

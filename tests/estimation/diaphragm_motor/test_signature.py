@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from estimation.diaphragm_motor.signature import steady_drive
+from estimation.diaphragm_motor.signature import logged_signature, steady_drive
+from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
+from plant.diaphragm_motor.run import BENCH_SENSORS, SAMPLE_TIME, motor_drive, simulate_motor
+from plant.errors import LogError
 
 
 @pytest.mark.parametrize("seconds", [0.2, 2.0, 10.0])
@@ -19,3 +22,14 @@ def test_frequency_swing_and_phase_of_a_drive_between_two_spectral_lines(seconds
     deviation = np.sqrt(6.0) * 0.01 / (np.pi * 60.0 * seconds * np.sqrt(size))
     assert found.frequency == pytest.approx(frequency, abs=6.0 * deviation)
     assert found.peak_to_peak == pytest.approx(120.0, rel=1e-3)
+
+
+def test_a_position_that_stands_still_at_the_end_of_its_range_is_refused() -> None:
+    drive = motor_drive(480.0, 200.0, 0.25, SAMPLE_TIME)
+    log = simulate_motor(
+        DiaphragmMotorParameters(), drive, SAMPLE_TIME, sensors=BENCH_SENSORS, rng=np.random.default_rng(1)
+    )
+    logged_signature(log)
+    end = 0.8 * float(log["position_m"].max())
+    with pytest.raises(LogError, match="position_m holds one value"):
+        logged_signature(log.replace(position_m=np.minimum(log["position_m"], end)))

@@ -8,7 +8,7 @@ import pytest
 
 from estimation.piezo_stack.estimate import covariance, estimate_stack, stack_bounds
 from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, UNKNOWNS
-from plant.errors import HydrostateError, LogError
+from plant.errors import DriveError, HydrostateError, LogError
 from plant.log.record import Record
 from plant.piezo_stack.parameters import PiezoStackParameters
 from plant.piezo_stack.run import BENCH_SENSORS, simulate_stack, sine_drive
@@ -75,11 +75,50 @@ def test_every_unknown_is_a_parameter_and_every_channel_a_sensor() -> None:
     [
         ({"drive_voltage_v": None}, "drive_voltage_v is needed"),
         ({"stack_displacement_m": np.append(np.nan, np.zeros(len(DRIVE) - 1))}, "must be whole, got 1 missing"),
+        ({"position_m": np.repeat(np.arange(11.0), 91)}, "position_m holds one value for 4.55 ms: the sensor froze"),
     ],
 )
 def test_a_log_that_cannot_be_used_is_refused(worn: Record, change: dict[str, np.ndarray | None], said: str) -> None:
     with pytest.raises(LogError, match=said):
         estimate_stack(worn.replace(**change), HEALTHY)
+
+
+def test_sensors_with_other_noise_and_other_zeros_tell_the_same_with_their_own_deviations(worn: Record) -> None:
+    zeros = {"stack_displacement_m": 3e-4, "stack_force_n": -800.0, "position_m": 0.05}
+    rng = np.random.default_rng(5)
+    noise = {name: 3.0 * value for name, value in asdict(BENCH_SENSORS).items()}
+    seen = {
+        name: worn[name] + zeros.get(name, 0.0) + rng.normal(0.0, deviation, len(DRIVE))
+        for name, deviation in noise.items()
+    }
+    found, before = (estimate_stack(log, HEALTHY) for log in (worn.replace(**seen), worn))
+    assert max(found.misfit.values()) < 1.1
+    for name in ("air_fraction", "chamber_leakage", "crossport_leakage", "coulomb_friction"):
+        assert abs(found.values[name] - getattr(WORN, name)) < 3.0 * found.deviations[name]
+        assert found.deviations[name] == pytest.approx(10.0**0.5 * before.deviations[name], rel=0.2)
+
+
+def test_a_measured_drive_may_leave_the_range_of_the_stack_by_its_own_error(worn: Record) -> None:
+    found = estimate_stack(worn.replace(drive_voltage_v=DRIVE - 0.02), HEALTHY)
+    assert found.values["coulomb_friction"] == pytest.approx(WORN.coulomb_friction, rel=0.05)
+    with pytest.raises(DriveError, match="the stack takes 0 to 150 V, got a drive from -4 to 136 V"):
+        estimate_stack(worn.replace(drive_voltage_v=DRIVE - 4.0), HEALTHY)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"position_m": 1e3}, "position_m is in mm"),
+        ({"stack_force_n": -1e-3}, "stack_force_n has the opposite sign and is in kN"),
+        (
+            {"chamber_pressure_pa": 1e-5, "position_m": -1.0},
+            "position_m has the opposite sign; chamber_pressure_pa is in",
+        ),
+    ],
+)
+def test_a_channel_of_another_sign_or_unit_is_named(worn: Record, change: dict[str, float], said: str) -> None:
+    with pytest.raises(LogError, match=said):
+        estimate_stack(worn.replace(**{name: factor * worn[name] for name, factor in change.items()}), HEALTHY)
 
 
 def test_an_unknown_that_is_not_known_is_refused(worn: Record) -> None:

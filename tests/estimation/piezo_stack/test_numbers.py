@@ -57,17 +57,17 @@ def unknowns_and_starts() -> dict[str, Any]:
 
 @NUMBERS.case(relative=1e-4)
 def runs_beside_a_log() -> dict[str, Any]:
-    runs, measured = prepared(log(), HEALTHY, ("chamber_leakage", "coulomb_friction"), STACK_CHANNELS, BENCH_SENSORS)
+    runs = prepared(log(), HEALTHY, ("chamber_leakage", "coulomb_friction"), STACK_CHANNELS)
+    measured = runs.measured
     theta = np.array([0.3, 0.2])
     base, slopes = runs.around(theta)
     coarse, steep = runs.around(theta, 5e-6, 2e-2)
-    order = runs.ordered(measured, STARTS)
+    guesses, beside = runs.first(STARTS)
+    order = [guesses[place] for place in np.argsort(np.sum((beside - measured) ** 2, axis=1), kind="stable")]
     lost = runs.scaled([np.array([0.0, np.nan])])
 
     def refused(**of: Any) -> Any:
-        return or_refused(
-            lambda: prepared(log().replace(**of), HEALTHY, ("chamber_leakage",), STACK_CHANNELS, BENCH_SENSORS)[1].size
-        )
+        return or_refused(lambda: prepared(log().replace(**of), HEALTHY, ("chamber_leakage",), STACK_CHANNELS).measured)
 
     return {
         "channels": list(runs.noise),
@@ -85,8 +85,8 @@ def runs_beside_a_log() -> dict[str, Any]:
             refused(**dict.fromkeys(STACK_CHANNELS)),
             refused(position_m=np.where(np.arange(120) == 4, np.nan, 0.0)),
         ],
-        "an unknown unknown": or_refused(lambda: prepared(log(), HEALTHY, ("x",), STACK_CHANNELS, BENCH_SENSORS)),
-        "no start": or_refused(lambda: runs.ordered(measured, ({"air_fraction": 0.1},))),
+        "an unknown unknown": or_refused(lambda: prepared(log(), HEALTHY, ("x",), STACK_CHANNELS)),
+        "no start": or_refused(lambda: runs.first(({"air_fraction": 0.1},))),
     }
 
 
@@ -120,7 +120,7 @@ def what_a_run_says() -> dict[str, Any]:
         ),
         "covariance": [covariance(slopes[:, :2])[0], covariance(slopes)[2, 2]],
         "share of a change": estimate._share(np.array([0.1, -0.6]), np.diag([0.01, 0.04])),  # pyright: ignore[reportPrivateUsage]
-        "spread": estimate._spread(np.arange(9.0), np.zeros(2)),  # pyright: ignore[reportPrivateUsage]
+        "spread": estimate._Optimum(np.zeros(2), np.arange(9.0), np.zeros((9, 2))).spread,  # pyright: ignore[reportPrivateUsage]
         "quantities": {
             name: {"value": one.value, "std": one.std, "unit": one.unit}
             for name, one in stack_quantities(found, HEALTHY).items()
@@ -137,6 +137,7 @@ def misfits_and_quantities() -> dict[str, Any]:
         {"position_m": 1.0, "stack_force_n": 1.0},
         5,
         HEALTHY,
+        1_000_000,
     )
 
     def misses(one: float) -> list[str]:

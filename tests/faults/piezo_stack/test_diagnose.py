@@ -70,3 +70,24 @@ def test_another_actuator_is_warned_of_and_diagnosed_once_calibrated() -> None:
     for name in list(CONDITIONS)[::4]:
         found = diagnose_stack(log_of(stack_in_condition(OTHER, name), 2), calibrated)
         assert (found.condition, found.gate.reasons) == (name, ())
+
+
+def test_a_drive_that_is_logged_too_small_shows_as_a_stroke_that_no_stack_has() -> None:
+    log = log_of(HEALTHY)
+    found = diagnose_stack(log.replace(drive_voltage_v=0.93 * log["drive_voltage_v"]), HEALTHY)
+    (fault,), (advice,) = found.faults, found.advice
+    assert str(fault) == "the stack moves 8 % more than by the rig file"
+    assert advice.code is StackAdviceCode.CHECK_SCALE
+
+
+@pytest.mark.slow
+def test_the_one_channel_that_disagrees_is_named_and_no_fault() -> None:
+    log = log_of(HEALTHY)
+    for name in ("stack_displacement_m", "stack_force_n"):
+        found = diagnose_stack(log.replace(**{name: 1.05 * log[name]}), HEALTHY)
+        assert found.unknown
+        assert str(found.against[-1]).startswith(f"{name} alone disagrees")
+        assert found.faults == ()
+    heavy = diagnose_stack(log_of(replace(HEALTHY, load_mass=HEALTHY.load_mass + 20.0)), HEALTHY)
+    assert heavy.unknown
+    assert not any("alone disagrees" in str(note) for note in heavy.against)

@@ -1,0 +1,86 @@
+"""Channels of a piezo-stack log with another sign, unit or name, by the runs of likely actuators."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+from math import sqrt
+
+from estimation.arrays import Array
+from plant.log.columns import UNITS
+
+ALIKE = 0.9
+"""Correlation with a run from which a channel has that run's course [dimensionless]. Each fault that is a first guess
+has over 0.99 with its own run."""
+
+NEAR = 2.0
+"""A channel's size may be off by this factor, for its faults and for a unit's slip to be told from one [dimensionless].
+The nearest slips of a unit are ten times apart."""
+
+SLIPS: Mapping[str, Mapping[float, str]] = {
+    "m": {1e3: "mm", 1e6: "um"},
+    "N": {1e-3: "kN"},
+    "Pa": {1e-5: "bar", 1e-6: "MPa", 1e-3: "kPa"},
+}
+"""Numbers for one SI unit [1], by what they are when given in another unit."""
+
+
+def channel_mistakes(measured: Mapping[str, Array], runs: Sequence[Mapping[str, Array]]) -> tuple[str, ...]:
+    """Return what is wrong with the sign, unit or name of channels, a clause each.
+
+    Every channel follows the drive, so a run of almost any actuator has its course.
+
+    Parameters
+    ----------
+    measured : Mapping[str, ndarray of shape (n,)]
+        The log's channels [SI].
+    runs : sequence of Mapping[str, ndarray of shape (n,)]
+        The same channels of likely actuators under the same drive [SI].
+
+    Returns
+    -------
+    tuple of str
+        Empty where each channel is as one of the actuators would have it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time = np.linspace(0.0, 1.0, 100)
+    >>> run = {"position_m": 1e-3 * np.sin(9.0 * time), "stack_force_n": 2e3 * np.cos(9.0 * time)}
+    >>> channel_mistakes({"position_m": -run["position_m"], "stack_force_n": 1e-3 * run["stack_force_n"]}, [run])
+    ('position_m has the opposite sign', 'stack_force_n is in kN')
+    """
+    swapped = tuple(_swapped(measured, runs))
+    return swapped or tuple(_by_themselves(measured, runs))
+
+
+def _swapped(measured: Mapping[str, Array], runs: Sequence[Mapping[str, Array]]) -> Iterator[str]:
+    for one, other in combinations(measured, 2):
+        crossed = _near(_share(measured[one], runs, other)) and _near(_share(measured[other], runs, one))
+        if crossed and not (_near(_share(measured[one], runs, one)) or _near(_share(measured[other], runs, other))):
+            yield f"{one} and {other} are swapped"
+
+
+def _by_themselves(measured: Mapping[str, Array], runs: Sequence[Mapping[str, Array]]) -> Iterator[str]:
+    for name, values in measured.items():
+        share = _share(values, runs, name)
+        unit = next((unit for factor, unit in SLIPS[UNITS[name]].items() if _near(abs(share) / factor)), "")
+        said = ["has the opposite sign"] if share < 0.0 and (unit or _near(-share)) else []
+        said += [f"is in {unit}"] if unit else []
+        if said:
+            yield f"{name} {' and '.join(said)}"
+
+
+def _share(values: Array, runs: Sequence[Mapping[str, Array]], name: str) -> float:
+    """Return a channel over that of the run whose course is most like it [dimensionless]; 0 where none is alike."""
+    best, share = ALIKE, 0.0
+    mine = values - values.mean()
+    for run in runs:
+        other = run[name] - run[name].mean()
+        product, own = float(mine @ other), float(other @ other)
+        size = sqrt(float(mine @ mine) * own)
+        if abs(product) > best * size:
+            best, share = abs(product) / size, product / own
+    return share
+
+
+def _near(ratio: float) -> bool:
+    return 1.0 / NEAR < ratio < NEAR
