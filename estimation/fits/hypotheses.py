@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isfinite
 
-from estimation.models.completed_flow import CRACKS
+from estimation.models.completed_flow import CRACKS, USUAL_CRACK
 from estimation.models.flow import STIFFNESS
 from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import CROSSED
@@ -200,10 +200,21 @@ PORTS_DRAIN = tuple(
     Hypothesis(f"port_{side}_drains", (f"drain_share_{side}",), ({f"drain_share_{side}": 1e2},)) for side in "ab"
 )
 
-MAY_HIDE = (replace(MAKEUP_BLOCKED, far=False), *PORTS_DRAIN, LEAKAGE_RISE, OFFSET, PUMP_COMPRESSES)
+MAKEUP_HIDDEN = replace(MAKEUP_BLOCKED, far=False, beside=CRACKS)
+"""The same beside a plain fit, where the drops at which valves open have taken it up: they are sought again."""
+
+MAY_HIDE = (MAKEUP_HIDDEN, *PORTS_DRAIN, LEAKAGE_RISE, OFFSET, PUMP_COMPRESSES)
 """What a log that the plain form explains is asked too: drops at which valves open, and leakage, may take it up. With
 `DELIVERY` and `ENCODER_ZERO` they are eight, of which one evaluation is made beside the fit. Slopes say what each
 promises, a stuck valve included, for it is near what the plain form found."""
+
+CHECKS_CRACK = Hypothesis(
+    "checks_crack", ("crack_pressure", "crack_difference"), ({"crack_pressure": 1e4},), known=True
+)
+
+UNLIKE_CRACKS = 3.0 * 2.0**0.5 * USUAL_CRACK
+"""Difference between the drops at which the two make-up valves open from which one may be stuck shut instead: three
+deviations of what is presumed [Pa]. A valve that opens far later than the other may be one that never opens."""
 
 HYPOTHESES = (
     PRESSURE_LATE,
@@ -241,7 +252,7 @@ HYPOTHESES = (
         tuple({"area_difference": differ, "volume_difference": differ, "pilot_share": 1.0} for differ in (-0.15, 0.15)),
         least=LEAST_ROD,
     ),
-    Hypothesis("checks_crack", ("crack_pressure", "crack_difference"), ({"crack_pressure": 1e4},), known=True),
+    CHECKS_CRACK,
     *PORTS_DRAIN,
 )
 """In no order: the log chooses."""

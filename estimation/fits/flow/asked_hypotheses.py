@@ -16,11 +16,13 @@ from estimation.fits.hypotheses import (
     LEAST_DELIVERY,
     LEAST_ZERO,
     MAKEUP_BENDS,
+    MAKEUP_HIDDEN,
     MAY_HIDE,
     OFFSET_AT_REST,
     PLAY,
     SPEED_LATE,
     START_LOAD,
+    UNLIKE_CRACKS,
     Hypothesis,
 )
 from estimation.fits.hypothesis_search.coarse_search import VANISHED
@@ -118,6 +120,8 @@ def hypotheses_asked(
     tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays), (SPEED_LATE, behind)
     asked = tuple(one for one, worthwhile in tried if worthwhile)
     asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > worth)
+    if MAKEUP_HIDDEN not in asked and _opens_late(swinging):
+        asked += (MAKEUP_HIDDEN,)
     remarks = open_wear_note(delivery, share_lost(log, swinging.values, parameters.pump_displacement))
     if not moving:
         return HYPOTHESES if not log.passes_on and doubted(swinging) else asked, remarks
@@ -126,6 +130,12 @@ def hypotheses_asked(
     lost = swinging is best and not fed and doubted(swinging)
     begun = predicted_gain(log.coarsened(), parameters, swinging.values, START_LOAD, by_mass=by_mass)
     return (BEGUN, *asked) if lost or _possible([begun], swinging)[0].gain > WORTH else asked, remarks
+
+
+def _opens_late(fit: GreyBoxFit) -> bool:
+    """Return whether a plain fit has one make-up valve open so late that it may be stuck shut: slopes do not tell."""
+    first, second = (fit.values.get(name, 0.0) for name in CRACKS)
+    return abs(first - second) > UNLIKE_CRACKS
 
 
 def worth_in(log: GreyBoxLog, left: float = 1.0) -> float:

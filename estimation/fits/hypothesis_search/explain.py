@@ -36,6 +36,7 @@ from estimation.fits.hypothesis_search.ranking import (
     refined,
 )
 from estimation.fits.hypothesis_search.screening import NEARLY, nearing, promising_starts, screen
+from estimation.fits.hypothesis_search.stuck_valve import stuck_instead
 from estimation.fits.hypothesis_search.wide_log import (
     balanced_by,
     delayed,
@@ -128,6 +129,9 @@ def explain(
         finished = _distinct([first, *pairs])
         if begun := [one for one in asked if one.from_first_sample and one.free == START_LOAD.free]:
             finished = _distinct([*finished, *_rig_and_load(wide, begun[0], finished[0], spared, accepted)])
+    if _explained(finished[0], accepted):
+        stuck = [one for one in stuck_instead(wide, finished[0], spared, WORTH) if _explained(one, accepted)]
+        finished = [*stuck, *finished[len(stuck) :]]
     best = finished[0]
     if not best.fits:
         return None

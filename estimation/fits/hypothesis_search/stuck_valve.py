@@ -1,0 +1,41 @@
+"""`stuck_instead(log, best, ...) -> list[Trial]`: a make-up valve that never opens, in place of one that opens late."""
+
+from dataclasses import replace
+
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypotheses import CHECKS_CRACK, MAKEUP_BLOCKED, UNLIKE_CRACKS
+from estimation.fits.hypothesis_search.decimation import Decimation
+from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.ranking import likeliest
+from estimation.fits.hypothesis_search.screening import screen
+from estimation.fits.hypothesis_search.wide_log import delayed
+
+
+def stuck_instead(log: GreyBoxLog, best: Trial, spared: Decimation, worth: float) -> list[Trial]:
+    """Return the best hypotheses with a stuck make-up valve, where one that opens far later is hardly likelier.
+
+    A valve that opens below all that a log has looks as late as the log allows. It is one fault with one unknown where
+    two drops are two, and the class of the log cannot be told beside it.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    best : Trial
+        The likeliest hypotheses.
+    spared : Decimation
+        What is spared, and where searches begin.
+    worth : float
+        Gain in log-likelihood below which the late valve is not believed instead [dimensionless].
+
+    Returns
+    -------
+    list of Trial
+        One at most.
+    """
+    if CHECKS_CRACK not in best.together or abs(best.values[CHECKS_CRACK.free[1]]) < UNLIKE_CRACKS:
+        return []
+    together = (*(one for one in best.together if one is not CHECKS_CRACK), MAKEUP_BLOCKED)
+    late, starts, wanted = delayed(log, best.delays), (best.values, *spared.starts), best.cost + worth
+    tried = likeliest(late, [[*screen(late, together, starts, every=spared.every)]], wanted, spared)
+    return [replace(one, delays=best.delays) for one in tried if one.fits and one.cost < wanted]

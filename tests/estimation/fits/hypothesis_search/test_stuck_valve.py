@@ -1,0 +1,60 @@
+"""A make-up valve that opens far later than the other may be one that never opens."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.fits.flow.fit import fit_flow
+from estimation.fits.greybox.descent import Point
+from estimation.fits.hypotheses import CHECKS_CRACK, DELIVERY, MAKEUP_BLOCKED, UNLIKE_CRACKS, Hypothesis
+from estimation.fits.hypothesis_search import stuck_valve
+from estimation.fits.hypothesis_search.decimation import NO_DECIMATION
+from estimation.fits.hypothesis_search.explanation import Trial
+from experiments.open_benchmark.kinds import make
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+from tests.estimation.fits.short_logs import made_fit
+
+NOTHING: Any = None
+
+
+def trial(together: Sequence[Hypothesis], cost: float, later: float = 0.0) -> Trial:
+    point = Point(np.zeros(1), cost, np.zeros(1), np.eye(1))
+    return Trial(tuple(together), point, {"crack_difference": later}, {}, {}, fits=(made_fit(cost, 2e8, 1e5),))
+
+
+def stuck(
+    monkeypatch: pytest.MonkeyPatch, cost: float, later: float, *beside: Hypothesis
+) -> list[tuple[Hypothesis, ...]]:
+    """Return what is told in place of a late valve of cost 1000, if a stuck one costs so much."""
+    monkeypatch.setattr(stuck_valve, "delayed", lambda log, _: log)
+    monkeypatch.setattr(stuck_valve, "screen", lambda _, together, *__, **___: iter([trial(together, cost)]))
+    monkeypatch.setattr(stuck_valve, "likeliest", lambda _, tried, *__: [way for one in tried for way in one])
+    best = trial([CHECKS_CRACK, *beside], 1000.0, later)
+    return [one.together for one in stuck_valve.stuck_instead(NOTHING, best, NO_DECIMATION, 10.0)]
+
+
+def test_a_stuck_valve_is_told_where_a_late_one_is_hardly_likelier(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`makeup_check_stuck_shut`, training 17011: 47 kPa late, likelier by 2, and "major leakage, major friction"."""
+    late = -2.0 * UNLIKE_CRACKS
+    assert stuck(monkeypatch, 1002.0, late) == [(MAKEUP_BLOCKED,)]
+    assert stuck(monkeypatch, 1002.0, late, DELIVERY) == [(DELIVERY, MAKEUP_BLOCKED)]
+    assert stuck(monkeypatch, 1011.0, late) == []
+
+
+def test_valves_that_open_alike_are_both_sound(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert stuck(monkeypatch, 900.0, 0.5 * UNLIKE_CRACKS) == []
+    assert stuck_valve.stuck_instead(NOTHING, trial([DELIVERY], 1000.0), NO_DECIMATION, 10.0) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("index", [16301, 17011])
+def test_a_valve_that_stays_shut_as_far_as_a_log_reaches_is_stuck(index: int) -> None:
+    """Both logs were in a class: one plain with a drop of 11 kPa (67 %), one with valves that open late (99.9 %)."""
+    log = make("makeup_check_stuck_shut", "training", index).log
+    channels = {name: log[name].to_numpy() for name in log.columns if name != "time_s"}
+    fit = fit_flow(Record(1e-3, channels), EhaParameters(), EhaParameters().bulk_modulus)
+    assert fit.explanation is not None
+    assert fit.explanation.names == (MAKEUP_BLOCKED.name,)
