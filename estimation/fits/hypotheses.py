@@ -55,9 +55,9 @@ class Hypothesis:
         What is fitted along with it, but is nothing that it promises.
     lower : bool
         Whether what is freed first is lower than the rig file has it: else it is not what the hypothesis says.
-    known : bool
-        Whether what is freed first must be larger than its deviation: a valve that never opens tells no drop, and a
-        circuit without air not when it gets in.
+    known : tuple of str
+        What must be larger than its deviation: a valve that never opens tells no drop, a circuit without air not when
+        it gets in, and air that is in from the beginning gets in at no time.
     """
 
     name: str
@@ -77,22 +77,23 @@ class Hypothesis:
     by_mass: bool = False
     beside: tuple[str, ...] = ()
     lower: bool = False
-    known: bool = False
+    known: tuple[str, ...] = ()
 
-    def told(self, value: float, std: float) -> bool:
-        """Return whether a log determines the first freed unknown, as far as the hypothesis needs it.
+    def told(self, values: Mapping[str, float], std: Mapping[str, float]) -> bool:
+        """Return whether a log determines what is freed, as far as the hypothesis needs it.
 
         Parameters
         ----------
-        value, std : float
-            What was found of it, and its standard deviation [SI].
+        values, std : Mapping[str, float]
+            What was found, and standard deviations; what has none is known [SI].
 
         Returns
         -------
         bool
             Whether it does.
         """
-        return (not self.lower or isfinite(std)) and (not self.known or std < abs(value))
+        found = not self.lower or isfinite(std.get(self.free[0], 0.0))
+        return found and all(std.get(name, 0.0) < abs(values[name]) for name in self.known)
 
 
 DELIVERY = Hypothesis("delivery", ("pump_displacement",))
@@ -185,7 +186,7 @@ AIR_MIDWAY = Hypothesis(
     at_end=("air_width",),
     beside=CRACKS,
     by_mass=True,
-    known=True,
+    known=("air_softness", "air_onset"),
 )
 """Where air gets in, lost flow says roughly. How long it takes is sought last: what is short stops a descent."""
 
@@ -235,7 +236,7 @@ HYPOTHESES = (
     DELIVERY,
     VOLUME,
     START_LOAD,
-    Hypothesis("air", ("air_softness",), ({"air_softness": 1e2}, {"air_softness": 1e3}), known=True),
+    Hypothesis("air", ("air_softness",), ({"air_softness": 1e2}, {"air_softness": 1e3}), known=("air_softness",)),
     AIR_MIDWAY,
     Hypothesis(
         "relief_low", ("relief_pressure", "relief_conductance"), shares_of_peak=(0.6, 0.85), far=True, lower=True

@@ -36,7 +36,7 @@ from estimation.fits.hypothesis_search.not_excluded import open_wear_note, share
 from estimation.fits.hypothesis_search.pump_delivery import contradicted
 from estimation.fits.hypothesis_search.pump_ripple_fits import asked_for_ripple
 from estimation.fits.hypothesis_search.speed_offset import speed_offset_instead
-from estimation.fits.hypothesis_search.varying_loss import VaryingLoss, loss_note, varying_loss
+from estimation.fits.hypothesis_search.varying_loss import VaryingLoss, loss_notes, varying_loss
 from estimation.models.completed_flow import CRACKS, balances_mass
 from estimation.models.flow import HELD_FLOW_FORM
 from estimation.notes import EstimateCode
@@ -245,7 +245,7 @@ def _losing_fit(plain: PlainFits, loss: VaryingLoss, sensed: ShownPlay) -> FormF
         chi_square=one.chi_square[0],
         reasons=play_left(one.play, sensed),
         rig_slopes=with_lumped_slopes(one.rig_slopes),
-        remarks=(*plain.teeth, loss_note(loss), *open_play),
+        remarks=(*plain.teeth, *loss_notes(loss), *open_play),
         turning=plain.turning,
         correlation=correlation,
     )

@@ -83,8 +83,7 @@ def final_fit(log: GreyBoxLog, tried: Trial, useful: float = np.inf) -> Trial:
     best = replace(done[0][0], coarse=tried.values)
     count = [one for one in done if one[0].cost <= best.cost + ALIKE]
     first, *rivals = (_concluded(problem, one.point, log) for one, problem in count)
-    found = ((one, one.free[0]) for one in best.together)
-    if best.meant and all(one.told(best.values[name], first.std.get(name, 0.0)) for one, name in found):
+    if best.meant and all(one.told(best.values, first.std) for one in best.together):
         return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
     return replace(best, void=True, fits=(replace(first, cost=NEVER),))
 

@@ -143,14 +143,18 @@ def varying_loss(
     return worn[0] if worn else best
 
 
-def loss_note(loss: VaryingLoss) -> Note:
-    """Return the note that names a loss.
+def loss_notes(loss: VaryingLoss) -> tuple[Note, ...]:
+    """Return the note that names a loss; none for one that may be zero, which led the search to a lower minimum.
 
     Returns
     -------
-    Note
+    tuple of Note
         With where or from when on it is, and how large.
     """
+    return (_loss_note(loss),) if loss.size > NORMAL_95 * loss.std else ()
+
+
+def _loss_note(loss: VaryingLoss) -> Note:
     course, measured = loss.course, loss.measured
     factor = 1.0 + loss.size * measured.leakage / loss.fit.values["leakage_coefficient"]
     match course.kind:
