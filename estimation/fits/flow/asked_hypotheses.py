@@ -10,9 +10,11 @@ from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_shows
 from estimation.fits.hypotheses import (
     BEGUN,
+    CHECKS_HIDDEN,
     DELIVERY,
     ENCODER_ZERO,
     HYPOTHESES,
+    LARGE_CRACK,
     LEAST_DELIVERY,
     LEAST_ZERO,
     MAKEUP_BENDS,
@@ -120,8 +122,7 @@ def hypotheses_asked(
     tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays), (SPEED_LATE, behind)
     asked = tuple(one for one, worthwhile in tried if worthwhile)
     asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > worth)
-    if MAKEUP_HIDDEN not in asked and _opens_late(swinging):
-        asked += (MAKEUP_HIDDEN,)
+    asked += tuple(one for one in _late_valves(swinging) if one not in asked)
     remarks = open_wear_note(delivery, share_lost(log, swinging.values, parameters.pump_displacement))
     if not moving:
         return HYPOTHESES if not log.passes_on and doubted(swinging) else asked, remarks
@@ -132,10 +133,11 @@ def hypotheses_asked(
     return (BEGUN, *asked) if lost or _possible([begun], swinging)[0].gain > WORTH else asked, remarks
 
 
-def _opens_late(fit: GreyBoxFit) -> bool:
-    """Return whether a plain fit has one make-up valve open so late that it may be stuck shut: slopes do not tell."""
+def _late_valves(fit: GreyBoxFit) -> tuple[Hypothesis, ...]:
+    """Return what is asked of make-up valves that a plain fit has open late: slopes do not tell that one never does."""
     first, second = (fit.values.get(name, 0.0) for name in CRACKS)
-    return abs(first - second) > UNLIKE_CRACKS
+    late, unlike = max(abs(first), abs(second)) > LARGE_CRACK, abs(first - second) > UNLIKE_CRACKS
+    return (CHECKS_HIDDEN,) * late + (MAKEUP_HIDDEN,) * unlike
 
 
 def worth_in(log: GreyBoxLog, left: float = 1.0) -> float:

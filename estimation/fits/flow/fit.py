@@ -22,6 +22,7 @@ from estimation.fits.greybox.work_limit import Work, WorkSpentError
 from estimation.fits.hypotheses import (
     AIR_MIDWAY,
     BEGUN,
+    CHECKS_HIDDEN,
     HYPOTHESES,
     OFFSET,
     PLAY,
@@ -204,7 +205,7 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
         near,
         explains,
         asked=asked,
-        paired=any(one not in (*ALWAYS_ASKED, PLAY) for one in asked),
+        paired=any(one not in (*ALWAYS_ASKED, CHECKS_HIDDEN, PLAY) for one in asked),
         hopeless=hopeless_cost(plain.swinging, asked),
         by_mass=balances_mass(plain.swinging.model),
         useful=_wanted((asked[0].name,), plain, traits, 0.0) if alone else np.inf,

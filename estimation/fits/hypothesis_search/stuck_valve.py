@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.hypotheses import CHECKS_CRACK, MAKEUP_BLOCKED, UNLIKE_CRACKS
+from estimation.fits.hypotheses import CHECKS_CRACK, MAKEUP_BLOCKED, MAKEUP_HIDDEN, UNLIKE_CRACKS
 from estimation.fits.hypothesis_search.decimation import Decimation
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.ranking import likeliest
@@ -33,9 +33,10 @@ def stuck_instead(log: GreyBoxLog, best: Trial, spared: Decimation, worth: float
     list of Trial
         One at most.
     """
-    if CHECKS_CRACK not in best.together or abs(best.values[CHECKS_CRACK.free[1]]) < UNLIKE_CRACKS:
+    others = tuple(one for one in best.together if one.name != CHECKS_CRACK.name)
+    if len(others) == len(best.together) or abs(best.values[CHECKS_CRACK.free[1]]) < UNLIKE_CRACKS:
         return []
-    together = (*(one for one in best.together if one is not CHECKS_CRACK), MAKEUP_BLOCKED)
+    together = (*others, MAKEUP_BLOCKED if CHECKS_CRACK in best.together else MAKEUP_HIDDEN)
     late, starts, wanted = delayed(log, best.delays), (best.values, *spared.starts), best.cost + worth
     tried = likeliest(late, [[*screen(late, together, starts, every=spared.every)]], wanted, spared)
     return [replace(one, delays=best.delays) for one in tried if one.fits and one.cost < wanted]

@@ -9,7 +9,16 @@ import pytest
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow.asked_hypotheses import ZERO_WORTH, hypotheses_asked
 from estimation.fits.greybox.chance import LARGEST_CHI_SQUARE
-from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO, HYPOTHESES, LEAST_ZERO, MAKEUP_HIDDEN, UNLIKE_CRACKS
+from estimation.fits.hypotheses import (
+    CHECKS_HIDDEN,
+    DELIVERY,
+    ENCODER_ZERO,
+    HYPOTHESES,
+    LARGE_CRACK,
+    LEAST_ZERO,
+    MAKEUP_HIDDEN,
+    UNLIKE_CRACKS,
+)
 from estimation.fits.hypothesis_search.fit_objections import DOUBTED
 from estimation.fits.hypothesis_search.not_excluded import OPEN_DELIVERY
 from estimation.fits.hypothesis_search.predicted_gains import PredictedGain
@@ -83,14 +92,23 @@ def test_a_log_is_asked_nothing_where_slopes_promise_more_than_it_leaves() -> No
         assert bool(asked) == bool(remarks) == wanted
 
 
-def test_a_stuck_valve_is_asked_for_where_a_plain_fit_has_one_valve_open_far_later_than_the_other() -> None:
-    """The slopes promised nothing, where the valve is all but shut already."""
+def test_valves_that_open_late_or_never_are_asked_for_where_a_plain_fit_has_late_ones() -> None:
+    """The slopes promised nothing, where a valve is all but shut already.
+
+    Bulk modulus of `checks_crack_late` 17006 passed 3.0 % low: the drops were held back by what is presumed of them.
+    """
     plain, sound = seen(log(0.2)), made_fit(400.0, 2e8, 1e5)
+    usual, late = 0.9 * LARGE_CRACK, 1.1 * LARGE_CRACK
+    unlike = usual - 1.1 * UNLIKE_CRACKS
     with all_promise(PredictedGain(0.0, 0.0, 2.0 * OPEN_DELIVERY)):
-        for later, wanted in ((1.1 * UNLIKE_CRACKS, (MAKEUP_HIDDEN,)), (0.9 * UNLIKE_CRACKS, ())):
-            for name in CRACKS:
-                fit = replace(sound, values={**sound.values, **dict.fromkeys(CRACKS, 1e4), name: 1e4 + later})
-                assert hypotheses_asked(plain, PAPER, fit, fit, loaded=False, moving=False)[0] == wanted
+        for cracks, wanted in (
+            ((usual, usual), ()),
+            ((usual, late), (CHECKS_HIDDEN,)),
+            ((unlike, usual), (MAKEUP_HIDDEN,)),
+            ((late, -late), (CHECKS_HIDDEN, MAKEUP_HIDDEN)),
+        ):
+            fit = replace(sound, values={**sound.values, **dict(zip(CRACKS, cracks, strict=True))})
+            assert hypotheses_asked(plain, PAPER, fit, fit, loaded=False, moving=False)[0] == wanted
 
 
 def test_a_plant_without_make_up_valves_is_explained_without_a_hypothesis() -> None:

@@ -8,7 +8,15 @@ import pytest
 
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.greybox.descent import Point
-from estimation.fits.hypotheses import CHECKS_CRACK, DELIVERY, MAKEUP_BLOCKED, UNLIKE_CRACKS, Hypothesis
+from estimation.fits.hypotheses import (
+    CHECKS_CRACK,
+    CHECKS_HIDDEN,
+    DELIVERY,
+    MAKEUP_BLOCKED,
+    MAKEUP_HIDDEN,
+    UNLIKE_CRACKS,
+    Hypothesis,
+)
 from estimation.fits.hypothesis_search import stuck_valve
 from estimation.fits.hypothesis_search.decimation import NO_DECIMATION
 from estimation.fits.hypothesis_search.explanation import Trial
@@ -26,13 +34,13 @@ def trial(together: Sequence[Hypothesis], cost: float, later: float = 0.0) -> Tr
 
 
 def stuck(
-    monkeypatch: pytest.MonkeyPatch, cost: float, later: float, *beside: Hypothesis
+    monkeypatch: pytest.MonkeyPatch, cost: float, later: float, *beside: Hypothesis, crack: Hypothesis = CHECKS_CRACK
 ) -> list[tuple[Hypothesis, ...]]:
     """Return what is told in place of a late valve of cost 1000, if a stuck one costs so much."""
     monkeypatch.setattr(stuck_valve, "delayed", lambda log, _: log)
     monkeypatch.setattr(stuck_valve, "screen", lambda _, together, *__, **___: iter([trial(together, cost)]))
     monkeypatch.setattr(stuck_valve, "likeliest", lambda _, tried, *__: [way for one in tried for way in one])
-    best = trial([CHECKS_CRACK, *beside], 1000.0, later)
+    best = trial([crack, *beside], 1000.0, later)
     return [one.together for one in stuck_valve.stuck_instead(NOTHING, best, NO_DECIMATION, 10.0)]
 
 
@@ -41,6 +49,7 @@ def test_a_stuck_valve_is_told_where_a_late_one_is_hardly_likelier(monkeypatch: 
     late = -2.0 * UNLIKE_CRACKS
     assert stuck(monkeypatch, 1002.0, late) == [(MAKEUP_BLOCKED,)]
     assert stuck(monkeypatch, 1002.0, late, DELIVERY) == [(DELIVERY, MAKEUP_BLOCKED)]
+    assert stuck(monkeypatch, 1002.0, late, crack=CHECKS_HIDDEN) == [(MAKEUP_HIDDEN,)]
     assert stuck(monkeypatch, 1011.0, late) == []
 
 
