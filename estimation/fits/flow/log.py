@@ -11,6 +11,7 @@ from estimation.fits.flow.pumped import pumped_evenly
 from estimation.fits.greybox.block_averages import averaged, odd_block
 from estimation.fits.greybox.intersample_doubt import OWN_NOISE, SLOW
 from estimation.fits.greybox.intersample_speed import straightened
+from estimation.fits.greybox.leaked_noise import encoder_noise
 from estimation.fits.greybox.log import GreyBoxLog, greybox_log
 from estimation.fits.hypothesis_search.fault_guesses import leakage_guess
 from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
@@ -179,19 +180,29 @@ def flow_log(
     )
     log = pumped_evenly(averaged(log, LONGEST_STEP, _block(log, parameters)), log, parameters)
     felt = log.noise[0].passed_on * parameters.bulk_modulus > FELT_NOISE * log.noise[0].variance ** 0.5
-    return _noisy(log, parameters) if felt else log.taken_at(parameters.bulk_modulus)
+    return _noisy(log, parameters, record) if felt else log.taken_at(parameters.bulk_modulus)
 
 
-def _noisy(log: GreyBoxLog, p: EhaParameters) -> GreyBoxLog:
+def _noisy(log: GreyBoxLog, p: EhaParameters, record: Record) -> GreyBoxLog:
     """Return a log whose output's noise has a part that goes with the oil's stiffness, and leaks off.
 
     Position that is off by ``d`` compresses oil by ``b A d / V``, which leaks off in a time ``V / (b L)``. So means
     over ``T`` are off by ``A d / (L T)`` at most, whatever the oil's stiffness. Without that bound, oil as stiff as
-    steel explained any log of a leaky actuator.
+    steel explained any log of a leaky actuator. How the noise goes with stiffness below it matters as much, and depends
+    on how alike an encoder's successive errors are.
     """
-    lost = (0.5 * log.sample_time * NOISY_BLOCK) ** 0.5 / p.chamber_volume
-    by = {"passed_over": ("chamber_volume", p.chamber_volume), "lost_by": ("leakage_coefficient", "case_leakage")}
-    return replace(log, noise=(replace(log.noise[0], **by, lost=lost),), block=NOISY_BLOCK)
+    averaged_over, samples = round(log.sample_time / record.sample_time), max(1, round(NOISY_BLOCK / log.sample_time))
+    position, speed = record["position_m"], bridged(record["motor_speed_rad_s"])
+    pumped = p.pump_displacement / p.piston_area * record.sample_time * np.cumsum(speed)
+    leaked = encoder_noise(bridged(position), pumped, position_variance(position), averaged_over, samples)
+    noise = replace(
+        log.noise[0],
+        passed_over=("chamber_volume", p.chamber_volume),
+        lost_by=("leakage_coefficient", "case_leakage"),
+        lost=log.sample_time / p.chamber_volume,
+        lost_from=leaked,
+    )
+    return replace(log, noise=(noise,), block=NOISY_BLOCK)
 
 
 def carried(

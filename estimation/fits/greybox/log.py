@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from estimation.arrays import Array, IntArray
+from estimation.fits.greybox.leaked_noise import LeakedNoise
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.greybox import GreyBoxModel
@@ -20,12 +21,6 @@ if TYPE_CHECKING:
 
 BLOCK = 1e-3
 """Usual length over which residuals are averaged before they are squared [s]."""
-
-
-SHARP = 4.0
-"""How sharply what a driving channel's noise adds comes to the most that losses leave of it [dimensionless]; judged. By
-an impulse response and white noise it is less about the corner, but a quantised position is no white noise: with 1 a
-leaky stiff actuator kept 1.3 times its noise, bulk modulus 1.5 % low; with 4 1.05 times, and 0.2 %."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +43,9 @@ class OutputNoise:
     lost_by : tuple of str
         Parameters by which it is lost again before the next samples.
     lost : float
-        How much of it a unit of `passed_by` and of these loses, over what is left at most [SI].
+        How much of it a unit of `passed_by` and of these loses from one sample to the next, where that is little [SI].
+    lost_from : LeakedNoise, optional
+        What losses leave of it in the means by which a fit is judged.
     """
 
     variance: float
@@ -58,6 +55,7 @@ class OutputNoise:
     passed_over: tuple[str, float] = ("", 1.0)
     lost_by: tuple[str, ...] = ()
     lost: float = 0.0
+    lost_from: LeakedNoise | None = None
 
     def passing(self, values: Mapping[str, float]) -> tuple[float, dict[str, float]]:
         """Return the output noise due to a driving channel's noise, and its slope by each unknown.
@@ -76,11 +74,13 @@ class OutputNoise:
         divisor, usual = self.passed_over
         felt = values.get(self.passed_by, 0.0) * usual / values.get(divisor, usual)
         losses = {name: self.lost * felt * values.get(name, 0.0) for name in self.lost_by}
-        lost = sum(losses.values())
-        kept = 1.0 / (1.0 + lost**SHARP)
-        goes = {name: -(1.0 - kept) * loss / lost for name, loss in losses.items() if loss > 0.0}
-        goes |= {name: slope for name, slope in ((self.passed_by, kept), (divisor, -kept)) if name in values}
-        return self.passed_on * felt * kept ** (1.0 / SHARP), goes
+        total = sum(losses.values())
+        kept, bent = (1.0, 0.0) if self.lost_from is None else self.lost_from.kept(total)
+        goes = {name: bent * loss / total for name, loss in losses.items() if loss > 0.0}
+        goes |= {
+            name: slope for name, slope in ((self.passed_by, 1.0 + bent), (divisor, -1.0 - bent)) if name in values
+        }
+        return self.passed_on * felt * kept, goes
 
     def scaled(self, variance: float, walk: float = 1.0) -> "OutputNoise":
         """Return the noise times a factor.
