@@ -12,7 +12,7 @@ from estimation.fits.flow.belief import hopeless_cost, play_explained, wanted_co
 from estimation.fits.flow.log import homed_at_stop, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
-from estimation.fits.flow.other_minimum import lower_minimum
+from estimation.fits.flow.other_minimum import lower_minimum, smaller_accumulator
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.greybox.fit import GreyBoxFit
@@ -272,7 +272,9 @@ def _elsewhere(plain: PlainFits, strange: Explanation) -> FitStart | None:
         return replace(start, speed_offset=turned, valley=None)
     if start.valley is not None:
         return None
-    lower = lower_minimum(plain.log, start.parameters, plain.swinging, strange.values, cost + WORTH)
+    lower = smaller_accumulator(plain.log, start.parameters, plain.fits, cost + WORTH)
+    if lower is None:
+        lower = lower_minimum(plain.log, start.parameters, plain.swinging, strange.values, cost + WORTH)
     return None if lower is None else replace(start, valley=lower)
 
 

@@ -1,6 +1,6 @@
 """`lower_minimum(log, ...)`: a lower minimum of the plain flow form, found from the values of another explanation."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -12,7 +12,7 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.greybox.spared_steps import spared
-from estimation.fits.hypothesis_search.wide_problem import flow_bounds
+from estimation.fits.hypothesis_search.wide_problem import BEYOND, flow_bounds, stiffest_accumulator
 from estimation.models.completed_flow import CRACKS, completed
 from estimation.models.flow import HELD_FLOW_FORM, STIFFNESS
 from estimation.models.greybox import GreyBoxModel
@@ -27,8 +27,33 @@ large, long model steps lead so far astray that 15 left 74 of log-likelihood, an
 WITHIN = 0.3
 """First radius of a search from a place in another valley [dimensionless]."""
 
+SMALLER = 2.0
+"""How many times as stiff as usual an accumulator is where the search for a small one begins [dimensionless]."""
+
+VANISHING = ("leakage_coefficient", "case_leakage", "makeup_opening")
+"""What another balance may have lost on its way."""
+
 Found: TypeAlias = tuple[Problem, Point, tuple[Array, Array]]
 """A problem, its solution, and the bounds of its search."""
+
+
+def nearest(one: Found, other: Found, guesses: Mapping[str, float]) -> Point:
+    """Return the point from which a form's search goes on: its own, or where another form's ended if that is lower.
+
+    A wrong balance may leave no leakage, from where its logarithm does not come back. So what may vanish begins at
+    first guesses there.
+
+    Parameters
+    ----------
+    one, other : Found
+        Where both searches have come to.
+    guesses : Mapping[str, float]
+        First guesses [SI].
+    """
+    problem, point, bounds = one
+    led = {STIFFNESS: 0.0, **other[0].model.values(other[1].theta), **{name: guesses[name] for name in VANISHING}}
+    there = problem.at(np.clip(problem.model.theta(led), *bounds))
+    return there if there.cost < problem.at(point.theta).cost else point
 
 
 def lower_minimum(
@@ -74,6 +99,42 @@ def lower_minimum(
             return None
     _, point, _ = from_minimum(fit.model, log, values, wanted, bent=bent)
     return values if point.cost < wanted else None
+
+
+def smaller_accumulator(
+    log: GreyBoxLog, parameters: EhaParameters, fits: Sequence[GreyBoxFit], wanted: float
+) -> Mapping[str, float] | None:
+    """Return a start from which the plain form falls below a cost with a smaller accumulator than is usual.
+
+    A compact actuator's accumulator may hold little more gas than its chambers take up oil. What its pressure then does
+    at every stroke passes for an encoder that was homed elsewhere.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    fits : sequence of GreyBoxFit
+        The plain form's.
+    wanted : float
+        The cost [dimensionless].
+
+    Returns
+    -------
+    Mapping[str, float] or None
+        Values of the unknowns of the plain form [SI]; None where no fit has the smallest usual accumulator, or none
+        falls so low.
+    """
+    usual = stiffest_accumulator(vars(parameters))
+    for fit in sorted(fits, key=lambda one: one.cost):
+        if CRACKS[0] in fit.values and fit.values.get(STIFFNESS, 0.0) > usual / BEYOND:
+            bent = BEND in fit.values
+            values = {BEND: 0.0, **fit.values, STIFFNESS: SMALLER * usual}
+            problem, point, _ = from_minimum(fit.model, log, values, bent=bent)
+            if point.cost < wanted:
+                return {**values, **problem.model.values(point.theta)}
+    return None
 
 
 def from_minimum(

@@ -13,7 +13,7 @@ import numpy as np
 
 from estimation.arrays import IntArray
 from estimation.fits.flow.log import DRAIN_START, OPENING_START, carried, outruns_pump
-from estimation.fits.flow.other_minimum import FINISHING, Found, completed_form, from_minimum
+from estimation.fits.flow.other_minimum import FINISHING, Found, completed_form, from_minimum, nearest
 from estimation.fits.flow.swept import swept_evenly
 from estimation.fits.greybox.descent import Point, descend, remembered
 from estimation.fits.greybox.driven import driven_samples
@@ -156,8 +156,11 @@ def balanced(
     first = rough[0] if rough[0] in likely else near  # whose kernel has fewer runs side by side
     steps = sparing_steps(first.problem.on(log), first.point.theta)
     done = each(lambda one: _finished(one, log, steps, bent=bent), likely)
-    wanted = min(done, key=_cost)[1].cost
-    done += each(lambda one: _finished(one, log, steps, wanted, bent=bent), behind)
+    best, here = min(done, key=_cost), log.stepped(steps)
+    if not explained(best[0], best[1]):
+        led = (nearest((one.problem.on(here), one.point, one.bounds), best, starts[0]) for one in behind)
+        behind = [replace(one, point=point) for one, point in zip(behind, led, strict=True)]
+    done += each(lambda one: _finished(one, log, steps, best[1].cost, bent=bent), behind)
     if valley is not None:
         done = each(lambda one: min(one, from_minimum(one[0].model, log, valley, bent=bent), key=_cost), done)
     while sparing := [one for one in _told_of(done) if one[0].log.steps is not log.steps]:

@@ -1,4 +1,4 @@
-"""`encoder_noise(position, ...) -> LeakedNoise`: noise of an encoder in means of an output that follows and loses it."""
+"""`encoder_noise(position, ...) -> LeakedNoise`: an encoder's noise in means of an output that follows and loses it."""
 
 import math
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ LAGS = 8
 within a block, and is lost."""
 
 READ = 3
-"""Blocks over which an encoder's reading is averaged to tell where it is within a step [count]; judged. Over one, what a
-steady piston reads differs by half a step from mean to mean; over more, it may turn round meanwhile."""
+"""Blocks over which an encoder's reading is averaged to tell where it is within a step [count]; judged. Over one, what
+a steady piston reads differs by half a step from mean to mean; over more, it may turn round meanwhile."""
 
 FREQUENCIES = 256
 """Frequencies at which their spectrum is taken [count]."""
@@ -99,7 +99,8 @@ def encoder_noise(position: Array, pumped: Array, variance: float, averaged: int
 
     At a position that noise before the encoder blurs by ``s``, the ``k``-th harmonic of the error of a step ``q`` has a
     variance of ``q^2 / (2 (pi k)^2)``, of which ``exp(-(2 pi k s / q)^2)`` goes with the position (Widrow and Kollar
-    2008, Quantization Noise, chapter 4) and the rest is white. Where the piston is comes from the log itself: what is quick is as the pump moves it, the rest as it is read.
+    2008, Quantization Noise, chapter 4) and the rest is white. Where the piston is comes from the log itself: what is
+    quick is as the pump moves it, the rest as it is read.
 
     Parameters
     ----------

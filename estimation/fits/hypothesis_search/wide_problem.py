@@ -45,8 +45,15 @@ ADIABATIC = 1.4
 """Exponent of nitrogen that is compressed quickly [dimensionless]."""
 
 LEAST_GAS = 1.0
-"""Least gas of the inner circuit's accumulator, in chamber volumes; judged. With less its pressure would follow every
-stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
+"""Usual least gas of the inner circuit's accumulator, in chamber volumes; judged. With less its pressure would follow
+every stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
+
+SMALLEST_GAS = 1.0
+"""Least gas that there may be, over the oil that both chambers take up from rest to relief pressure [dimensionless]:
+with as much it loses half its pressure then, and a designer gives it more."""
+
+BEYOND = 1.001
+"""How many times as stiff as usual an accumulator is that is smaller than usual [dimensionless]: but for rounding."""
 
 MOST_WORN = 0.2
 """Most that a worn pump loses of its displacement where the search for it begins [fraction]; judged."""
@@ -168,6 +175,26 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
     return [{"relief_pressure": share * peak, "relief_conductance": RELIEF_START} for share in one.shares_of_peak]
 
 
+def stiffest_accumulator(rig: Mapping[str, float], *, small: bool = False) -> float:
+    """Return how stiff the inner circuit's accumulator may be.
+
+    Parameters
+    ----------
+    rig : Mapping[str, float]
+        The actuator's parameters [SI].
+    small : bool
+        Whether it may be as small as the oil that it takes, or as a chamber if that is less.
+
+    Returns
+    -------
+    float
+        Rise of its pressure per volume of oil that it takes in [Pa/m^3].
+    """
+    taken = min(4.0 * rig["relief_pressure"] / rig["bulk_modulus"], 1.0)
+    gas = SMALLEST_GAS * taken if small else LEAST_GAS
+    return ADIABATIC * rig["accumulator_pressure"] / (gas * rig["chamber_volume"])
+
+
 def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) -> tuple[Array, Array]:
     """Return the bounds of a search for the flow form's unknowns, plain or wide.
 
@@ -176,7 +203,7 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     model : GreyBoxModel
         The flow form with its unknowns.
     guesses : sequence of ndarray, shape (unknowns,)
-        Where it begins [dimensionless].
+        Where it begins [dimensionless]. An accumulator that is smaller than usual there may be as small as any.
     log : GreyBoxLog
         The log, as the model sees it.
 
@@ -188,7 +215,9 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     rig = dict(zip(parameter_names(model.parameters), map(float, log.parameters), strict=True))
     most = rig["pump_displacement"] * float(np.max(np.abs(log.drives[:, 0])))
     relief = (0.0, max(most / (SHARPEST_RELIEF * rig["relief_pressure"]), rig["relief_conductance"]))
-    stiffest = ADIABATIC * rig["accumulator_pressure"] / (LEAST_GAS * rig["chamber_volume"])
+    stiffest = stiffest_accumulator(rig)
+    if STIFFNESS in model.unknowns and max(model.values(guess)[STIFFNESS] for guess in guesses) > BEYOND * stiffest:
+        stiffest = stiffest_accumulator(rig, small=True)
     latest = 0.0 if log.course is None else -log.sample_time
     limits = {"speed_lead": (latest, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
     limits[START_LEVEL] = (-rig["accumulator_pressure"], shut_in(log))
