@@ -1,5 +1,6 @@
 """Notes on rig and logger for a log that the plain flow form does not explain, and the corrected log."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
@@ -20,6 +21,7 @@ from estimation.models.wide_flow import CROSSED, GROWTH, TURBULENT_AT
 from estimation.notes import RigCode
 from plant.arrays import Array
 from plant.components.oil import ATMOSPHERE
+from plant.eha.doubts import DOUBTS
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
@@ -47,6 +49,12 @@ OUTSIDE = {
     RigCode.LEAKS_ONE_WAY,
 }
 """Faults that are none of the nine conditions."""
+
+THROUGH = 99.9
+"""Share of side A that side B of a through rod has at least [%]."""
+
+OTHER_ROD = 2.0 * 2.0**0.5 * max(DOUBTS["piston_area"].usual)
+"""Difference of the logarithm of a piston's two areas from which they are not those of the rig file: two deviations."""
 
 
 def notes_of(found: Explanation, parameters: EhaParameters) -> tuple[Note, ...]:
@@ -153,6 +161,18 @@ def _single_rod(found: Explanation, p: EhaParameters) -> Note:
         rig_volume_percent=100.0 * _b_over_a(p.volume_difference),
         rig_pilot_share=p.pilot_share,
     )
+
+
+def of_another_rod(note: Note) -> bool:
+    """Return whether a note tells areas that are not those of a rig file which says a single rod.
+
+    What is wrong with such a rig is taken up by its areas at times, a displacement that is 6 % off by 10 % of one. Its
+    bulk modulus may be right then, but its force balance is not.
+    """
+    if note.code is not RigCode.SINGLE_ROD:
+        return False
+    told, written = float(note.data["percent"]), float(note.data["rig_percent"])
+    return written < THROUGH and abs(math.log(told / written)) > OTHER_ROD
 
 
 def _b_over_a(difference: float) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 
 from estimation.eha.bulk_modulus import EstimateOptions
 from estimation.eha.estimate import estimated, explained, finding_of, refused
-from estimation.eha.explanation_notes import OUTSIDE, at_pump_speed, rig_set_right, set_right
+from estimation.eha.explanation_notes import OUTSIDE, at_pump_speed, of_another_rod, rig_set_right, set_right
 from estimation.eha.result import BulkModulusEstimate
 from estimation.eha.rig_share import SOFT, scaled_responses, with_total
 from estimation.finding import Finding, Outcome, Quantity
@@ -151,7 +151,7 @@ class _Case(NamedTuple):
     @property
     def doubts(self) -> tuple[Note, ...]:
         """Reasons against all nine conditions before a circuit is fitted."""
-        outside = (note for note in self.strange if note.code in OUTSIDE)
+        outside = (note for note in self.strange if note.code in OUTSIDE or of_another_rod(note))
         return (*refused(self.estimate), *outside, *self.log.objections)
 
 

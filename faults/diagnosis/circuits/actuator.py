@@ -49,9 +49,27 @@ def actuator_of(parameters: EhaParameters) -> Actuator:
     RigError
         If no circuit fits around it.
     """
+    parameters = with_room(parameters)
     rated = steady_state(parameters.rated_speed, parameters)[0]
     points = [coordinates_of(parameters_for(condition, parameters), rated) for condition in CONDITIONS.values()]
     circuit = circuit_of(parameters)
     if parameters.stroke is None:
         circuit = replace(circuit, stroke=float(longest_stroke(circuit)))
     return Actuator(circuit, rated, np.array(points))
+
+
+def with_room(p: EhaParameters) -> EhaParameters:
+    """Return an actuator whose chambers have room for its stroke: a stroke is measured, a volume is estimated.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    EhaParameters
+        With the least volume that its stroke leaves, if it says less.
+    """
+    wanted = (p.stroke or 0.0) / float(longest_stroke(p))
+    return replace(p, chamber_volume=wanted * p.chamber_volume) if wanted > 1.0 else p
