@@ -21,6 +21,9 @@ LAGS = 8
 """Blocks over which errors of an encoder are looked at for a likeness [count]; what is alike beyond does not change
 within a block, and is lost."""
 
+UNEVEN = 0.02
+"""Mean distance of readings from multiples of a step from which they are none [steps]; a continuous one's is 0.25."""
+
 READ = 3
 """Blocks over which an encoder's reading is averaged to tell where it is within a step [count]; judged. Over one, what
 a steady piston reads differs by half a step from mean to mean; over more, it may turn round meanwhile."""
@@ -120,24 +123,34 @@ def encoder_noise(position: Array, pumped: Array, variance: float, averaged: int
     LeakedNoise
         As the log's own motion makes it.
     """
-    steps = np.abs(np.diff(position))
-    step = float(np.min(steps[steps > 0.0], initial=np.inf))
-    block = averaged * samples
-    if not (np.isfinite(step) and 12.0 * variance >= step**2 and len(position) > 2 * READ * block):
+    step, block = _step(position), averaged * samples
+    if not step or len(position) <= 2 * READ * block:
         return white_noise(samples)
-    blurred = max(variance - step**2 / 12.0, 0.0) / step**2
+    of_steps = min(step**2 / (12.0 * variance), 1.0)  # of the variance
+    blurred = (1.0 / of_steps - 1.0) / 12.0
     course = _course(position, pumped, READ * block) / step
     lags = min(LAGS * block, len(course) // 2)
     alike = np.zeros(lags)
     for k in range(1, HARMONICS + 1):
         share = float(np.exp(-((2.0 * np.pi * k) ** 2) * blurred)) / (2.0 * (np.pi * k) ** 2)
         if share > 1e-3:
-            alike += share * step**2 / variance * _likeness(np.exp(2j * np.pi * k * course), lags)
+            alike += 12.0 * of_steps * share * _likeness(np.exp(2j * np.pi * k * course), lags)
     alike = (alike - alike[-1]) * (1.0 - np.arange(lags) / lags)
     alike[0] = 1.0
     within = np.convolve(np.ones(averaged), np.ones(averaged)) / averaged  # means of samples
     both = np.convolve(np.concatenate([alike[:0:-1], alike]), within)
     return _leaked(both[len(both) // 2 :: averaged], samples)
+
+
+def _step(position: Array) -> float:
+    """Return the step of an encoder; 0 where its readings are no multiples of one."""
+    moved = np.abs(np.diff(position))
+    moved = moved[moved > 0.0]
+    if not len(moved):
+        return 0.0
+    step = float(np.min(moved))
+    multiples = moved / step
+    return step if np.mean(np.abs(multiples - np.round(multiples))) < UNEVEN else 0.0
 
 
 def _course(position: Array, pumped: Array, over: int) -> Array:

@@ -1,0 +1,77 @@
+"""Noise of a driving channel that an output follows and loses again."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from estimation.arrays import Array
+from estimation.fits.greybox.leaked_noise import LeakedNoise, encoder_noise, white_noise
+
+STEP, SAMPLES = 1e-6, 25
+RNG = np.random.default_rng(0)
+
+
+def spread(errors: Array, lost: float, samples: int) -> float:
+    """Return the deviation of means of an output that follows errors and loses them, over that of white noise."""
+    kept = math.exp(-lost)
+    output = lfilter([(1.0 - kept) / lost], [1.0, -kept], np.diff(errors))[40 * samples :]
+    means = output[: len(output) // samples * samples].reshape(-1, samples).mean(axis=1)
+    return float(np.std(means) * samples**0.5 / np.std(errors))
+
+
+@pytest.mark.parametrize("samples", [1, 5])
+@pytest.mark.parametrize("lost", [0.03, 0.3, 1.0, 4.0])
+def test_means_of_white_noise_that_is_lost_again_have_the_variance_that_is_told(lost: float, samples: int) -> None:
+    told, _ = white_noise(samples).kept(lost)
+    assert spread(RNG.standard_normal(200_000), lost, samples) == pytest.approx(told, rel=0.03)
+
+
+def read(per_sample: float, blur: float) -> tuple[Array, Array, LeakedNoise]:
+    """Return errors of an encoder, the piston's course, and what is told of it: to and fro at one speed."""
+    turns = np.convolve(np.repeat(np.resize([1.0, -1.0], 80), 250), np.full(20, 0.05), "same")
+    course = np.cumsum(turns) * per_sample * STEP + 0.02 * STEP * np.cumsum(RNG.standard_normal(len(turns)))
+    position = STEP * np.round((course + blur * STEP * RNG.standard_normal(len(course))) / STEP)
+    variance = STEP**2 / 12.0 + (blur * STEP) ** 2
+    return position - course, course, encoder_noise(position, 2.0 * course, variance, 1, SAMPLES)
+
+
+@pytest.mark.parametrize("lost", [0.1, 0.3, 1.0])
+def test_errors_of_an_encoder_are_alike_at_a_steady_speed(lost: float) -> None:
+    """At 8.99 steps a sample each error is nearly the one before; white noise would be half as large or less."""
+    errors, _, told = read(8.99, 0.0)
+    found = spread(errors, lost, SAMPLES)
+    assert told.kept(lost)[0] == pytest.approx(found, rel=0.3)
+    assert white_noise(SAMPLES).kept(lost)[0] < 0.85 * found
+
+
+def test_errors_of_an_encoder_whose_reading_flickers_are_white() -> None:
+    errors, _, told = read(8.99, 0.6)
+    assert told.kept(0.3)[0] == pytest.approx(spread(errors, 0.3, SAMPLES), rel=0.08)
+    assert told.kept(0.3)[0] == pytest.approx(white_noise(SAMPLES).kept(0.3)[0], rel=0.05)
+
+
+def test_means_of_samples_are_judged_as_their_samples_are() -> None:
+    """Where nothing is alike from one sample to the next, a mean of five is lost as one sample of white noise is."""
+    _, course, _ = read(8.99, 0.6)
+    position = course + STEP * RNG.standard_normal(len(course))
+    of_means = encoder_noise(position, course, STEP**2, 5, SAMPLES // 5)
+    assert of_means.kept(0.3) == pytest.approx(white_noise(SAMPLES // 5).kept(0.3), rel=1e-3)
+
+
+@pytest.mark.parametrize("told", [white_noise(5), read(8.99, 0.0)[2]], ids=["white", "alike"])
+@pytest.mark.parametrize("lost", [1e-5, 0.2, 3.0, 600.0, 1e6])
+def test_its_slope_is_that_of_its_logarithm(lost: float, told: LeakedNoise) -> None:
+    above, below = (math.log(told.kept(lost * factor)[0]) for factor in (1.001, 1.0 / 1.001))
+    assert told.kept(lost)[1] == pytest.approx((above - below) / (2.0 * math.log(1.001)), abs=1e-4)
+
+
+def test_nothing_is_lost_where_nothing_leaks() -> None:
+    assert white_noise(5).kept(0.0) == pytest.approx((1.0, 0.0), abs=1e-5)
+
+
+def test_a_short_log_or_one_that_stands_still_is_taken_for_white() -> None:
+    for position in (np.zeros(5000), STEP * np.arange(20.0)):
+        told = encoder_noise(position, position, STEP**2, 1, SAMPLES)
+        assert told.kept(0.3) == white_noise(SAMPLES).kept(0.3)
