@@ -88,6 +88,10 @@ class ClassCode(Code):
     CHANNEL_ZERO = "no class: every sample of {channels} is 0; check the column, or log again while the piston moves"
     MODELS_ALIKE = "no class: the models of all conditions move alike under this drive; drive the actuator in steps"
     NO_CIRCUIT = "no circuit can be fitted with this rig file, so there are scores but no probabilities: {reason}"
+    VOLUME_FOR_STROKE = (
+        "the rig file's chamber_volume has no room for its stroke: it must be {percent:.0f} % larger at least, and the "
+        "circuits were fitted with that; measure chamber_volume and stroke"
+    )
     NO_PROBABILITIES = "no probabilities: {reason}"
     LOAD_ON_ROD = (
         "a constant load of {force_n:.0f} N ({low:.0f} to {high:.0f} N) holds the rod back, or differential_pressure_pa"

@@ -29,7 +29,7 @@ from faults.diagnosis.beyond_nine.load import Loaded, under_load
 from faults.diagnosis.beyond_nine.wear import whatever_the_pump_delivers
 from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuit_verdict import Diagnosis
-from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.actuator import actuator_of, with_room
 from faults.diagnosis.circuits.blocks import LONGEST
 from faults.diagnosis.failed_search import doubts_after
 from faults.diagnosis.known_losses import by_the_balance
@@ -107,7 +107,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     scores = plain.scores_of(log, rig.parameters)
     verdict = models_verdict(scores, log.record)
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
-    unsure = (*_healthy_of_the_paper(plain.parameters), *estimate.rig_notes)
+    unsure = (*_doubtful_rig(plain.parameters), *estimate.rig_notes)
     notes = (*log.left_out, *case.strange, *verdict.notes, *absent, *unsure)
     found = replace(found, outcome=verdict.outcome, notes=notes, channels=scores.channels)
     if log.mistakes:
@@ -268,6 +268,13 @@ def _diagnosed(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEs
     if estimate.form != "flow" or not estimate.gate.passed:
         return Loaded(of(parameters, 0.0), parameters)
     return under_load(of, parameters, estimate)
+
+
+def _doubtful_rig(p: EhaParameters) -> tuple[Note, ...]:
+    """Return notes on entries of a rig file that do not go together."""
+    larger = with_room(p).chamber_volume / p.chamber_volume - 1.0
+    tight = (ClassCode.VOLUME_FOR_STROKE.note(percent=100.0 * larger),) if larger > 0.0 else ()
+    return (*_healthy_of_the_paper(p), *tight)
 
 
 def _healthy_of_the_paper(p: EhaParameters) -> tuple[Note, ...]:

@@ -12,6 +12,10 @@ from plant.eha.circuit_parameters import CircuitParameters, circuit_of, longest_
 from plant.eha.model import EhaParameters
 from plant.eha.steady_state import steady_state
 
+MOST_VOLUME = 2.0
+"""Times a rig file's volume that its stroke may ask for [dimensionless]: as far as a volume is sought in a log; beyond,
+stroke or unit is wrong, and no circuit fits."""
+
 
 @dataclass(frozen=True, eq=False)
 class Actuator:
@@ -69,7 +73,7 @@ def with_room(p: EhaParameters) -> EhaParameters:
     Returns
     -------
     EhaParameters
-        With the least volume that its stroke leaves, if it says less.
+        With the least volume that its stroke leaves, if it says less; the same one if that is no error of a volume.
     """
     wanted = (p.stroke or 0.0) / float(longest_stroke(p))
-    return replace(p, chamber_volume=wanted * p.chamber_volume) if wanted > 1.0 else p
+    return replace(p, chamber_volume=wanted * p.chamber_volume) if 1.0 < wanted < MOST_VOLUME else p

@@ -1,5 +1,6 @@
 """What explains a log is told in numbers that follow from what was fitted, and the log is set right by them."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,7 +9,15 @@ import pytest
 
 from estimation.eha.bulk_modulus import _impossible_delivery
 from estimation.eha.changing_leakage import WARMED
-from estimation.eha.explanation_notes import LEAKAGE_COURSE, OUTSIDE, at_pump_speed, notes_of, rig_set_right, set_right
+from estimation.eha.explanation_notes import (
+    LEAKAGE_COURSE,
+    OUTSIDE,
+    at_pump_speed,
+    notes_of,
+    of_another_rod,
+    rig_set_right,
+    set_right,
+)
 from estimation.fits.greybox.pump_ripple import EVENLY, Ripple, Turning, delivering
 from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.log_checks.clean import CleanLog
@@ -71,6 +80,19 @@ def test_a_pump_that_delivers_what_none_can_has_its_speed_in_another_unit() -> N
     assert note is not None
     assert note.data["factor"] == pytest.approx(1.0 / 9.5)
     assert said(1.2) is None
+
+
+@pytest.mark.parametrize(
+    ("rig", "told_share", "other"), [(0.25, 0.25, False), (0.25, 0.23, False), (0.25, 0.2, True), (0.0, 0.25, False)]
+)
+def test_areas_of_another_single_rod_than_the_rig_files_are_doubted(
+    rig: float, told_share: float, *, other: bool
+) -> None:
+    """A displacement that was 6 % off was taken up by the rod, and the class was wrong at 99 %."""
+    rods = {"area_difference": (told_share, 0.01), "volume_difference": (0.2, 0.1), "pilot_share": (0.0, 0.1)}
+    found = explanation("single_rod", **rods)
+    (note,) = notes_of(found, replace(P, area_difference=rig))
+    assert of_another_rod(note) == other
 
 
 def test_volume_load_relief_and_check_valves_are_told_beside_the_rigs() -> None:
