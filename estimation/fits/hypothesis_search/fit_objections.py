@@ -16,6 +16,11 @@ LARGEST_AUTOCORRELATION = 0.1
 NOISY = (1.44, 0.3)
 """The same two where noise of position counts: it is known to a fifth, and an encoder's steps are not white."""
 
+QUIET = 0.5
+"""Mean squared normalised residual where noise of position counts below which a fit is none [dimensionless]; judged.
+That noise grows with the oil's stiffness. A pressure that seems late keeps less of it, so that oil five times as stiff
+as it is explained a leaky rig's log at a fifth of the noise, gate open."""
+
 LATE_WORTH = 20.0
 """Gain in log-likelihood from which speed or position is said to come late or early, if no hypothesis says more. On
 logs of 18 kinds of strange rigs, and on 18 of a foreign bench, the gain of a right explanation is 6 at most, and that
@@ -75,10 +80,12 @@ def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
     largest, correlated = limits(noisy, fit.seen)
     if fit.chi_square[0] > largest:
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=fit.chi_square[0] ** 0.5))
+    if noisy and fit.chi_square[0] < QUIET:
+        reasons.append(EstimateCode.PRESSURE_RESIDUALS_SMALL.note(ratio=fit.chi_square[0] ** -0.5))
     if abs(fit.autocorrelation[0]) > correlated and not _too_noisy(fit):
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_CORRELATED.note(correlation=fit.autocorrelation[0]))
     channel, late, gain = most_late(fit.late)
-    wanted = LATE_SHARE * fit.cost * (1.0 - 1.0 / fit.chi_square[0]) if reasons else 0.0
+    wanted = LATE_SHARE * fit.cost * max(1.0 - 1.0 / fit.chi_square[0], 0.0) if reasons else 0.0
     if gain > max(LATE_WORTH, wanted):
         when = "late" if late > 0.0 else "early"
         reasons.insert(0, EstimateCode.CHANNEL_LATE.note(channel=channel, milliseconds=1e3 * abs(late), when=when))
