@@ -12,6 +12,7 @@ from estimation.fits.flow.search import balanced, flow_starts
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, Search, concluded, explained, fit_greybox
+from estimation.fits.greybox.log import OutputNoise
 from estimation.fits.greybox.problem import Problem, search_bounds
 from estimation.fits.greybox.problem import weighed as sums_of
 from estimation.fits.hypotheses import HYPOTHESES, LIMITS
@@ -38,6 +39,12 @@ NUMBERS = Numbers(__file__)
 
 
 @NUMBERS.case()
+def noise_of(noise: OutputNoise) -> dict[str, Any]:
+    """Return an output's noise, with what losses leave of it."""
+    kept = None if noise.lost_from is None else [noise.lost_from.kept(lost) for lost in (0.1, 1.0)]
+    return {**asdict(replace(noise, lost_from=None)), "lost_from": kept}
+
+
 def logs_of_the_flow_form() -> dict[str, Any]:
     record = log()
     speed = record[SPEED].copy()
@@ -72,7 +79,7 @@ def logs_of_the_flow_form() -> dict[str, Any]:
             "drives": found.drives[[5, 77, -1]],
             "measured [Pa]": found.measured[[5, 77, -1], 0],
             "lost": int(np.count_nonzero(np.isnan(found.measured))),
-            "noise": [asdict(one) for one in found.noise],
+            "noise": [noise_of(one) for one in found.noise],
             "noise of drives": list(found.drive_std),
             "presumed": {one: list(pair) for one, pair in found.presumed.items()},
             "steps": int(np.max(found.steps)),
