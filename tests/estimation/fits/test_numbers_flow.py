@@ -38,13 +38,13 @@ from tests.numbers import Found, Numbers
 NUMBERS = Numbers(__file__)
 
 
-@NUMBERS.case()
 def noise_of(noise: OutputNoise) -> dict[str, Any]:
     """Return an output's noise, with what losses leave of it."""
     kept = None if noise.lost_from is None else [noise.lost_from.kept(lost) for lost in (0.1, 1.0)]
     return {**asdict(replace(noise, lost_from=None)), "lost_from": kept}
 
 
+@NUMBERS.case()
 def logs_of_the_flow_form() -> dict[str, Any]:
     record = log()
     speed = record[SPEED].copy()
