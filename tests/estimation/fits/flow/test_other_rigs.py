@@ -13,6 +13,7 @@ from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.hypothesis_search.fit_objections import objections
 from estimation.models.completed_flow import balances_mass
+from estimation.notes import EstimateCode
 from faults.conditions import severity
 from plant.eha.circuit_parameters import CircuitParameters, circuit_of
 from plant.eha.drives import prbs
@@ -120,6 +121,18 @@ def test_noise_that_was_taken_for_too_large_speaks_against_no_fit() -> None:
     assert objections(replace(fit, chi_square=(0.5,), autocorrelation=(-0.4,)), noisy=False) == ()
     assert len(objections(replace(fit, chi_square=(0.5,), autocorrelation=(0.4,)), noisy=False)) == 1
     assert len(objections(replace(fit, chi_square=(1.2,), autocorrelation=(-0.4,)), noisy=False)) == 1
+
+
+@pytest.mark.parametrize(("left", "small"), [(0.21, True), (0.6, False), (1.0, False)])
+def test_oil_in_which_the_encoders_noise_would_be_felt_more_than_it_is_explains_no_log(
+    left: float, *, small: bool
+) -> None:
+    """Oil five times as stiff as it is was believed, with a pressure that seemed late, at a fifth of the noise."""
+    record, variances = without_strays(log(PAPER, 1.0, 1e-3))
+    fit = replace(plain_fits(Logged(record, variances), FitStart(PAPER, 2e8)).best, chi_square=(left,))
+    fit = replace(fit, autocorrelation=(-0.1,))
+    assert [note.code for note in objections(fit, noisy=True)] == [EstimateCode.PRESSURE_RESIDUALS_SMALL] * small
+    assert objections(fit, noisy=False) == ()
 
 
 def test_a_single_rod_that_pumps_up_its_mean_pressure_is_balanced_by_mass() -> None:
