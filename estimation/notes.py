@@ -137,10 +137,7 @@ class EstimateCode(Code):
     PRESSURE_RESIDUALS_LARGE = (
         "the flow balance does not explain the log: the pressure residuals are {ratio:.1f} times the sensor's noise"
     )
-    PRESSURE_RESIDUALS_SMALL = (
-        "the oil of this fit would make the encoder's noise felt in pressure {ratio:.1f} times as much as the log "
-        "shows: it is not as stiff as that"
-    )
+    PRESSURE_RESIDUALS_SMALL = "the encoder's noise is {ratio:.1f} times less felt than in oil as stiff as this fit's"
     PRESSURE_RESIDUALS_CORRELATED = (
         "the flow balance leaves something out: successive pressure residuals have a correlation of {correlation:.2f} "
         "(noise alone: 0)"
