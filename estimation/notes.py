@@ -83,6 +83,7 @@ class ChannelCode(Code):
         "{channel}: the values are {factor:.3g} times what {against} would give, which looks like {slip}; give the "
         "column's unit (NAME:UNIT under [columns] in the rig file, or --columns CHANNEL=NAME:UNIT)"
     )
+    CHANNEL_MISREAD = "{channel}: the log fits the rig only with {slip}; give its unit (--columns CHANNEL=NAME:UNIT)"
     UNIT_CHANGES = (
         "{channel}: from {begin_s:.3g} s on, noise is about {factor:.3g} times what it was, as when the column's unit "
         "changes within the log; cut the log there, and read each part by itself"

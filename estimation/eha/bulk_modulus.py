@@ -199,8 +199,8 @@ def estimate_clean(
         unseen = without_number(Outcome.NOT_OBSERVABLE, (too_wide(bound),), form, MOTION_CHANNELS, bound)
         return _doubting_sensors(unseen, log)
     fit = None if filtering else _fit(log, parameters, form, guess, spreads, chosen=options.method == LEAST_SQUARES)
-    if fit is not None and (slip := _impossible_delivery(fit, parameters)) is not None:
-        return without_number(Outcome.MISMATCH, (slip,), form, FITTED[form][1])
+    if fit is not None and (slips := _channel_slips(fit, parameters)):
+        return without_number(Outcome.MISMATCH, slips, form, FITTED[form][1])
     if fit is not None:
         found = _fitted(fit, form, FITTED[form][1])
         if form == "flow":
@@ -286,12 +286,12 @@ def rigid_bound(log: CleanLog, parameters: EhaParameters) -> float:
     return std / parameters.bulk_modulus
 
 
-def _impossible_delivery(fit: FormFit, parameters: EhaParameters) -> Note | None:
-    """Return a note where a log is explained by a pump that delivers what none can: its speed is in another unit."""
+def _channel_slips(fit: FormFit, parameters: EhaParameters) -> tuple[Note, ...]:
+    """Return the wrong signs and units that a fit names; no pump delivers several times what it displaces."""
     share = None if fit.explanation is None else delivered(fit.explanation, parameters)
     if share is None or share <= FARTHEST:
-        return None
-    return ChannelCode.CHANNEL_UNIT.note(channel=SPEED, against=POSITION, factor=1.0 / share, slip=TURNS[RPM])
+        return tuple(note for note in fit.reasons if isinstance(note.code, ChannelCode))
+    return (ChannelCode.CHANNEL_UNIT.note(channel=SPEED, against=POSITION, factor=1.0 / share, slip=TURNS[RPM]),)
 
 
 def _misread(log: CleanLog, form: str) -> BulkModulusEstimate:

@@ -20,7 +20,7 @@ from estimation.eha.rig_share import SOFT, scaled_responses, with_total
 from estimation.finding import Finding, Outcome, Quantity
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
-from estimation.notes import RigCode
+from estimation.notes import ChannelCode, RigCode
 from faults.diagnosis.advice import advice_for, oil_advice, volume_advice
 from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
 from faults.diagnosis.beyond_nine.balance_refused import class_without_balance
@@ -110,8 +110,8 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     unsure = (*_doubtful_rig(plain.parameters), *estimate.rig_notes)
     notes = (*log.left_out, *case.strange, *verdict.notes, *absent, *unsure)
     found = replace(found, outcome=verdict.outcome, notes=notes, channels=scores.channels)
-    if log.mistakes:
-        return replace(_without_class(found, log, scores, log.mistakes), outcome=Outcome.MISMATCH)
+    if mistakes := log.mistakes or tuple(one for one in estimate.gate.reasons if isinstance(one.code, ChannelCode)):
+        return replace(_without_class(found, log, scores, mistakes), outcome=Outcome.MISMATCH)
     if verdict.outcome is not Outcome.OK:
         return replace(found, evidence=EhaEvidence(estimate, scores, None))
     try:

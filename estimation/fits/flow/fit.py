@@ -12,6 +12,7 @@ from estimation.fits.flow.belief import hopeless_cost, play_explained, wanted_co
 from estimation.fits.flow.log import homed_at_stop, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
+from estimation.fits.flow.misread import is_kin, misread
 from estimation.fits.flow.other_minimum import lower_minimum, smaller_accumulator
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer
 from estimation.fits.flow.search import MAKEUP_TRIED
@@ -105,8 +106,9 @@ def fit_flow(
     Gross outliers are taken out, and what the pump delivered while its speed is missing is read off the pressure after.
     Where oil is so much stiffer than the rig file's that noise of position counts, a log is fitted anew from there. So
     it is where what is strange leads to a lower valley of the plain form, or is an offset of speed. A slow log that
-    looks strange is asked with its turns read off the next samples too (`agreed`). A fit is not to be believed if the
-    search for what is strange did more than it may (`estimation.fits.greybox.work_limit`).
+    looks strange is asked with its turns read off the next samples too (`agreed`). A log that is none of the rig's
+    is asked for wrong signs and units (`misread`). A fit is not to be believed if the search for what is strange did
+    more than it may (`estimation.fits.greybox.work_limit`).
 
     Parameters
     ----------
@@ -143,7 +145,9 @@ def fit_flow(
     answer = _answered(logged, FitStart(parameters, bulk_modulus), sensed, traits, work)
     if answer.asked and answer.plain.turns_told and not answer.ended:
         answer = agreed(answer, _answered(logged, replace(answer.plain.start, turns_read=True), sensed, traits, work))
-    plain, asked, open_ends, strange, ended = answer
+    plain, asked, open_ends, strange, ended, slip = answer
+    if slip is not None:
+        return replace(_plain_fit(plain, sensed, (), begun=False), reasons=(slip,))
     if strange is not None:
         return _explained_fit(plain, strange, sensed, traits)
     loss = None
@@ -161,11 +165,14 @@ def fit_flow(
 
 def _answered(logged: Logged, start: FitStart, sensed: ShownPlay, traits: LogTraits, work: Work) -> Answered:
     """Return what a log says, fitted anew for as long as that leads elsewhere."""
+    first = not start.turns_read
     while True:
         plain = plain_fits(logged, start)
         if (stiff := stiffer(logged, plain)) is not None:
             start = replace(start, parameters=stiff, bulk_modulus=stiff.bulk_modulus, valley=None)
             continue
+        if first and (slip := misread(logged, plain, plain.best)) is not None:
+            return Answered(plain, (), (), None, slip=slip)
         asked, open_ends = _asked(plain, sensed, traits)
         try:
             with work.counted():
@@ -174,8 +181,9 @@ def _answered(logged: Logged, start: FitStart, sensed: ShownPlay, traits: LogTra
             return Answered(plain, asked, open_ends, None, ended=True)
         elsewhere = strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))
         if elsewhere is None:
-            return Answered(plain, asked, open_ends, strange)
-        start = elsewhere
+            slip = misread(logged, plain, strange.fit) if strange and is_kin(plain, plain.best) else None
+            return Answered(plain, asked, open_ends, strange, slip=slip)
+        start, first = elsewhere, False
 
 
 def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequence[Hypothesis], Sequence[Note]]:
