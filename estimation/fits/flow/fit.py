@@ -146,6 +146,8 @@ def fit_flow(
     if answer.asked and answer.plain.turns_told and not answer.ended:
         answer = agreed(answer, _answered(logged, replace(answer.plain.start, turns_read=True), sensed, traits, work))
     plain, asked, open_ends, strange, ended, slip = answer
+    if strange is not None and is_kin(plain, plain.best):  # else slips were tried
+        slip = misread(logged, plain, strange.fit)
     if slip is not None:
         return replace(_plain_fit(plain, sensed, (), begun=False), reasons=(slip,))
     if strange is not None:
@@ -181,8 +183,7 @@ def _answered(logged: Logged, start: FitStart, sensed: ShownPlay, traits: LogTra
             return Answered(plain, asked, open_ends, None, ended=True)
         elsewhere = strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))
         if elsewhere is None:
-            slip = misread(logged, plain, strange.fit) if strange and is_kin(plain, plain.best) else None
-            return Answered(plain, asked, open_ends, strange, slip=slip)
+            return Answered(plain, asked, open_ends, strange)
         start, first = elsewhere, False
 
 

@@ -1,0 +1,78 @@
+"""Signs and units that fits name where correlations of channels do not."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from estimation.finding import Outcome
+from estimation.fits.flow import misread as misread_module
+from estimation.fits.flow.misread import FOREIGN, KIN, SLIPS, is_kin
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
+from estimation.log_checks.channel_physics import RPM, channel_mistakes
+from estimation.notes import ChannelCode
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+from tests.estimation.fits.short_logs import made_fit
+from tests.thinned import thinned
+
+RIG = EhaParameters()
+SAID = {SPEED: "rpm read as rad/s", PRESSURE: "its sign turned", POSITION: "its sign turned"}
+
+
+def log(softer: float = 1.0) -> Record:
+    """Return a second of steps: too little for correlations."""
+    rng, p = np.random.default_rng(8), replace(RIG, bulk_modulus=RIG.bulk_modulus / softer)
+    return simulate(CIRCUIT, make_drive("steps", 1.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+
+
+@pytest.mark.parametrize("turned", thinned([SPEED, PRESSURE], [SPEED]))
+def test_a_short_log_names_a_unit_or_sign_that_correlations_do_not(
+    turned: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(misread_module, "SLIPS", [one for one in SLIPS if one.channel == turned][:2])
+    sound = log()
+    wrong = sound.replace(**{turned: sound[turned] * (RPM if turned == SPEED else -1.0)})
+    assert channel_mistakes(wrong, RIG) == ()
+    told = estimate_bulk_modulus(wrong, RIG)
+    assert (told.outcome, told.value, told.gate.passed) == (Outcome.MISMATCH, None, False)
+    (note,) = told.gate.reasons
+    assert note.code == ChannelCode.CHANNEL_MISREAD
+    assert note.data["channel"] == turned
+    assert SAID[turned] in str(note)
+
+
+@pytest.mark.parametrize("softer", [1.0, 5.0])
+def test_a_short_log_of_oil_that_is_soft_accuses_no_channel(softer: float) -> None:
+    told = estimate_bulk_modulus(log(softer), RIG)
+    assert not any(isinstance(note.code, ChannelCode) for note in told.gate.reasons)
+
+
+@pytest.mark.parametrize(
+    ("times", "std", "lost", "explained", "kin"),
+    [
+        (1.0, 0.01, 1.0, True, True),
+        (1.1 / FOREIGN, 0.01, 1.0, True, True),
+        (0.9 / FOREIGN, 0.01, 1.0, True, False),
+        (0.9 / FOREIGN, 0.3, 1.0, True, True),
+        (0.9 / FOREIGN, 0.3, 1.0, False, False),
+        (1.1 * FOREIGN, 0.01, 1.0, True, False),
+        (1.0, 0.01, 9.0, True, False),
+    ],
+)
+def test_a_fit_is_none_of_the_rigs_where_its_oil_or_what_its_pump_loses_is_surely_beyond_it(
+    times: float, std: float, lost: float, explained: bool, kin: bool
+) -> None:
+    assert KIN < FOREIGN
+    modulus = times * RIG.bulk_modulus
+    values = {"bulk_modulus": modulus, "leakage_coefficient": 4e-12, "flow_bias": lost * RIG.flow_bias}
+    deviations = {"bulk_modulus": std * modulus, "leakage_coefficient": 1e-13, "flow_bias": 1e-8}
+    fit = replace(made_fit(50.0, modulus, 1e5), values=values, std=deviations)
+    plain: Any = SimpleNamespace(start=SimpleNamespace(parameters=RIG), explains=lambda _: explained)
+    assert is_kin(plain, fit) is kin
