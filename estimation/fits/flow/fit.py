@@ -146,8 +146,8 @@ def fit_flow(
     if answer.asked and answer.plain.turns_told and not answer.ended:
         answer = agreed(answer, _answered(logged, replace(answer.plain.start, turns_read=True), sensed, traits, work))
     plain, asked, open_ends, strange, ended, slip = answer
-    if strange is not None and is_kin(plain, plain.best):  # else slips were tried
-        slip = misread(logged, plain, strange.fit)
+    if strange is not None and is_kin(plain, plain.best, parameters):  # else slips were tried
+        slip = misread(logged, plain, strange.fit, parameters)
     if slip is not None:
         return replace(_plain_fit(plain, sensed, (), begun=False), reasons=(slip,))
     if strange is not None:
@@ -167,13 +167,13 @@ def fit_flow(
 
 def _answered(logged: Logged, start: FitStart, sensed: ShownPlay, traits: LogTraits, work: Work) -> Answered:
     """Return what a log says, fitted anew for as long as that leads elsewhere."""
-    first = not start.turns_read
+    first, rig = not start.turns_read, start.parameters
     while True:
         plain = plain_fits(logged, start)
         if (stiff := stiffer(logged, plain)) is not None:
             start = replace(start, parameters=stiff, bulk_modulus=stiff.bulk_modulus, valley=None)
             continue
-        if first and (slip := misread(logged, plain, plain.best)) is not None:
+        if first and (slip := misread(logged, plain, plain.best, rig)) is not None:
             return Answered(plain, (), (), None, slip=slip)
         asked, open_ends = _asked(plain, sensed, traits)
         try:

@@ -32,6 +32,9 @@ SURELY = 2.0
 ASKED_SECONDS = 2.0
 """Length of a log's beginning on which slips are tried first [s]: it refutes most of them."""
 
+ALIKE = 0.1
+"""Share by which two fits' blocks may differ in number where their costs are compared [fraction]."""
+
 TURNED = "its sign turned (-UNIT)"
 """What is said of a channel that counts the other way."""
 
@@ -80,7 +83,7 @@ SLIPS: Sequence[Slip] = (
 """Mistakes that are tried."""
 
 
-def misread(logged: Logged, plain: PlainFits, found: GreyBoxFit) -> Note | None:
+def misread(logged: Logged, plain: PlainFits, found: GreyBoxFit, rig: EhaParameters) -> Note | None:
     """Return the slips that make a log one of the rig, where a fit says that it is none as it was read.
 
     Parameters
@@ -91,15 +94,17 @@ def misread(logged: Logged, plain: PlainFits, found: GreyBoxFit) -> Note | None:
         Its fits by the plain form.
     found : GreyBoxFit
         The fit that is believed most.
+    rig : EhaParameters
+        The actuator, as its file has it.
 
     Returns
     -------
     Note or None
         None where the fit is one of the rig's kin, or no slip makes it so.
     """
-    if is_kin(plain, found):
+    if is_kin(plain, found, rig):
         return None
-    rig, begun = plain.start.parameters, _beginning(logged)
+    begun = _beginning(logged)
     fits = [(slip, one) for slip in SLIPS if (one := _right_with(slip, begun, rig)) is not None]
     if begun is not logged:
         fits = [(slip, one) for slip, _ in fits if (one := _right_with(slip, logged, rig)) is not None]
@@ -107,7 +112,7 @@ def misread(logged: Logged, plain: PlainFits, found: GreyBoxFit) -> Note | None:
     return _told([slip for slip, _ in fits]) if fits else None
 
 
-def is_kin(plain: PlainFits, found: GreyBoxFit) -> bool:
+def is_kin(plain: PlainFits, found: GreyBoxFit, rig: EhaParameters) -> bool:
     """Return whether a fit says that a log may be one of the rig's, as it was read.
 
     Parameters
@@ -116,8 +121,10 @@ def is_kin(plain: PlainFits, found: GreyBoxFit) -> bool:
         The log's fits by the plain form.
     found : GreyBoxFit
         The fit.
+    rig : EhaParameters
+        The actuator, as its file has it.
     """
-    return _kin(found, plain.start.parameters, FOREIGN, SURELY if plain.explains(found) else 0.0)
+    return _kin(found, rig, FOREIGN, SURELY if plain.explains(found) else 0.0)
 
 
 def _told(slips: Sequence[Slip]) -> Note:
@@ -127,8 +134,9 @@ def _told(slips: Sequence[Slip]) -> Note:
 
 
 def _lost_to(found: GreyBoxFit, other: GreyBoxFit) -> float:
-    """Return by how much a fit is likelier than another, whose blocks may be longer [log-likelihood]."""
-    return 0.5 * found.seen * (other.chi_square[0] - found.chi_square[0])
+    """Return by how much a fit is likelier than another; 0 where their blocks differ [log-likelihood]."""
+    lost = 0.5 * found.seen * (other.chi_square[0] - found.chi_square[0])
+    return lost if abs(other.seen - found.seen) < ALIKE * found.seen else 0.0
 
 
 def _kin(fit: GreyBoxFit, rig: EhaParameters, times: float, surely: float) -> bool:

@@ -11,7 +11,7 @@ from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.finding import Outcome
 from estimation.fits.flow import misread as misread_module
 from estimation.fits.flow.misread import FOREIGN, KIN, SLIPS, is_kin
-from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
+from estimation.log_checks.channel_names import PRESSURE, SPEED
 from estimation.log_checks.channel_physics import RPM, channel_mistakes
 from estimation.notes import ChannelCode
 from plant.eha.drives import make_drive
@@ -23,7 +23,7 @@ from tests.estimation.fits.short_logs import made_fit
 from tests.thinned import thinned
 
 RIG = EhaParameters()
-SAID = {SPEED: "rpm read as rad/s", PRESSURE: "its sign turned", POSITION: "its sign turned"}
+SAID = {SPEED: "rpm read as rad/s", PRESSURE: "its sign turned"}
 
 
 def log(softer: float = 1.0) -> Record:
@@ -74,5 +74,5 @@ def test_a_fit_is_none_of_the_rigs_where_its_oil_or_what_its_pump_loses_is_surel
     values = {"bulk_modulus": modulus, "leakage_coefficient": 4e-12, "flow_bias": lost * RIG.flow_bias}
     deviations = {"bulk_modulus": std * modulus, "leakage_coefficient": 1e-13, "flow_bias": 1e-8}
     fit = replace(made_fit(50.0, modulus, 1e5), values=values, std=deviations)
-    plain: Any = SimpleNamespace(start=SimpleNamespace(parameters=RIG), explains=lambda _: explained)
-    assert is_kin(plain, fit) is kin
+    plain: Any = SimpleNamespace(explains=lambda _: explained)
+    assert is_kin(plain, fit, RIG) is kin
