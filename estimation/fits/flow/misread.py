@@ -147,7 +147,7 @@ def _kin(fit: GreyBoxFit, rig: EhaParameters, times: float, surely: float) -> bo
     """
     slides = rig.friction_coulomb / rig.piston_area
     most = {"flow_bias": MOST_LOST * rig.rated_flow, "leakage_coefficient": rig.rated_flow / slides}
-    if any(fit.values[name] - surely * fit.std[name] > largest for name, largest in most.items()):
+    if any(fit.values.get(name, 0.0) - surely * fit.std.get(name, 0.0) > largest for name, largest in most.items()):
         return False
     modulus = fit.values["bulk_modulus"]
     std = (
