@@ -295,7 +295,8 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
         length is not None and believed[1] and gone < NEAR * length and not (slips and " and " in moved)
     ):  # two that agree are right
         slips.append((moved, LENGTHS[length], length))
-    if not slips and far and together > FOLLOWS and (balance is None or balance.swept * FARTHEST < 1.0):
+    unlike = not slips and far and together > FOLLOWS and (balance is None or balance.swept * FARTHEST < 1.0)
+    if unlike and _swept_more(long, p):
         lossy = 100.0 * NEAR < gone < 1e3  # too far for cm, and for any unit of speed
         channel = SPEED if " and " in moved and not lossy else f"{moved} or {SPEED}"
         times = 1.0 / gone if channel == SPEED else gone
@@ -304,6 +305,13 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
         return ()
     channel, slip = " or ".join(one[0] for one in slips), " or ".join(one[1] for one in slips)
     return (_unit(channel, moved if channel == SPEED else SPEED, slips[0][2], slip),)
+
+
+def _swept_more(long: ChannelBlocks, p: EhaParameters) -> bool:
+    """Return whether a piston swept more than was pumped in all; at one speed no path but that tells how far it went."""
+    if long.piston is None or long.pumped is None:
+        return False
+    return bool(p.piston_area * np.abs(long.piston).sum() > np.abs(long.pumped).sum())
 
 
 def _slides(record: Record, p: EhaParameters) -> bool:

@@ -176,6 +176,20 @@ def test_a_piston_too_far_for_its_pump_tells_the_unit_where_the_balance_takes_mo
     assert said.data["slip"] == "rad/s read as rpm"
 
 
+@pytest.mark.parametrize("power", [3, 4])
+def test_a_pump_at_one_speed_that_delivered_more_than_the_piston_swept_has_no_unknown_unit(power: int) -> None:
+    """Without its mean and trend a path of constant speed is noise, and any piston goes farther."""
+    rng, time = np.random.default_rng(0), 1e-3 * np.arange(1001)
+    position = -0.0095 * time**power
+    channels = {
+        "motor_speed_rad_s": -102.0 * (1.0 - np.exp(-time / 0.004)) + 0.05 * rng.standard_normal(len(time)),
+        "position_m": position,
+        "velocity_m_s": np.gradient(position, 1e-3) + 1e-3 * rng.standard_normal(len(time)),
+        "differential_pressure_pa": -4e5 * (1.0 - np.exp(-time / 0.3)),
+    }
+    assert channel_mistakes(Record(1e-3, channels), HEALTHY) == ()
+
+
 @pytest.mark.parametrize(("share", "named"), [(9.0, True), (3.2, True), (2.5, False), (0.8, False)])
 def test_a_pump_that_would_deliver_what_none_can_is_a_speed_in_another_unit(
     share: float, named: bool, monkeypatch: pytest.MonkeyPatch
