@@ -92,7 +92,7 @@ _REFIT = (
 COLUMNS: Mapping[str, Columns] = {
     "section 4 first tests": (
         "test",
-        "at",
+        Column("at", words=spaced),
         Column("value", "circuit"),
         Column("expected", "implied by Tables 2 to 4"),
         "published",

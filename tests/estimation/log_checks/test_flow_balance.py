@@ -47,3 +47,15 @@ def test_a_pump_that_knows_one_speed_leaves_its_flow_bias_open() -> None:
     assert found is not None
     assert abs(found.swept - 1.0) < 3.0 * found.swept_std < 0.6
     assert abs(found.compressed - 1.0) < 3.0 * found.compressed_std
+
+
+def test_of_a_piston_that_stands_still_nothing_is_known_however_well_its_pressure_is_explained() -> None:
+    """Where every other flow bias was out of question, the deviation was no number, and NumPy warned of it."""
+    rng = np.random.default_rng(1)
+    speed = np.repeat(100.0 * rng.choice([-1.0, 1.0], 3000) * rng.uniform(0.2, 1.0, 3000), 30)
+    pressure = 1e7 * HEALTHY.pump_displacement * np.cumsum(speed)
+    log = Record(1e-3, {SPEED: speed, POSITION: np.zeros_like(speed), PRESSURE: pressure})
+    found = flow_balance(log, HEALTHY, MIDDLE)
+    assert found is not None
+    assert found.swept_std == np.inf
+    assert 0.0 < found.compressed_std < 0.1
