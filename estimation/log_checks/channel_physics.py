@@ -308,7 +308,7 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
 
 
 def _swept_more(long: ChannelBlocks, p: EhaParameters) -> bool:
-    """Return whether a piston swept more than was pumped in all; at one speed no path but that tells how far it went."""
+    """Return whether a piston swept more than was pumped in all; at one speed nothing else tells how far it went."""
     if long.piston is None or long.pumped is None:
         return False
     return bool(p.piston_area * np.abs(long.piston).sum() > np.abs(long.pumped).sum())
