@@ -32,4 +32,4 @@ def test_a_file_in_the_way_is_refused(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("mine", encoding="utf-8")
     done = RUN.invoke(app, ["motor-paper", "--out", str(tmp_path / "taken")])
     assert done.exit_code == 2
-    assert "result folder" in " ".join(done.stderr.split())
+    assert "--out must be a folder, got the file" in " ".join(done.stderr.split())

@@ -46,7 +46,7 @@ def test_drives_are_ranked_by_their_hardest_pair() -> None:
         (("--sensors", "smell"), "--sensors must be one of"),
         (("--noise", "loud"), "--noise must be one of"),
         (("--drive", "kick"), "--drive must be one of"),
-        (("--seconds", "-1"), "--seconds must be positive"),
+        (("--seconds", "-1"), "--seconds (--duration) must be positive"),
     ],
 )
 def test_what_is_not_known_is_refused(arguments: tuple[str, ...], said: str) -> None:

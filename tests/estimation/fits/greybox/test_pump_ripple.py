@@ -149,9 +149,9 @@ def fitted(ripple: float) -> FormFit:
 def test_bulk_modulus_with_teeth_is_what_it_would_be_without_and_is_off_where_they_are_not_taken_up(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    sound, taken_up = fitted(0.0), fitted(0.1)
+    sound, taken_up = fitted(0.0), fitted(0.2)
     monkeypatch.setattr("estimation.fits.flow.plain.with_pump_ripple", lambda log, fits, *_: RippleFits(log, fits(log)))
-    passed_over = fit_flow(logged(0.1), PAPER, PAPER.bulk_modulus)
+    passed_over = fit_flow(logged(0.2), PAPER, PAPER.bulk_modulus)
     value, std = sound.parameters["bulk_modulus"]
     assert taken_up.parameters["bulk_modulus"][0] == pytest.approx(value, abs=0.3 * std)
     assert abs(passed_over.parameters["bulk_modulus"][0] - value) > std
