@@ -159,7 +159,7 @@ def test_bulk_modulus_with_teeth_is_what_it_would_be_without_and_is_off_where_th
     (note,) = taken_up.remarks
     assert note.code is RigCode.PUMP_RIPPLES
     assert note.data["teeth"] == 11
-    assert abs(note.data["percent"] - 10.0) < note.data["half_width"] < 5.0
+    assert abs(note.data["percent"] - 20.0) < note.data["half_width"] < 5.0
 
 
 def test_overtones_go_with_the_teeth() -> None:
