@@ -132,6 +132,8 @@ MAKEUP_BENDS = Hypothesis("makeup_bends", (BEND,), ({BEND: 3e-5},), least=LEAST_
 
 OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
 
+PRESSURE_DRIFT = Hypothesis("pressure_drift", ("pressure_drift",))
+
 OFFSET_AT_REST = replace(OFFSET, from_first_sample=True)
 """The same of a log that begins at rest with a differential pressure: the offset is then that, or there is a load."""
 
@@ -237,7 +239,7 @@ HYPOTHESES = (
     ),
     Hypothesis("position_late", ("position_lag",), ({"position_lag": 1e-3},), LATE_TRIED, "position_m"),
     OFFSET,
-    Hypothesis("pressure_drift", ("pressure_drift",)),
+    PRESSURE_DRIFT,
     ENCODER_ZERO,
     PLAY,
     DELIVERY,

@@ -12,7 +12,7 @@ from estimation.fits.flow.belief import hopeless_cost, play_explained, wanted_co
 from estimation.fits.flow.log import homed_at_stop, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
-from estimation.fits.flow.misread import is_kin, misread
+from estimation.fits.flow.misread import is_kin, misread, no_slip
 from estimation.fits.flow.other_minimum import lower_minimum, smaller_accumulator
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer
 from estimation.fits.flow.search import MAKEUP_TRIED
@@ -173,7 +173,8 @@ def _answered(logged: Logged, start: FitStart, sensed: ShownPlay, traits: LogTra
         if (stiff := stiffer(logged, plain)) is not None:
             start = replace(start, parameters=stiff, bulk_modulus=stiff.bulk_modulus, valley=None)
             continue
-        if first and (slip := misread(logged, plain, plain.best, rig)) is not None:
+        foreign = first and not is_kin(plain, plain.best, rig)
+        if foreign and plain.explains(plain.best) and (slip := misread(logged, plain, plain.best, rig)) is not None:
             return Answered(plain, (), (), None, slip=slip)
         asked, open_ends = _asked(plain, sensed, traits)
         try:
@@ -181,6 +182,10 @@ def _answered(logged: Logged, start: FitStart, sensed: ShownPlay, traits: LogTra
                 strange = _strange(plain, asked, traits) if asked else None
         except WorkSpentError:
             return Answered(plain, asked, open_ends, None, ended=True)
+        if foreign and not (strange and no_slip(plain, strange, rig)):
+            slip = None if plain.explains(plain.best) else misread(logged, plain, plain.best, rig)
+            if slip is not None:
+                return Answered(plain, (), (), None, slip=slip)
         elsewhere = strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))
         if elsewhere is None:
             return Answered(plain, asked, open_ends, strange)

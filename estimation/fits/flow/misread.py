@@ -13,7 +13,8 @@ import numpy as np
 
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits
 from estimation.fits.greybox.fit import GreyBoxFit
-from estimation.fits.hypothesis_search.explain import WORTH
+from estimation.fits.hypotheses import CHECKS_CRACK, MAKEUP_BENDS, OFFSET, PRESSURE_DRIFT
+from estimation.fits.hypothesis_search.explain import WORTH, Explanation
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.channel_physics import LENGTHS, RPM, TURNS
 from estimation.log_checks.flow_balance import MOST_LOST
@@ -34,6 +35,9 @@ ASKED_SECONDS = 2.0
 
 ALIKE = 0.1
 """Share by which two fits' blocks may differ in number where their costs are compared [fraction]."""
+
+UNLIKE_SLIPS = frozenset({OFFSET.name, PRESSURE_DRIFT.name, CHECKS_CRACK.name, MAKEUP_BENDS.name})
+"""Hypotheses that no slip looks like: they add to a pressure, or concern valves, and change no scale and no sign."""
 
 TURNED = "its sign turned (-UNIT)"
 """What is said of a channel that counts the other way."""
@@ -125,6 +129,21 @@ def is_kin(plain: PlainFits, found: GreyBoxFit, rig: EhaParameters) -> bool:
         The actuator, as its file has it.
     """
     return _kin(found, rig, FOREIGN, SURELY if plain.explains(found) else 0.0)
+
+
+def no_slip(plain: PlainFits, strange: Explanation, rig: EhaParameters) -> bool:
+    """Return whether what is strange about a log is none that a wrong sign or unit looks like, and makes it the rig's.
+
+    Parameters
+    ----------
+    plain : PlainFits
+        The log's fits by the plain form.
+    strange : Explanation
+        What is strange about the log.
+    rig : EhaParameters
+        The actuator, as its file has it.
+    """
+    return UNLIKE_SLIPS.issuperset(strange.names) and is_kin(plain, strange.fit, rig)
 
 
 def _told(slips: Sequence[Slip]) -> Note:
