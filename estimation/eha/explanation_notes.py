@@ -50,11 +50,11 @@ OUTSIDE = {
 }
 """Faults that are none of the nine conditions."""
 
-THROUGH = 99.9
-"""Share of side A that side B of a through rod has at least [%]."""
+THROUGH = 0.001
+"""Difference of the logarithm of a piston's two areas up to which its rod is a through rod [dimensionless]."""
 
 OTHER_ROD = 2.0 * 2.0**0.5 * max(DOUBTS["piston_area"].usual)
-"""Difference of the logarithm of a piston's two areas from which they are not those of the rig file: two deviations."""
+"""The same between fit and rig file from which the areas are not the file's [dimensionless]: two deviations."""
 
 
 def notes_of(found: Explanation, parameters: EhaParameters) -> tuple[Note, ...]:
@@ -171,8 +171,8 @@ def of_another_rod(note: Note) -> bool:
     """
     if note.code is not RigCode.SINGLE_ROD:
         return False
-    told, written = float(note.data["percent"]), float(note.data["rig_percent"])
-    return written < THROUGH and abs(math.log(told / written)) > OTHER_ROD
+    told, written = (math.log(0.01 * float(note.data[name])) for name in ("percent", "rig_percent"))
+    return abs(written) > THROUGH and abs(told - written) > OTHER_ROD
 
 
 def _b_over_a(difference: float) -> float:

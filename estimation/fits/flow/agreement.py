@@ -26,8 +26,6 @@ class Answered(NamedTuple):
         What is strange about it, if it is believed rather than the plain form.
     ended : bool
         Whether the search for it was ended before it was done, see `estimation.fits.greybox.work_limit`.
-    slip : Note, optional
-        Channel with a wrong sign or unit, without which it would be one of the rig's.
     """
 
     plain: PlainFits
@@ -35,7 +33,6 @@ class Answered(NamedTuple):
     open_ends: Sequence[Note]
     strange: Explanation | None
     ended: bool = False
-    slip: Note | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from estimation.fits.flow.belief import hopeless_cost, play_explained, wanted_co
 from estimation.fits.flow.log import homed_at_stop, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
-from estimation.fits.flow.misread import is_kin, misread, no_slip
+from estimation.fits.flow.misread import CorrectedLogs, is_kin, no_slip
 from estimation.fits.flow.other_minimum import lower_minimum, smaller_accumulator
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer
 from estimation.fits.flow.search import MAKEUP_TRIED
@@ -107,8 +107,8 @@ def fit_flow(
     Where oil is so much stiffer than the rig file's that noise of position counts, a log is fitted anew from there. So
     it is where what is strange leads to a lower valley of the plain form, or is an offset of speed. A slow log that
     looks strange is asked with its turns read off the next samples too (`agreed`). A log that is none of the rig's
-    is asked for wrong signs and units (`misread`). A fit is not to be believed if the search for what is strange did
-    more than it may (`estimation.fits.greybox.work_limit`).
+    is asked for wrong signs and units (`CorrectedLogs`). A fit is not to be believed if the search for what is strange
+    did more than it may (`estimation.fits.greybox.work_limit`).
 
     Parameters
     ----------
@@ -141,14 +141,13 @@ def fit_flow(
     if variances is None:
         record, variances = without_strays(record)
     logged = Logged(record, variances, uncertainties or {})
-    work = Work()
-    answer = _answered(logged, FitStart(parameters, bulk_modulus), sensed, traits, work)
+    work, corrected = Work(), CorrectedLogs(logged, parameters)
+    answer = _answered(corrected, FitStart(parameters, bulk_modulus), sensed, traits, work)
     if answer.asked and answer.plain.turns_told and not answer.ended:
-        answer = agreed(answer, _answered(logged, replace(answer.plain.start, turns_read=True), sensed, traits, work))
-    plain, asked, open_ends, strange, ended, slip = answer
-    if strange is not None and is_kin(plain, plain.best, parameters):  # else slips were tried
-        slip = misread(logged, plain, strange.fit, parameters)
-    if slip is not None:
+        read = replace(answer.plain.start, turns_read=True)
+        answer = agreed(answer, _answered(corrected, read, sensed, traits, work))
+    plain, asked, open_ends, strange, ended = answer
+    if (slip := corrected.misread(plain, plain.best if strange is None else strange.fit)) is not None:
         return replace(_plain_fit(plain, sensed, (), begun=False), reasons=(slip,))
     if strange is not None:
         return _explained_fit(plain, strange, sensed, traits)
@@ -165,31 +164,30 @@ def fit_flow(
     return replace(fit, reasons=(*fit.reasons, EstimateCode.SEARCH_ENDED.note())) if ended else fit
 
 
-def _answered(logged: Logged, start: FitStart, sensed: ShownPlay, traits: LogTraits, work: Work) -> Answered:
-    """Return what a log says, fitted anew for as long as that leads elsewhere."""
-    first, rig = not start.turns_read, start.parameters
+def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, traits: LogTraits, work: Work) -> Answered:
+    """Return what a log says, fitted anew for as long as that leads elsewhere; nothing is asked of one misread."""
+    logged = corrected.logged
     while True:
         plain = plain_fits(logged, start)
         if (stiff := stiffer(logged, plain)) is not None:
             start = replace(start, parameters=stiff, bulk_modulus=stiff.bulk_modulus, valley=None)
             continue
-        foreign = first and not is_kin(plain, plain.best, rig)
-        if foreign and plain.explains(plain.best) and (slip := misread(logged, plain, plain.best, rig)) is not None:
-            return Answered(plain, (), (), None, slip=slip)
+        foreign = not start.turns_read and not is_kin(plain, plain.best, corrected.rig)
+        if foreign and plain.explains(plain.best) and corrected.misread(plain, plain.best) is not None:
+            return Answered(plain, (), (), None)
         asked, open_ends = _asked(plain, sensed, traits)
         try:
             with work.counted():
                 strange = _strange(plain, asked, traits) if asked else None
         except WorkSpentError:
             return Answered(plain, asked, open_ends, None, ended=True)
-        if foreign and not (strange and no_slip(plain, strange, rig)):
-            slip = None if plain.explains(plain.best) else misread(logged, plain, plain.best, rig)
-            if slip is not None:
-                return Answered(plain, (), (), None, slip=slip)
+        sound = strange is not None and no_slip(plain, strange, corrected.rig)
+        if foreign and not sound and corrected.misread(plain, plain.best) is not None:
+            return Answered(plain, (), (), None)
         elsewhere = strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))
         if elsewhere is None:
             return Answered(plain, asked, open_ends, strange)
-        start, first = elsewhere, False
+        start = elsewhere
 
 
 def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequence[Hypothesis], Sequence[Note]]:

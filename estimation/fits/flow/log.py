@@ -194,7 +194,7 @@ def _noisy(log: GreyBoxLog, p: EhaParameters, record: Record) -> GreyBoxLog:
     averaged_over, samples = round(log.sample_time / record.sample_time), max(1, round(NOISY_BLOCK / log.sample_time))
     position, speed = record["position_m"], bridged(record["motor_speed_rad_s"])
     pumped = p.pump_displacement / p.piston_area * record.sample_time * np.cumsum(speed)
-    leaked = encoder_noise(bridged(position), pumped, position_variance(position), averaged_over, samples)
+    leaked = encoder_noise(position, pumped, position_variance(position), averaged_over, samples)
     noise = replace(
         log.noise[0],
         passed_over=("chamber_volume", p.chamber_volume),

@@ -1,4 +1,4 @@
-"""`misread(logged, plain, found)`: a wrong sign or unit without which a log would be one of the rig's.
+"""`CorrectedLogs(logged, rig).misread(plain, found)`: a wrong sign or unit without which a log would be the rig's.
 
 Correlations of channels name such a slip in most logs (`estimation.log_checks.channel_physics`). A short log, or one
 whose piston hardly moves, has too little of them. The flow form may even explain it, with oil a tenth as stiff and a
@@ -6,6 +6,8 @@ pump that loses more than it pumps. So where a fit ends there, slips are correct
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from math import log as ln
 from typing import NamedTuple
 
@@ -31,15 +33,22 @@ SURELY = 2.0
 """Deviations by which a fit that explains a log must be beyond what a rig's may be [dimensionless]."""
 
 ASKED_SECONDS = 2.0
-"""Length of a log's beginning on which slips are tried first [s]: it refutes most of them."""
+"""Time from when the pump turns on which slips are tried first [s]: it refutes most of them."""
+
+TURNING = 0.1
+"""Share of the highest speed from which the pump turns [fraction]: far above a resolver's noise at rest."""
 
 ALIKE = 0.1
 """Share by which two fits' blocks may differ in number where their costs are compared [fraction]."""
 
+FELT = 4.0
+"""Variance of a pressure over that of its noise from which it changes [dimensionless]: twice the noise; judged. A dead
+sensor shows its noise alone, and any slower pump explains that."""
+
 UNLIKE_SLIPS = frozenset({OFFSET.name, PRESSURE_DRIFT.name, CHECKS_CRACK.name, MAKEUP_BENDS.name})
 """Hypotheses that no slip looks like: they add to a pressure, or concern valves, and change no scale and no sign."""
 
-TURNED = "its sign turned (-UNIT)"
+TURNED = "a wrong sign of {} (-UNIT)"
 """What is said of a channel that counts the other way."""
 
 PRESSURES: Mapping[float, str] = {
@@ -75,45 +84,61 @@ class Slip(NamedTuple):
 
 
 SLIPS: Sequence[Slip] = (
-    Slip(SPEED, TURNED, -1.0),
+    Slip(SPEED, TURNED.format(SPEED), -1.0),
     *(Slip(SPEED, said, times) for times, said in TURNS.items()),
     Slip(SPEED, "krpm read as rad/s", 1e3 / RPM),
-    Slip(PRESSURE, TURNED, -1.0),
+    Slip(PRESSURE, TURNED.format(PRESSURE), -1.0),
     *(Slip(PRESSURE, said, times) for times, said in PRESSURES.items()),
-    Slip(POSITION, TURNED, -1.0),
+    Slip(POSITION, TURNED.format(POSITION), -1.0),
     Slip(POSITION, LENGTHS[1e3], 1e-3),
-    Slip(POSITION, f"{VELOCITY} in its place", 0.0, VELOCITY),
+    Slip(POSITION, f"{VELOCITY} in the place of {POSITION}", 0.0, VELOCITY),
 )
 """Mistakes that are tried."""
 
 
-def misread(logged: Logged, plain: PlainFits, found: GreyBoxFit, rig: EhaParameters) -> Note | None:
-    """Return the slips that make a log one of the rig, where a fit says that it is none as it was read.
+@dataclass(frozen=True, eq=False)
+class CorrectedLogs:
+    """A log with its channels corrected for one slip at a time, and fitted where that is asked for.
 
     Parameters
     ----------
     logged : Logged
         The log.
-    plain : PlainFits
-        Its fits by the plain form.
-    found : GreyBoxFit
-        The fit that is believed most.
     rig : EhaParameters
         The actuator, as its file has it.
-
-    Returns
-    -------
-    Note or None
-        None where the fit is one of the rig's kin, or no slip makes it so.
     """
-    if is_kin(plain, found, rig):
-        return None
-    begun = _beginning(logged)
-    fits = [(slip, one) for slip in SLIPS if (one := _right_with(slip, begun, rig)) is not None]
-    if begun is not logged:
-        fits = [(slip, one) for slip, _ in fits if (one := _right_with(slip, logged, rig)) is not None]
-    fits = [(slip, one) for slip, one in fits if _lost_to(found, one) < WORTH]
-    return _told([slip for slip, _ in fits]) if fits else None
+
+    logged: Logged
+    rig: EhaParameters
+
+    def misread(self, plain: PlainFits, found: GreyBoxFit) -> Note | None:
+        """Return the slips that make a log one of the rig's, where a fit says that it is none as it was read.
+
+        Parameters
+        ----------
+        plain : PlainFits
+            The log's fits by the plain form.
+        found : GreyBoxFit
+            The fit that is believed most.
+
+        Returns
+        -------
+        Note or None
+            None where the fit is one of the rig's kin, no slip makes it so, or pressure does not change.
+        """
+        if is_kin(plain, found, self.rig) or not _pressed(self.logged):
+            return None
+        slips = [slip for slip, one in self._explained if _lost_to(found, one) < WORTH]
+        return _told(slips) if slips else None
+
+    @cached_property
+    def _explained(self) -> Sequence[tuple[Slip, GreyBoxFit]]:
+        """The slips without which the log is one of the rig's, each with its fit."""
+        begun, rig = _beginning(self.logged), self.rig
+        fits = [(slip, one) for slip in SLIPS if (one := _right_with(slip, begun, rig)) is not None]
+        if begun is self.logged:
+            return fits
+        return [(slip, one) for slip, _ in fits if (one := _right_with(slip, self.logged, rig)) is not None]
 
 
 def is_kin(plain: PlainFits, found: GreyBoxFit, rig: EhaParameters) -> bool:
@@ -169,17 +194,26 @@ def _kin(fit: GreyBoxFit, rig: EhaParameters, times: float, surely: float) -> bo
     if any(fit.values.get(name, 0.0) - surely * fit.std.get(name, 0.0) > largest for name, largest in most.items()):
         return False
     modulus = fit.values["bulk_modulus"]
-    std = (
-        min(fit.std["bulk_modulus"] / modulus, 1.0) if modulus > 0.0 else 0.0
-    )  # a logarithm that is not held may be any
-    return modulus > 0.0 and abs(ln(modulus / rig.bulk_modulus)) - surely * std < ln(times)
+    if modulus <= 0.0:
+        return False
+    std = min(fit.std["bulk_modulus"] / modulus, 1.0)  # of a logarithm that is not held, lest any oil be the rig's
+    return abs(ln(modulus / rig.bulk_modulus)) - surely * std < ln(times)
+
+
+def _pressed(logged: Logged) -> bool:
+    return bool(np.nanvar(logged.record[PRESSURE]) > FELT * logged.variances[PRESSURE])
 
 
 def _beginning(logged: Logged) -> Logged:
-    samples = round(ASKED_SECONDS / logged.record.sample_time) + 1
-    if samples >= len(logged.record):
+    """Return a log up to where its pump has turned for some time; all of it if that is no less."""
+    record = logged.record
+    speed = np.abs(record[SPEED])
+    told = np.all([np.isfinite(record[name]) for name in (SPEED, POSITION, PRESSURE)], axis=0)
+    turning = np.flatnonzero(told & (speed > TURNING * np.nanmax(speed)))
+    if not len(turning):
         return logged
-    return Logged(logged.record.slice(0, samples), logged.variances)
+    samples = int(turning[0]) + round(ASKED_SECONDS / record.sample_time) + 1
+    return logged if samples >= len(record) else replace(logged, record=record.slice(0, samples))
 
 
 def _right_with(slip: Slip, logged: Logged, rig: EhaParameters) -> GreyBoxFit | None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.fits.convolution import smooth_length
+from estimation.log_checks.bridging import bridged
 
 MOST_LOST = 500.0
 """Losses beyond which nothing is left from one sample to the next, lest exponentials overflow [dimensionless]."""
@@ -108,7 +109,7 @@ def encoder_noise(position: Array, pumped: Array, variance: float, averaged: int
     Parameters
     ----------
     position : ndarray, shape (n,)
-        As the encoder reads it, no sample missing [m].
+        As the encoder reads it; NaN is missing [m].
     pumped : ndarray, shape (n,)
         As the pump would move the piston [m].
     variance : float
@@ -128,7 +129,7 @@ def encoder_noise(position: Array, pumped: Array, variance: float, averaged: int
         return white_noise(samples)
     of_steps = min(step**2 / (12.0 * variance), 1.0)  # of the variance
     blurred = (1.0 / of_steps - 1.0) / 12.0
-    course = _course(position, pumped, READ * block) / step
+    course = _course(bridged(position), pumped, READ * block) / step
     lags = min(LAGS * block, len(course) // 2)
     alike = np.zeros(lags)
     for k in range(1, HARMONICS + 1):

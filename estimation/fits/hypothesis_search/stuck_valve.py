@@ -34,7 +34,8 @@ def stuck_instead(log: GreyBoxLog, best: Trial, spared: Decimation, worth: float
         One at most.
     """
     others = tuple(one for one in best.together if one.name != CHECKS_CRACK.name)
-    if len(others) == len(best.together) or abs(best.values[CHECKS_CRACK.free[1]]) < UNLIKE_CRACKS:
+    stuck = any(one.name == MAKEUP_BLOCKED.name for one in others)
+    if stuck or len(others) == len(best.together) or abs(best.values[CHECKS_CRACK.free[1]]) < UNLIKE_CRACKS:
         return []
     together = (*others, MAKEUP_BLOCKED if CHECKS_CRACK in best.together else MAKEUP_HIDDEN)
     late, starts, wanted = delayed(log, best.delays), (best.values, *spared.starts), best.cost + worth

@@ -83,7 +83,8 @@ def test_a_pump_that_delivers_what_none_can_has_its_speed_in_another_unit() -> N
 
 
 @pytest.mark.parametrize(
-    ("rig", "told_share", "other"), [(0.25, 0.25, False), (0.25, 0.23, False), (0.25, 0.2, True), (0.0, 0.25, False)]
+    ("rig", "told_share", "other"),
+    [(0.25, 0.25, False), (0.25, 0.23, False), (0.25, 0.2, True), (-0.25, -0.2, True), (0.0, 0.25, False)],
 )
 def test_areas_of_another_single_rod_than_the_rig_files_are_doubted(
     rig: float, told_share: float, *, other: bool

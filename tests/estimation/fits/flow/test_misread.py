@@ -10,8 +10,9 @@ import pytest
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.finding import Outcome
 from estimation.fits.flow import misread as misread_module
-from estimation.fits.flow.misread import FOREIGN, KIN, SLIPS, is_kin
-from estimation.log_checks.channel_names import PRESSURE, SPEED
+from estimation.fits.flow.misread import FOREIGN, KIN, SLIPS, CorrectedLogs, Slip, is_kin
+from estimation.fits.flow.plain import Logged
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
 from estimation.log_checks.channel_physics import RPM, channel_mistakes
 from estimation.notes import ChannelCode
 from plant.eha.drives import make_drive
@@ -23,7 +24,7 @@ from tests.estimation.fits.short_logs import made_fit
 from tests.thinned import thinned
 
 RIG = EhaParameters()
-SAID = {SPEED: "rpm read as rad/s", PRESSURE: "its sign turned"}
+SAID = {SPEED: "rpm read as rad/s", PRESSURE: "a wrong sign of differential_pressure_pa"}
 
 
 def log(softer: float = 1.0) -> Record:
@@ -46,6 +47,31 @@ def test_a_short_log_names_a_unit_or_sign_that_correlations_do_not(
     assert note.code == ChannelCode.CHANNEL_MISREAD
     assert note.data["channel"] == turned
     assert SAID[turned] in str(note)
+
+
+@pytest.mark.parametrize(
+    ("rests", "missing", "lengths"), [(0, 0, [2001, 5000]), (1500, 2000, [4001, 5000]), (1500, 3500, [5000])]
+)
+def test_slips_are_tried_once_and_first_where_the_pump_has_turned_for_two_seconds(
+    rests: int, missing: int, lengths: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A speed that was missing throughout the first 2 s ended in an error."""
+    seen: list[int] = []
+    fit = made_fit(50.0, 0.01 * RIG.bulk_modulus, 1e5)
+
+    def right_with(slip: Slip, logged: Logged, _: EhaParameters) -> Any:
+        seen.append(len(logged.record))
+        return fit if slip is SLIPS[0] else None
+
+    monkeypatch.setattr(misread_module, "SLIPS", SLIPS[:1])
+    monkeypatch.setattr(misread_module, "_right_with", right_with)
+    speed, position = np.ones(5000), np.zeros(5000)
+    speed[:rests], position[:missing] = 0.0, np.nan
+    record = Record(1e-3, {SPEED: speed, POSITION: position, PRESSURE: np.zeros(5000)})
+    corrected, plain = CorrectedLogs(Logged(record, {}), RIG), SimpleNamespace(explains=lambda _: False)
+    told: Any = plain
+    assert [bool(corrected.misread(told, fit)) for _ in range(2)] == [True, True]
+    assert seen == lengths
 
 
 @pytest.mark.parametrize("softer", [1.0, 5.0])

@@ -75,3 +75,12 @@ def test_a_short_log_or_one_that_stands_still_is_taken_for_white() -> None:
     for position in (np.zeros(5000), STEP * np.arange(20.0)):
         told = encoder_noise(position, position, STEP**2, 1, SAMPLES)
         assert told.kept(0.3) == white_noise(SAMPLES).kept(0.3)
+
+
+def test_an_encoders_step_shows_beside_samples_that_are_missing() -> None:
+    """A line across a gap has steps that are none of the encoder's, and its noise was taken for white."""
+    errors, course, told = read(8.99, 0.0)
+    position = course + errors
+    position[5000:5050] = np.nan
+    holed = encoder_noise(position, 2.0 * course, STEP**2 / 12.0, 1, SAMPLES)
+    assert holed.kept(0.3)[0] == pytest.approx(told.kept(0.3)[0], rel=0.05)

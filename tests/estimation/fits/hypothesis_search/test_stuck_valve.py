@@ -53,6 +53,10 @@ def test_a_stuck_valve_is_told_where_a_late_one_is_hardly_likelier(monkeypatch: 
     assert stuck(monkeypatch, 1011.0, late) == []
 
 
+def test_a_valve_that_is_stuck_already_is_not_stuck_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert stuck(monkeypatch, 900.0, 2.0 * UNLIKE_CRACKS, MAKEUP_BLOCKED) == []
+
+
 def test_valves_that_open_alike_are_both_sound(monkeypatch: pytest.MonkeyPatch) -> None:
     assert stuck(monkeypatch, 900.0, 0.5 * UNLIKE_CRACKS) == []
     assert stuck_valve.stuck_instead(NOTHING, trial([DELIVERY], 1000.0), NO_DECIMATION, 10.0) == []
