@@ -83,10 +83,7 @@ class ChannelCode(Code):
         "{channel}: the values are {factor:.3g} times what {against} would give, which looks like {slip}; give the "
         "column's unit (NAME:UNIT under [columns] in the rig file, or --columns CHANNEL=NAME:UNIT)"
     )
-    CHANNEL_MISREAD = (
-        "{channel}: the log is the rig's only if corrected for {slip}; give the column's unit (NAME:UNIT under "
-        "[columns] in the rig file, or --columns CHANNEL=NAME:UNIT)"
-    )
+    CHANNEL_MISREAD = "{channel}: the log fits the rig only once {slip} is set right (--columns CHANNEL=NAME:UNIT)"
     UNIT_CHANGES = (
         "{channel}: from {begin_s:.3g} s on, noise is about {factor:.3g} times what it was, as when the column's unit "
         "changes within the log; cut the log there, and read each part by itself"
@@ -141,10 +138,7 @@ class EstimateCode(Code):
     PRESSURE_RESIDUALS_LARGE = (
         "the flow balance does not explain the log: the pressure residuals are {ratio:.1f} times the sensor's noise"
     )
-    PRESSURE_RESIDUALS_SMALL = (
-        "the pressure residuals are {ratio:.1f} times smaller than the encoder's noise makes them in oil as stiff as "
-        "this fit's"
-    )
+    PRESSURE_RESIDUALS_SMALL = "pressure residuals are {ratio:.1f} times smaller than position noise in oil so stiff"
     PRESSURE_RESIDUALS_CORRELATED = (
         "the flow balance leaves something out: successive pressure residuals have a correlation of {correlation:.2f} "
         "(noise alone: 0)"

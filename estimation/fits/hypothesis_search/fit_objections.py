@@ -80,7 +80,7 @@ def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
     largest, correlated = limits(noisy, fit.seen)
     if fit.chi_square[0] > largest:
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=fit.chi_square[0] ** 0.5))
-    if noisy and fit.chi_square[0] < QUIET:
+    if noisy and 0.0 < fit.chi_square[0] < QUIET:  # of a pressure that is 0 throughout nothing is left
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_SMALL.note(ratio=fit.chi_square[0] ** -0.5))
     if abs(fit.autocorrelation[0]) > correlated and not _too_noisy(fit):
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_CORRELATED.note(correlation=fit.autocorrelation[0]))

@@ -67,11 +67,23 @@ def test_slips_are_tried_once_and_first_where_the_pump_has_turned_for_two_second
     monkeypatch.setattr(misread_module, "_right_with", right_with)
     speed, position = np.ones(5000), np.zeros(5000)
     speed[:rests], position[:missing] = 0.0, np.nan
-    record = Record(1e-3, {SPEED: speed, POSITION: position, PRESSURE: np.zeros(5000)})
-    corrected, plain = CorrectedLogs(Logged(record, {}), RIG), SimpleNamespace(explains=lambda _: False)
-    told: Any = plain
-    assert [bool(corrected.misread(told, fit)) for _ in range(2)] == [True, True]
+    record = Record(1e-3, {SPEED: speed, POSITION: position, PRESSURE: np.arange(5000.0)})
+    plain: Any = SimpleNamespace(explains=lambda _: False)
+    corrected = CorrectedLogs(Logged(record, {PRESSURE: 1.0}), RIG)
+    assert [bool(corrected.misread(plain, fit)) for _ in range(2)] == [True, True]
     assert seen == lengths
+    dead = CorrectedLogs(Logged(record, {PRESSURE: float(np.var(record[PRESSURE]))}), RIG)
+    assert dead.misread(plain, fit) is None
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e3])
+def test_a_dead_sensor_of_pressure_accuses_no_speed(noise: float) -> None:
+    """Nothing moved, so that a pump a tenth as fast explained it best."""
+    sound = log()
+    still = {name: np.zeros(len(sound)) for name in ("position_m", "velocity_m_s")}
+    dead = noise * np.random.default_rng(1).standard_normal(len(sound))
+    told = estimate_bulk_modulus(sound.replace(**still, **{PRESSURE: dead}), RIG)
+    assert not any(isinstance(note.code, ChannelCode) for note in told.gate.reasons)
 
 
 @pytest.mark.parametrize("softer", [1.0, 5.0])

@@ -123,7 +123,7 @@ def test_noise_that_was_taken_for_too_large_speaks_against_no_fit() -> None:
     assert len(objections(replace(fit, chi_square=(1.2,), autocorrelation=(-0.4,)), noisy=False)) == 1
 
 
-@pytest.mark.parametrize(("left", "small"), [(0.21, True), (0.6, False), (1.0, False)])
+@pytest.mark.parametrize(("left", "small"), [(0.0, False), (0.21, True), (0.6, False), (1.0, False)])
 def test_oil_in_which_the_encoders_noise_would_be_felt_more_than_it_is_explains_no_log(
     left: float, *, small: bool
 ) -> None:
