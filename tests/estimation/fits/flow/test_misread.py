@@ -9,9 +9,12 @@ import pytest
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.finding import Outcome
+from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import misread as misread_module
 from estimation.fits.flow.misread import FOREIGN, KIN, SLIPS, CorrectedLogs, Slip, is_kin
-from estimation.fits.flow.plain import Logged
+from estimation.fits.flow.plain import FitStart, Logged
+from estimation.fits.greybox.work_limit import Work
+from estimation.fits.hypotheses import DELIVERY
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
 from estimation.log_checks.channel_physics import RPM, channel_mistakes
 from estimation.notes import ChannelCode
@@ -74,6 +77,19 @@ def test_slips_are_tried_once_and_first_where_the_pump_has_turned_for_two_second
     assert seen == lengths
     dead = CorrectedLogs(Logged(record, {PRESSURE: float(np.var(record[PRESSURE]))}), RIG)
     assert dead.misread(plain, fit) is None
+
+
+def test_a_log_that_is_fitted_anew_is_asked_for_slips_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A lower valley may be none of the rig's where the first one was."""
+    plains, nothing = [SimpleNamespace(best="kin"), SimpleNamespace(best="foreign")], Any
+    monkeypatch.setattr(flow_fit, "plain_fits", lambda *_: plains.pop(0))
+    monkeypatch.setattr(flow_fit, "stiffer", lambda *_: None)
+    monkeypatch.setattr(flow_fit, "_asked", lambda *_: ((DELIVERY,), ()))
+    monkeypatch.setattr(flow_fit, "_strange", lambda *_: "a lower valley")
+    monkeypatch.setattr(flow_fit, "_elsewhere", lambda *_: FitStart(RIG, 2e8))
+    corrected: Any = SimpleNamespace(logged=nothing, misread=lambda _, found: found == "foreign" or None)
+    answer = flow_fit._answered(corrected, FitStart(RIG, 2e8), nothing, nothing, Work())
+    assert (answer.plain.best, answer.asked, plains) == ("foreign", (), [])
 
 
 @pytest.mark.parametrize("noise", [0.0, 2e3])
