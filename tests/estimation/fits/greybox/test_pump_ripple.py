@@ -74,7 +74,7 @@ def test_two_counts_of_teeth_add_up() -> None:
 @cache
 def logged(ripple: float, overtone: float = 0.0) -> Record:
     """Return a leaky actuator that is driven slowly, whose pump has 11 teeth."""
-    machine = Machine(leakage=12.0 * Machine().leakage, teeth=11.0, ripple=ripple)
+    machine = Machine(leakage=12.0 * Machine().leakage, crack_a=0.0, crack_b=0.0, teeth=11.0, ripple=ripple)
     time = SAMPLE * np.arange(4000)
     course = np.ones((len(time), 5))
     course[:, 0] = 60.0 * np.sin(np.pi * time) + 40.0 * np.sin(2.6 * np.pi * time)
