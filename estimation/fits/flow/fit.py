@@ -12,7 +12,7 @@ from estimation.fits.flow.belief import hopeless_cost, play_explained, wanted_co
 from estimation.fits.flow.log import homed_at_stop, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
-from estimation.fits.flow.misread import CorrectedLogs, is_kin, no_slip
+from estimation.fits.flow.misread import CorrectedLogs
 from estimation.fits.flow.other_minimum import lower_minimum, smaller_accumulator
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer
 from estimation.fits.flow.search import MAKEUP_TRIED
@@ -172,7 +172,7 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
         if (stiff := stiffer(logged, plain)) is not None:
             start = replace(start, parameters=stiff, bulk_modulus=stiff.bulk_modulus, valley=None)
             continue
-        foreign = not start.turns_read and not is_kin(plain, plain.best, corrected.rig)
+        foreign = not start.turns_read and not corrected.is_kin(plain, plain.best)
         if foreign and plain.explains(plain.best) and corrected.misread(plain, plain.best) is not None:
             return Answered(plain, (), (), None)
         asked, open_ends = _asked(plain, sensed, traits)
@@ -181,7 +181,7 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
                 strange = _strange(plain, asked, traits) if asked else None
         except WorkSpentError:
             return Answered(plain, asked, open_ends, None, ended=True)
-        sound = strange is not None and no_slip(plain, strange, corrected.rig)
+        sound = strange is not None and corrected.is_sound(plain, strange)
         if foreign and not sound and corrected.misread(plain, plain.best) is not None:
             return Answered(plain, (), (), None)
         elsewhere = strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))

@@ -126,10 +126,34 @@ class CorrectedLogs:
         Note or None
             None where the fit is one of the rig's kin, no slip makes it so, or pressure does not change.
         """
-        if is_kin(plain, found, self.rig) or not _pressed(self.logged):
+        if self.is_kin(plain, found) or not _pressed(self.logged):
             return None
         slips = [slip for slip, one in self._explained if _lost_to(found, one) < WORTH]
         return _told(slips) if slips else None
+
+    def is_kin(self, plain: PlainFits, found: GreyBoxFit) -> bool:
+        """Return whether a fit says that the log may be one of the rig's, as it was read.
+
+        Parameters
+        ----------
+        plain : PlainFits
+            The log's fits by the plain form.
+        found : GreyBoxFit
+            The fit.
+        """
+        return _kin(found, self.rig, FOREIGN, SURELY if plain.explains(found) else 0.0)
+
+    def is_sound(self, plain: PlainFits, strange: Explanation) -> bool:
+        """Return whether what is strange makes the log one of the rig's, and is nothing that a slip looks like.
+
+        Parameters
+        ----------
+        plain : PlainFits
+            The log's fits by the plain form.
+        strange : Explanation
+            What is strange about the log.
+        """
+        return UNLIKE_SLIPS.issuperset(strange.names) and self.is_kin(plain, strange.fit)
 
     @cached_property
     def _explained(self) -> Sequence[tuple[Slip, GreyBoxFit]]:
@@ -139,36 +163,6 @@ class CorrectedLogs:
         if begun is self.logged:
             return fits
         return [(slip, one) for slip, _ in fits if (one := _right_with(slip, self.logged, rig)) is not None]
-
-
-def is_kin(plain: PlainFits, found: GreyBoxFit, rig: EhaParameters) -> bool:
-    """Return whether a fit says that a log may be one of the rig's, as it was read.
-
-    Parameters
-    ----------
-    plain : PlainFits
-        The log's fits by the plain form.
-    found : GreyBoxFit
-        The fit.
-    rig : EhaParameters
-        The actuator, as its file has it.
-    """
-    return _kin(found, rig, FOREIGN, SURELY if plain.explains(found) else 0.0)
-
-
-def no_slip(plain: PlainFits, strange: Explanation, rig: EhaParameters) -> bool:
-    """Return whether what is strange about a log is none that a wrong sign or unit looks like, and makes it the rig's.
-
-    Parameters
-    ----------
-    plain : PlainFits
-        The log's fits by the plain form.
-    strange : Explanation
-        What is strange about the log.
-    rig : EhaParameters
-        The actuator, as its file has it.
-    """
-    return UNLIKE_SLIPS.issuperset(strange.names) and is_kin(plain, strange.fit, rig)
 
 
 def _told(slips: Sequence[Slip]) -> Note:

@@ -11,7 +11,7 @@ from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.finding import Outcome
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import misread as misread_module
-from estimation.fits.flow.misread import FOREIGN, KIN, SLIPS, CorrectedLogs, Slip, is_kin
+from estimation.fits.flow.misread import FOREIGN, KIN, SLIPS, CorrectedLogs, Slip
 from estimation.fits.flow.plain import FitStart, Logged
 from estimation.fits.greybox.work_limit import Work
 from estimation.fits.hypotheses import DELIVERY
@@ -81,15 +81,41 @@ def test_slips_are_tried_once_and_first_where_the_pump_has_turned_for_two_second
 
 def test_a_log_that_is_fitted_anew_is_asked_for_slips_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     """A lower valley may be none of the rig's where the first one was."""
-    plains, nothing = [SimpleNamespace(best="kin"), SimpleNamespace(best="foreign")], Any
+    plains = [SimpleNamespace(best=best, explains=lambda _: True) for best in ("kin", "foreign")]
+    nothing: Any = None
     monkeypatch.setattr(flow_fit, "plain_fits", lambda *_: plains.pop(0))
     monkeypatch.setattr(flow_fit, "stiffer", lambda *_: None)
     monkeypatch.setattr(flow_fit, "_asked", lambda *_: ((DELIVERY,), ()))
     monkeypatch.setattr(flow_fit, "_strange", lambda *_: "a lower valley")
     monkeypatch.setattr(flow_fit, "_elsewhere", lambda *_: FitStart(RIG, 2e8))
-    corrected: Any = SimpleNamespace(logged=nothing, misread=lambda _, found: found == "foreign" or None)
+    corrected: Any = SimpleNamespace(
+        logged=nothing,
+        is_kin=lambda _, found: found == "kin",
+        is_sound=lambda *_: True,
+        misread=lambda _, found: found == "foreign" or None,
+    )
     answer = flow_fit._answered(corrected, FitStart(RIG, 2e8), nothing, nothing, Work())
     assert (answer.plain.best, answer.asked, plains) == ("foreign", (), [])
+
+
+@pytest.mark.parametrize("named", ["pressure_offset", "delivery"])
+def test_slips_are_tried_of_what_nothing_explains_unless_an_offset_of_pressure_does(
+    monkeypatch: pytest.MonkeyPatch, named: str
+) -> None:
+    """A pump that delivers a tenth looks like a speed in rpm; no slip looks like an offset."""
+    plain: Any = SimpleNamespace(best="foreign", explains=lambda _: False)
+    strange: Any = SimpleNamespace(names=(named,), fit="kin")
+    nothing: Any = None
+    monkeypatch.setattr(flow_fit, "plain_fits", lambda *_: plain)
+    monkeypatch.setattr(flow_fit, "stiffer", lambda *_: None)
+    monkeypatch.setattr(flow_fit, "_asked", lambda *_: ((DELIVERY,), ()))
+    monkeypatch.setattr(flow_fit, "_strange", lambda *_: strange)
+    monkeypatch.setattr(flow_fit, "_elsewhere", lambda *_: None)
+    monkeypatch.setattr(flow_fit, "quieter", lambda *_: None)
+    monkeypatch.setattr(CorrectedLogs, "is_kin", lambda _, __, found: found == "kin")
+    monkeypatch.setattr(CorrectedLogs, "misread", lambda *_: True)
+    answer = flow_fit._answered(CorrectedLogs(nothing, RIG), FitStart(RIG, 2e8), nothing, nothing, Work())
+    assert (answer.strange is strange) == (named == "pressure_offset")
 
 
 @pytest.mark.parametrize("noise", [0.0, 2e3])
@@ -129,4 +155,5 @@ def test_a_fit_is_none_of_the_rigs_where_its_oil_or_what_its_pump_loses_is_surel
     deviations = {"bulk_modulus": std * modulus, "leakage_coefficient": 1e-13, "flow_bias": 1e-8}
     fit = replace(made_fit(50.0, modulus, 1e5), values=values, std=deviations)
     plain: Any = SimpleNamespace(explains=lambda _: explained)
-    assert is_kin(plain, fit, RIG) is kin
+    nothing: Any = None
+    assert CorrectedLogs(nothing, RIG).is_kin(plain, fit) is kin
