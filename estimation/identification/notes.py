@@ -89,9 +89,9 @@ class IdentificationCode(Code):
         " and a slow model imitates the drift; do not rely on the model"
     )
     RANDOM_WALK = (
-        "{output!r} wanders by itself like a random walk, by {rmse:.3g} (root mean square): the model was fitted to "
-        "changes from sample to sample, which the walk leaves its gain and poles to; its offset and the fit of its "
-        "free run say nothing of other logs"
+        "{output!r} wanders by itself like a random walk or a drift, by {rmse:.3g} (root mean square): the model was "
+        "fitted to changes from sample to sample, so that this does not spoil its gain and poles; its offset and the "
+        "fit of its free run say nothing of other logs"
     )
     OUTLIERS = (
         "{count} of {total} samples of {output!r} stand out from their neighbours and decide what is fitted: if the "

@@ -49,10 +49,18 @@ GAIN_MEANS_NOTHING = frozenset(
 
 
 def is_usable(view: IdentifiedView) -> bool:
-    """Return whether the model may be used at all: it runs free, and does better than the mean on held-back data."""
+    """Return whether the model may be used at all: it runs free, and does better than the mean on held-back data.
+
+    Of an output that wanders by itself, the fit of a free run says nothing of the model.
+    """
     held, own = view.result["held_back_percent"], view.result["fit_percent"]
-    better = own is not None and own > 0.0 and (held is None or held > 0.0)
+    better = wanders(view) or (own is not None and own > 0.0 and (held is None or held > 0.0))
     return better and view.result["outcome"] == "ok" and bool(np.isfinite(view.simulated).all())
+
+
+def wanders(view: IdentifiedView) -> bool:
+    """Return whether the output wanders by itself, so that the model was fitted to its changes."""
+    return IdentificationCode.RANDOM_WALK in {one["code"] for one in view.result.get("notes", ())}
 
 
 def title_of(view: IdentifiedView) -> str:
@@ -63,6 +71,8 @@ def title_of(view: IdentifiedView) -> str:
     order = view.result.get("order") or (None if view.linear is None else view.linear.denominator.size - 1)
     kind = KINDS.get(view.result["structure"], view.result["structure"])
     said = f"Model of {view.output.name} ({kind}{f', order {order}' if order else ''})"
+    if wanders(view):
+        return f"{said}, fitted to changes: the output also wanders by itself."
     if held is None:
         return f"{said}: fit {own:.1f} % on the data of the fit; the log is too short to hold data back."
     return f"{said}: fit {held:.1f} % on data held back from the fit."
@@ -85,11 +95,12 @@ def answer_of(view: IdentifiedView) -> str:
     """Return the meaning of the verdict's number, and the size of the error."""
     inputs = ", ".join(one.name for one in view.inputs)
     said = f"The model runs free from {inputs}: it never sees the measured output. "
-    said += "A fit of 100 % is perfect; 0 % is no better than the mean. "
     error = _held_back_error(view)
-    if error is None:
-        return said.rstrip()
-    return f"{said}The error is about {view.output.amount(number(error, 2))}{_unit_of(view.output)} (rms)."
+    size = "" if error is None else f"{view.output.amount(number(error, 2))}{_unit_of(view.output)} (rms)"
+    if wanders(view):
+        return f"{said}The error is about {size}, with what the output does by itself." if size else said.rstrip()
+    said += "A fit of 100 % is perfect; 0 % is no better than the mean. "
+    return f"{said}The error is about {size}." if size else said.rstrip()
 
 
 def _unit_of(output: Signal) -> str:
@@ -156,8 +167,11 @@ def uses_of(view: IdentifiedView, measured: MeasuredCurve | None) -> tuple[list[
         ranges = " and ".join(f"{one.name} from {_range(one, view.u[:, k])}" for k, one in enumerate(view.inputs))
         held, own = view.result["held_back_percent"], view.result["fit_percent"]
         rough = "Rough simulation" if (own if held is None else held) < ROUGH else "Simulation"
-        good.append(f"{rough} of {view.output.name} by {ranges}.")
+        what = f"Simulation of changes of {view.output.name}" if wanders(view) else f"{rough} of {view.output.name}"
+        good.append(f"{what} by {ranges}.")
         bad.append("Inputs beyond that range: the log says nothing about them.")
+        if wanders(view):
+            bad.append(f"The level of {view.output.name}: it also moves by itself.")
     band = told_band(measured) if usable and view.is_linear else None
     if band is not None and measured is not None:
         apart = distance(view, measured, band)

@@ -1,7 +1,7 @@
 """The page of `hydrostate inspect`: columns with guesses and reasons, the block of a rig file, every column drawn."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -13,6 +13,7 @@ from experiments.page.render import render_page
 from experiments.page.sentences import sentence
 from experiments.page.style import BLUE, Margins, panels, styled
 from experiments.page.tables import Column
+from plant.arrays import Array
 from plant.log.columns import TIME
 
 if TYPE_CHECKING:
@@ -36,9 +37,15 @@ def inspect_page(result: Mapping[str, Any], tables: "Sequence[TableFacts]") -> s
 
     rows = [row for one in result["tables"] for row in one["columns"]]
     told = [row for row in rows if row["channel"] == TIME]
-    drawn = [(one, _time_of(facts, told)) for facts in tables for one in facts.columns if len(one.present) > 1]
+    times = [_time_of(facts, told) for facts in tables]
+    drawn = [
+        (one, time)
+        for facts, time in zip(tables, times, strict=True)
+        for one in facts.columns
+        if len(one.present) > 1 and (time is None or one is not time.column)
+    ]
     with styled():
-        figure = _draw([pair for pair in drawn if pair[0] is not pair[1]][:MOST_COLUMNS])
+        figure = _draw(drawn[:MOST_COLUMNS])
     units = ["unit"] if any(row["unit"] for row in rows) else []
     facts = {
         "result": result,
@@ -68,16 +75,27 @@ def _row(row: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def _time_of(facts: "TableFacts", told: Sequence[Mapping[str, Any]]) -> "ColumnFacts | None":
-    """Return the column of a table that holds the time, if it rises from row to row."""
+class _Time(NamedTuple):
+    """The column of a table that holds the time, its values as they are drawn, and the name of their axis."""
+
+    column: "ColumnFacts"
+    values: Array
+    label: str
+
+
+def _time_of(facts: "TableFacts", told: Sequence[Mapping[str, Any]]) -> _Time | None:
+    """Return the time of a table if it rises from row to row; of dates, the seconds since the first."""
     names = {row["name"] for row in told}
     for one in facts.columns:
-        if one.heading.name in names and one.values is not None and one.span is not None:
-            return one if bool(np.all(np.diff(one.values) > 0.0)) else None
+        if one.heading.name in names and one.values is not None:
+            dated = one.values.dtype.kind == "M"
+            values = (one.values - one.values[:1]) / np.timedelta64(1, "s") if dated else one.values
+            label = "time since the first row [s]" if dated else f"{one.heading.name} {_bracketed(one.heading.unit)}"
+            return _Time(one, values, label.rstrip()) if bool(np.all(np.diff(values) > 0.0)) else None
     return None
 
 
-def _draw(columns: "Sequence[tuple[ColumnFacts, ColumnFacts | None]]") -> Figure:
+def _draw(columns: "Sequence[tuple[ColumnFacts, _Time | None]]") -> Figure:
     """Draw columns of numbers, each by its table's time, else by its row."""
     count = max(1, len(columns))
     figure, axes = panels("", count, 1, 0.9 + 1.45 * count, Margins(left=0.9, down=0.6))
@@ -86,18 +104,18 @@ def _draw(columns: "Sequence[tuple[ColumnFacts, ColumnFacts | None]]") -> Figure
         rows = np.linspace(0, len(values) - 1, min(len(values), MOST_POINTS)).astype(int)
         finite = np.where(np.isfinite(values), np.clip(values, -1e300, 1e300), np.nan)
         by, label = rows, "row"
-        if time is not None and time.values is not None and len(time.values) == len(values):
-            by, label = time.values[rows], f"{_plain(time.heading.name)} {_bracketed(time.heading.unit)}".rstrip()
+        if time is not None and len(time.values) == len(values):
+            by, label = time.values[rows], time.label
         axis.plot(by, finite[rows], color=BLUE, lw=0.8)
         axis.set_title(_plain(one.heading.name[:80]))
-        axis.set_ylabel(_bracketed(one.heading.unit))
+        axis.set_ylabel(_plain(_bracketed(one.heading.unit)))
         if place == count - 1 or columns[place + 1][1] is not time:
-            axis.set_xlabel(label)
+            axis.set_xlabel(_plain(label))
     return figure
 
 
 def _bracketed(unit: str | None) -> str:
-    return f"[{_plain(unit)}]" if unit else ""
+    return f"[{unit}]" if unit else ""
 
 
 def _plain(text: str) -> str:

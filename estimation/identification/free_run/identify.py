@@ -112,11 +112,12 @@ def identify_channels(
         One log or several.
     structure : str
         ``"output-error"``: linear; ``"narx"``: polynomial, its terms chosen by the free run; ``"auto"``: linear,
-        unless the polynomial one is clearly better on blocks held back, or of one input the next. Both are fitted to
-        changes from sample to sample, and linear, where the output wanders by itself (`random_walk`). Of one input also
+        unless the polynomial one is clearly better on blocks held back, or of one input the next. Of one input also
         ``"hammerstein"``: a dead zone, saturation or backlash in front of a linear model, where one of them is better
         there than none; and the keys of `other_structures.ADOPTED`, at the order that output error is given.
         ``"wiener"``: linear, its output measured without a sign; of outputs that may be, ``"auto"`` tries it too.
+        Where the output wanders by itself, ``"output-error"`` and ``"auto"`` fit a linear model to changes from sample
+        to sample (`random_walk`).
     order, delay, n_numerator : int, optional
         Of every input; chosen by the free run on blocks held back where not given.
 

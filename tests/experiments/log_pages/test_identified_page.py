@@ -21,7 +21,7 @@ from experiments.identification.entries import linear_entries
 from experiments.log_pages.identified_charts import MeasuredCurve, bode_charts, measured_curve, step_charts
 from experiments.log_pages.identified_page import control_text, identified_page
 from experiments.log_pages.identified_view import IdentifiedView, view_of_channels
-from experiments.log_pages.identified_words import chance, is_usable, title_of, told_band, uses_of
+from experiments.log_pages.identified_words import answer_of, chance, is_usable, title_of, told_band, uses_of
 from plant.log.files import write_record
 from plant.log.record import Record
 
@@ -65,6 +65,16 @@ def test_the_title_is_the_verdict(view: Callable[[], IdentifiedView], usable: bo
     good, bad = uses_of(one, measured_curve(one))
     assert bool(good) == usable
     assert any(said.startswith("Diagnosis") for said in bad)
+
+
+def test_a_model_of_an_output_that_wanders_is_used_whatever_its_free_run_fits() -> None:
+    view = seen(held=-30.0, fit_percent=-5.0, notes=[{"code": "random_walk"}])
+    assert is_usable(view)
+    assert title_of(view) == "Model of velocity (linear, order 2), fitted to changes: the output also wanders by itself."
+    good, bad = uses_of(view, None)
+    assert good[0].startswith("Simulation of changes of velocity by motor speed")
+    assert "The level of velocity: it also moves by itself." in bad
+    assert "no better than the mean" not in answer_of(view)
 
 
 def test_a_right_model_may_be_used_for_control_and_a_wrong_one_not() -> None:

@@ -39,6 +39,16 @@ def test_columns_are_drawn_by_time_or_by_row_where_time_does_not_rise(tmp_path: 
     assert "<!-- row -->" in drawing(page_of(tmp_path, "time_s,motor_speed_rad_s", np.round(TIME, 2), SPEED))
 
 
+def test_columns_beside_dates_are_drawn_by_seconds_since_the_first(tmp_path: Path) -> None:
+    path = tmp_path / "dated.csv"
+    rows = (f"2026-03-01 12:00:00.{k:03d},{value}" for k, value in enumerate(SPEED))
+    path.write_text("\n".join(["time,motor_speed_rad_s", *rows]))
+    found, tables = looked_into(path, None)
+    drawn = drawing(inspect_page({"file": path.name, **found}, tables))
+    assert "<!-- time since the first row [s] -->" in drawn
+    assert "<!-- row -->" not in drawn
+
+
 def test_a_column_that_is_named_like_an_erratum_is_no_link(tmp_path: Path) -> None:
     page = page_of(tmp_path, "time_s,M1,position_m,P1", TIME, SPEED, WAY, SPEED)
     assert "P1" in page
