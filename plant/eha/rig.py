@@ -39,8 +39,8 @@ UNNAMED = "paper"
 """Name of the rig without a rig file, and of a rig file until its owner gives another."""
 
 MOST_UNCERTAIN = 2.0
-"""Largest relative standard deviation [fraction]: what is worse known is not known at all, and more is a percentage that
-was written without its sign. One or two percent pass: no number tells them from what is not known."""
+"""Largest relative standard deviation [fraction]: what is worse known is not known at all, and a larger number is a
+percentage that should be a fraction. Of 1 and 2 that cannot be told."""
 
 UNEQUAL_SIDES = (*PAIRS.values(), "pilot_share")
 """Entries that two numbers for sides A and B set: a template has them as comments, so that they do not contradict."""
