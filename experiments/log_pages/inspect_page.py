@@ -88,8 +88,9 @@ def _time_of(facts: "TableFacts", told: Sequence[Mapping[str, Any]]) -> _Time | 
     names = {row["name"] for row in told}
     for one in facts.columns:
         if one.heading.name in names and one.values is not None:
-            dated = one.values.dtype.kind == "M"
-            values = (one.values - one.values[:1]) / np.timedelta64(1, "s") if dated else one.values
+            stamps: Any = one.values
+            dated = stamps.dtype.kind == "M"
+            values: Array = (stamps - stamps[:1]) / np.timedelta64(1, "s") if dated else stamps
             label = "time since the first row [s]" if dated else f"{one.heading.name} {_bracketed(one.heading.unit)}"
             return _Time(one, values, label.rstrip()) if bool(np.all(np.diff(values) > 0.0)) else None
     return None

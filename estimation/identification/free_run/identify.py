@@ -8,14 +8,11 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimation.identification.fit.feedback import feedback_note
 from estimation.identification.free_run.absolute_dynamics import AbsoluteDynamics
 from estimation.identification.free_run.absolute_output import refitted_absolute
-from estimation.identification.free_run.believable import believable
 from estimation.identification.free_run.candidate_rows import (
     absolute_row,
     hammerstein_row,
-    linear_row,
     polynomial_row,
 )
 from estimation.identification.free_run.choose_absolute import (
@@ -30,11 +27,10 @@ from estimation.identification.free_run.choose_hammerstein import (
     hammerstein_candidates,
     worthwhile,
 )
-from estimation.identification.free_run.choose_linear import Candidate, linear_candidates
+from estimation.identification.free_run.choose_linear import Candidate
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate, polynomial_candidates
 from estimation.identification.free_run.data import (
     Channels,
-    Scaling,
     blocks,
     require_room,
     require_size,
@@ -50,17 +46,16 @@ from estimation.identification.free_run.hammerstein_fit import deviations, finis
 from estimation.identification.free_run.held_back import BLOCKS
 from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.integrating import refitted_linear
+from estimation.identification.free_run.linear_comparison import LinearComparison, Task, linear_comparison
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.random_walk import from_changes, wandering
-from estimation.identification.free_run.transfer_function import linear_model
-from estimation.identification.free_run.unrelated import bend_explains, linear_explains, polynomial_explains
+from estimation.identification.free_run.unrelated import bend_explains, polynomial_explains
 from estimation.identification.notes import IdentificationCode
 from plant.errors import HydrostateError, LogWarning, require_known
-from plant.notes import Note
 
 FREE_STRUCTURES = ("output-error", "narx", "hammerstein", "wiener", "auto", *ADOPTED)
 """Structures between any channels; auto chooses between the first four."""
@@ -151,93 +146,92 @@ def identify_channels(
 def _identified(
     data: Channels, structure: str, order: int | None, delay: int | None, n_numerator: int | None
 ) -> Identified:
+    """Return the model: of changes where the output wanders, else linear, or of the structure that is asked for."""
     whole, by = scaled(data)
-    part = section(whole, MOST_CHOSEN)
-    orders = range(1, HIGHEST + 1) if order is None else (order,)
+    orders = list(range(1, HIGHEST + 1)) if order is None else [order]
     delays = None if delay is None else (delay,) * len(data.inputs)
+    asked = Asked(order, delay, n_numerator)
+    task = Task(data, whole, by, section(whole, MOST_CHOSEN), asked, orders, delays)
     if structure in ("output-error", "auto"):
-        walk = wandering(whole, part, list(orders), delays, n_numerator)
+        walk = wandering(whole, task.part, orders, delays, n_numerator)
         if walk is not None:
             return from_changes(walk, data, by)
-    linear = linear_candidates(part, list(orders), delays, n_numerator)
-    best, notes = believable(linear, part, by)
-    rows = [linear_row(one) for one in linear]
-    related = not best.outlasts_block(part) or linear_explains(best.fit, part)
-    notes = notes if related else [IdentificationCode.UNRELATED.note(output=data.output)]
-    sound = related and not best.doubt
+    linear = linear_comparison(task)
     if structure in ADOPTED:
-        return _adopted(structure, best, data, by, rows, [] if related else notes)
-    if structure == "auto" and best.held_back < ROUNDING:
+        return _adopted(structure, linear)
+    if structure == "auto" and linear.best.held_back < ROUNDING:
         structure = "output-error"
-    asked = Asked(order, delay, n_numerator)
     if structure in ("output-error", "auto", "wiener"):
-        signless = _without_sign(section(whole, MOST_COMPARED), by, asked, best, rows, surely=structure != "wiener")
+        signless = _without_sign(linear, surely=structure != "wiener")
         if signless is not None and structure != "output-error":
-            return _absolute(signless, data, whole, rows)
+            return _absolute(signless, linear)
         if signless is not None:
-            left = signless.held_back / best.held_back
-            notes = [*notes, IdentificationCode.SIGN_NOT_MEASURED.note(output=data.output, left=left)]
-    compared, judged, own = part, linear, best
-    if structure != "output-error":
-        # a whole period, where there is one: a shorter section would say nothing of what is slower than itself
-        most = max(MOST_COMPARED, part.told) if part.told < part.longest else MOST_COMPARED
-        compared, judged, own = on_fewer(linear, best, part, section(whole, most))
-    nonlinear = None
-    if structure == "hammerstein" or (structure == "auto" and len(data.inputs) == 1):
-        nonlinear = _worthwhile_nonlinearity(judged, own, compared, rows, surely=structure == "auto")
-        if nonlinear is not None and not related and not bend_explains(nonlinear.fit, compared):
-            nonlinear = None
+            left = signless.held_back / linear.best.held_back
+            linear.notes.append(IdentificationCode.SIGN_NOT_MEASURED.note(output=data.output, left=left))
+    return linear.identified() if structure == "output-error" else _nonlinear_or_linear(structure, linear)
+
+
+def _nonlinear_or_linear(structure: str, linear: LinearComparison) -> Identified:
+    """Return a nonlinear model, or the linear one where no nonlinear one is asked for and none is better."""
+    task = linear.task
+    # a whole period, where there is one: a shorter section would say nothing of what is slower than itself
+    most = max(MOST_COMPARED, task.part.told) if task.part.told < task.part.longest else MOST_COMPARED
+    compared, judged, own = on_fewer(linear.candidates, linear.best, task.part, section(task.whole, most))
+    bend = None
+    if structure == "hammerstein" or (structure == "auto" and len(task.data.inputs) == 1):
+        bend = _worthwhile_nonlinearity(judged, own, compared, linear.rows, surely=structure == "auto")
+        if bend is not None and not linear.related and not bend_explains(bend.fit, compared):
+            bend = None
     if structure == "hammerstein":
-        if nonlinear is not None:
-            return _nonlinear(nonlinear, data, whole, rows)
-        notes = [*notes, IdentificationCode.NO_NONLINEARITY.note(output=data.output)]
-        structure = "output-error"
-    dynamics, held_back, named = LinearDynamics.of(best.fit), best.held_back, "output-error"
-    if structure != "output-error":
-        straight = min([own, *(one for one in judged if not one.doubt)], key=lambda one: one.held_back)
-        bar = (1.0 - CLEAR_MARGIN) * straight.held_back if structure == "auto" and sound else float("inf")
-        bar = bar if nonlinear is None else min(bar, nonlinear.held_back)
-        polynomial = polynomial_candidates([own] if own.doubt else judged, compared, asked, bar)
-        rows += [polynomial_row(one) for one in polynomial]
-        better = min(polynomial, key=lambda one: (one.price, one.held_back), default=None)
-        if better is None and structure == "narx":
-            raise HydrostateError(f"no polynomial model of {data.output!r} runs free without growing beyond bounds")
-        taken = better is not None and (structure == "narx" or not sound or _clearly_better(better, straight))
-        if nonlinear is not None and not (taken and better is not None and better.price < nonlinear.held_back):
-            stands_in = _fallback(nonlinear, own, compared, whole) if structure == "auto" and sound else None
-            return _nonlinear(nonlinear, data, whole, rows, stands_in)
-        if taken and better is not None:
-            dynamics, held_back, named = _refitted(better, whole), better.held_back, "narx"
-            if structure == "auto" and sound:
-                dynamics = replace(dynamics, fallback=_fallback(better, own, compared, whole))
-            related = related or polynomial_explains(better, compared)
-            notes = [] if related else [IdentificationCode.UNRELATED.note(output=data.output)]
-            sound = related and np.isfinite(held_back) and held_back < 1.0
-    transfer = None
-    if isinstance(dynamics, LinearDynamics):
-        fit = refitted_linear(best.fit, whole)
-        # fitted on, a model with a pole at 1 may come where it cannot be written: what was judged stays
-        fit = best.fit if part is whole and not fit.cost <= best.fit.cost else fit
-        dynamics = LinearDynamics.of(fit)
-        transfer = linear_model(fit, whole, by) if len(data.inputs) == 1 else None
-    model = FreeRunModel(data.inputs, data.output, data.sample_time, named, by, dynamics, transfer)
-    quality = model.quality(data.u, data.y)
-    notes = [*notes, *_fed_back(model, data)]
-    empty = isinstance(dynamics, LinearDynamics) and best.doubt == "no_fit"
-    if empty or not quality.fit_percent > 0.0 or not held_back < 1.0:
-        notes = [*notes, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
-        sound = False
-    return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(rows), tuple(notes), bool(sound))
+        if bend is not None:
+            return _bent(bend, linear)
+        linear.notes.append(IdentificationCode.NO_NONLINEARITY.note(output=task.data.output))
+        return linear.identified()
+    polynomial = _taken_polynomial(structure, linear, compared, judged, own, bend)
+    stands_in = structure == "auto" and linear.sound
+    if bend is not None and (polynomial is None or not polynomial.price < bend.held_back):
+        return _bent(bend, linear, _fallback(bend, own, compared, task.whole) if stands_in else None)
+    if polynomial is None:
+        return linear.identified()
+    related = linear.related or polynomial_explains(polynomial, compared)
+    fallback = _fallback(polynomial, own, compared, task.whole) if stands_in else None
+    return _polynomial(polynomial, linear, fallback, related=related)
 
 
-def _fed_back(model: FreeRunModel, data: Channels) -> list[Note]:
-    """Return a note where the input of a linear model follows the output's noise, by the longest log."""
-    if len(data.inputs) != 1 or not isinstance(model.dynamics, LinearDynamics):
-        return []
-    k = int(np.argmax([y.size for y in data.y]))
-    u, y = data.u[k], data.y[k]
-    said = feedback_note(y - model.simulate(u, y), u[:, 0], (data.inputs[0], data.output))
-    return [] if said is None else [said]
+def _taken_polynomial(
+    structure: str,
+    linear: LinearComparison,
+    compared: Channels,
+    judged: Sequence[Candidate],
+    own: Candidate,
+    bend: HammersteinCandidate | None,
+) -> PolynomialCandidate | None:
+    """Return the best polynomial model, or None where ``auto`` has a linear one that is nearly as good."""
+    straight = min([own, *(one for one in judged if not one.doubt)], key=lambda one: one.held_back)
+    bar = (1.0 - CLEAR_MARGIN) * straight.held_back if structure == "auto" and linear.sound else float("inf")
+    bar = bar if bend is None else min(bar, bend.held_back)
+    found = polynomial_candidates([own] if own.doubt else judged, compared, linear.task.asked, bar)
+    linear.rows.extend(map(polynomial_row, found))
+    better = min(found, key=lambda one: (one.price, one.held_back), default=None)
+    if better is None and structure == "narx":
+        output = linear.task.data.output
+        raise HydrostateError(f"no polynomial model of {output!r} runs free without growing beyond bounds")
+    if better is None or structure == "narx" or not linear.sound or _clearly_better(better, straight):
+        return better
+    return None
+
+
+def _polynomial(
+    taken: PolynomialCandidate, linear: LinearComparison, fallback: Fallback | None, *, related: bool
+) -> Identified:
+    """Return a polynomial model, fitted to all data."""
+    data, by = linear.task.data, linear.task.by
+    dynamics = replace(_refitted(taken, linear.task.whole), fallback=fallback)
+    model = FreeRunModel(data.inputs, data.output, data.sample_time, "narx", by, dynamics)
+    found = _told(model, data, taken.held_back, linear.rows)
+    if related:
+        return found
+    return replace(found, notes=(IdentificationCode.UNRELATED.note(output=data.output), *found.notes), sound=False)
 
 
 def _worthwhile_nonlinearity(
@@ -251,20 +245,15 @@ def _worthwhile_nonlinearity(
     return worthwhile(found, linear, best, surely=surely)
 
 
-def _nonlinear(
-    taken: HammersteinCandidate,
-    data: Channels,
-    whole: Channels,
-    rows: list[dict[str, Any]],
-    fallback: Fallback | None = None,
-) -> Identified:
+def _bent(taken: HammersteinCandidate, linear: LinearComparison, fallback: Fallback | None = None) -> Identified:
     """Return a model with a nonlinearity at its input, fitted to all data."""
+    data, whole, by = linear.task.data, linear.task.whole, linear.task.by
     part = section(whole, MOST_FITTED)
     # on the data of the comparison a start elsewhere might lead to a model that no block has judged
     fit = finished(taken.fit, whole) if section(whole, MOST_COMPARED) is whole else refitted(taken.fit, part)
     dynamics = replace(HammersteinDynamics.of(fit, deviations(fit, part)), fallback=fallback)
-    model = FreeRunModel(data.inputs, data.output, data.sample_time, "hammerstein", scaled(data)[1], dynamics)
-    return _told(model, data, taken.held_back, rows)
+    model = FreeRunModel(data.inputs, data.output, data.sample_time, "hammerstein", by, dynamics)
+    return _told(model, data, taken.held_back, linear.rows)
 
 
 def _told(model: FreeRunModel, data: Channels, held_back: float, rows: list[dict[str, Any]]) -> Identified:
@@ -275,40 +264,39 @@ def _told(model: FreeRunModel, data: Channels, held_back: float, rows: list[dict
     return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(rows), notes, sound)
 
 
-def _without_sign(
-    data: Channels, by: Scaling, asked: Asked, best: Candidate, rows: list[dict[str, Any]], *, surely: bool
-) -> AbsoluteCandidate | None:
+def _without_sign(linear: LinearComparison, *, surely: bool) -> AbsoluteCandidate | None:
     """Return the best model of a size whose sign is not measured; None where there is none, or a linear one will do."""
+    data, by = section(linear.task.whole, MOST_COMPARED), linear.task.by
     if surely and not may_lack_sign(data, by):
         return None
-    found = absolute_candidates(data, by, asked)
-    rows += [absolute_row(one) for one in found]
+    found = absolute_candidates(data, by, linear.task.asked)
+    linear.rows.extend(map(absolute_row, found))
     if not found and not surely:
         raise HydrostateError(f"no model of {data.output!r} without its sign has poles quicker than a held-back block")
     if not found:
         return None
     taken = chosen_absolute(found)
-    return None if surely and not taken.held_back < SIGNLESS * best.held_back else taken
+    return None if surely and not taken.held_back < SIGNLESS * linear.best.held_back else taken
 
 
-def _absolute(taken: AbsoluteCandidate, data: Channels, whole: Channels, rows: list[dict[str, Any]]) -> Identified:
+def _absolute(taken: AbsoluteCandidate, linear: LinearComparison) -> Identified:
     """Return a model whose output has no sign, fitted to all data."""
-    by = scaled(data)[1]
-    fit = refitted_absolute(taken.fit, from_zero(section(whole, MOST_FITTED), by))
+    data, by = linear.task.data, linear.task.by
+    fit = refitted_absolute(taken.fit, from_zero(section(linear.task.whole, MOST_FITTED), by))
     model = FreeRunModel(data.inputs, data.output, data.sample_time, "wiener", by, AbsoluteDynamics.of(fit, taken.zero))
-    return _told(model, data, taken.held_back, rows)
+    return _told(model, data, taken.held_back, linear.rows)
 
 
-def _adopted(
-    structure: str, best: Candidate, data: Channels, by: Scaling, rows: list[dict[str, Any]], said: Sequence[Note]
-) -> Identified:
+def _adopted(structure: str, compared: LinearComparison) -> Identified:
     """Return a structure that is not fitted by its free run, at the order of the best output-error model."""
-    dynamics, linear, held_back = adopt(structure, best.form, data, by)
+    data, by = compared.task.data, compared.task.by
+    said = [] if compared.related else compared.notes
+    dynamics, linear, held_back = adopt(structure, compared.best.form, data, by)
     model = FreeRunModel(data.inputs, data.output, data.sample_time, structure, by, dynamics, linear)
     quality = model.quality(data.u, data.y)
     sound = quality.fit_percent > 0.0 and held_back < 1.0
     notes = said if sound else [*said, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
-    return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(rows), tuple(notes), sound and not said)
+    return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(compared.rows), tuple(notes), sound and not said)
 
 
 def _clearly_better(nonlinear: PolynomialCandidate, linear: Candidate) -> bool:

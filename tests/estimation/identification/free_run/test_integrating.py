@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.arrays import Array
-from estimation.identification.free_run import identify
+from estimation.identification.free_run import identify, linear_comparison
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.integrating import RECORDS, fit_integrating, refitted_linear
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
@@ -68,7 +68,7 @@ def test_a_model_that_cannot_be_written_once_it_is_fitted_on_stays_as_it_was_jud
     u = levels(3)
     data = channels_from([u[:, None]], [driven(u, 1.0) + NOISE[0]], 1.0, ["u"], "y")
     lost = lambda fit, _: replace(fit, theta=np.zeros(fit.theta.size), cost=float("inf"))  # noqa: E731 -- used once
-    monkeypatch.setattr(identify, "refitted_linear", lost)
+    monkeypatch.setattr(linear_comparison, "refitted_linear", lost)
     with pytest.warns(LogWarning, match="integrates its input"):
         found = identify.identify_channels(data, order=2)
     assert found.sound

@@ -1,0 +1,124 @@
+"""Linear models of one output, compared on blocks held back, and the one of them that may be believed."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from estimation.identification.fit.feedback import feedback_note
+from estimation.identification.free_run.believable import believable
+from estimation.identification.free_run.candidate_rows import linear_row
+from estimation.identification.free_run.choose_linear import Candidate, linear_candidates
+from estimation.identification.free_run.data import Channels, Scaling
+from estimation.identification.free_run.dense_polynomial import Asked
+from estimation.identification.free_run.identified import Identified
+from estimation.identification.free_run.integrating import refitted_linear
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
+from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.transfer_function import linear_model
+from estimation.identification.free_run.unrelated import linear_explains
+from estimation.identification.notes import IdentificationCode
+from plant.notes import Note
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What is to be identified.
+
+    Parameters
+    ----------
+    data : Channels
+        In units of the channels.
+    whole, by : Channels, Scaling
+        The same scaled, and how.
+    part : Channels
+        The section of it on which linear models are compared.
+    asked : Asked
+        Sizes that are given.
+    orders : list of int
+        Orders of linear models that are compared.
+    delays : tuple of int or None
+        Dead time of each input [samples]; None where the data choose it.
+    """
+
+    data: Channels
+    whole: Channels
+    by: Scaling
+    part: Channels
+    asked: Asked
+    orders: list[int]
+    delays: tuple[int, ...] | None
+
+
+@dataclass(frozen=True, eq=False)
+class LinearComparison:
+    """Linear models that were compared.
+
+    Parameters
+    ----------
+    task : Task
+        What they are models of.
+    candidates : list of Candidate
+        All of them.
+    best : Candidate
+        The one that may be believed.
+    related : bool
+        Whether the inputs explain the output better than in another order.
+    notes : list of Note
+        What was passed over, or is doubtful.
+    rows : list of dict
+        What was compared, as `Identified.candidates` has it; other structures are added.
+    """
+
+    task: Task
+    candidates: list[Candidate]
+    best: Candidate
+    related: bool
+    notes: list[Note]
+    rows: list[dict[str, Any]]
+
+    @property
+    def sound(self) -> bool:
+        """Whether the best model may be relied on."""
+        return self.related and not self.best.doubt
+
+    def identified(self) -> Identified:
+        """Return the best model, fitted to all data."""
+        data, by, whole, best = self.task.data, self.task.by, self.task.whole, self.best
+        fit = refitted_linear(best.fit, whole)
+        # fitted on, a model with a pole at 1 may come where it cannot be written: what was judged stays
+        fit = best.fit if self.task.part is whole and not fit.cost <= best.fit.cost else fit
+        transfer = linear_model(fit, whole, by) if len(data.inputs) == 1 else None
+        named = data.inputs, data.output, data.sample_time, "output-error"
+        model = FreeRunModel(*named, by, LinearDynamics.of(fit), transfer)
+        quality = model.quality(data.u, data.y)
+        notes, sound = [*self.notes, *_fed_back(model, data)], self.sound
+        if best.doubt == "no_fit" or not quality.fit_percent > 0.0 or not best.held_back < 1.0:
+            notes = [*notes, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
+            sound = False
+        return Identified(model, quality, 100.0 * (1.0 - best.held_back), tuple(self.rows), tuple(notes), sound)
+
+
+def linear_comparison(task: Task) -> LinearComparison:
+    """Compare linear models of all orders that are asked for.
+
+    Parameters
+    ----------
+    task : Task
+        What is to be identified.
+    """
+    candidates = linear_candidates(task.part, task.orders, task.delays, task.asked.n_numerator)
+    best, notes = believable(candidates, task.part, task.by)
+    related = not best.outlasts_block(task.part) or linear_explains(best.fit, task.part)
+    said = notes if related else [IdentificationCode.UNRELATED.note(output=task.data.output)]
+    return LinearComparison(task, candidates, best, related, [*said], [linear_row(one) for one in candidates])
+
+
+def _fed_back(model: FreeRunModel, data: Channels) -> list[Note]:
+    """Return a note where the input of a linear model follows the output's noise, by the longest log."""
+    if len(data.inputs) != 1:
+        return []
+    k = int(np.argmax([y.size for y in data.y]))
+    u, y = data.u[k], data.y[k]
+    said = feedback_note(y - model.simulate(u, y), u[:, 0], (data.inputs[0], data.output))
+    return [] if said is None else [said]
