@@ -271,7 +271,8 @@ def guarded(run: Callable[[], object]) -> int:
         return USAGE
     except OSError as error:
         _to_nowhere(sys.stdout)
-        note(f"hydrostate: {error.filename or 'standard output'}: {error.strerror or error}")
+        place = f"{error.filename}: " if error.filename else ""  # none of standard output and of connections
+        note(f"hydrostate: {place}{error.strerror or error}")
         return SOME_FAILED
     except Exception as error:
         said = _usage_sentence(error)

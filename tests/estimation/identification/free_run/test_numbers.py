@@ -15,7 +15,6 @@ from estimation.identification.free_run import (
     dead_times,
     held_back,
     identify,
-    identify,
     linear_comparison,
     linear_fit,
 )
@@ -30,7 +29,6 @@ from estimation.identification.free_run.model import FreeRunModel, _fit
 from estimation.identification.free_run.other_structures import adopt
 from estimation.identification.free_run.transfer_function import linear_model
 from estimation.identification.search import criterion
-from plant.arrays import Array
 from tests.estimation.identification.free_run.made_channels import NOISE, N, U, answer, channels
 from tests.kernels import loops_in_python
 from tests.numbers import Found, Numbers, Roughly, refused, some
