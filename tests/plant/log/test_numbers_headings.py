@@ -186,9 +186,10 @@ def usual_sizes() -> dict[str, Any]:
     told["still"] = [
         notes(**channels)
         for channels in (
-            {"motor_speed_rad_s": np.ones(9)},
-            {"position_m": np.ones(9), "velocity_m_s": np.zeros(9)},
+            {"motor_speed_rad_s": np.ones(9), "velocity_m_s": np.arange(9.0)},
+            {"motor_speed_rad_s": np.arange(9.0), "position_m": np.ones(9), "velocity_m_s": np.zeros(9)},
             {"position_m": np.ones(9), "velocity_m_s": np.arange(9.0)},
+            {"motor_speed_rad_s": np.ones(9), "position_m": np.ones(9)},
         )
     ]
     told["measurable"] = [
