@@ -49,7 +49,7 @@ def inspect_page(result: Mapping[str, Any], tables: "Sequence[TableFacts]") -> s
     units = ["unit"] if any(row["unit"] for row in rows) else []
     facts = {
         "result": result,
-        "title": "This log can be read." if result["reads"] else "This log cannot be read yet.",
+        "title": "This log can be diagnosed." if result["reads"] else "This log cannot be diagnosed yet.",
         "message": f"{result['message'][:1].upper()}{result['message'][1:]}.",
         "block": block_of(result["columns"]),
         "clocks": [sentence(clock_sentence(one)) for one in result["tables"]],

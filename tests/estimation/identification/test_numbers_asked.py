@@ -20,6 +20,7 @@ from estimation.identification.free_run import (
     dense_polynomial,
     hammerstein_fit,
     identify,
+    linear_comparison,
     linear_fit,
     linear_problem,
     polynomial_fit,
@@ -230,7 +231,9 @@ def choices() -> dict[str, Any]:
         ("one order", "output-error", {"order": 2, "delay": 3, "n_numerator": 1}),
     ):
         whole = channels_from([U[:, None]], [answer()], 0.1, ("a",), "y")
-        with watched(identify, "linear_candidates", lambda data, *rest: [data.n_samples, *rest], stop) as asked:
+        with watched(
+            linear_comparison, "linear_candidates", lambda data, *rest: [data.n_samples, *rest], stop
+        ) as asked:
             try:
                 identify._identified(whole, structure, given.get("order"), given.get("delay"), given.get("n_numerator"))
             except StopIteration:

@@ -23,9 +23,9 @@ WAY = 1e-6 * np.cumsum(SPEED)
 
 def test_the_page_says_first_whether_the_log_can_be_read(tmp_path: Path) -> None:
     page = page_of(tmp_path, "time_s,motor_speed_rad_s,position_m", TIME, SPEED, WAY)
-    assert "<h1>This log can be read.</h1>" in page
+    assert "<h1>This log can be diagnosed.</h1>" in page
     assert "no gaps" in page
-    assert "<h1>This log cannot be read yet.</h1>" in page_of(tmp_path, "time_s,M1", TIME, SPEED)
+    assert "<h1>This log cannot be diagnosed yet.</h1>" in page_of(tmp_path, "time_s,M1", TIME, SPEED)
 
 
 def drawing(page: str) -> str:
