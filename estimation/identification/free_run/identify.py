@@ -46,7 +46,7 @@ from estimation.identification.free_run.hammerstein_fit import deviations, finis
 from estimation.identification.free_run.held_back import BLOCKS
 from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.integrating import refitted_linear
-from estimation.identification.free_run.linear_comparison import LinearComparison, Task, linear_comparison
+from estimation.identification.free_run.linear_comparison import LinearComparison, Task, fed_back, linear_comparison
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.model import FreeRunModel
@@ -154,8 +154,10 @@ def _identified(
     task = Task(data, whole, by, section(whole, MOST_CHOSEN), asked, orders, delays)
     if structure in ("output-error", "auto"):
         walk = wandering(whole, task.part, orders, delays, n_numerator)
-        if walk is not None:
-            return from_changes(walk, data, by)
+        found = None if walk is None else from_changes(walk, data, by)
+        # a controller that answers the output's noise bends a fit of changes more than one of levels
+        if found is not None and not fed_back(found.model, data, changes=True):
+            return found
     linear = linear_comparison(task)
     if structure in ADOPTED:
         return _adopted(structure, linear)

@@ -92,7 +92,7 @@ class LinearComparison:
         named = data.inputs, data.output, data.sample_time, "output-error"
         model = FreeRunModel(*named, by, LinearDynamics.of(fit), transfer)
         quality = model.quality(data.u, data.y)
-        notes, sound = [*self.notes, *_fed_back(model, data)], self.sound
+        notes, sound = [*self.notes, *fed_back(model, data)], self.sound
         if best.doubt == "no_fit" or not quality.fit_percent > 0.0 or not best.held_back < 1.0:
             notes = [*notes, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
             sound = False
@@ -114,11 +114,29 @@ def linear_comparison(task: Task) -> LinearComparison:
     return LinearComparison(task, candidates, best, related, [*said], [linear_row(one) for one in candidates])
 
 
-def _fed_back(model: FreeRunModel, data: Channels) -> list[Note]:
-    """Return a note where the input of a linear model follows the output's noise, by the longest log."""
+def fed_back(model: FreeRunModel, data: Channels, *, changes: bool = False) -> list[Note]:
+    """Return a note where the input of a linear model follows the output's noise, by the longest log.
+
+    Parameters
+    ----------
+    model : FreeRunModel
+        The model.
+    data : Channels
+        Levels, in units of the channels.
+    changes : bool
+        Whether changes from sample to sample are asked, of an output whose noise is a random walk.
+
+    Returns
+    -------
+    list of Note
+        One note or none.
+    """
     if len(data.inputs) != 1:
         return []
     k = int(np.argmax([y.size for y in data.y]))
     u, y = data.u[k], data.y[k]
-    said = feedback_note(y - model.simulate(u, y), u[:, 0], (data.inputs[0], data.output))
+    left, followed = y - model.simulate(u, y), u[:, 0]
+    if changes:
+        left, followed = np.diff(left), np.diff(followed)
+    said = feedback_note(left, followed, (data.inputs[0], data.output))
     return [] if said is None else [said]

@@ -102,9 +102,13 @@ def wandering(
     sizes : int, optional
         Numerator coefficients of each input.
     """
-    if part.n_samples < FEWEST:
+    changes = changes_of(part)
+    known = [np.count_nonzero(np.isfinite(y)) for y in changes.y]
+    if sum(known) < FEWEST or not all(known):
         return None
-    changed, by = scaled(changes_of(part))
+    changed, by = scaled(changes)
+    if not all(np.isfinite(y).any() for y in changed.y):  # of an output that always changes by the same
+        return None
     late = estimate_delays(changed) if delays is None else delays
     first = fit_linear(Form(ORDER, (ORDER + 1,) * len(late), late), changed, least_gain=COARSE)
     rest = _longest_rest(first, changed)

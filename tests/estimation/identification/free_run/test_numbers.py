@@ -230,7 +230,7 @@ def fed_back() -> dict[str, Any]:
         logs = [slice(0, 60), slice(60, N)]
         one = channels_from([fed[log, :inputs] for log in logs], [NOISE[log] for log in logs], 0.1, "ab"[:inputs], "y")
         model = FreeRunModel(one.inputs, "y", 0.1, "", scaled(one)[1], body)
-        told[name] = [dict(note.data) for note in linear_comparison._fed_back(model, one)]
+        told[name] = [dict(note.data) for note in linear_comparison.fed_back(model, one)]
     return told
 
 

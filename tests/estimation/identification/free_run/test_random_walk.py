@@ -117,3 +117,31 @@ def test_a_fit_of_changes_runs_at_the_levels() -> None:
     found = at_levels(fit, whole, by)
     assert found.cost < 1e-9
     assert found.f[1] == pytest.approx(-POLE, abs=1e-6)
+
+
+@pytest.mark.parametrize("gaps", [False, True])
+def test_an_output_whose_changes_say_nothing_does_not_wander(gaps: bool) -> None:
+    ramp = 0.5 * np.arange(float(N))
+    if gaps:
+        ramp[::2] = np.nan
+    whole, _ = scaled(channels_from([LEVELS[:, None]], [ramp], 0.1, ["u"], "y"))
+    assert wandering(whole, whole, [1], None, None) is None
+
+
+@pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
+def test_a_controller_that_answers_the_noise_is_told_and_no_walk() -> None:
+    """Fitted to changes, the gain was 1.7 in place of 1 and no word was said."""
+    rng = np.random.default_rng(0)
+    r, white = np.repeat(rng.choice([-1.0, 1.0], 30), 20), 0.2 * rng.normal(size=600)
+    u, y, x, noise = np.zeros(600), np.zeros(600), 0.0, 0.0
+    for t in range(600):
+        noise = 0.9 * noise + white[t]
+        y[t] = x + noise
+        u[t] = r[t] - 2.0 * y[t - 1]
+        x = 0.8 * x + 0.2 * u[t]
+    data = channels_from([u[:, None]], [y], 0.01, ["u"], "y")
+    whole, _ = scaled(data)
+    assert wandering(whole, whole, [1], (1,), None) is not None
+    said = [str(note.code) for note in identify_channels(data, order=1, delay=1).notes]
+    assert "feedback" in said
+    assert "random_walk" not in said
