@@ -21,6 +21,7 @@ from estimation.identification.free_run.random_walk import (
     wandering,
 )
 from plant.errors import LogWarning
+from tests.estimation.identification.test_two_stage import closed_loop
 
 N, POLE, GAIN = 1200, 0.8, 2.0
 LEVELS: Array = np.repeat(np.random.default_rng(16800).standard_normal(N // 10), 10)
@@ -131,15 +132,8 @@ def test_an_output_whose_changes_say_nothing_does_not_wander(gaps: bool) -> None
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
 def test_a_controller_that_answers_the_noise_is_told_and_no_walk() -> None:
     """Fitted to changes, the gain was 1.7 in place of 1 and no word was said."""
-    rng = np.random.default_rng(0)
-    r, white = np.repeat(rng.choice([-1.0, 1.0], 30), 20), 0.2 * rng.normal(size=600)
-    u, y, x, noise = np.zeros(600), np.zeros(600), 0.0, 0.0
-    for t in range(600):
-        noise = 0.9 * noise + white[t]
-        y[t] = x + noise
-        u[t] = r[t] - 2.0 * y[t - 1]
-        x = 0.8 * x + 0.2 * u[t]
-    data = channels_from([u[:, None]], [y], 0.01, ["u"], "y")
+    loop = closed_loop(0)
+    data = channels_from([loop["u"][:, None]], [loop["y"]], 0.01, ["u"], "y")
     whole, _ = scaled(data)
     assert wandering(whole, whole, [1], (1,), None) is not None
     said = [str(note.code) for note in identify_channels(data, order=1, delay=1).notes]
