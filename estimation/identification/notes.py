@@ -93,6 +93,10 @@ class IdentificationCode(Code):
         "fitted to changes from sample to sample, so that this does not spoil its gain and poles; its offset and the "
         "fit of its free run say nothing of other logs"
     )
+    OFFSETS_DIFFER = (
+        "the offset of {output!r} differs from log to log ({above} beside their mean): each log was given its own, and "
+        "the model has their mean, so its level says nothing of other logs"
+    )
     OUTLIERS = (
         "{count} of {total} samples of {output!r} stand out from their neighbours and decide what is fitted: if the "
         "sensor is at fault there, leave their cells empty and identify again"
@@ -100,6 +104,10 @@ class IdentificationCode(Code):
     INPUTS_ALIKE = (
         "input {channel!r} is a linear function of {others}: the log does not tell their effects apart, so how the "
         "gain is shared between them means nothing; leave one out, or log inputs that differ"
+    )
+    ANSWERS_LATE = (
+        "{output!r} seems to answer {input!r} after {dead_time_s:.4g} s only, more than a fifth of the log, which is "
+        "too long to be judged: a model behind it leaves {left:.0%} of the error; try --delay {samples}, or a longer log"
     )
     NOTHING_ANSWERED = (
         "{logs} has at most {longest} samples in one piece, and the model of {output!r} a dead time of {dead_time}: "

@@ -62,7 +62,8 @@ def identify_columns(
     """
     data = [channels_of(records, inputs, output, sample_time, split=not references) for output in outputs]
     if not references:
-        return identify_outputs(data, **options), data
+        found = identify_outputs(data, **options)
+        return found, [one.at_one_offset(each) for one, each in zip(found, data, strict=True)]
     if twice := set(references) & {*inputs, *outputs}:
         raise HydrostateError(f"a reference must be neither input nor output, got {min(twice)!r}")
     drives = [channels_of(records, references, one, data[0].sample_time) for one in inputs]

@@ -102,7 +102,8 @@ def identify_columns(logs: Sequence[Path], fit: ColumnFit, *, as_json: bool, out
             result = _answer(found, read, output, fit, logs)
         if output in pages.places:
             about = with_remarks({"file": ", ".join(map(str, logs)), **result}, said)
-            pages.write(output, _page(about, found, channels_of(read[0], fit.inputs, output, fit.resampled)))
+            data = found.at_one_offset(channels_of(read[0], fit.inputs, output, fit.resampled))
+            pages.write(output, _page(about, found, data))
         return result
 
     columns = {Path(output): output for output in fit.outputs}  # a path drops parts of some names, such as "x/."
@@ -147,7 +148,7 @@ def _answer(
         test = {"files": [str(one) for one in fit.validate], **quality_of(found.model, held, named)}
     if not (fit.figure or fit.simulated or fit.response):
         return {**BLANK, **column_entries(found), "test": test, "frequency_response": None}
-    data = channels_of(records, fit.inputs, output, fit.resampled)
+    data = found.at_one_offset(channels_of(records, fit.inputs, output, fit.resampled))
     figure = own_paths(fit.figure, fit.outputs).get(output)
     if figure is not None:
         from experiments.log_pages.free_run_figure import write_free_run

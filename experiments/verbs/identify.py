@@ -75,8 +75,8 @@ def identify(
     """Identify a transfer function: from motor speed [rad/s] to velocity [m/s] of each log, or between any columns.
 
     With --input and --output, the model relates any columns, in any unit. Several logs are then experiments on the same
-    plant, each with its own initial state; they share one offset. Free runs on held-back blocks choose order, dead time
-    and structure. Fit and rms error are always those of the free run.
+    plant, each with its own initial state, and its own offset where these differ. Free runs on held-back blocks choose
+    order, dead time and structure. Fit and rms error are always those of the free run.
 
     Without them, the command makes an output-error fit with covariance; the defaults are the form of Table 6.
     Differential pressure is not used, so its absence costs nothing. Nothing is random, so the seed changes nothing.

@@ -14,7 +14,7 @@ from estimation.identification.free_run.hammerstein_fit import (
     fit_hammerstein,
     refitted,
 )
-from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled, surely_better
+from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled, told_apart
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.transfer_function import linear_model
@@ -119,7 +119,7 @@ def worthwhile(
     best : Candidate
         Of them, the one that is taken otherwise.
     surely : bool
-        Whether it must beat that one by more than blocks scatter: nobody has asked for a nonlinearity.
+        Whether it must be told apart from that one: nobody has asked for a nonlinearity.
 
     Returns
     -------
@@ -132,7 +132,7 @@ def worthwhile(
     bar = min(best.held_back, *(one.held_back for one in linear))
     if not taken.held_back < (1.0 - BENT_MARGIN) * bar:
         return None
-    return None if surely and not surely_better(taken.block_errors, best.block_errors) else taken
+    return None if surely and not told_apart(taken.block_errors, best.block_errors) else taken
 
 
 def _bases(linear: Sequence[Candidate]) -> list[Candidate]:

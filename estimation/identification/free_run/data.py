@@ -35,6 +35,8 @@ class Channels:
         Inputs of each log, no gaps.
     y : tuple of ndarray, shape (n,)
         Output of each log; NaN where missing.
+    own_offsets : bool
+        Whether linear models have an offset for each log.
     """
 
     inputs: tuple[str, ...]
@@ -42,6 +44,7 @@ class Channels:
     sample_time: float
     u: tuple[Array, ...]
     y: tuple[Array, ...]
+    own_offsets: bool = False
 
     @property
     def n_samples(self) -> int:

@@ -1,8 +1,9 @@
 """`Identified`: a model with what it was chosen by."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
 from plant.notes import Note
 
@@ -23,6 +24,8 @@ class Identified:
         What was passed over, or is doubtful.
     sound : bool
         Whether the model may be believed.
+    above : tuple of float
+        How much each log's offset is above the model's; empty where they have one [output unit].
     """
 
     model: FreeRunModel
@@ -31,3 +34,16 @@ class Identified:
     candidates: tuple[dict[str, Any], ...]
     notes: tuple[Note, ...]
     sound: bool
+    above: tuple[float, ...] = ()
+
+    def at_one_offset(self, data: Channels) -> Channels:
+        """Return the fitted logs with the model's offset, where each has its own.
+
+        Parameters
+        ----------
+        data : Channels
+            In units of the channels.
+        """
+        if len(self.above) != len(data.y):  # one offset, or logs that were split at gaps for the fit
+            return data
+        return replace(data, y=tuple(y - one for y, one in zip(data.y, self.above, strict=True)))

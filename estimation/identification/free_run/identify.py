@@ -37,6 +37,7 @@ from estimation.identification.free_run.data import (
     scaled,
     section,
 )
+from estimation.identification.free_run.dead_times import late_answers
 from estimation.identification.free_run.dense_polynomial import Asked
 from estimation.identification.free_run.doubtful_channels import doubtful_channels
 from estimation.identification.free_run.fallback import Fallback
@@ -49,6 +50,7 @@ from estimation.identification.free_run.integrating import refitted_linear
 from estimation.identification.free_run.linear_comparison import LinearComparison, Task, fed_back, linear_comparison
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import COARSE
+from estimation.identification.free_run.log_offsets import believed, levelled
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
@@ -71,6 +73,8 @@ WARNED = (
     IdentificationCode.INPUTS_ALIKE,
     IdentificationCode.OUTLIERS,
     IdentificationCode.RANDOM_WALK,
+    IdentificationCode.OFFSETS_DIFFER,
+    IdentificationCode.ANSWERS_LATE,
 )
 """Notes that are raised as warnings too; the others say only what was passed over."""
 
@@ -136,7 +140,12 @@ def identify_channels(
     require_room(data, order, delay, n_numerator)
     with threadpool_limits(limits=1, user_api="blas"):
         found = _identified(data, structure, order, delay, n_numerator)
-    found = replace(found, notes=(*found.notes, *doubtful_channels(found.model, data)))
+    flat = found.at_one_offset(data)
+    found = replace(found, notes=(*found.notes, *doubtful_channels(found.model, flat)))
+    if delay is None and not any(note.code == IdentificationCode.RANDOM_WALK for note in found.notes):
+        whole, by = scaled(flat)
+        late = late_answers(section(whole, MOST_CHOSEN), found.quality.rmse / by.y_std)
+        found = replace(found, notes=(*found.notes, *late), sound=found.sound and not late)
     for note in found.notes:
         if note.code in WARNED:
             warnings.warn(LogWarning(note), stacklevel=2)
@@ -159,6 +168,13 @@ def _identified(
         if found is not None and not fed_back(found.model, data, changes=True):
             return found
     linear = linear_comparison(task)
+    apart = levelled(data, orders, delays) if structure in ("output-error", "auto") else None
+    if apart is not None:
+        whole, by = scaled(apart.data)
+        own = linear_comparison(replace(task, data=apart.data, whole=whole, by=by, part=section(whole, MOST_CHOSEN)))
+        if believed(own, linear):
+            own.notes.append(apart.note)
+            return replace(own.identified(), above=tuple(apart.above.tolist()))
     if structure in ADOPTED:
         return _adopted(structure, linear)
     if structure == "auto" and linear.best.held_back < ROUNDING:

@@ -97,7 +97,7 @@ def _summed(data: Channels) -> tuple[Channels, Array]:
             levels[:, index - 1] = 1.0
         columns.append(np.column_stack([one / scales, ramps, levels]))
     names = (*data.inputs, *(f"ramp {k}" for k in range(logs)), *(f"level {k}" for k in range(1, logs)))
-    return replace(data, inputs=names, u=tuple(columns)), scales
+    return replace(data, inputs=names, u=tuple(columns), own_offsets=False), scales
 
 
 def _without_slowest(f: Array) -> Array:
@@ -114,7 +114,7 @@ def _written(form: Form, data: Channels, found: LinearFit, scales: Array) -> Lin
     pole = float(np.exp(-1.0 / (RECORDS * data.longest)))
     f, settled = np.convolve(found.f, [1.0, -pole]), float(found.f.sum())
     if not settles(f[1:]) or f.sum() < ROUNDED * np.abs(f).sum():
-        return LinearFit(form, np.zeros(form.n_values + form.order * len(data.u)), float("inf"), integrates=True)
+        return LinearFit(form, np.zeros(Problem(form, data).n_parameters), float("inf"), integrates=True)
     gains = np.array([one.sum() for one in b]) / settled
     ramps = found.numerators[len(b) : len(b) + len(data.u)]
     slopes = [float(ramp[0]) / settled / data.longest for ramp in ramps]

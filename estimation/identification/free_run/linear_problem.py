@@ -92,7 +92,8 @@ class LinearFit:
     Parameters
     ----------
     theta : ndarray, shape (p,)
-        Numerators, denominator behind its 1, offset, and the initial state of each log.
+        Numerators, denominator behind its 1, offset, and the initial state of each log; then how much higher each log's
+        offset is, but the first one's, where logs have their own.
     cost : float
         Sum of squared residuals; where outputs are left out, as if they had left as much [dimensionless].
     bounded : bool
@@ -133,7 +134,8 @@ class Problem:
             self.used[first : first + begin] = False
         self.share = told / max(int(np.count_nonzero(self.used)), 1)
         self.counted = Counted(self.used)
-        self.n_parameters = form.n_values + form.order * len(data.y)
+        self.n_own = len(data.y) - 1 if data.own_offsets else 0
+        self.n_parameters = form.n_values + form.order * len(data.y) + self.n_own
 
     def linear_columns(self, f: Array) -> Array:
         """Return the output's derivative by numerators, offset and initial states for a denominator.
@@ -145,10 +147,10 @@ class Problem:
 
         Returns
         -------
-        ndarray, shape (n, n_b + 1 + order * logs)
-            Numerators, offset, initial states of each log.
+        ndarray, shape (n, n_b + 1 + order * logs), or more
+            Numerators, offset, initial states of each log, and their offsets where they have their own.
         """
-        out = np.zeros((self.y.size, self.form.n_b + 1 + self.form.order * len(self.data.y)), order="F")
+        out = np.zeros((self.y.size, self.n_parameters - self.form.order), order="F")
         self._lay_linear(f, out, self.form.n_b)
         return out
 
@@ -173,6 +175,8 @@ class Problem:
             begin = first + self.begins[index]
             for k in range(min(n, last - begin)):
                 out[begin + k : last, offset + 1 + index * n + k] = rows[-1, : last - begin - k]
+            if index and self.n_own:
+                out[first:last, index - 1 - self.n_own] = 1.0
 
     def first_columns(self, index: int) -> Array:
         """Return the lagged inputs before a log: every lag stands at the first value."""
@@ -221,7 +225,8 @@ class Problem:
             part = slice(int(first), int(self.bounds[index + 1]))
             # before the log the input stood at its first value, and so did what it drives
             before = float(self.first_columns(index) @ theta[:n_b]) / float(f.sum())
-            moved = -(output[part] - theta[n_b + n])[None, :]
+            level = theta[n_b + n] + (theta[index - 1 - self.n_own] if index and self.n_own else 0.0)
+            moved = -(output[part] - level)[None, :]
             decay_rows(f, moved, np.array([-before]))
             for k in range(1, n + 1):
                 lay_shifted(jacobian[part, n_b + k - 1], moved[0], k, -before / float(f.sum()))

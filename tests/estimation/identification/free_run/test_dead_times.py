@@ -1,12 +1,13 @@
 """Dead times: long ones are found by the default, and cost a fit none of its certainty."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimation.identification.free_run.data import Channels, channels_from, scaled
-from estimation.identification.free_run.dead_times import estimate_delays
+from estimation.identification.free_run.dead_times import estimate_delays, late_answers
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import fit_linear
@@ -15,6 +16,7 @@ from estimation.identification.state_space.fit import fit_state_space
 from estimation.identification.state_space.joint import Joint, joined
 from estimation.identification.state_space.problem import Size
 from estimation.identification.state_space.starts import subspace_starts
+from plant.errors import LogWarning
 
 NOISE = 0.02
 
@@ -132,3 +134,26 @@ def test_a_state_space_is_not_fitted_to_outputs_that_answer_inputs_from_before_t
     assert np.isnan(late.y[0][:79]).all()
     assert np.isfinite(late.y[0][79:]).all()
     assert np.isfinite(joined([scaled(late_plant(80))[0]]).delayed((20,)).y[0]).all()
+
+
+def test_a_dead_time_beyond_those_looked_for_is_named() -> None:
+    data = scaled(late_plant(200, 600))[0]
+    (note,) = late_answers(data, rmse=0.9)
+    assert note.code == "answers_late"
+    assert 195 <= note.data["samples"] <= 201
+    assert note.data["left"] < 0.05
+    assert late_answers(data, rmse=0.4) == []  # a model that explains most of the output has found the answer
+
+
+def test_a_dead_time_that_is_looked_for_is_not_named_and_neither_is_chance() -> None:
+    assert late_answers(scaled(late_plant(80, 600))[0], rmse=0.9) == []
+    noise = np.random.default_rng(0).standard_normal((2, 300))
+    assert late_answers(channels_from([noise[0][:, None]], [noise[1]], 0.1, ["u"], "y"), rmse=0.99) == []
+
+
+def test_a_model_before_a_dead_time_that_is_too_long_to_be_judged_is_not_sound() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        found = identify_channels(late_plant(200, 600), order=1)
+    assert found.notes[-1].code == "answers_late"
+    assert not found.sound

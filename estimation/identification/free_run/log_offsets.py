@@ -1,0 +1,106 @@
+"""Logs of one plant whose offsets differ: sensors that were set to zero anew in between.
+
+With one offset, a fit follows the steps between logs with slow poles, whose initial states do what an offset would,
+and its gain is anything. So linear models are compared with an offset of each log too, where these explain more than
+chance. They are taken where they leave clearly less on held-back blocks, or as little with poles that settle within a
+block. Each log is brought to the mean offset before, and keeps an offset among its values, so that covariances know of it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.identification.free_run.choose_linear import Candidate, criteria
+from estimation.identification.free_run.data import Channels, scaled
+from estimation.identification.free_run.dead_times import ORDER, estimate_delays
+from estimation.identification.free_run.held_back import surely_better
+from estimation.identification.free_run.linear_comparison import LinearComparison
+from estimation.identification.free_run.linear_fit import COARSE, fit_linear
+from estimation.identification.free_run.linear_problem import Form, Problem
+from estimation.identification.notes import IdentificationCode
+from plant.notes import Note
+
+CLEARLY, NEARLY = 0.85, 1.02
+"""Share of the held-back error that offsets of logs must come below to be believed, as a nonlinear structure must; and
+what they may leave where a model with one offset has a pole that outlasts a block, as for a simpler model."""
+
+
+@dataclass(frozen=True, eq=False)
+class LevelledLogs:
+    """Logs that were brought to one offset.
+
+    Parameters
+    ----------
+    data : Channels
+        The logs, each less how much its offset is above the mean.
+    above : ndarray, shape (logs,)
+        How much [output unit].
+    """
+
+    data: Channels
+    above: Array
+
+    @property
+    def note(self) -> Note:
+        """That offsets differ, and by how much."""
+        shown = ", ".join(f"{one:+.4g}" for one in self.above)
+        return IdentificationCode.OFFSETS_DIFFER.note(output=self.data.output, above=shown)
+
+
+def levelled(data: Channels, orders: Sequence[int], delays: tuple[int, ...] | None = None) -> LevelledLogs | None:
+    """Return logs brought to one offset; None of one log alone, or where their offsets differ by chance.
+
+    Parameters
+    ----------
+    data : Channels
+        In units of the channels.
+    orders : sequence of int
+        Of models that are compared; the first few tell offsets.
+    delays : tuple of int, optional
+        Dead time of each input; estimated unless told [samples].
+    """
+    if len(data.y) < 2 or not all(np.isfinite(y).any() for y in data.y):
+        return None
+    means = np.array([np.nanmean(y) for y in data.y])
+    centred = replace(data, y=tuple(y - mean for y, mean in zip(data.y, means, strict=True)), own_offsets=True)
+    if all(np.nanmin(y) == np.nanmax(y) for y in centred.y):
+        return None
+    apart, by = scaled(centred)
+    together = replace(apart, y=tuple(y / by.y_std for y in data.y), own_offsets=False)
+    late = estimate_delays(apart) if delays is None else delays
+    best, levels = np.inf, None
+    for order in orders[:ORDER]:
+        form = Form(order, (order + 1,) * len(late), late)
+        fit, more, n = fit_linear(form, apart, least_gain=COARSE), len(means) - 1, data.n_samples
+        bic = criteria(fit.cost, fit.theta.size, n)[0]
+        # with the same poles: others may follow the steps from log to log
+        if bic < criteria(Problem(form, together).profiled(fit.f)[0], fit.theta.size - more, n)[0] and bic < best:
+            best, levels = bic, means + by.y_std * np.concatenate([[0.0], fit.theta[-more:]])
+    if levels is None:
+        return None
+    above = levels - np.average(levels, weights=[np.isfinite(y).sum() for y in data.y])
+    flat = replace(data, y=tuple(y - one for y, one in zip(data.y, above, strict=True)), own_offsets=True)
+    return LevelledLogs(flat, above)
+
+
+def believed(own: LinearComparison, one: LinearComparison) -> bool:
+    """Return whether offsets of logs are believed.
+
+    Parameters
+    ----------
+    own, one : LinearComparison
+        Models with an offset of each log, and with one.
+    """
+    lasting = [_lasts(each.best, each) for each in (own, one)]
+    spread = own.task.by.y_std / one.task.by.y_std
+    errors, least = [spread * error for error in own.best.block_errors], spread * own.best.held_back
+    if lasting == [False, True]:
+        return least <= NEARLY * one.best.held_back
+    return least < CLEARLY * one.best.held_back and surely_better(errors, one.best.block_errors)
+
+
+def _lasts(best: Candidate, of: LinearComparison) -> bool:
+    """Return whether a pole is slower than a held-back block."""
+    return bool(best.doubt) or best.fit.integrates or best.outlasts_block(of.task.part)

@@ -1,0 +1,77 @@
+"""Logs whose sensors were set to zero anew in between have an offset each, and one gain."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.arrays import Array
+from estimation.identification.free_run.data import Channels, channels_from, scaled
+from estimation.identification.free_run.identify import Identified, identify_channels
+from estimation.identification.free_run.linear_problem import Form, Problem
+from estimation.identification.free_run.log_offsets import levelled
+from plant.errors import LogWarning
+
+N, POLE, GAIN = 160, 0.9, 2.0
+
+
+def logs(offsets: tuple[float, ...], seed: int = 0, noise: float = 0.1) -> Channels:
+    """Return logs of a plant of the first order."""
+    rng, u, y = np.random.default_rng([seed, 1700]), list[Array](), list[Array]()
+    for offset in offsets:
+        driven = np.repeat(rng.standard_normal(N // 10), 10)
+        answer = np.full(N, GAIN * driven[0])
+        for t in range(1, N):
+            answer[t] = POLE * answer[t - 1] + (1.0 - POLE) * GAIN * driven[t - 1]
+        u.append(driven[:, None])
+        y.append(answer + offset + noise * rng.standard_normal(N))
+    return channels_from(u, y, 0.1, ["u"], "y")
+
+
+def identified(data: Channels, structure: str = "output-error") -> Identified:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        return identify_channels(data, structure=structure, order=1, delay=1)
+
+
+@pytest.mark.parametrize("structure", ["output-error", "auto"])
+def test_each_log_has_its_own_offset_where_they_differ(structure: str) -> None:
+    found = identified(logs((0.0, 1.0, 5.0)), structure)
+    assert found.notes[-1].code == "offsets_differ"
+    assert found.sound
+    linear = found.model.linear
+    assert linear is not None
+    assert abs(linear.dc_gain - GAIN) < 2.6 * linear.dc_gain_std
+    assert linear.dc_gain_std < 0.02 * GAIN
+    assert linear.offset == pytest.approx(2.0, abs=0.05)  # their mean
+    assert found.quality.rmse == pytest.approx(0.1, rel=0.1)  # the noise
+
+
+def test_it_is_warned_of() -> None:
+    with pytest.warns(LogWarning, match=r"differs from log to log \(-0\.\d+, \+0\.\d+ beside their mean\)"):
+        identify_channels(logs((2.0, 3.0)), order=1, delay=1)
+
+
+def test_offsets_that_differ_by_chance_are_one() -> None:
+    assert levelled(logs((2.0, 2.0, 2.0)), [1]) is None
+    assert levelled(logs((2.0,)), [1]) is None
+    assert identified(logs((2.0, 2.0))).notes == ()
+
+
+def test_a_log_without_outputs_or_changes_has_no_offset_of_its_own() -> None:
+    data = logs((2.0, 3.0))
+    assert levelled(replace(data, y=(data.y[0], np.full(N, np.nan))), [1]) is None
+    assert levelled(replace(data, y=(np.zeros(N), np.ones(N))), [1]) is None
+
+
+def test_derivatives_by_offsets_are_those_of_differences() -> None:
+    data = replace(scaled(logs((0.0, 1.0, 5.0)))[0], own_offsets=True)
+    problem, rng = Problem(Form(2, (2,), (1,)), data), np.random.default_rng(1)
+    theta = np.concatenate([[0.1, 0.2, -1.2, 0.4], rng.standard_normal(1 + 2 * 3 + 2)])
+    assert theta.size == problem.n_parameters
+    found = problem.jacobian(theta)[1]
+    for k in range(theta.size):
+        step = 1e-6 * np.eye(theta.size)[k]
+        expected = (problem.jacobian(theta + step)[0] - problem.jacobian(theta - step)[0]) / 2e-6
+        np.testing.assert_allclose(found[:, k], expected, atol=1e-7)
