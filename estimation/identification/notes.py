@@ -106,8 +106,8 @@ class IdentificationCode(Code):
         "gain is shared between them means nothing; leave one out, or log inputs that differ"
     )
     ANSWERS_LATE = (
-        "{output!r} seems to answer {input!r} after {dead_time_s:.4g} s only, more than a fifth of the log, which is "
-        "too long to be judged: a model behind it leaves {left:.0%} of the error; try --delay {samples}, or a longer log"
+        "{output!r} seems to answer {input!r} after {dead_time_s:.4g} s, more than a fifth of the log, which is too "
+        "long to be judged: a model behind it leaves {left:.0%} of the error; try --delay {samples}, or a longer log"
     )
     NOTHING_ANSWERED = (
         "{logs} has at most {longest} samples in one piece, and the model of {output!r} a dead time of {dead_time}: "

@@ -3,7 +3,7 @@
 With one offset, a fit follows the steps between logs with slow poles, whose initial states do what an offset would,
 and its gain is anything. So linear models are compared with an offset of each log too, where these explain more than
 chance. They are taken where they leave clearly less on held-back blocks, or as little with poles that settle within a
-block. Each log is brought to the mean offset before, and keeps an offset among its values, so that covariances know of it.
+block. Each log is brought to the mean offset before, and keeps an offset among its values for its covariance.
 """
 
 from collections.abc import Sequence
