@@ -93,6 +93,10 @@ class IdentificationCode(Code):
         "fitted to changes from sample to sample, so that this does not spoil its gain and poles; its offset and the "
         "fit of its free run say nothing of other logs"
     )
+    WALK_FOLLOWED = (
+        "{output!r} wanders by itself like a random walk or a drift, which {structure} follows with its poles: they "
+        "and the gain may be anything; use --structure output-error, which is then fitted to changes"
+    )
     OFFSETS_DIFFER = (
         "the offset of {output!r} differs from log to log ({above} beside their mean): each log was given its own, and "
         "the model has their mean, so its level says nothing of other logs"
@@ -114,3 +118,21 @@ class IdentificationCode(Code):
         "all outputs answer inputs from before the log, so there is no fit"
     )
     NO_FIT = "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): do not rely on it"
+
+
+WARNED = (
+    IdentificationCode.TIME_CONSTANT_BEYOND_RECORD,
+    IdentificationCode.NO_FIT,
+    IdentificationCode.UNRELATED,
+    IdentificationCode.INTEGRATES,
+    IdentificationCode.SLOWER_THAN_PERIOD,
+    IdentificationCode.SIGN_NOT_MEASURED,
+    IdentificationCode.FEEDBACK,
+    IdentificationCode.INPUTS_ALIKE,
+    IdentificationCode.OUTLIERS,
+    IdentificationCode.RANDOM_WALK,
+    IdentificationCode.WALK_FOLLOWED,
+    IdentificationCode.OFFSETS_DIFFER,
+    IdentificationCode.ANSWERS_LATE,
+)
+"""Notes that are raised as warnings too; the others say only what was passed over."""

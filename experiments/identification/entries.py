@@ -44,7 +44,7 @@ def with_std(roots: Any, spreads: Any) -> list[dict[str, float]]:
 
 def column_entries(found: "Identified") -> dict[str, Any]:
     """Return a model between columns by the names of the JSON contract."""
-    from estimation.identification.free_run.identify import WARNED
+    from estimation.identification.notes import WARNED
     from estimation.identification.state_space.dynamics import StateSpaceDynamics
 
     model, linear = found.model, found.model.linear

@@ -115,8 +115,8 @@ def surely_better(errors: Sequence[float], others: Sequence[float]) -> bool:
 def told_apart(errors: Sequence[float], others: Sequence[float]) -> bool:
     """Return whether a model beats another on the same blocks by more than chance, by the ratio of their errors.
 
-    What few blocks gain much on, and others lose on, is one stretch of a log; ratios count each block alike. Their
-    logarithms are asked as Student (1908) does, at 5 %.
+    Ratios count each block alike, however large the output is there. Their logarithms are asked as Student (1908) does,
+    at 5 %.
 
     Parameters
     ----------

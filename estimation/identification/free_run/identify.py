@@ -54,29 +54,14 @@ from estimation.identification.free_run.log_offsets import believed, levelled
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
-from estimation.identification.free_run.random_walk import from_changes, wandering
+from estimation.identification.free_run.random_walk import followed_walk, from_changes, wandering
 from estimation.identification.free_run.unrelated import bend_explains, polynomial_explains
-from estimation.identification.notes import IdentificationCode
+from estimation.identification.notes import WARNED, IdentificationCode
 from plant.errors import HydrostateError, LogWarning, require_known
+from plant.notes import Note
 
 FREE_STRUCTURES = ("output-error", "narx", "hammerstein", "wiener", "auto", *ADOPTED)
 """Structures between any channels; auto chooses between the first four."""
-
-WARNED = (
-    IdentificationCode.TIME_CONSTANT_BEYOND_RECORD,
-    IdentificationCode.NO_FIT,
-    IdentificationCode.UNRELATED,
-    IdentificationCode.INTEGRATES,
-    IdentificationCode.SLOWER_THAN_PERIOD,
-    IdentificationCode.SIGN_NOT_MEASURED,
-    IdentificationCode.FEEDBACK,
-    IdentificationCode.INPUTS_ALIKE,
-    IdentificationCode.OUTLIERS,
-    IdentificationCode.RANDOM_WALK,
-    IdentificationCode.OFFSETS_DIFFER,
-    IdentificationCode.ANSWERS_LATE,
-)
-"""Notes that are raised as warnings too; the others say only what was passed over."""
 
 HIGHEST = 6
 """Order of a linear model at most, where the data choose."""
@@ -142,14 +127,22 @@ def identify_channels(
         found = _identified(data, structure, order, delay, n_numerator)
     flat = found.at_one_offset(data)
     found = replace(found, notes=(*found.notes, *doubtful_channels(found.model, flat)))
-    if delay is None and not any(note.code == IdentificationCode.RANDOM_WALK for note in found.notes):
-        whole, by = scaled(flat)
-        late = late_answers(section(whole, MOST_CHOSEN), found.quality.rmse / by.y_std)
-        found = replace(found, notes=(*found.notes, *late), sound=found.sound and not late)
+    found = _with_doubts(found, flat, structure, looked_for=delay is None)
     for note in found.notes:
         if note.code in WARNED:
             warnings.warn(LogWarning(note), stacklevel=2)
     return found
+
+
+def _with_doubts(found: Identified, data: Channels, structure: str, *, looked_for: bool) -> Identified:
+    """Return what was found with notes on a walk that it follows, and on dead times that were not looked for."""
+    whole, by = scaled(data)
+    part, notes = section(whole, MOST_CHOSEN), list[Note]()
+    if structure in ("narx", "hammerstein", "wiener"):
+        notes += followed_walk(whole, part, range(1, HIGHEST + 1), structure)
+    elif looked_for and not any(note.code == IdentificationCode.RANDOM_WALK for note in found.notes):
+        notes += late_answers(part, found.quality.rmse / by.y_std)
+    return replace(found, notes=(*found.notes, *notes), sound=found.sound and not notes)
 
 
 def _identified(

@@ -15,7 +15,7 @@ from estimation.arrays import Array
 from estimation.identification.free_run.choose_linear import Candidate, criteria
 from estimation.identification.free_run.data import Channels, scaled
 from estimation.identification.free_run.dead_times import ORDER, estimate_delays
-from estimation.identification.free_run.held_back import surely_better
+from estimation.identification.free_run.held_back import told_apart
 from estimation.identification.free_run.linear_comparison import LinearComparison
 from estimation.identification.free_run.linear_fit import COARSE, fit_linear
 from estimation.identification.free_run.linear_problem import Form, Problem
@@ -98,7 +98,7 @@ def believed(own: LinearComparison, one: LinearComparison) -> bool:
     errors, least = [spread * error for error in own.best.block_errors], spread * own.best.held_back
     if lasting == [False, True]:
         return least <= NEARLY * one.best.held_back
-    return least < CLEARLY * one.best.held_back and surely_better(errors, one.best.block_errors)
+    return least < CLEARLY * one.best.held_back and told_apart(errors, one.best.block_errors)
 
 
 def _lasts(best: Candidate, of: LinearComparison) -> bool:

@@ -32,6 +32,7 @@ from estimation.identification.free_run.transfer_function import linear_model
 from estimation.identification.notes import IdentificationCode
 from estimation.stretches import stretches
 from estimation.trust.chi_square import chi_square_tail
+from plant.notes import Note
 
 FEWEST = 200
 """Outputs in a row below which a walk is not told from slow noise; of white noise the statistic is -7 there."""
@@ -149,6 +150,23 @@ def from_changes(walk: Wandering, data: Channels, by: Scaling) -> Identified:
     note = IdentificationCode.RANDOM_WALK.note(output=data.output, rmse=quality.rmse)
     rows = tuple(map(linear_row, walk.candidates))
     return Identified(model, quality, 100.0 * (1.0 - walk.held_back), rows, (note,), sound=True)
+
+
+def followed_walk(data: Channels, part: Channels, orders: Sequence[int], structure: str) -> list[Note]:
+    """Return a note where an output wanders by itself and a structure that is fitted to levels was asked for.
+
+    Parameters
+    ----------
+    data, part : Channels
+        As `wandering` takes them.
+    orders : sequence of int
+        Likewise.
+    structure : str
+        What was asked for.
+    """
+    if wandering(data, part, orders, None, None) is None:
+        return []
+    return [IdentificationCode.WALK_FOLLOWED.note(output=data.output, structure=structure)]
 
 
 def changes_of(data: Channels) -> Channels:

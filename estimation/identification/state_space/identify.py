@@ -13,14 +13,15 @@ from estimation.identification.free_run.data import Channels, require_room, requ
 from estimation.identification.free_run.doubtful_channels import doubtful_channels
 from estimation.identification.free_run.held_back import pooled
 from estimation.identification.free_run.identify import (
+    HIGHEST,
     MOST_CHOSEN,
     MOST_FITTED,
-    WARNED,
     Identified,
     identify_channels,
 )
 from estimation.identification.free_run.model import FreeRunModel
-from estimation.identification.notes import IdentificationCode
+from estimation.identification.free_run.random_walk import followed_walk
+from estimation.identification.notes import WARNED, IdentificationCode
 from estimation.identification.state_space.choose import StateCandidate, chosen_state, state_candidates
 from estimation.identification.state_space.dynamics import StateSpaceDynamics
 from estimation.identification.state_space.fit import fit_state_space, system_of
@@ -83,8 +84,8 @@ def identify_outputs(
     rows = [(*one.candidates, *other.candidates) for one, other in zip(single, together, strict=True)]
     fewer = together[0].model.n_values < sum(one.model.n_values for one in single)
     bar = _left(single) * (1.0 if fewer else 1.0 - CLEARLY)
-    # what wanders by itself a state space would follow with slow poles
-    alone = (IdentificationCode.UNRELATED, IdentificationCode.RANDOM_WALK)
+    # what wanders by itself, or differs from log to log, a state space would follow with slow poles
+    alone = (IdentificationCode.UNRELATED, IdentificationCode.RANDOM_WALK, IdentificationCode.OFFSETS_DIFFER)
     related = not any(note.code in alone for one in single for note in one.notes)
     better = related and all(one.sound for one in together) and _left(together) < bar
     return [replace(one, candidates=row) for one, row in zip(together if better else single, rows, strict=True)]
@@ -167,5 +168,7 @@ def _judged(
         )
     if not quality.fit_percent > 0.0 or not held_back < 1.0:
         notes.append(IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent))
+    whole, _ = scaled(data)
+    notes += followed_walk(whole, section(whole, MOST_CHOSEN), range(1, HIGHEST + 1), STATE_SPACE)
     doubtful = doubtful_channels(model, data)
     return Identified(model, quality, 100.0 * (1.0 - held_back), rows, (*notes, *doubtful), not notes)

@@ -16,10 +16,12 @@ from estimation.identification.free_run.random_walk import (
     COMES_BACK,
     at_levels,
     changes_of,
+    followed_walk,
     remembers,
     returns,
     wandering,
 )
+from estimation.identification.state_space.identify import identify_state_space
 from plant.errors import LogWarning
 from tests.estimation.identification.test_two_stage import closed_loop
 
@@ -60,6 +62,19 @@ def test_the_gain_of_an_output_that_wanders_is_within_its_interval(seed: int, no
 def test_it_is_warned_of() -> None:
     with pytest.warns(LogWarning, match="'y' wanders by itself like a random walk"):
         identify_channels(log(16801), order=1, delay=1)
+
+
+def test_a_structure_that_follows_a_walk_says_so() -> None:
+    data = scaled(log(16801))[0]
+    (note,) = followed_walk(data, data, [1], "narx")
+    assert note.code == "walk_followed"
+    assert followed_walk(*[scaled(log(16801, 0.0, 0.3))[0]] * 2, [1], "narx") == []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        (found,) = identify_state_space([log(16801)], order=1, delay=1)
+        bent = identify_channels(log(16801), structure="hammerstein", order=1, delay=1)
+    assert not (found.sound or bent.sound)
+    assert {found.notes[-1].code, bent.notes[-1].code} == {"walk_followed"}
 
 
 def test_white_noise_is_no_walk() -> None:
