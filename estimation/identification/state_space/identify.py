@@ -27,6 +27,7 @@ from estimation.identification.state_space.dynamics import StateSpaceDynamics
 from estimation.identification.state_space.fit import fit_state_space, system_of
 from estimation.identification.state_space.joint import joined
 from plant.errors import HydrostateError, LogWarning
+from plant.notes import Note
 
 STATE_SPACE = "state-space"
 """What the structure is called."""
@@ -77,7 +78,7 @@ def identify_outputs(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", LogWarning)
-            together = identify_state_space(data, **form)
+            together = _fitted_to_levels(data, order, delay)  # whether outputs wander has been asked
     except HydrostateError:
         # too few samples for so many values: a model an output needs fewer
         return single
@@ -127,14 +128,29 @@ def identify_state_space(
     LogWarning
         If the model is not to be believed.
     """
+    found = _fitted_to_levels(data, order, delay)
+    found = [
+        replace(one, notes=(*one.notes, *notes), sound=one.sound and not notes)
+        for one, notes in zip(found, map(_followed, data), strict=True)
+    ]
+    for note in {note.code: note for one in found for note in one.notes if note.code in WARNED}.values():
+        warnings.warn(LogWarning(note), stacklevel=2)
+    return found
+
+
+def _fitted_to_levels(data: Sequence[Channels], order: int | None, delay: int | None) -> list[Identified]:
+    """Return the state space of a size that logs are long enough for."""
     require_size(order, delay, None)
     for one in data:
         require_room(one, None, delay, None)  # whether it is long enough for the order, the fit itself says
     with threadpool_limits(limits=1, user_api="blas"):
-        found = _identified(data, range(1, MOST_STATES + 1) if order is None else [order], delay)
-    for note in {note.code: note for one in found for note in one.notes if note.code in WARNED}.values():
-        warnings.warn(LogWarning(note), stacklevel=2)
-    return found
+        return _identified(data, range(1, MOST_STATES + 1) if order is None else [order], delay)
+
+
+def _followed(data: Channels) -> list[Note]:
+    """Return a note where an output wanders by itself."""
+    whole, _ = scaled(data)
+    return followed_walk(whole, section(whole, MOST_CHOSEN), range(1, HIGHEST + 1), STATE_SPACE)
 
 
 def _identified(data: Sequence[Channels], orders: Sequence[int], delay: int | None) -> list[Identified]:
@@ -168,7 +184,5 @@ def _judged(
         )
     if not quality.fit_percent > 0.0 or not held_back < 1.0:
         notes.append(IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent))
-    whole, _ = scaled(data)
-    notes += followed_walk(whole, section(whole, MOST_CHOSEN), range(1, HIGHEST + 1), STATE_SPACE)
     doubtful = doubtful_channels(model, data)
     return Identified(model, quality, 100.0 * (1.0 - held_back), rows, (*notes, *doubtful), not notes)

@@ -35,7 +35,7 @@ def test_more_values_must_do_better_by_a_hundredth_and_fewer_by_anything(
     data: Any = ["y", "z"]
     monkeypatch.setattr(identify, "identify_channels", lambda *_, **__: found("own", LEFT, 10))
     together = [found("shared", left, n_values) for _ in data]
-    monkeypatch.setattr(identify, "identify_state_space", lambda *_, **__: together)
+    monkeypatch.setattr(identify, "_fitted_to_levels", lambda *_, **__: together)
     chosen = identify_outputs(data, structure="auto")
     assert [one.model.structure for one in chosen] == ["shared" if shared else "own"] * 2
     assert [[row["structure"] for row in one.candidates] for one in chosen] == [["own", "shared"]] * 2
@@ -45,5 +45,5 @@ def test_one_unsound_output_of_a_shared_model_keeps_all_on_their_own(monkeypatch
     data: Any = ["y", "z"]
     together = [found("shared", 0.5 * LEFT, 5, sound=sound) for sound in (True, False)]
     monkeypatch.setattr(identify, "identify_channels", lambda *_, **__: found("own", LEFT, 10))
-    monkeypatch.setattr(identify, "identify_state_space", lambda *_, **__: together)
+    monkeypatch.setattr(identify, "_fitted_to_levels", lambda *_, **__: together)
     assert {one.model.structure for one in identify_outputs(data, structure="auto")} == {"own"}
