@@ -52,7 +52,7 @@ ALIKE = 3.0
 """Correlation of neighbouring changes from which they are smooth, not white [standard errors]: the same probability."""
 
 SMOOTH = 0.1
-"""Share of the power of changes that those two samples ago or more explain, from which no more poles than `ORDER` are
+"""Share of the power of changes that those two samples ago or more explain beyond chance, from which no more poles than `ORDER` are
 asked whether it is a walk: poles that are missing leave less, and bends more (0.2 to 4; judged)."""
 
 MATERIAL = 0.15
@@ -113,7 +113,7 @@ def wandering(
     late = estimate_delays(changed) if delays is None else delays
     first = fit_linear(Form(ORDER, (ORDER + 1,) * len(late), late), changed, least_gain=COARSE)
     rest = _longest_rest(first, changed)
-    if rest.size < FEWEST or returns(rest) <= COMES_BACK or np.sum(_correlations(rest)[1:] ** 2) > SMOOTH:
+    if rest.size < FEWEST or returns(rest) <= COMES_BACK or _explained(rest) > SMOOTH:
         return None
     candidates = linear_candidates(changed, orders, delays, sizes)
     best, _ = believable(candidates, changed, by)
@@ -246,11 +246,9 @@ def remembers(changes: Array) -> bool:
     (False, False, True)
     """
     found = _correlations(changes)
-    # correlations of a moving average of one term have this variance at the lags that it has none at (Bartlett 1946)
-    spread = (1.0 + 2.0 * float(found[0]) ** 2) / changes.size
     if found[0] > ALIKE / np.sqrt(changes.size):
         return True
-    return chi_square_tail(float(np.sum(found[1:] ** 2)) / spread, DEFAULT_LAGS - 1) < REMEMBERED
+    return chi_square_tail(float(np.sum(found[1:] ** 2)) / _by_chance(found, changes), DEFAULT_LAGS - 1) < REMEMBERED
 
 
 def at_levels(fit: LinearFit, data: Channels, by: Scaling) -> LinearFit:
@@ -279,6 +277,18 @@ def _correlations(changes: Array) -> Array:
     centred = changes - changes.mean()
     power = max(float(centred @ centred), 1e-300)
     return np.array([centred[k:] @ centred[:-k] for k in range(1, DEFAULT_LAGS + 1)]) / power
+
+
+def _by_chance(correlations: Array, changes: Array) -> float:
+    """Return the variance of correlations at lags where changes that remember one sample at most have none."""
+    # Bartlett (1946), of a moving average of one term
+    return (1.0 + 2.0 * float(correlations[0]) ** 2) / changes.size
+
+
+def _explained(changes: Array) -> float:
+    """Return the share of the power of changes that those two samples ago or more explain, less what chance does."""
+    found = _correlations(changes)
+    return float(np.sum(found[1:] ** 2 - _by_chance(found, changes)))
 
 
 def _longest_rest(fit: LinearFit, changes: Channels) -> Array:

@@ -64,15 +64,27 @@ def test_it_is_warned_of() -> None:
         identify_channels(log(16801), order=1, delay=1)
 
 
+def first(data: Channels, count: int) -> Channels:
+    return replace(data, u=(data.u[0][:count],), y=(data.y[0][:count],))
+
+
+@pytest.mark.parametrize(("seed", "noise"), [(16802, 0.1), (16804, 0.1), (16807, 0.0)])
+def test_a_walk_of_few_samples_is_told_though_their_correlations_are_not_small_by_chance(
+    seed: int, noise: float
+) -> None:
+    data = scaled(first(log(seed, noise=noise), 260))[0]
+    assert wandering(data, data, [1], (1,), None) is not None
+
+
 def test_a_structure_that_follows_a_walk_says_so() -> None:
-    data, noisy = scaled(log(16801))[0], scaled(log(16801, 0.0, 0.3))[0]
+    data, noisy = (scaled(first(one, 300))[0] for one in (log(16801), log(16801, 0.0, 0.3)))
     (note,) = followed_walk(data, data, [1], "narx")
     assert note.code == "walk_followed"
     assert followed_walk(noisy, noisy, [1], "narx") == []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LogWarning)
-        (found,) = identify_state_space([log(16801)], order=1, delay=1)
-        bent = identify_channels(log(16801), structure="hammerstein", order=1, delay=1)
+        (found,) = identify_state_space([first(log(16801), 300)], order=1, delay=1)
+        bent = identify_channels(first(log(16801), 300), structure="hammerstein", order=1, delay=1)
     assert (found.sound, bent.sound) == (False, False)
     assert found.notes[-1].code == bent.notes[-1].code == "walk_followed"
 
