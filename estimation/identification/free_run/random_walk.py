@@ -52,8 +52,8 @@ ALIKE = 3.0
 """Correlation of neighbouring changes from which they are smooth, not white [standard errors]: the same probability."""
 
 SMOOTH = 0.1
-"""Share of the power of changes that those two samples ago or more explain beyond chance, from which no more poles than `ORDER` are
-asked whether it is a walk: poles that are missing leave less, and bends more (0.2 to 4; judged)."""
+"""Share of the power of changes that those two samples ago or more explain beyond chance, from which no more poles
+than `ORDER` are asked whether it is a walk: poles that are missing leave less, and bends more (0.2 to 4; judged)."""
 
 MATERIAL = 0.15
 """Least root mean square by which the output wanders on blocks held back, over its deviation: bends leave up to 0.12

@@ -21,7 +21,7 @@ from estimation.identification.free_run.random_walk import (
     returns,
     wandering,
 )
-from estimation.identification.state_space.identify import identify_state_space
+from estimation.identification.state_space.identify import identify_outputs
 from plant.errors import LogWarning
 from tests.estimation.identification.test_two_stage import closed_loop
 
@@ -76,17 +76,20 @@ def test_a_walk_of_few_samples_is_told_though_their_correlations_are_not_small_b
     assert wandering(data, data, [1], (1,), None) is not None
 
 
-def test_a_structure_that_follows_a_walk_says_so() -> None:
+def test_what_follows_a_walk_is_told_of_walks_alone() -> None:
     data, noisy = (scaled(first(one, 300))[0] for one in (log(16801), log(16801, 0.0, 0.3)))
     (note,) = followed_walk(data, data, [1], "narx")
     assert note.code == "walk_followed"
     assert followed_walk(noisy, noisy, [1], "narx") == []
+
+
+@pytest.mark.parametrize("structure", ["hammerstein", "state-space"])
+def test_a_structure_that_follows_a_walk_says_so(structure: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LogWarning)
-        (found,) = identify_state_space([first(log(16801), 300)], order=1, delay=1)
-        bent = identify_channels(first(log(16801), 300), structure="hammerstein", order=1, delay=1)
-    assert (found.sound, bent.sound) == (False, False)
-    assert found.notes[-1].code == bent.notes[-1].code == "walk_followed"
+        (found,) = identify_outputs([first(log(16801), 300)], structure=structure, order=1, delay=1)
+    assert found.notes[-1].code == "walk_followed"
+    assert not found.sound
 
 
 def test_white_noise_is_no_walk() -> None:
