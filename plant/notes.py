@@ -25,6 +25,10 @@ WRITTEN_OUT = 1e7
 """Size below which a reader is spared a power of ten."""
 
 
+UNTOLD = " ± inf"
+"""What a half width reads that no log bounds."""
+
+
 def written_out(value: float, spec: str) -> str:
     """Return a number in significant digits as a reader writes it: 100, not 1e+02.
 
@@ -122,7 +126,8 @@ class Note:
     data: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def __str__(self) -> str:
-        return _SENTENCE.format(self.code.template, **self.data)
+        said = _SENTENCE.format(self.code.template, **self.data)
+        return said if UNTOLD not in said else f"{said.replace(UNTOLD, '')}; the log does not tell how far off this may be"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the note for JSON.

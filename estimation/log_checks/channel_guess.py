@@ -101,6 +101,7 @@ def guess_channels(
     for channel in channels:
         said = {place: points_by_name(headings[place], channel) for place in columns}
         points[channel] = {place: worth for place, worth in said.items() if worth is not None}
+    _by_other_names(points)
     why: dict[tuple[str, int], list[Note]] = {}
     with np.errstate(over="ignore", invalid="ignore"):  # columns may hold anything
         _by_clock(points, columns, why)
@@ -118,6 +119,18 @@ def _add(points: dict[str, dict[int, float]], channel: str, place: int, worth: f
         return False
     points[channel][place] += worth
     return True
+
+
+def _by_other_names(points: dict[str, dict[int, float]]) -> None:
+    """Let a name that says one channel speak against those of which it says nothing: a pressure may move as a slope."""
+    said: dict[int, float] = {}
+    for worth in points.values():
+        for place, one in worth.items():
+            said[place] = max(said.get(place, 0.0), one)
+    for worth in points.values():
+        for place, one in worth.items():
+            if one == 0.0:
+                worth[place] = -said[place]
 
 
 def _by_clock(points: dict[str, dict[int, float]], columns: Mapping[int, Any], why: dict[Any, list[Note]]) -> None:

@@ -63,6 +63,8 @@ def changes_and_rests(values: Array) -> Array:
     ndarray, shape (n,)
         [unit of the channel].
     """
+    if not len(values):
+        return np.array(values)
     first = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
     after = np.append(first[1:], len(values))
     count = after - first

@@ -16,7 +16,14 @@ if TYPE_CHECKING:
 
 Settings = TypeVar("Settings", bound="DataclassInstance")
 
-Folder: TypeAlias = Annotated[Path, option("DIR", "Folder of the report.", "--out", "-o")]
+
+def _folder(out: Path) -> Path:
+    """Refuse what is no folder before a study is imported, which takes seconds."""
+    require_folder("--out", out)
+    return out
+
+
+Folder: TypeAlias = Annotated[Path, option("DIR", "Folder of the report.", "--out", "-o", callback=_folder)]
 
 
 def finish_study(study: "Study[Settings]", settings: Settings, out: Path, *, as_json: bool) -> None:
@@ -25,14 +32,13 @@ def finish_study(study: "Study[Settings]", settings: Settings, out: Path, *, as_
     Raises
     ------
     HydrostateError
-        If the folder is a file, or cannot be written.
+        If the folder cannot be written.
     """
     from rich.console import Console
 
     from experiments.running.study import run_study
     from experiments.streams.endings import stop_at_signals
 
-    require_folder("--out", out)
     stop_at_signals()
     begin = perf_counter()
     written = run_study(study, settings, out, Console(stderr=True))

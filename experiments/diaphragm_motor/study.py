@@ -10,7 +10,7 @@ from experiments.diaphragm_motor.control import averaged_course, control_runs
 from experiments.diaphragm_motor.figures import MOTOR_FIGURES
 from experiments.diaphragm_motor.quoted import claimed_speeds, not_reproduced, reproduced, root_efficiency
 from experiments.page.frames import parameter_table
-from experiments.page.numbers import MINUS, number
+from experiments.page.numbers import MINUS, as_set, pretty_unit
 from experiments.page.tables import Column, Columns, spaced
 from experiments.running.progress import Track
 from experiments.running.study import Found, Seeded, Study
@@ -78,7 +78,7 @@ def _parameters() -> pd.DataFrame:
     """Return the parameters as text; what each chamber or valve has of its own is the same for all."""
     table = parameter_table(RIG)
     values = [
-        f"{number(value[0])}, each of {ROWS[name]}" if isinstance(value, tuple) else number(value)
+        f"{as_set(value[0])}, each of {ROWS[name]}" if isinstance(value, tuple) else as_set(value)
         for name, value in zip(table["parameter"], table["value"], strict=True)
     ]
     return table.assign(value=values)
@@ -118,7 +118,7 @@ COLUMNS: Mapping[str, Columns] = {
         Column("flow_m3_s", "peak flow", "ml/min", 6e7),
         Column("blocking_n", "blocking force at 480 Hz", digits=3),
     ),
-    "rig": (Column("parameter", "name", words=spaced), *("value", "unit", "meaning", "source")),
+    "rig": (Column("parameter", "name", words=spaced), "value", Column("unit", words=pretty_unit), *("meaning", "source")),
 }
 
 

@@ -12,7 +12,7 @@ from markupsafe import Markup, escape
 from estimation.finding import interval_95
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.outlook import Outlook, outlook_of
-from experiments.fleet.page import IF_RIGHT, amount_in, found_in, untold_since, worst_in
+from experiments.fleet.page import IF_RIGHT, found_in, untold_since, worst_in
 from experiments.fleet.rows import STATES, LogRow
 from experiments.page.charts import Charts
 from experiments.page.names_shown import SHOWN
@@ -60,6 +60,7 @@ LOGS = (
     Column("date", words=lambda date: Cell(date, "name")),
     Column("state", words=lambda state: Cell(STATES[state], f"fleet-{state} name")),
     "found",
+    "worst",
 )
 
 
@@ -80,7 +81,6 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
     counted = max((len(one.logs) for one in outlooks), default=0)
     charts = _charts(outlooks, row.name)
     last = [*row.logs][-MOST_LOGS:][::-1]
-    decides = row.last.worst.name if row.last.worst else ""
     facts = {
         "name": row.name,
         "title": f"{row.name}: {STATES[row.state]}{f' ({found_in(row.last)})' if row.last.between else ''}.",
@@ -96,12 +96,12 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
                     one.named.shown,
                     one.state,
                     found_in(one),
-                    amount_in(one, decides) if one.shown else "",
+                    worst_in(one) if one.shown else "",
                     pages.get(one.file, ""),
                 )
                 for one in last
             ],
-            columns=["log", "date", "state", "found", "decides", "page"],
+            columns=["log", "date", "state", "found", "worst", "page"],
         ),
         "charts": {f"course-{place}": each for place, (_, each) in enumerate(charts)},
         "captions": [caption for caption, _ in charts],
@@ -109,8 +109,7 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
         "counted": counted,
         "left_out": len(row.logs) - counted,
     }
-    logs = (*LOGS, Column("decides", SHOWN.get(decides, decides.replace("_", " ")))) if decides else LOGS
-    return render_page("fleet/actuator.html", facts, {"forecasts": FORECASTS, "logs": logs}, {})
+    return render_page("fleet/actuator.html", facts, {"forecasts": FORECASTS, "logs": LOGS}, {})
 
 
 def _restarts(outlooks: Sequence[Outlook], maintained: Sequence[float]) -> list[str]:
@@ -175,7 +174,7 @@ def _forecast(one: Outlook, newest: LogRow) -> dict[str, str]:
         "growth": f"{fixed(growth, places)}\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}{fixed(growth_std, places)} {unit}",
         "half": one.when(1, 3) or MISSING,
         "most": one.when(0, 4) or MISSING,
-        "outlook": one.words,
+        "outlook": f"{one.words}{one.doubt}",
     }
 
 

@@ -119,7 +119,7 @@ def told_dates(places: Iterable[float], ahead: Iterable[float]) -> str:
     Examples
     --------
     >>> told_dates([20490.0, 20560.0], [60.0, 130.0]), told_dates([20490.0, float("inf")], [60.0, float("inf")])
-    ('early February to mid April 2026', 'early February 2026 or later')
+    ('early February to mid April 2026', 'not before early February 2026')
     >>> told_dates([20490.0, 20491.0], [60.0, 61.0]), told_dates([20530.6, 20535.0], [1.0, 5.4])
     ('early February 2026', '18 to 23 March 2026')
     """
@@ -128,7 +128,7 @@ def told_dates(places: Iterable[float], ahead: Iterable[float]) -> str:
         return "not within sight"
     begin = told_date(low, max(first, min(last, HOURS)))  # an interval of days needs no hour
     if high == float("inf"):
-        return f"{begin} or later"
+        return f"not before {begin}"
     end = told_date(high, last)
     short = begin
     for same in (end[-4:], end.rpartition(" ")[0].rpartition(" ")[2]):  # the year, then the month, if both ends have it

@@ -81,6 +81,14 @@ class Outlook:
         day = self.logs[first].named.day
         return f"past the limit since {day}" if day else f"past the limit for {count} log{'s' if count > 1 else ''}"
 
+    @property
+    def doubt(self) -> str:
+        """What to do where the last logs are past the limit and the level of the trend is not; empty where they agree."""
+        level = self.trend.level[0] - self.series.healthy
+        if not self.past or level / (self.series.limit - self.series.healthy) > 1.0:
+            return ""
+        return "; its trend is still within it: log again to see whether this lasts"
+
     def when(self, low: int, high: int) -> str:
         """Return when the limit is reached, between two of `QUANTILES`: as dates where logs have them, else in logs.
 
@@ -125,7 +133,7 @@ class Outlook:
     def in_full(self) -> str:
         """The forecast in one sentence for the page of the actuator, without a full stop."""
         if self.past or self.left is None or self.left[1] <= 0.0 or len(self.logs) - self.trend.begin < FEWEST:
-            return f": {self.words}"
+            return f": {self.words}{self.doubt}"
         low, middle, high = self.left
         logs = (
             f"in about {middle:.0f} log{'' if round(middle) == 1 else 's'}" if middle >= 1.0 else "before the next log"

@@ -33,7 +33,7 @@ def inspect_page(result: Mapping[str, Any], tables: "Sequence[TableFacts]") -> s
     tables : sequence of TableFacts
         The tables of the log.
     """
-    from experiments.log_pages.inspected import block_of, clock_sentence
+    from experiments.log_pages.inspected import block_of, clock_sentence, without_unit
 
     rows = [row for one in result["tables"] for row in one["columns"]]
     told = [row for row in rows if row["channel"] == TIME]
@@ -52,6 +52,7 @@ def inspect_page(result: Mapping[str, Any], tables: "Sequence[TableFacts]") -> s
         "title": "This log can be diagnosed." if result["reads"] else "This log cannot be diagnosed yet.",
         "message": f"{result['message'][:1].upper()}{result['message'][1:]}.",
         "block": block_of(result["columns"]),
+        "guessed": without_unit(result["tables"]),
         "clocks": [sentence(clock_sentence(one)) for one in result["tables"]],
         "most": MOST_COLUMNS,
         "columns": pd.DataFrame([_row(row) for row in rows]),

@@ -169,6 +169,20 @@ def block_of(columns: Mapping[str, str]) -> str:
     )
 
 
+def without_unit(tables: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the names of likely channels whose unit was guessed, since the file gives none.
+
+    Parameters
+    ----------
+    tables : sequence of Mapping
+        Entries of ``tables``.
+    """
+    from estimation.notes import GuessCode
+
+    rows = (row for one in tables for row in one["columns"])
+    return [row["name"] for row in rows if any(why["code"] == GuessCode.UNIT_GUESSED for why in row["why"])]
+
+
 def clock_sentence(one: Mapping[str, Any]) -> str:
     """Return what is known of the time of a table, as one sentence.
 

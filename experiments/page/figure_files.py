@@ -1,5 +1,6 @@
 """Figures that are drawn from named tables, as the files that they become."""
 
+import re
 from base64 import b64encode
 from collections.abc import Callable, Mapping
 from io import BytesIO
@@ -21,6 +22,10 @@ Drawings: TypeAlias = "Mapping[str, Callable[[Tables], Figure]]"
 
 PNG_DOTS_PER_INCH, LOG_DOTS_PER_INCH = 150, 130
 """Resolution of the PNG figures of studies, 1500 pixels wide, and of logs."""
+
+
+TALL = 0.7
+"""Height over width of a figure from which it is tall: 9.2 cm high, it would be less than 13 of 18 cm wide."""
 
 
 def figure_files(drawings: Drawings, tables: Tables) -> dict[str, bytes]:
@@ -70,6 +75,18 @@ def image_of(figure: "Figure | bytes", words: str) -> Markup:
     content = figure if isinstance(figure, bytes) else svg_of(figure)
     data = b64encode(content).decode("ascii")
     return Markup('<img alt="{}" src="data:image/svg+xml;base64,{}">').format(words, data)
+
+
+def is_tall(svg: bytes) -> bool:
+    """Return whether a figure is so much taller than usual that a third of a sheet would make its words unreadable.
+
+    Examples
+    --------
+    >>> is_tall(b'<svg viewBox="0 0 720 680">'), is_tall(b'<svg viewBox="0 0 720 400">')
+    (True, False)
+    """
+    box = re.search(rb'viewBox="0 0 ([\d.]+) ([\d.]+)"', svg)
+    return box is not None and float(box[2]) > TALL * float(box[1])
 
 
 def write_png(draw: "Callable[[], Figure]", path: Path) -> None:

@@ -1,6 +1,7 @@
 """Numbers as a reader wants them: sensible digits, exponents in threes, raised units."""
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 
 MISSING = "\N{EN DASH}"
@@ -8,7 +9,7 @@ MISSING = "\N{EN DASH}"
 
 MINUS, TIMES = "\N{MINUS SIGN}", " \N{MULTIPLICATION SIGN} "
 
-SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+SUPERSCRIPTS = str.maketrans("-.0123456789", "⁻·⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 MOST_DIGITS = 4
 """Digits that a value with an interval is shown with, at most [count]; files for programs have all."""
@@ -179,6 +180,22 @@ def exact(value: float) -> str:
     return (shown.rstrip("0").rstrip(".") if "." in shown else shown) + times + power
 
 
+def as_set(value: float) -> str:
+    """Write a number as it was given if three digits give it exactly, for then it was set and not measured.
+
+    Parameters
+    ----------
+    value : float
+        The number [any unit].
+
+    Examples
+    --------
+    >>> as_set(275.0), as_set(2.345678), as_set(1e-6)
+    ('275', '2.346', '1 × 10⁻⁶')
+    """
+    return exact(value) if math.isclose(value, float(f"{value:.3g}"), rel_tol=1e-12) else number(value)
+
+
 def reader_unit(unit: str) -> tuple[float, str]:
     """Return the unit in which a reader is told a quantity: that of a workshop, and percent for shares.
 
@@ -216,8 +233,7 @@ def pretty_unit(unit: str) -> str:
 
     Examples
     --------
-    >>> pretty_unit("N s^2/m^2")
-    'N s²/m²'
+    >>> pretty_unit("N s^2/m^2"), pretty_unit("m^3/(s Pa^0.5)")
+    ('N s²/m²', 'm³/(s Pa⁰·⁵)')
     """
-    head, *rest = unit.split("^")
-    return head + "".join(part[:1].translate(SUPERSCRIPTS) + part[1:] for part in rest)
+    return re.sub(r"\^(-?\d(?:\.\d)?)", lambda power: power[1].translate(SUPERSCRIPTS), unit)

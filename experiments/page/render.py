@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from experiments.command.visible_text import visible_page
 from experiments.page.errata import linked, linked_errata
-from experiments.page.figure_files import image_of
+from experiments.page.figure_files import image_of, is_tall
 from experiments.page.numbers import exact, number
 from experiments.page.scripting import with_scripts
 from experiments.page.sentences import rig_in_words, whole_dates
@@ -58,7 +58,8 @@ def render_page(
         caption = " ".join(caption.split())
         image = image_of(files[f"figures/{name}.svg"], caption)
         box = Markup('<div class="picture" tabindex="0" role="region" aria-label="{}">{}</div>').format(name, image)
-        return Markup('<figure id="figure-{}">{}<figcaption>{}</figcaption></figure>').format(name, box, caption)
+        tall = Markup(' class="tall"') if is_tall(files[f"figures/{name}.svg"]) else ""
+        return Markup('<figure id="figure-{}"{}>{}<figcaption>{}</figcaption></figure>').format(name, tall, box, caption)
 
     def chart(name: str, caption: str) -> Markup:
         return facts["charts"][name].html(name, " ".join(caption.split()))

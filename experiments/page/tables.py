@@ -1,6 +1,5 @@
 """Tables for a reader: columns with their units in the header, cells by what they hold."""
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
@@ -8,7 +7,7 @@ from typing import Any, TypeAlias
 import pandas as pd
 from markupsafe import Markup
 
-from experiments.page.numbers import MINUS, exact, fixed, number
+from experiments.page.numbers import MINUS, as_set, exact, fixed, number
 
 
 @dataclass(frozen=True)
@@ -160,7 +159,9 @@ def html_table(frame: pd.DataFrame, columns: Columns, caption: str, *, cards: bo
 
 
 def folded_tables(frame: pd.DataFrame, columns: Columns, by: str, count: str) -> Markup:
-    """Return a long data frame as a table for each group of rows, which a click opens; paper shows all of them.
+    """Return a long data frame as a table for each group of rows, which a click opens; paper shows those that are open.
+
+    A box of the page with the id ``every-row`` opens them all.
 
     Parameters
     ----------
@@ -174,7 +175,8 @@ def folded_tables(frame: pd.DataFrame, columns: Columns, by: str, count: str) ->
     for name, group in frame.groupby(by, sort=False):
         counts = group[count].value_counts()
         told = ", ".join(f"{number} {value}" for value, number in counts.items())
-        line = f"{name}: {len(group)} row{'' if len(group) == 1 else 's'} ({told})"
+        one = len(counts) == 1
+        line = f"{name}: {len(group)} row{'' if len(group) == 1 else 's'}{f', {counts.index[0]}' if one else f' ({told})'}"
         made.append(
             Markup('<details class="group"><summary>{}</summary>{}</details>').format(
                 line, html_table(group, others, f"Rows of {name}.", cards=True)
@@ -216,6 +218,6 @@ def _by_type(column: Column, value: Any) -> Shown:
     if isinstance(value, int) and column.scale == 1.0:
         return right(str(value).replace("-", MINUS))
     shown = None if value is None else column.scale * float(value)
-    if column.digits is None and shown is not None and math.isclose(shown, float(f"{shown:.3g}"), rel_tol=1e-12):
-        return as_given(shown)  # it was set, not measured: 275, not 275.0
+    if column.digits is None and shown is not None:
+        return right(as_set(shown))
     return right(number(shown, column.digits or 4))

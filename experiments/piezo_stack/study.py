@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.page.frames import Tables, parameter_table
-from experiments.page.numbers import number
+from experiments.page.numbers import number, pretty_unit
 from experiments.page.tables import Cell, Column, Columns, interval, spaced
 from experiments.papers.verdict import TONES
 from experiments.piezo_stack import flow
@@ -109,7 +109,7 @@ COLUMNS: Mapping[str, Columns] = {
         lambda name: Column(name, f"{spaced(name)} [%]", words=_told),
     ),
     "identifiability": (Column("frequency_hz", "drive"), "sensors", lambda name: Column(name, unit="%", digits=2)),
-    "rig": (Column("parameter", "name", words=spaced), Column("value", words=number), *("unit", "meaning", "source")),
+    "rig": (Column("parameter", "name", words=spaced), "value", Column("unit", words=pretty_unit), *("meaning", "source")),
 }
 
 

@@ -74,14 +74,19 @@ class Log(Shown):
         refusal: str = "",
         name: str = "log",
     ) -> None:
+        import warnings
+
         from plant.eha.rig import Rig
-        from plant.log.record import Record
+        from plant.log.record import Record, with_samples
 
         if not isinstance(record, Record):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
             refuse(f"a Log is made of a Record, got {type(record).__name__}; hydrostate.read opens files and tables")
         if not isinstance(rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
             refuse(f"the rig of a Log must be a Rig, got {type(rig).__name__}; hydrostate.read_rig reads one")
-        self.record, self.rig, self.plant, self._said = record, rig, plant, tuple(said)
+        record, empty = with_samples(record)
+        for one in empty:
+            warnings.warn(one, stacklevel=2)
+        self.record, self.rig, self.plant, self._said = record, rig, plant, (*said, *empty)
         self._sparse, self._refusal, self._name = sparse, refusal, name
         self._kept: tuple[Record, dict[Any, Any]] = record, {}
 

@@ -56,8 +56,10 @@ class WatchEvents:
         self.watch, self.began = watch, watch.last
         about = {"file": source, "rig": rig, "rate_hz": round(1.0 / watch.sample_time, 6)}
         about |= {"balances": list(watch.balances), "false_alarms_per_hour": false_alarms}
-        said = "learning the healthy behaviour"
-        said += f", without {PRESSURE}" if "motion" in watch.balances else ""
+        said = f"learning the healthy behaviour: alarms are possible after {watch.unlearnt:.0f} s of motion"
+        if self._armed:
+            said = "the healthy behaviour was learnt before"
+        said += f"; without {PRESSURE}" if "motion" in watch.balances else ""
         self._line("start", self.began, **about, message=said)
         if self._armed:
             self._ready(self.began, watch.thresholds)
@@ -94,18 +96,20 @@ class WatchEvents:
         self.rows += max((len(values) for values in channels.values()), default=0)
         self._came = time.monotonic()
 
-    def nearness(self) -> dict[str, dict[str, float]]:
+    def nearness(self) -> dict[str, Any]:
         """Return the nearness of each balance to an alarm.
 
         Returns
         -------
-        dict[str, dict[str, float]]
-            ``scores`` and ``thresholds`` by balance [dimensionless]; empty before the watch begins.
+        dict[str, Any]
+            ``scores`` and ``thresholds`` by balance [dimensionless], and ``unlearnt_s``, the motion that is still to be
+            learnt [s]; empty before the watch begins.
         """
         if self.watch is None:
             return {}
         numbers = {"scores": self.watch.scores, "thresholds": self.watch.thresholds}
-        return {name: dict(zip(self.watch.balances, values, strict=True)) for name, values in numbers.items()}
+        named = {name: dict(zip(self.watch.balances, values, strict=True)) for name, values in numbers.items()}
+        return {**named, "unlearnt_s": self.watch.unlearnt}
 
     def events(self, events: "Sequence[Event]") -> None:
         """Tell what has happened."""

@@ -69,7 +69,7 @@ def drawn(told: Watched) -> "Group":
     if gauges is not None:
         balances = Table("balance", "towards an alarm", "[%]", box=None)
         for name, score in gauges["scores"].items():
-            balances.add_row(name, *_bar(score, gauges["thresholds"][name]))
+            balances.add_row(name, *_bar(score, gauges["thresholds"][name], gauges["unlearnt_s"]))
         channels = Table("channel", "now", "unit", box=None)
         for name, value in gauges["values"].items():
             channels.add_row(*_reading(name, value))
@@ -103,12 +103,13 @@ def _standing(state: Mapping[str, Any], alarms: int) -> str:
     return said if silent < 1.0 else f"{said}, no row for {silent:.0f} s"
 
 
-def _bar(score: float, threshold: float | None) -> tuple[Any, str]:
-    """Return a bar as long as a score is of its threshold, and the share in percent."""
+def _bar(score: float, threshold: float | None, unlearnt: float) -> tuple[Any, str]:
+    """Return a bar as long as a score is of its threshold, and the share in percent; or how long learning takes [s]."""
     from rich.text import Text
 
     if not threshold:
-        return Text("still learning", style="dim"), "-"
+        more = f", {math.ceil(unlearnt)} s more of motion" if unlearnt else ""
+        return Text(f"still learning{more}", style="dim"), "-"
     share = min(max(score / threshold, 0.0), 1.0)
     colour = "green" if share < CALM else "yellow" if share < NEAR else "red"
     return Text("#" * round(BAR * share), style=colour) + Text("." * (BAR - round(BAR * share))), f"{100.0 * share:.0f}"

@@ -20,7 +20,7 @@ from experiments.command.options import (
     option,
     require_positive,
 )
-from experiments.command.output_paths import require_folder
+from experiments.command.output_paths import require_folder, require_place
 from experiments.command.terminal import emit, note
 from experiments.running.refusal import refused
 from plant.errors import HydrostateError
@@ -125,6 +125,7 @@ def fmu(
     Parameters and variables have the units and meanings of the parameter notes. A plant advances by whole samples,
     a filter by one sample per step.
     """
+    require_place("--out", out, ".fmu")
     require_positive("--sample-time", sample_time, "s")
     bench = load_rig(rig)
     if plant is not None:
@@ -170,6 +171,7 @@ def model(
     In MATLAB, for a model of one input: load model.mat, then tf(numerator, denominator, sample_time_s, 'Variable',
     'z^-1').
     """
+    require_folder("--out", out)
     from estimation.export.c_model import model_in_c
     from estimation.export.mat_model import model_in_mat
     from estimation.identification.free_run.saved import load_models
@@ -182,7 +184,6 @@ def model(
     called = "model" if name is None else name
     files: Mapping[str, str | bytes]
     files = model_in_c(found, name=called, precision=precision) if to == "c" else model_in_mat(found, name=called)
-    require_folder("--out", out)
     prepare_output(out)
     written = write_files(out, files)
     emit(

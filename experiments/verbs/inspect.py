@@ -14,7 +14,7 @@ from experiments.command.output_paths import own_paths, page_place, require_plac
 from experiments.command.pages import Pages
 from experiments.command.terminal import note, table
 from experiments.command.visible_text import visible, visible_name
-from experiments.log_pages.inspected import BLANK, block_of, clock_sentence, looked_into
+from experiments.log_pages.inspected import BLANK, block_of, clock_sentence, looked_into, without_unit
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def inspect(
 
     The guess uses names, units and physics: time increases, the slope of position is velocity, pressure follows the
     motion. Each guess has a probability and reasons. Copy the block at the end into a rig file (or use --write), or add
-    the printed options to one command. Check every unit that is marked as guessed.
+    the printed options to one command. Check the units that the file does not give.
     """
     if plant is not None:
         actuator(plant)
@@ -101,6 +101,8 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
             if result["columns"]
             else "no column was recognised; name the columns yourself"
         )
+        if named := without_unit(result["tables"]):
+            yield visible(f"check the unit of {', '.join(named)}: the file gives none")
         yield ""
         if result["options"]:
             yield visible(f"or add to one command: {result['options']}")

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.eha.bulk_modulus import EstimateOptions
-from estimation.eha.estimate import estimated, explained, finding_of, refused
+from estimation.eha.estimate import estimated, explained, finding_of, refused, without_numbers
 from estimation.eha.explanation_notes import OUTSIDE, at_pump_speed, of_another_rod, rig_set_right, set_right
 from estimation.eha.result import BulkModulusEstimate
 from estimation.eha.rig_share import SOFT, scaled_responses, with_total
@@ -108,7 +108,8 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     verdict = models_verdict(scores, log.record)
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
     unsure = (*_doubtful_rig(plain.parameters), *estimate.rig_notes)
-    notes = (*log.left_out, *case.strange, *verdict.notes, *absent, *unsure)
+    strange = without_numbers(case.strange, verdict.outcome)
+    notes = (*log.left_out, *strange, *verdict.notes, *absent, *unsure)
     found = replace(found, outcome=verdict.outcome, notes=notes, channels=scores.channels)
     if mistakes := log.mistakes or tuple(one for one in estimate.gate.reasons if isinstance(one.code, ChannelCode)):
         return replace(_without_class(found, log, scores, mistakes), outcome=Outcome.MISMATCH)
@@ -303,11 +304,11 @@ def _severities(
 ) -> Mapping[str, Quantity]:
     """Return the severities, with the estimated bulk modulus and the uncertainty of the rig.
 
-    Without pressure, where the check refuses the fit of motion, the circuit's own bulk modulus stays.
+    Where the check refuses a filter, or the fit of motion without pressure, the circuit's own bulk modulus stays.
     """
     oil = estimate.quantity
-    if not pressure and not estimate.gate.passed:
-        laws = scaled_responses(healthy, {}, pressure=False)["bulk_modulus"]
+    if not estimate.gate.passed and not (pressure and estimate.form == "flow"):
+        laws = scaled_responses(healthy, {}, pressure=pressure)["bulk_modulus"]
         oil = with_total(diagnosis.severity["bulk_modulus"], laws, estimate.spreads)
     found = with_bulk_modulus(diagnosis.severity, oil, actuator_of(healthy))
     logged = diagnosis.scoreboard.blocks.pressure

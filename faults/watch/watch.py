@@ -156,6 +156,11 @@ class Watch:
         return self.start + self._taken * self.sample_time
 
     @property
+    def unlearnt(self) -> float:
+        """Motion that is still to be learnt before alarms can be raised [s]; standing still does not count."""
+        return max(0.0, self._sizes.learning - float(self._clock[USABLE])) * self.block * self.sample_time
+
+    @property
     def thresholds(self) -> tuple[float, ...]:
         """Thresholds of the balances [dimensionless]; infinite while they are learnt."""
         slow = self._known[LIMIT] if self._known[WANTED] < np.inf else np.inf

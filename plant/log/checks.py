@@ -123,6 +123,21 @@ def _counted(count: int, total: int) -> dict[str, float]:
     return {"count": count, "total": total, "percent": 100.0 * count / total}
 
 
+def all_missing(name: str, values: Array) -> Note | None:
+    """Return a note if a channel has no sample at all.
+
+    Parameters
+    ----------
+    name : str
+        The channel.
+    values : ndarray, shape (n,)
+        [any unit]; NaN is missing.
+    """
+    if np.isfinite(values).any():
+        return None
+    return LogCode.CHANNEL_LEFT_OUT.note(channel=name, **_counted(len(values), len(values)))
+
+
 def _present(columns: Channels, required: Collection[str], source: str) -> None:
     if missing := lacking(required, columns):
         known = ", ".join(columns) or "none that is known"

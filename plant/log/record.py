@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from plant.errors import LogError, LogWarning
-from plant.log.checks import REQUIRED, trusted
+from plant.log.checks import REQUIRED, all_missing, trusted
 from plant.log.columns import CHANNELS as CHANNELS
 from plant.log.columns import converted, resolve_columns
 from plant.log.formats.cells import numbers, values_of
@@ -230,3 +230,30 @@ class Record:
         for note in checked.notes:
             warnings.warn(LogWarning(note, source), stacklevel=2)
         return Record(checked.sample_time, checked.channels, start_time=checked.start_time)
+
+
+def with_samples(record: Record) -> tuple[Record, tuple[LogWarning, ...]]:
+    """Return a record without channels of which no sample is there, as files are read.
+
+    Parameters
+    ----------
+    record : Record
+        Made by hand, or a part of a log.
+
+    Returns
+    -------
+    record : Record
+        The same where every channel has a sample, or none has.
+    said : tuple of LogWarning
+        One for each channel that was left out.
+
+    Examples
+    --------
+    >>> made = Record(1e-3, {"position_m": np.zeros(3), "velocity_m_s": np.full(3, np.nan)})
+    >>> list(with_samples(made)[0])
+    ['position_m']
+    """
+    notes = {name: note for name in record if (note := all_missing(name, record[name])) is not None}
+    if not notes or len(notes) == len(record.channels):
+        return record, ()
+    return record.replace(**dict.fromkeys(notes)), tuple(LogWarning(note) for note in notes.values())

@@ -16,3 +16,11 @@ def test_a_sentence_writes_no_powers_of_ten_where_a_reader_would_not() -> None:
 
     said = str(Size.SHARE.note(percent=100.0, factor=123456.0, tiny=2.5e-6, huge=2e9))
     assert said == "missing in 100 %, 123000 times too large, 2.5e-06 m, 2e+09 Pa"
+
+
+def test_a_half_width_that_nothing_bounds_is_no_number() -> None:
+    class Offset(Code):
+        READS = "pressure reads {offset_pa:.3g|bar} ± {half_width_pa:.2g|bar} bar too much"
+
+    said = str(Offset.READS.note(offset_pa=1e5, half_width_pa=float("inf")))
+    assert said == "pressure reads 1 bar too much; the log does not tell how far off this may be"

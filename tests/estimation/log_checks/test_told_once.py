@@ -32,6 +32,10 @@ def test_what_is_told_of_a_turn_lies_neither_before_nor_behind_it() -> None:
     assert abs(mean_error(turning)) < 0.3  # -1.3 with all rows of motion and one of the rest
 
 
+def test_a_channel_without_rows_has_none() -> None:
+    assert changes_and_rests(np.empty(0)).shape == (0,)
+
+
 def mean_error(position: Array) -> float:
     """Return the sum of the errors that are told, on average over where the encoder's steps lie [steps]."""
     true = position + np.linspace(-0.495, 0.495, 100)[:, None]

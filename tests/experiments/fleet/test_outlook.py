@@ -268,3 +268,20 @@ def test_the_page_of_an_actuator_works_in_a_browser(browser: Any, tmp_path: Path
     assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
     assert complaints == []
     page.close()
+
+
+def test_a_last_log_past_the_limit_beside_a_trend_within_it_says_so_and_what_to_do() -> None:
+    """The page told "past the limit" beside a level that was far within it."""
+    leaks = np.append(np.full(12, 1.2), 6.0)
+    row = actuator(leaks)
+    assert row.outlook is not None
+    assert row.outlook.trend.level[0] < 3.0
+    page = actuator_page(row, {})
+    assert page.count("its trend is still within it: log again") == 2  # the first sentence, and the table
+    assert "still within" not in actuator_page(actuator(np.full(12, 6.0)), {})
+
+
+def test_each_of_the_last_logs_has_the_severity_that_was_its_worst() -> None:
+    page = actuator_page(actuator(np.append(np.full(5, 1.2), 6.0)), {})
+    worst = re.findall(r'<td data-head="worst">(.*?)</td>', page)
+    assert [one.split()[0] for one in worst] == ["leakage", *5 * ["bulk"]]

@@ -73,7 +73,7 @@ def test_a_circuit_beside_the_nine_has_no_verdict_but_is_shown_and_named_if_few_
     assert "No verdict since 2; leakage 4.00 L/min now, if the rig file is right" in actuator_page(row, {}).replace(
         "\N{NO-BREAK SPACE}", " "
     )
-    assert 'data-head="leakage">4.00' in actuator_page(row, {})
+    assert 'data-head="worst">leakage 4.00' in actuator_page(row, {})
     assert sickest_of(fleet([store_row(files[0], 1.0), *rows[-5:]])) == ["P-8"]
     assert sickest_of(fleet([store_row(one, 4.0, **doubt) for one in files])) == []  # of another size, rather
     assert "move their logs" in rig_hint(fleet([store_row(one, 4.0, **doubt) for one in files]))

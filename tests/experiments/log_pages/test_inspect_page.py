@@ -59,3 +59,10 @@ def test_a_file_without_units_has_no_column_for_them(tmp_path: Path) -> None:
     page = page_of(tmp_path, "time_s,motor_speed_rad_s,position_m", TIME, SPEED, WAY)
     assert ">unit<" not in page
     assert ">unit<" in page_of(tmp_path, "time [s],speed [rpm]", TIME, SPEED)
+
+
+def test_units_are_to_be_checked_where_the_file_gives_none_and_the_columns_are_named(tmp_path: Path) -> None:
+    """The page asked for units "that are marked as guessed", and marked none."""
+    asked = "The file gives no unit for Zeit, Drehzahl, Weg: check"
+    assert asked in page_of(tmp_path, "Zeit,Drehzahl,Weg", TIME, SPEED, WAY)
+    assert "gives no unit" not in page_of(tmp_path, "time_s,motor_speed_rad_s,position_m", TIME, SPEED, WAY)

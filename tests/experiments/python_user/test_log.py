@@ -213,3 +213,13 @@ def test_what_is_no_time_and_no_size_is_refused_in_a_sentence(log: hs.Log) -> No
     ):
         with pytest.raises(hs.HydrostateError, match=said):
             log.identify(input="motor_speed_rad_s", output="velocity_m_s", **size)
+
+
+def test_a_channel_without_a_sample_is_left_out_of_a_record_made_by_hand_and_of_a_part(log: hs.Log) -> None:
+    """The fit asked for "a signal with at least one finite sample", of no file and no channel."""
+    late = log["differential_pressure_pa"].copy()
+    late[: len(log) // 2] = np.nan
+    whole = hs.Log(log.record.replace(differential_pressure_pa=late), log.rig)
+    with pytest.warns(LogWarning, match="differential_pressure_pa is missing in 201 of 201 samples"):
+        part = whole.between(0.0, 0.2)
+    assert "differential_pressure_pa" not in part.channels

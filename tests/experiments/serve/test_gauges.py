@@ -38,7 +38,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 def watching(sent: list[Any]) -> Gauges:
     found = Gauges(SimpleNamespace(send=sent.append))  # type: ignore[arg-type]
-    found.watch = SimpleNamespace(balances=("flow",), scores=(1.0,), thresholds=(4.0,), last=7.0)  # type: ignore[assignment]
+    found.watch = SimpleNamespace(balances=("flow",), scores=(1.0,), thresholds=(4.0,), unlearnt=0.0, last=7.0)  # type: ignore[assignment]
     return found
 
 

@@ -56,14 +56,14 @@ def test_gauges_have_the_range_since_the_last_ones_and_count_whole_rows(monkeypa
     monkeypatch.setattr(module, "EVERY", 0.0)
     sent: list[Any] = []
     found = Gauges(SimpleNamespace(send=sent.append))  # type: ignore[arg-type]
-    found.watch = SimpleNamespace(balances=("flow",), scores=(1.0,), thresholds=(np.inf,))  # type: ignore[assignment]
+    found.watch = SimpleNamespace(balances=("flow",), scores=(1.0,), thresholds=(np.inf,), unlearnt=87.0)  # type: ignore[assignment]
     found.saw({"a": np.array([1.0, np.nan, -2.0]), "b": np.array([5.0, 5.0, 5.0])}, 0.3, False)
     found.saw({"a": np.array([4.0]), "b": np.array([6.0])}, 0.4, True)
     (_, first), (_, second) = sent
     assert (first["rows"], second["rows"], second["gaps"]) == (2, 3, 1)
     assert (first["low"], first["high"]) == ({"a": -2.0, "b": 5.0}, {"a": 1.0, "b": 5.0})
     assert (second["low"], second["values"]) == ({"a": 4.0, "b": 6.0}, {"a": 4.0, "b": 6.0})
-    assert first["thresholds"] == {"flow": None}
+    assert (first["thresholds"], first["unlearnt_s"]) == ({"flow": None}, 87.0)
 
 
 def test_a_view_that_comes_back_gets_what_it_missed_and_no_more_than_is_kept(stream: Stream) -> None:

@@ -271,7 +271,7 @@ def test_many_events_leave_the_charts_in_sight(opened: Any) -> None:
 def test_a_negative_gauge_has_a_minus_and_a_balance_that_is_learnt_no_empty_chart(opened: Any) -> None:
     gauge = {"time_s": 1.0, "rows": 9, "gaps": 0, "left_out": 0, "number": 1}
     channels = {"values": {"pressure_a_pa": -2.5e5}, "low": {"pressure_a_pa": -3e5}, "high": {"pressure_a_pa": 1e5}}
-    learnt = {"scores": {"flow": 0.0, "loss": 1.0}, "thresholds": {"flow": None, "loss": 4.0}}
+    learnt = {"scores": {"flow": 0.0, "loss": 1.0}, "thresholds": {"flow": None, "loss": 4.0}, "unlearnt_s": 86.2}
     told = {"name": "bench", "state": "learning", "message": "learning", "gauges": None, "events": []}
     body = f"event: history\ndata: {json.dumps({**told, 'history': [{**gauge, **channels, **learnt}] * 2})}\n\n"
     page = opened("live")
@@ -284,6 +284,7 @@ def test_a_negative_gauge_has_a_minus_and_a_balance_that_is_learnt_no_empty_char
         ["learning", "flow balance: how close to an alarm"],
         ["25 %", "lost flow: how close to an alarm"],
     ]
+    assert "alarms are possible after 87 s more of motion" in tiles[1].replace("\N{NO-BREAK SPACE}", " ")
     assert page.locator(".histories figcaption").all_inner_texts() == [
         "pressure A [bar]",
         "lost flow: how close to an alarm [%]",

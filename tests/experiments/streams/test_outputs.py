@@ -28,7 +28,7 @@ class OneBalance:
     """What an output asks of a watch."""
 
     balances, scores, thresholds = ("flow", "motion"), (3.0, 1.0), (12.0, float("inf"))
-    sample_time, last = 1e-3, 5.0
+    sample_time, last, unlearnt = 1e-3, 5.0, 0.0
 
 
 def watching() -> Watched:

@@ -68,3 +68,17 @@ def test_a_heartbeat_in_thousands_of_years_is_none_and_no_error(monkeypatch: pyt
     with beating(WatchEvents(lambda _: None), 1e20):
         pass
     assert failed == []
+
+
+def test_a_start_says_how_much_motion_is_to_be_learnt_or_that_it_was_learnt_before() -> None:
+    lines: list[dict[str, Any]] = []
+    for unlearnt, threshold in ((120.0, float("inf")), (0.0, 4.0)):
+        watch: Any = SimpleNamespace(
+            last=0.0, thresholds=(threshold,), balances=("flow",), sample_time=1e-3, unlearnt=unlearnt
+        )
+        WatchEvents(lines.append).start("bench", watch, "paper", 1.0)
+    said = [one["message"] for one in lines if one["event"] == "start"]
+    assert said == [
+        "learning the healthy behaviour: alarms are possible after 120 s of motion",
+        "the healthy behaviour was learnt before",
+    ]

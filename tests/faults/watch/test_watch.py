@@ -160,3 +160,14 @@ def test_what_cannot_be_watched_is_refused(changes: dict[str, float], said: str)
     given = {"sample_time": T, **changes}
     with pytest.raises(HydrostateError, match=said):
         Watch(P, **given)
+
+
+def test_what_is_still_to_be_learnt_is_known_and_standing_still_teaches_nothing() -> None:
+    watch, moving = Watch(P, T, learning=60.0), _run(seconds=20.0, seed=3)
+    watch.take(moving[:10])
+    assert watch.unlearnt == pytest.approx(60.0)
+    watch.take(moving[10:])
+    left = watch.unlearnt
+    assert 39.0 < left < 45.0  # blocks in which the actuator hardly moved do not count
+    watch.take(np.tile([0.0, moving[-1, 1], 0.0], (5000, 1)))
+    assert watch.unlearnt > left - 1.0
