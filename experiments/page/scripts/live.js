@@ -85,7 +85,7 @@
       const part = share(point, balance);
       const [value, unit] = part === null ? ["learning", ""] : [digits(Math.round(part)), "%"];
       const left = Math.ceil(point.unlearnt_s ?? 0);
-      const more = part === null && left ? `alarms are possible after ${left}\u00a0s more of motion; standing still does not count` : "an alarm is raised at 100 %";
+      const more = part === null && left ? `alarms are possible after ${left}\u00a0s more of motion` : "an alarm is raised at 100 %";
       tiles.push(tile(`${balanceWords(balance)}: how close to an alarm`, value, unit, more));
     }
     tiles.push(tile("rows", String(point.rows), "", `${point.gaps} gaps, ${point.left_out} left out, ${digits(point.time_s)}\u00a0s`));

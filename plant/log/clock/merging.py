@@ -106,7 +106,10 @@ def merged(parts: Sequence[Timed], source: str) -> Merged:
     first = int(np.ceil((begin - fastest.start_time) / T - SAME))
     count = int(np.floor((end - fastest.start_time) / T + SAME)) - first + 1
     if count < FEWEST_SAMPLES:
-        raise LogError(f"{' and '.join(one.name for one in parts)} do not overlap in time", source)
+        spans = " and ".join(f"{one.name} ({_span(one.time)})" for one in parts)
+        few = f"overlap in {count} samples, at least {FEWEST_SAMPLES} are needed"
+        apart = few if count > 0 else f"do not overlap in time{_exchanged(parts) if dated[0] else ''}"
+        raise LogError(f"{spans} {apart}", source)
     even: Array = fastest.start_time + T * (first + np.arange(count, dtype=np.float64))
     channels: dict[str, Any] = {}
     for one in checked:
@@ -122,6 +125,24 @@ def _same_time(one: Any, other: Any) -> bool:
         return False
     apart, step = np.abs(one - other).max(), np.abs(one[-1] - one[0]) / (len(one) - 1)
     return bool(apart <= SAME * step)
+
+
+def _span(time: Any) -> str:
+    """Return from when to when stamps go, in words."""
+    if time.dtype.kind != "M":
+        there = time[np.isfinite(time)]
+        return f"{there.min():g} to {there.max():g} s"
+    first, last = (str(end.astype("datetime64[s]")).replace("T", " ") for end in (np.nanmin(time), np.nanmax(time)))
+    return f"{first} to {last}"
+
+
+def _exchanged(parts: Sequence[Timed]) -> str:
+    """Return what to do where two loggers would be of one day, had one of them day and month the other way round."""
+    days = [str(np.nanmin(one.time).astype("datetime64[D]")).split("-") for one in parts]
+    turned = {(year, day, month) for year, month, day in days} & {tuple(day) for day in days}
+    if not turned or len({tuple(day) for day in days}) == 1:
+        return ""
+    return "; day and month may be exchanged in one of them: write dates as 2026-03-31"
 
 
 def _length(one: Checked) -> int:

@@ -33,6 +33,16 @@ def test_velocity_is_the_slope_of_position_whatever_it_is_called(record: Record)
     assert "is_slope" in [note.code for note in found["velocity_m_s"].why]
 
 
+def test_a_column_that_is_called_pressure_is_no_velocity_though_it_moves_like_one(record: Record) -> None:
+    """A log in German without a velocity: its pressure was taken for one, in mm/s."""
+    named = [("t", record.time), ("Weg", 1e3 * record["position_m"]), ("Druck", 1e3 * record["velocity_m_s"])]
+    headings = [Heading(name) for name, _ in named]
+    found = guess_channels(headings, {place: one for place, (_, one) in enumerate(named)}, HEALTHY)
+    assert {one.guess.channel: one.guess.name for one in found if one.guess.name == "Druck"} == {
+        "differential_pressure_pa": "Druck"
+    }
+
+
 def test_swapped_names_lose_against_physics_of_the_clock(record: Record) -> None:
     found = guess(record, {"time_s": "A", "position_m": "time"}, {})
     assert found["time_s"].guess.name == "A"

@@ -202,3 +202,24 @@ def test_without_pressure_a_refused_fit_of_motion_leaves_the_circuits_bulk_modul
     assert told.ci95 is not None
     assert told.ci95[0] < HEALTHY.bulk_modulus < told.ci95[1]
     assert found.severities["entrained_air"].ci95_total is not None
+
+
+def test_without_position_a_refused_filter_leaves_the_circuits_bulk_modulus() -> None:
+    """The number of a filter that its own check refused, a third of the truth, stood beside a class that is reliable."""
+    record = log(duration=1.0).replace(position_m=None)
+    gate = Gate(False, (EstimateCode.ESTIMATE_WANDERS.note(state="bulk_modulus_pa", ratio=47.0),))
+    refused = BulkModulusEstimate(Outcome.OK, 7e7, 1e6, 0.004, gate, "pressure", ("velocity_m_s", PRESSURE), {}, {})
+    found = diagnose_log(record, RIG, (clean_log(record, HEALTHY), refused))
+    told, circuits = found.severities["bulk_modulus"], found.evidence.diagnosis.severity["bulk_modulus"]
+    assert not found.unknown
+    assert (told.value, told.ci95) == (circuits.value, circuits.ci95)
+
+
+def test_where_nothing_moves_pump_wear_is_no_matter() -> None:
+    rng, count = np.random.default_rng(17410), 1500
+    noise = {"motor_speed_rad_s": 0.05, "position_m": 1e-6, PRESSURE: 2e3}
+    still = Record(1e-3, {name: size * rng.standard_normal(count) for name, size in noise.items()})
+    found = diagnose_log(still, RIG)
+    assert found.outcome is Outcome.NOT_OBSERVABLE
+    assert RigCode.WEAR_NOT_EXCLUDED not in codes(found)
+    assert RigCode.WEAR_NOT_EXCLUDED in {note.code for note in found.evidence.estimate.remarks}

@@ -46,7 +46,7 @@ def test_a_file_of_one_clock_is_merged_without_a_note(tmp_path: Path) -> None:
 def test_loggers_that_never_ran_together_are_refused(tmp_path: Path) -> None:
     motor = logger(tmp_path / "a.csv", "motor_speed_rad_s", T * np.arange(200))
     other = logger(tmp_path / "b.csv", "position_m", 5.0 + T * np.arange(200))
-    with pytest.raises(LogError, match=r"a\.csv and b\.csv do not overlap in time"):
+    with pytest.raises(LogError, match=r"a\.csv \(0 to 0\.199 s\) and b\.csv \(5 to 5\.199 s\) do not overlap in time"):
         read_record(motor, beside=[other])
 
 
@@ -70,3 +70,13 @@ def test_clocks_are_the_same_by_their_step_however_late_they_begin(begin: float)
     time = begin + T * np.arange(200)
     assert _same_time(time, time + 0.5 * SAME * T)
     assert not _same_time(time, time + 2.0 * SAME * T)
+
+
+def test_a_refusal_has_the_times_of_both_and_says_where_day_and_month_may_be_exchanged(tmp_path: Path) -> None:
+    """01/03/2026 was read as the third of January, beside a logger of 1 March, and nothing said so."""
+    steps = 0.01 * np.arange(300)
+    american, iso = (np.array([f"{day} 12:00:{one:06.3f}" for one in steps]) for day in ("01/03/2026", "2026-03-01"))
+    motor = logger(tmp_path / "a.csv", "motor_speed_rad_s", steps, american)
+    other = logger(tmp_path / "b.csv", "position_m", steps, iso)
+    with pytest.raises(LogError, match=r"2026-01-03 12:00:00 to .*2026-03-01 12:00:00 to .*may be exchanged"):
+        read_record(motor, beside=[other])
