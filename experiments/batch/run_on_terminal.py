@@ -195,8 +195,10 @@ class Pace:
         return (self.done - self._before) / max(time.monotonic() - self._begin, 1e-9)
 
     def __str__(self) -> str:
-        left = (self.total - self.done) / self.rate if self.rate > 0.0 else 0.0
-        return f"{self.done} of {self.total} cases, {self.rate:.3g} a second, {duration(left)} left"
+        rate = self.rate
+        left = (self.total - self.done) / rate if rate > 0.0 else 0.0
+        pace = f"{1.0 / rate:.2g} s each" if 0.0 < rate < 1.0 else f"{rate:.3g} a second"
+        return f"{self.done} of {self.total} cases, {pace}, {duration(left)} left"
 
 
 def duration(seconds: float) -> str:

@@ -10,6 +10,10 @@ from markupsafe import Markup
 from experiments.page.numbers import MINUS, as_set, exact, fixed, number
 
 
+WORDS = 24
+"""Characters of a cell from which its column holds words, and needs room to be read [count]."""
+
+
 @dataclass(frozen=True)
 class Cell:
     """A cell that says more than a number.
@@ -151,11 +155,20 @@ def html_table(frame: pd.DataFrame, columns: Columns, caption: str, *, cards: bo
         )
         for column, *cells in zip(shown, *body, strict=True)
     )
+    wordy = [max((len(cell.striptags()) for cell in cells), default=0) > WORDS for cells in zip(*body, strict=True)]
+    body = [[_worded(cell) if long else cell for cell, long in zip(row, wordy, strict=True)] for row in body]
     rows = Markup("\n").join(Markup("<tr>{}</tr>").format(Markup("").join(cells)) for cells in body)
     return Markup(
         '<div class="scroll" tabindex="0" role="region" aria-label="{}"><table{}>\n<caption>{}</caption>\n'
         "<thead><tr>{}</tr></thead>\n<tbody>\n{}\n</tbody></table></div>"
     ).format(caption, Markup(' class="cards whole"') if cards else "", caption, head, rows)
+
+
+def _worded(cell: Markup) -> Markup:
+    """Return a cell of a column of words, which is no narrow one."""
+    if ' class="' in cell.split(">", 1)[0]:
+        return Markup(cell.replace(' class="', ' class="words ', 1))  # noqa: S704 - it is markup already
+    return Markup(cell.replace("<td", '<td class="words"', 1))  # noqa: S704
 
 
 def folded_tables(frame: pd.DataFrame, columns: Columns, by: str, count: str) -> Markup:

@@ -310,10 +310,10 @@ def with_bulk_modulus(found: Mapping[str, Quantity], estimated: Quantity, actuat
     if estimated.value is None or estimated.ci95 is None:
         return {**found, "bulk_modulus": estimated, "entrained_air": Quantity(None, UNITS["entrained_air"])}
     ends, total = (
-        None if ci is None else (_air(max(ci[1], 1.0), actuator), _air(max(ci[0], 1.0), actuator))
+        None if ci is None else (float(_air(max(ci[1], 1.0), actuator)), float(_air(max(ci[0], 1.0), actuator)))
         for ci in (estimated.ci95, estimated.ci95_total)
     )
-    air = Quantity(_air(estimated.value, actuator), UNITS["entrained_air"], ends, ci95_total=total)
+    air = Quantity(float(_air(estimated.value, actuator)), UNITS["entrained_air"], ends, ci95_total=total)
     return {**found, "bulk_modulus": estimated, "entrained_air": _with_air(air, estimated, actuator)}
 
 

@@ -80,6 +80,8 @@ def test_pace_counts_only_what_this_run_did(monkeypatch: pytest.MonkeyPatch) -> 
     pace.done += 20
     assert pace.rate == pytest.approx(2.0)
     assert str(pace).startswith("40 of 60 cases, 2 a second")
+    pace.done = 24
+    assert str(pace).startswith("24 of 60 cases, 2.5 s each")
 
 
 def test_logs_of_the_command_line_replace_those_of_a_study_that_has_some() -> None:
