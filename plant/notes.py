@@ -127,7 +127,9 @@ class Note:
 
     def __str__(self) -> str:
         said = _SENTENCE.format(self.code.template, **self.data)
-        return said if UNTOLD not in said else f"{said.replace(UNTOLD, '')}; the log does not tell how far off this may be"
+        return (
+            said if UNTOLD not in said else f"{said.replace(UNTOLD, '')}; the log does not tell how far off this may be"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the note for JSON.

@@ -118,7 +118,12 @@ COLUMNS: Mapping[str, Columns] = {
         Column("flow_m3_s", "peak flow", "ml/min", 6e7),
         Column("blocking_n", "blocking force at 480 Hz", digits=3),
     ),
-    "rig": (Column("parameter", "name", words=spaced), "value", Column("unit", words=pretty_unit), *("meaning", "source")),
+    "rig": (
+        Column("parameter", "name", words=spaced),
+        "value",
+        Column("unit", words=pretty_unit),
+        *("meaning", "source"),
+    ),
 }
 
 

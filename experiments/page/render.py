@@ -59,7 +59,9 @@ def render_page(
         image = image_of(files[f"figures/{name}.svg"], caption)
         box = Markup('<div class="picture" tabindex="0" role="region" aria-label="{}">{}</div>').format(name, image)
         tall = Markup(' class="tall"') if is_tall(files[f"figures/{name}.svg"]) else ""
-        return Markup('<figure id="figure-{}"{}>{}<figcaption>{}</figcaption></figure>').format(name, tall, box, caption)
+        return Markup('<figure id="figure-{}"{}>{}<figcaption>{}</figcaption></figure>').format(
+            name, tall, box, caption
+        )
 
     def chart(name: str, caption: str) -> Markup:
         return facts["charts"][name].html(name, " ".join(caption.split()))

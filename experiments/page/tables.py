@@ -9,7 +9,6 @@ from markupsafe import Markup
 
 from experiments.page.numbers import MINUS, as_set, exact, fixed, number
 
-
 WORDS = 24
 """Characters of a cell from which its column holds words, and needs room to be read [count]."""
 
@@ -189,7 +188,9 @@ def folded_tables(frame: pd.DataFrame, columns: Columns, by: str, count: str) ->
         counts = group[count].value_counts()
         told = ", ".join(f"{number} {value}" for value, number in counts.items())
         one = len(counts) == 1
-        line = f"{name}: {len(group)} row{'' if len(group) == 1 else 's'}{f', {counts.index[0]}' if one else f' ({told})'}"
+        line = (
+            f"{name}: {len(group)} row{'' if len(group) == 1 else 's'}{f', {counts.index[0]}' if one else f' ({told})'}"
+        )
         made.append(
             Markup('<details class="group"><summary>{}</summary>{}</details>').format(
                 line, html_table(group, others, f"Rows of {name}.", cards=True)

@@ -109,7 +109,12 @@ COLUMNS: Mapping[str, Columns] = {
         lambda name: Column(name, f"{spaced(name)} [%]", words=_told),
     ),
     "identifiability": (Column("frequency_hz", "drive"), "sensors", lambda name: Column(name, unit="%", digits=2)),
-    "rig": (Column("parameter", "name", words=spaced), "value", Column("unit", words=pretty_unit), *("meaning", "source")),
+    "rig": (
+        Column("parameter", "name", words=spaced),
+        "value",
+        Column("unit", words=pretty_unit),
+        *("meaning", "source"),
+    ),
 }
 
 
