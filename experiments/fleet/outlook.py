@@ -83,7 +83,7 @@ class Outlook:
 
     @property
     def doubt(self) -> str:
-        """What to do where the last logs are past the limit and the level of the trend is not; empty where they agree."""
+        """What to do where the last logs are past the limit and the trend is not; empty where they agree."""
         level = self.trend.level[0] - self.series.healthy
         if not self.past or level / (self.series.limit - self.series.healthy) > 1.0:
             return ""

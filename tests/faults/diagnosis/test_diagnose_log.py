@@ -205,7 +205,7 @@ def test_without_pressure_a_refused_fit_of_motion_leaves_the_circuits_bulk_modul
 
 
 def test_without_position_a_refused_filter_leaves_the_circuits_bulk_modulus() -> None:
-    """The number of a filter that its own check refused, a third of the truth, stood beside a class that is reliable."""
+    """A filter's number that its own check refused, a third of the truth, stood beside a reliable class."""
     record = log(duration=1.0).replace(position_m=None)
     gate = Gate(False, (EstimateCode.ESTIMATE_WANDERS.note(state="bulk_modulus_pa", ratio=47.0),))
     refused = BulkModulusEstimate(Outcome.OK, 7e7, 1e6, 0.004, gate, "pressure", ("velocity_m_s", PRESSURE), {}, {})
