@@ -22,6 +22,7 @@ from estimation.log_checks.channel_physics import LENGTHS, RPM, TURNS
 from estimation.log_checks.flow_balance import MOST_LOST
 from estimation.notes import ChannelCode
 from plant.eha.model import EhaParameters
+from plant.log.record import Record
 from plant.notes import Note
 
 FOREIGN, KIN = 7.0, 3.0
@@ -47,6 +48,9 @@ sensor shows its noise alone, and any slower pump explains that."""
 
 UNLIKE_SLIPS = frozenset({OFFSET.name, PRESSURE_DRIFT.name, CHECKS_CRACK.name, MAKEUP_BENDS.name})
 """Hypotheses that no slip looks like: they add to a pressure, or concern valves, and change no scale and no sign."""
+
+ROUNDING = 1e-9
+"""Difference of logarithms that rounding may leave [dimensionless]."""
 
 TURNED = "a wrong sign of {} (-UNIT)"
 """What is said of a channel that counts the other way."""
@@ -213,10 +217,25 @@ def _beginning(logged: Logged) -> Logged:
 def _right_with(slip: Slip, logged: Logged, rig: EhaParameters) -> GreyBoxFit | None:
     """Return the fit of a log whose slip is set right, where it explains the log as one of the rig's."""
     set_right = _set_right(slip, logged)
-    if set_right is None:
+    if set_right is None or not _slides_as_well(set_right.record, logged.record, rig):
         return None
     plain = plain_fits(set_right, FitStart(rig, rig.bulk_modulus))
     return plain.best if plain.explains(plain.best) and _kin(plain.best, rig, KIN, 0.0) else None
+
+
+def _slides_as_well(right: Record, read: Record, rig: EhaParameters) -> bool:
+    """Return whether a corrected pressure is no further from what the rig's friction takes than it was as read.
+
+    Only this tells a unit from oil as many times as stiff: a flow balance holds pressure over stiffness. Conditions
+    change friction less than any unit does.
+    """
+
+    def off(record: Record) -> float:
+        turning = np.abs(record[SPEED]) > TURNING * np.nanmax(np.abs(record[SPEED]))
+        pressure = np.nanmedian(np.abs(record[PRESSURE][turning]))
+        return abs(ln(pressure * rig.piston_area / rig.friction_coulomb)) if pressure > 0.0 else np.inf
+
+    return off(right) <= off(read) + ROUNDING
 
 
 def _set_right(slip: Slip, logged: Logged) -> Logged | None:

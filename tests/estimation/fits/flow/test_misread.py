@@ -157,3 +157,15 @@ def test_a_fit_is_none_of_the_rigs_where_its_oil_or_what_its_pump_loses_is_surel
     plain: Any = SimpleNamespace(explains=lambda _: explained)
     nothing: Any = None
     assert CorrectedLogs(nothing, RIG).is_kin(plain, fit) is kin
+
+
+def test_oil_seven_times_as_stiff_as_the_rigs_is_no_pressure_in_another_unit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pressure read ten times too large has the stiffness of such oil; friction tells the two apart."""
+    monkeypatch.setattr(misread_module, "SLIPS", [one for one in SLIPS if one.channel == PRESSURE])
+    stiff = log(1 / (1.05 * FOREIGN))
+    found = estimate_bulk_modulus(stiff, RIG)
+    assert found.gate.passed
+    assert found.value is not None
+    assert abs(found.value / (1.05 * FOREIGN * RIG.bulk_modulus) - 1.0) < 0.02
+    (note,) = estimate_bulk_modulus(log().replace(**{PRESSURE: 10.0 * log()[PRESSURE]}), RIG).gate.reasons
+    assert "bar read as MPa" in str(note)
