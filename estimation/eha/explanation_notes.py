@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.eha.changing_leakage import growth_note, leakage_over, step_note
+from estimation.eha.entrained_air import air_note
 from estimation.eha.port_drains import drain_note
 from estimation.finding import NORMAL_95
 from estimation.fits.greybox.play_courses import crossings
@@ -20,7 +21,6 @@ from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import CROSSED, GROWTH, TURBULENT_AT
 from estimation.notes import RigCode
 from plant.arrays import Array
-from plant.components.oil import ATMOSPHERE
 from plant.eha.doubts import DOUBTS
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -185,15 +185,6 @@ def _load(found: Explanation, p: EhaParameters) -> Note:
     return RigCode.STARTS_UNDER_LOAD.note(pressure_pa=value, force_n=value * p.piston_area)
 
 
-def _air(found: Explanation, _: EhaParameters) -> Note:
-    (softness, std), stated = found.values["air_softness"], found.stated_pressure
-    liquid = 1.0 / (1.0 / found.values["bulk_modulus"][0] - softness / stated**2)
-    said = {"percent": 100.0 * softness / ATMOSPHERE, "half_width": 100.0 * NORMAL_95 * std / ATMOSPHERE}
-    if "air_onset" in found.values:
-        return RigCode.AIR_ENTERS.note(**said, percent_of_log=100.0 * found.values["air_onset"][0])
-    return RigCode.AIR_ENTRAINED.note(**said, stated_pa=stated, liquid_pa=liquid)
-
-
 def _bends(found: Explanation, _: EhaParameters) -> Note:
     return RigCode.MAKEUP_BENDS.note(drop_pa=3.0 / found.values[BEND][0])
 
@@ -242,8 +233,8 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "volume": _volume,
     "single_rod": _single_rod,
     "start_load": _load,
-    "air": _air,
-    "air_midway": _air,
+    "air": air_note,
+    "air_midway": air_note,
     "relief_low": _relief,
     "leakage_growth": growth_note,
     "leakage_rise": growth_note,

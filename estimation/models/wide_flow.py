@@ -13,7 +13,7 @@ from estimation.models.flow import STIFFNESS, delivered_flow, leaked_flow, port_
 from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.inner_circuit import BEND, USUAL_BEND, narrowed
-from plant.compiled.functions import Scalar, maximum, minimum, sqrt, where
+from plant.compiled.functions import Scalar, exp, log, maximum, minimum, sqrt, where
 from plant.components.check_valve import make_up_flow
 from plant.components.oil import ATMOSPHERE
 from plant.eha.circuit import chamber_volumes
@@ -42,6 +42,9 @@ COURSES = ("side_of_play", "play_by_pressure", "play_at_once", "play_sprung")
 CROSSED = COURSES[1:]
 """Parameters that say how far each of the others is followed in place of the first."""
 
+QUICKNESS, QUICKEST = "air_quickness", 2.0 / 7.0
+"""1 - 1/n of the bubbles' exponent n: 0 is isothermal; and the most of it, n = 1.4 [dimensionless]."""
+
 GROWTH = ("leakage_growth", "leakage_bend", "leakage_rise")
 """Parameters of a leakage that changes over the log, in the order of `grown_leakage`."""
 
@@ -67,6 +70,7 @@ class WideFlowParameters(FlowParameters):
     air_softness: float = si(0.0, "Pa", "a of 1/beta(p) = 1/beta_liquid + a/p^2", "fitted")
     air_onset: float = si(-1.0, "1", "when that air gets in, in lengths of the log", "fitted")
     air_width: float = si(0.05, "1", "how long it takes to get in, in lengths of the log", "fitted last")
+    air_quickness: float = si(0.0, "1", "1 - 1/n of bubbles with exponent n: a/p^2 grows with p to that", "fitted last")
     stated_pressure: float = si(1e6, "Pa", "absolute pressure that bulk modulus is stated at", "chosen")
     leakage_growth: float = si(0.0, "1", "growth of leakage over the log, of its value halfway", "fitted")
     leakage_bend: float = si(0.0, "1", "part of that growth which goes with time squared", "fitted")
@@ -89,34 +93,42 @@ def _air(elapsed: Scalar, p: SimpleNamespace) -> Scalar:
     return p.air_softness * minimum(maximum((elapsed - p.air_onset) / p.air_width, 0.0), 1.0)
 
 
-def _bubbles(pressure: Scalar, air: Scalar) -> Scalar:
+def _bubbles(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
     """Return the volume of entrained air over that of its oil [dimensionless]."""
-    return air / maximum(pressure, 0.05 * VAPOUR)
+    above = maximum(pressure, 0.05 * VAPOUR)
+    return air / above * exp(p.air_quickness * log(above / ATMOSPHERE)) if quick else air / above
 
 
-def _oil(pressure: Scalar, p: SimpleNamespace) -> Scalar:
+def _oil(pressure: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
     """Return the tangent bulk modulus of oil alone [Pa], to which by mass its volume is proportional."""
-    return p.bulk_modulus - p.by_mass * (pressure - ATMOSPHERE)
+    return p.bulk_modulus - p.by_mass * (pressure - (p.stated_pressure if quick else ATMOSPHERE))
 
 
-def _stiffness(pressure: Scalar, air: Scalar, p: SimpleNamespace) -> Scalar:
-    """Return the tangent bulk modulus of a chamber [Pa]: liquid, air that softens as 1/p^2, and vapour.
+def _stiffness(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool = False) -> Scalar:
+    """Return the tangent bulk modulus of a chamber [Pa]: liquid, air that softens as 1/p^2 or so, and vapour.
 
     `bulk_modulus` is that at `stated_pressure`, air included; the liquid's where air gets in midway. By mass both are
     of the room that the oil fills, bubbles included.
     """
     above = maximum(pressure, 0.05 * VAPOUR)
-    ratio, bubbles = VAPOUR / above, _bubbles(pressure, air)
+    ratio, bubbles = VAPOUR / above, _bubbles(pressure, air, p, quick=quick)
     short = ratio * ratio
-    before = where(p.air_onset < 0.0, air / p.stated_pressure, 0.0)
-    softer = bubbles / above - before / p.stated_pressure
-    oil = _oil(pressure, p)
+    before = where(p.air_onset < 0.0, _bubbles(p.stated_pressure, air, p, quick=quick), 0.0)
+    slope = 1.0 - p.air_quickness if quick else 1.0
+    softer = slope * (bubbles / above - before / p.stated_pressure)
+    oil = _oil(pressure, p, quick=quick)
     room = 1.0 + p.by_mass * (bubbles - before)
     return oil * room / maximum(1.0 + short * short + softer * oil, STIFFEST)
 
 
 def _rates(
-    state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar, *, turbulent: bool = False
+    state: tuple[Scalar, ...],
+    drives: Any,
+    p: SimpleNamespace,
+    share: Scalar,
+    *,
+    turbulent: bool = False,
+    quick: bool = False,
 ) -> tuple[Scalar, ...]:
     speeds, (read, next_read), (begun, next_begun), (rate, next_rate), *courses, step = drives
     p1, p2, behind, supply = state
@@ -145,11 +157,11 @@ def _rates(
     into_1 = fed_1 - p.drain_share_a * drain * (p1 - supply)
     into_2 = fed_2 - p.drain_share_b * drain * (p2 - supply)
     air = _air(elapsed, p)
-    freed = _bubbles(p2, air) - _bubbles(p1, air)
-    swelling = (p.by_mass * (dp / _oil(p1, p) + freed), p.by_mass * (dp / _oil(p2, p) + freed))
-    at_1, at_2 = port_flows(pumped, leaked, dp, swelling)
-    rise = _stiffness(p1, air, p) * (at_1 - area_1 * velocity + into_1) / volume_1
-    fall = _stiffness(p2, air, p) * (area_2 * velocity - at_2 + into_2) / volume_2
+    freed = _bubbles(p2, air, p, quick=quick) - _bubbles(p1, air, p, quick=quick)
+    swelling_1, swelling_2 = (p.by_mass * (dp / _oil(one, p, quick=quick) + freed) for one in (p1, p2))
+    at_1, at_2 = port_flows(pumped, leaked, dp, (swelling_1, swelling_2))
+    rise = _stiffness(p1, air, p, quick=quick) * (at_1 - area_1 * velocity + into_1) / volume_1
+    fall = _stiffness(p2, air, p, quick=quick) * (area_2 * velocity - at_2 + into_2) / volume_2
     # how far the sensor is behind stays small where its lag is short, which a stiff step resolves
     offset = p.pressure_offset + p.pressure_drift * elapsed
     lagging = rise - fall - (behind + offset) / (p.pressure_lag + SHORTEST_LAG)
@@ -290,8 +302,19 @@ def _turbulent(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share
     return _rates(state, drives, p, share, turbulent=True)
 
 
+def _quick(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
+    return _rates(state, drives, p, share, quick=True)
+
+
+def _turbulent_quick(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
+    return _rates(state, drives, p, share, turbulent=True, quick=True)
+
+
 TURBULENT_FLOW_FORM = replace(WIDE_FLOW_FORM, name="wide_flow_turbulent", rates=_turbulent)
-"""The same with a share of the leakage turbulent. Plain logs, which the wide form is asked of too, pay for no roots."""
+QUICK_FLOW_FORM = replace(WIDE_FLOW_FORM, name="wide_flow_quick", rates=_quick)
+TURBULENT_QUICK_FLOW_FORM = replace(WIDE_FLOW_FORM, name="wide_flow_turbulent_quick", rates=_turbulent_quick)
+"""The same with a share of the leakage turbulent, with `QUICKNESS` of bubbles, and with both. Plain logs, which the
+wide form is asked of too, pay for no roots and no powers."""
 
 LINEAR = {
     "speed_lead": 1e-5,
@@ -307,6 +330,7 @@ LINEAR = {
     "start_level": 1e4,
     "air_softness": 1e2,
     "air_onset": 0.1,
+    QUICKNESS: 0.1,
     "leakage_growth": 1.0,
     "leakage_bend": 1.0,
     "leakage_rise": 1.0,

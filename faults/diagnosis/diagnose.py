@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.eha.bulk_modulus import EstimateOptions
+from estimation.eha.entrained_air import amount_of_air, with_air
 from estimation.eha.estimate import estimated, explained, finding_of, refused, without_numbers
 from estimation.eha.explanation_notes import OUTSIDE, at_pump_speed, of_another_rod, rig_set_right, set_right
 from estimation.eha.result import BulkModulusEstimate
@@ -104,7 +105,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     estimate = estimated(log, rig, EstimateOptions())[1] if seen is None else seen[1]
     found, case = finding_of(log, estimate, rig), _set_right(log, rig, estimate)
     log, rig = case.log, case.rig
-    scores = plain.scores_of(log, rig.parameters)
+    scores = plain.scores_of(log, case.as_a_whole)
     verdict = models_verdict(scores, log.record)
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
     unsure = (*_doubtful_rig(plain.parameters), *estimate.rig_notes)
@@ -137,9 +138,9 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
 class _Case(NamedTuple):
     """A log and its rig, set right by what explains the log.
 
-    Circuits are fitted around ``rig``, which has the oil that was measured where that is no kin of the file's.
-    Severities count from ``healthy``. What is ``strange`` is noted of rig, oil and logger. ``written`` is what the rig
-    file says.
+    Circuits are fitted around ``rig``, which has the oil that was measured where that holds air, or is no kin of the
+    file's. Severities count from ``healthy``. What is ``strange`` is noted of rig, oil and logger. ``written`` is what
+    the rig file says. Nominal models, which know no air, are of the actuator as a whole.
     """
 
     log: CleanLog
@@ -148,6 +149,13 @@ class _Case(NamedTuple):
     written: EhaParameters
     estimate: BulkModulusEstimate
     strange: tuple[Note, ...]
+
+    @property
+    def as_a_whole(self) -> EhaParameters:
+        """The actuator with the bulk modulus of its oil, air included."""
+        if self.healthy.bulk_modulus == self.rig.parameters.bulk_modulus or self.estimate.value is None:
+            return self.healthy
+        return replace(self.healthy, bulk_modulus=self.estimate.value)
 
     @property
     def doubts(self) -> tuple[Note, ...]:
@@ -164,10 +172,12 @@ def _set_right(log: CleanLog, rig: Rig, estimate: BulkModulusEstimate) -> _Case:
         log = set_right(log, estimate.explanation)
         rig = replace(rig, parameters=rig_set_right(rig.parameters, estimate.explanation))
     healthy = rig.parameters
-    if (other := _another_oil(estimate, healthy)) is not None:
+    around = with_air(healthy, estimate.explanation)
+    of_oil = around.bulk_modulus if around is not healthy else estimate.value
+    if (other := _another_oil(of_oil, estimate, healthy)) is not None:
         strange = (*strange, other)
-        rig = replace(rig, parameters=replace(healthy, bulk_modulus=estimate.value))
-    return _Case(log, rig, healthy, written, estimate, strange)
+        around = replace(around, bulk_modulus=of_oil)
+    return _Case(log, replace(rig, parameters=around), healthy, written, estimate, strange)
 
 
 def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tuple[Note, ...]) -> Finding:
@@ -286,14 +296,14 @@ def _healthy_of_the_paper(p: EhaParameters) -> tuple[Note, ...]:
     return (ClassCode.HEALTHY_OF_THE_PAPER.note(),) if another and left else ()
 
 
-def _another_oil(estimate: BulkModulusEstimate, healthy: EhaParameters) -> Note | None:
-    """Return a note where the oil is no kin of the rig's: the circuit is then fitted around what was measured.
+def _another_oil(value: float | None, estimate: BulkModulusEstimate, healthy: EhaParameters) -> Note | None:
+    """Return a note where the oil, without its air, is no kin of the rig's: the circuit is fitted around what it is.
 
     Stiff oil is no fault, and soft oil is told by its severity, the air that would make it so soft.
     """
-    if not estimate.gate.passed or estimate.value is None:
+    if not estimate.gate.passed or value is None:
         return None
-    ratio = estimate.value / healthy.bulk_modulus
+    ratio = value / healthy.bulk_modulus
     if SOFT <= ratio <= 1.0 / SOFT:
         return None
     return (RigCode.OIL_SOFTER if ratio < 1.0 else RigCode.OIL_STIFFER).note(ratio=ratio)
@@ -311,6 +321,8 @@ def _severities(
         laws = scaled_responses(healthy, {}, pressure=pressure)["bulk_modulus"]
         oil = with_total(diagnosis.severity["bulk_modulus"], laws, estimate.spreads)
     found = with_bulk_modulus(diagnosis.severity, oil, actuator_of(healthy))
+    air = amount_of_air(estimate.explanation, estimate.responses.get("bulk_modulus"), estimate.spreads)
+    found = found if air is None else {**found, "entrained_air": air}
     logged = diagnosis.scoreboard.blocks.pressure
     reached = inf if logged is None else float(np.nanmax(np.abs(logged)))
     return with_totals(found, actuator_of(rig.parameters), estimate.spreads, pressure=pressure, reached=reached)

@@ -13,7 +13,15 @@ from estimation.log_checks.channel_names import POSITION
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM, STIFFNESS
 from estimation.models.inner_circuit import BEND
-from estimation.models.wide_flow import COURSES, CROSSED, LINEAR, WIDE_FLOW_FORM, WideFlowParameters
+from estimation.models.wide_flow import (
+    COURSES,
+    CROSSED,
+    LINEAR,
+    QUICKEST,
+    QUICKNESS,
+    WIDE_FLOW_FORM,
+    WideFlowParameters,
+)
 from plant.eha.model import EhaParameters
 from plant.solvers.steps import parameter_names, parameter_row
 
@@ -22,6 +30,9 @@ START_LEVEL = "start_level"
 LEVEL_OPEN = 3.0**-0.5
 """Root mean square of the level at which the lower side begins, over the most that it may be, before a log is seen: it
 is anywhere between none and that [fraction]."""
+
+EVEN = 3.0**-0.5
+"""Standard deviation of what is anywhere between two ends, over half their distance [dimensionless]."""
 
 LEAST_PEAK = 1.0
 """Highest differential pressure taken of a log whose sensor is dead: the logarithm of none is no start [Pa]."""
@@ -66,6 +77,7 @@ def widened(
             **log.presumed,
             **{name: (known[name], std) for name, std in PRESUMED.items()},
             **dict.fromkeys(CROSSED, (0.0, 1.0)),
+            QUICKNESS: (0.5 * QUICKEST, 0.5 * QUICKEST * EVEN / LINEAR[QUICKNESS]),
             START_LEVEL: (0.0, LEVEL_OPEN * shut_in(log) / LINEAR[START_LEVEL]),
         },
     )

@@ -19,7 +19,10 @@ from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relievi
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.wide_flow import (
     LINEAR,
+    QUICK_FLOW_FORM,
+    QUICKNESS,
     TURBULENT_FLOW_FORM,
+    TURBULENT_QUICK_FLOW_FORM,
     WIDE_FLOW_FORM,
 )
 from plant.arrays import Array
@@ -98,7 +101,12 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedP
     known = [name for name in plain.unknowns if name not in held]
     late = {one.late for one in together}
     log = replace(log, timed=tuple(channel for channel in log.timed if channel not in late))
-    form = TURBULENT_FLOW_FORM if set(LEAKAGE_TURBULENT.free) <= set(extra) else WIDE_FLOW_FORM
+    slow, quick = (
+        (TURBULENT_FLOW_FORM, TURBULENT_QUICK_FLOW_FORM)
+        if set(LEAKAGE_TURBULENT.free) <= set(extra)
+        else (WIDE_FLOW_FORM, QUICK_FLOW_FORM)
+    )
+    form = quick if QUICKNESS in extra else slow
     free = tuple(dict.fromkeys((*known, *extra)))
     ridge = Ridge(DELIVERY.free[0], FLOW_BIAS, flow_speed(log)) if DELIVERY.free[0] in free else None
     return FreedProblem(form, log, free, LINEAR, ridge)

@@ -14,8 +14,11 @@ from estimation.fits.hypothesis_search.wide_problem import freed
 from estimation.log_checks.clean import clean_log
 from estimation.models.wide_flow import (
     LAMINAR_BELOW,
+    QUICK_FLOW_FORM,
+    QUICKNESS,
     TURBULENT_AT,
     TURBULENT_FLOW_FORM,
+    TURBULENT_QUICK_FLOW_FORM,
     WIDE_FLOW_FORM,
     turbulent_leakage,
 )
@@ -68,9 +71,12 @@ def test_turbulent_leakage_is_an_orifices_at_high_pressure_and_laminar_at_low() 
     assert low[1] == pytest.approx(low[0], rel=1e-6)
 
 
-def test_only_a_log_that_is_asked_for_a_turbulent_share_pays_for_its_roots() -> None:
+def test_only_a_log_that_is_asked_for_a_turbulent_share_or_an_exponent_pays_for_roots_and_powers() -> None:
     record, *_ = leaking(0.0)
     sound, variances = without_strays(record)
     log = widened(flow_log(sound, RIG, {}, variances), RIG)
-    rates = [freed(log, asked).model.rates for asked in ((LEAKAGE_RISE,), (LEAKAGE_RISE, LEAKAGE_TURBULENT))]
-    assert rates == [WIDE_FLOW_FORM.rates, TURBULENT_FLOW_FORM.rates]
+    asked, turbulent = (LEAKAGE_RISE,), (LEAKAGE_RISE, LEAKAGE_TURBULENT)
+    assert freed(log, asked).model.rates is WIDE_FLOW_FORM.rates
+    assert freed(log, turbulent).model.rates is TURBULENT_FLOW_FORM.rates
+    assert freed(log, asked, QUICKNESS).model.rates is QUICK_FLOW_FORM.rates
+    assert freed(log, turbulent, QUICKNESS).model.rates is TURBULENT_QUICK_FLOW_FORM.rates

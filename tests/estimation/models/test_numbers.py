@@ -138,6 +138,12 @@ def wide_flow_form() -> dict[str, Any]:
         told[name]["stiffness [Pa]"] = [
             wide_flow._stiffness(one, wide_flow._air(0.4, p), p) for one in (2e2, 1e3, 2e4, 1e6)
         ]
+    for name in ("air", "air that is in"):
+        p = SimpleNamespace(**{**base, **WIDE[name], "air_quickness": 0.2, "by_mass": 1.0})
+        told[f"{name}, squeezed quickly"] = {
+            where: list(wide_flow.QUICK_FLOW_FORM.rates((*pressures, 1e4, 4.4e5), drives, p, 0.25))
+            for where, pressures in PRESSURES.items()
+        }
     told["growth"] = [
         wide_flow.grown_leakage(elapsed, *changes)
         for elapsed in (0.0, 0.5, 0.9)

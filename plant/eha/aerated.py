@@ -1,0 +1,37 @@
+"""The gear-pump actuator whose oil holds air: what a log says of its oil, beside what its rig file says of the rest."""
+
+from dataclasses import dataclass, fields
+
+from plant.eha.model import EhaParameters
+from plant.units import si
+
+
+@dataclass(frozen=True, kw_only=True)
+class AeratedParameters(EhaParameters):
+    """Parameters of an actuator, and the air in its oil. Bulk modulus is that of the oil without it.
+
+    The circuit around it (`plant.eha.circuit_parameters.circuit_of`) has that air.
+
+    Examples
+    --------
+    >>> AeratedParameters(air_fraction=0.01).piston_area
+    0.00152
+    """
+
+    air_fraction: float = si(0.0, "1", "entrained air at atmospheric pressure", "a log")
+
+
+def aerated(p: EhaParameters, air_fraction: float, bulk_modulus: float) -> AeratedParameters:
+    """Return an actuator with air in its oil.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+    air_fraction : float
+        Volume of air over that of oil and air, at atmospheric pressure [fraction].
+    bulk_modulus : float
+        Bulk modulus of the oil without air [Pa].
+    """
+    known = {field.name: getattr(p, field.name) for field in fields(EhaParameters)}
+    return AeratedParameters(**known | {"bulk_modulus": bulk_modulus}, air_fraction=air_fraction)

@@ -1,0 +1,68 @@
+"""Air that explains a log: how much there is, the oil without it, and the actuator whose oil holds it."""
+
+import pytest
+
+from estimation.eha.entrained_air import amount_of_air, entrained_air, with_air
+from estimation.fits.hypothesis_search.explanation import Explanation
+from estimation.models.wide_flow import QUICKEST
+from plant.components.oil import ATMOSPHERE
+from plant.eha.aerated import AeratedParameters
+from plant.eha.circuit_parameters import MOST_AIR, circuit_of
+from plant.eha.doubts import Spread
+from plant.eha.model import EhaParameters
+
+RIG = EhaParameters()
+STATED = 1e6
+SHARE, LIQUID = 0.02, 2.5e8
+
+
+def explanation(share: float = SHARE, liquid: float = LIQUID, quickness: float = 0.0, **values: float) -> Explanation:
+    """Return air as a search finds it, in oil that is so stiff without it."""
+    bubbles = share * (ATMOSPHERE / STATED) ** (1.0 - quickness)
+    whole = 1.0 / (1.0 / liquid + (1.0 - quickness) * bubbles / STATED)
+    found = {"air_softness": share * ATMOSPHERE, "bulk_modulus": whole, "air_quickness": quickness} | values
+    told = {name: (value, 0.1 * value) for name, value in found.items()}
+    return Explanation(("air",), told, {}, None, 0, STATED)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("quickness", [0.0, 0.2, QUICKEST])
+def test_oil_without_its_air_is_as_stiff_whatever_the_exponent_of_bubbles(quickness: float) -> None:
+    air = entrained_air(explanation(quickness=quickness))
+    assert air is not None
+    assert air.share == pytest.approx(SHARE)
+    assert air.liquid == pytest.approx(LIQUID)
+
+
+def test_a_circuit_has_isothermal_bubbles_that_yield_as_much_at_the_inner_circuits_pressure() -> None:
+    pressure, found = RIG.accumulator_pressure, explanation(quickness=0.2)
+    air, p = entrained_air(found), with_air(RIG, found)
+    assert air is not None
+    assert isinstance(p, AeratedParameters)
+    share = p.air_fraction / (1.0 - p.air_fraction)
+    assert share * ATMOSPHERE / pressure**2 == pytest.approx(air.compliance_at(pressure))
+    whole = 1.0 / p.bulk_modulus + share * ATMOSPHERE / STATED**2
+    assert whole == pytest.approx(air.compliance)
+    assert circuit_of(p).air_fraction == p.air_fraction
+    assert circuit_of(p).piston_area == RIG.piston_area
+
+
+def test_an_actuator_stays_as_it_is_where_no_oil_holds_such_air() -> None:
+    late = explanation(air_onset=0.4)
+    stiffer_than_any = explanation(bulk_modulus=2.0 * LIQUID, share=0.2)
+    foam = explanation(share=2.0 * MOST_AIR / (1.0 - MOST_AIR))
+    assert entrained_air(late) is None
+    for found in (None, late, stiffer_than_any, foam):
+        assert with_air(RIG, found) is RIG
+
+
+def test_air_is_less_by_as_much_as_bulk_modulus_is_larger_in_a_larger_chamber() -> None:
+    spreads = {"chamber_volume": Spread(0.1, 0.2)}
+    air = amount_of_air(explanation(), {"chamber_volume": 1.0}, spreads)
+    assert air is not None
+    assert air.ci95 is not None
+    assert air.ci95_total is not None
+    value = 100.0 * SHARE
+    assert air.value == pytest.approx(value)
+    below, above = value - air.ci95_total[0], air.ci95_total[1] - value
+    assert below > above > value - air.ci95[0]
+    assert amount_of_air(None, {}, spreads) is None
