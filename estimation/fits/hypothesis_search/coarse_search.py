@@ -1,6 +1,6 @@
 """Coarse search for the optimum of a set of hypotheses, with one model step per sample."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from estimation.fits.hypotheses import LATEST, Hypothesis
 from estimation.fits.hypothesis_search.decimation import decimated
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.wide_log import balanced_by, delayed, usual_values
-from estimation.fits.hypothesis_search.wide_problem import AIR_ONSET, AIR_WIDTH, flow_bounds, freed
+from estimation.fits.hypothesis_search.wide_problem import AIR_ONSET, AIR_WIDTH, flow_bounds, freed, freed_at_end
 from estimation.models.wide_flow import LINEAR
 from plant.arrays import Array
 
@@ -187,14 +187,3 @@ def coarsened(
     """
     row = decimated(delayed(log, delays), every)
     return balanced_by(row, 1.0) if any(one.by_mass for one in together) else row
-
-
-def freed_at_end(together: Iterable[Hypothesis]) -> list[str]:
-    """Return the parameters that a hypothesis frees only at the end of its search; beside another one, from the start.
-
-    Returns
-    -------
-    list of str
-        Parameters of the wide form.
-    """
-    return [name for one in together for name in one.at_end]

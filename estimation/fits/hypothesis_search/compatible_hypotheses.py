@@ -12,13 +12,13 @@ import numpy as np
 from estimation.fits.greybox.descent import descend
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
-from estimation.fits.hypothesis_search.coarse_search import FINEST_DELAY, NEAR, coarsened, freed_at_end
+from estimation.fits.hypothesis_search.coarse_search import FINEST_DELAY, NEAR, coarsened
 from estimation.fits.hypothesis_search.decimation import FEW, SHORT_STEP, cost_over_noise, decimation_for
 from estimation.fits.hypothesis_search.decimation_limit import decimation_limit
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.final_fits import REACHED, UNFINISHED
 from estimation.fits.hypothesis_search.wide_log import usual_values
-from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed, own_starts
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed, freed_at_end, own_starts
 from estimation.models.wide_flow import LINEAR
 
 TOGETHER = 40

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import Hypothesis
-from estimation.fits.hypothesis_search.coarse_search import coarsened, freed_at_end
+from estimation.fits.hypothesis_search.coarse_search import coarsened
 from estimation.fits.hypothesis_search.decimation import cost_over_noise
 from estimation.fits.hypothesis_search.wide_log import usual_values
-from estimation.fits.hypothesis_search.wide_problem import freed
+from estimation.fits.hypothesis_search.wide_problem import freed, freed_at_end
 
 MOVED, MOVED_LEAST = 0.15, 0.3
 """Share of what is left, and least of it over the noise, by which fewer samples may leave more or less [dimensionless];

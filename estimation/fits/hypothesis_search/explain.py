@@ -193,8 +193,12 @@ def _alone(
 
 
 def _promising_enough(asked: Sequence[Hypothesis], gains: Mapping[str, float], needed: float) -> Sequence[Hypothesis]:
-    """Return the hypotheses that may bring a gain, and those of which slopes say nothing."""
-    return [one for one in asked if one.far or one.beside or TRUSTED * gains[one.name] >= needed]
+    """Return the hypotheses that may bring a gain, and those of which slopes say nothing, or too little."""
+
+    def promises(one: Hypothesis) -> bool:
+        return one.far or bool(one.beside) or one.underrated or TRUSTED * gains[one.name] >= needed
+
+    return [one for one in asked if promises(one)]
 
 
 def _paired(

@@ -9,11 +9,11 @@ from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.spared_steps import LAST, spared
-from estimation.fits.hypothesis_search.coarse_search import FINEST_DELAY, NEAR, coarsened, descended, freed_at_end
+from estimation.fits.hypothesis_search.coarse_search import FINEST_DELAY, NEAR, coarsened, descended
 from estimation.fits.hypothesis_search.decimation import FEW, cost_over_noise
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.wide_log import balanced_by, balances_mass, delayed, usual_values
-from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed, freed_at_end
 from estimation.models.flow import STIFFNESS
 from plant.arrays import Array
 

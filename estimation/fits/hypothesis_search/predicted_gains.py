@@ -13,7 +13,7 @@ from estimation.fits.hypotheses import Hypothesis
 from estimation.fits.hypothesis_search.air_entry import likeliest_entry
 from estimation.fits.hypothesis_search.leakage_step import likeliest_step
 from estimation.fits.hypothesis_search.wide_log import balanced_by, usual_values, widened
-from estimation.fits.hypothesis_search.wide_problem import freed
+from estimation.fits.hypothesis_search.wide_problem import freed, freed_at_end
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
@@ -160,12 +160,13 @@ def _promises(
     slopes: Mapping[str, Array] = MappingProxyType({}),
 ) -> list[PredictedGain]:
     """Return the predicted gain of each hypothesis beside those accepted, from one evaluation."""
-    problem = freed(log, (*together, *(replace(one, instead=()) for one in asked)))
+    last = freed_at_end(together)
+    problem = freed(log, (*together, *(replace(one, instead=()) for one in asked)), *last)
     theta = problem.model.theta({**usual_values(log), **found})
     point = problem.at_beside(theta, slopes) if slopes else problem.at(theta)
     # an unknown at its bound promises what only the hypothesis in its place can keep
     held = {name for one in asked for name in one.instead}
-    own = [name for name in freed(log, together).model.unknowns if name not in held]
+    own = [name for name in freed(log, together, *last).model.unknowns if name not in held]
 
     def step(names: Sequence[str]) -> tuple[float, Array, Array]:
         places = [problem.model.unknowns.index(name) for name in names]

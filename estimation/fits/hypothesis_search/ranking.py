@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.hypothesis_search.coarse_search import coarsened, freed_at_end, search_coarsely
+from estimation.fits.hypothesis_search.coarse_search import coarsened, search_coarsely
 from estimation.fits.hypothesis_search.decimation import NO_DECIMATION, Decimation, cost_over_noise
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.final_fits import CLOSE, LITTLE, REACHED, UNFINISHED, final_fit, is_hopeless
 from estimation.fits.hypothesis_search.screening import NEARLY, screen
 from estimation.fits.hypothesis_search.wide_log import usual_values
-from estimation.fits.hypothesis_search.wide_problem import freed
+from estimation.fits.hypothesis_search.wide_problem import freed, freed_at_end
 
 FINALISTS, CARRIED = 3, 2
 """Hypotheses that are carried on, and starts of each."""

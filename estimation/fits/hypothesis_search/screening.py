@@ -10,10 +10,10 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.parallel_descents import Way, descend_in_turn
 from estimation.fits.hypotheses import DELIVERY, Hypothesis
-from estimation.fits.hypothesis_search.coarse_search import NEAR, SLIGHT, coarsened, freed_at_end
+from estimation.fits.hypothesis_search.coarse_search import NEAR, SLIGHT, coarsened
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.wide_log import usual_values
-from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed, own_starts, worn_start
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed, freed_at_end, own_starts, worn_start
 
 SCREENING = 7
 """Evaluations of the model for a start [count]."""

@@ -1,6 +1,6 @@
 """The least-squares problem of a log under hypotheses, its starts and its bounds."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -110,6 +110,17 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedP
     free = tuple(dict.fromkeys((*known, *extra)))
     ridge = Ridge(DELIVERY.free[0], FLOW_BIAS, flow_speed(log)) if DELIVERY.free[0] in free else None
     return FreedProblem(form, log, free, LINEAR, ridge)
+
+
+def freed_at_end(together: Iterable[Hypothesis]) -> list[str]:
+    """Return the parameters that a hypothesis frees only at the end of its search; beside another one, from the start.
+
+    Returns
+    -------
+    list of str
+        Parameters of the wide form.
+    """
+    return [name for one in together for name in one.at_end]
 
 
 def flow_speed(log: GreyBoxLog) -> float:
