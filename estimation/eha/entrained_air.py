@@ -38,7 +38,18 @@ class EntrainedAir(NamedTuple):
     stated: float
 
     def compliance_at(self, pressure: float) -> float:
-        """Return what the air alone adds to the compliance of oil, of a unit of volume, at a pressure [1/Pa]."""
+        """Return what the air alone adds to the compliance of oil.
+
+        Parameters
+        ----------
+        pressure : float
+            Absolute [Pa].
+
+        Returns
+        -------
+        float
+            Of a unit of oil [1/Pa].
+        """
         bubbles = self.share * (ATMOSPHERE / pressure) ** (1.0 - self.quickness)
         return bubbles * (1.0 - self.quickness) / pressure
 
@@ -49,7 +60,13 @@ class EntrainedAir(NamedTuple):
         return 1.0 / left if left else 0.0
 
     def isothermal(self, pressure: float) -> "EntrainedAir":
-        """Return isothermal air that yields as much at a pressure [Pa], in oil that is as stiff as a whole."""
+        """Return isothermal air that yields as much at a pressure, in oil that is as stiff as a whole.
+
+        Parameters
+        ----------
+        pressure : float
+            Absolute [Pa].
+        """
         share = self.compliance_at(pressure) * pressure**2 / ATMOSPHERE
         return self._replace(share=share, quickness=0.0)
 

@@ -45,6 +45,7 @@ from estimation.fits.hypothesis_search.wide_log import (
     widened,
 )
 from estimation.fits.hypothesis_search.wide_problem import freed, own_starts
+from estimation.models.flow import STIFFNESS
 from estimation.models.wide_flow import GROWTH, grown_leakage
 from plant.eha.model import EhaParameters
 
@@ -332,10 +333,13 @@ def _begun_again(log: GreyBoxLog, first: Trial) -> Mapping[str, float]:
 
 
 def _delivery_open(log: GreyBoxLog, best: Trial) -> PredictedGain:
-    """Return the predicted gain of another pump delivery beside an explanation of a log; see `Explanation`."""
+    """Return the predicted gain of another pump delivery beside an explanation of a log, in its balance."""
     if DELIVERY.free[0] in best.values:
         return NO_GAIN
-    return predicted_gain_beside(delayed(log, best.delays), best.together, best.values, DELIVERY)
+    row, more = delayed(log, best.delays), (STIFFNESS,) if STIFFNESS in best.values else ()
+    if not any(STIFFNESS in one.beside for one in best.together):  # else it is freed in either balance
+        row = balanced_by(row, float(bool(more)))
+    return predicted_gain_beside(row, best.together, best.values, DELIVERY, *more)
 
 
 def _distinct(tried: Iterable[Trial]) -> list[Trial]:

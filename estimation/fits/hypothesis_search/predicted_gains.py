@@ -103,7 +103,7 @@ def predicted_gains(
 
 
 def predicted_gain_beside(
-    log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], one: Hypothesis
+    log: GreyBoxLog, together: tuple[Hypothesis, ...], found: Mapping[str, float], one: Hypothesis, *more: str
 ) -> PredictedGain:
     """Return the predicted gain of one more hypothesis beside those accepted.
 
@@ -117,8 +117,10 @@ def predicted_gain_beside(
         What the fit under them found [SI].
     one : Hypothesis
         What is asked.
+    *more : str
+        What else that fit freed.
     """
-    return _promises(log, together, found, (one,))[0]
+    return _promises(log, together, found, (one,), more=more)[0]
 
 
 def by_predicted_gain(
@@ -158,9 +160,10 @@ def _promises(
     found: Mapping[str, float],
     asked: Sequence[Hypothesis],
     slopes: Mapping[str, Array] = MappingProxyType({}),
+    more: Sequence[str] = (),
 ) -> list[PredictedGain]:
     """Return the predicted gain of each hypothesis beside those accepted, from one evaluation."""
-    last = freed_at_end(together)
+    last = *freed_at_end(together), *more
     problem = freed(log, (*together, *(replace(one, instead=()) for one in asked)), *last)
     theta = problem.model.theta({**usual_values(log), **found})
     point = problem.at_beside(theta, slopes) if slopes else problem.at(theta)

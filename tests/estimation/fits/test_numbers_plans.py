@@ -146,7 +146,7 @@ def plan_of_explanations() -> dict[str, Any]:
         "one is far better": lambda k: 1000.0 - 900.0 * (k % 7 == 0),
     }
 
-    def promised(_: Any, __: Any, ___: Any, given: Sequence[Any]) -> list[Any]:
+    def promised(_: Any, __: Any, ___: Any, given: Sequence[Any], **_more: object) -> list[Any]:
         return promises[: len(given)]
 
     def concluded(_: Any, point: Point, **_told: bool) -> Any:

@@ -1,12 +1,19 @@
 """What is tried first, by what the slopes promise."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox import freed_problem
-from estimation.fits.hypotheses import DELIVERY, MAKEUP_BLOCKED, MAY_HIDE, OFFSET
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypotheses import AIR, DELIVERY, MAKEUP_BLOCKED, MAY_HIDE, OFFSET
+from estimation.fits.hypothesis_search import explain, predicted_gains
 from estimation.fits.hypothesis_search.predicted_gains import by_predicted_gain, predicted_gain, predicted_gain_beside
+from estimation.fits.hypothesis_search.wide_log import balances_mass
+from estimation.fits.hypothesis_search.wide_problem import freed
 from estimation.models.flow import STIFFNESS
+from estimation.models.wide_flow import QUICK_FLOW_FORM, QUICKNESS
 from tests.estimation.fits.short_logs import PAPER, at_one_speed, log, lost_in_bias, seen, wide
 
 FOUND = {**flow_starts(PAPER, PAPER.bulk_modulus)[2], STIFFNESS: 3e7, "case_leakage": 4e-13}
@@ -33,6 +40,46 @@ def test_what_is_taken_already_leaves_less_to_tell() -> None:
     known = {**FOUND, "pressure_offset": 1e3}
     alone, beside = (predicted_gain_beside(wide(), taken, known, DELIVERY) for taken in ((), (OFFSET,)))
     assert beside.deviation > alone.deviation
+
+
+def test_what_is_promised_beside_air_is_promised_with_bubbles_as_they_were_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With isothermal ones beside a fit of others, a sound pump was worn at 99 %, for a gain that was not there."""
+    asked = list[object]()
+
+    def noted(*given: object) -> object:
+        asked.append(problem := freed(*given))  # type: ignore[arg-type]
+        return problem
+
+    monkeypatch.setattr(predicted_gains, "freed", noted)
+    predicted_gain_beside(wide(), (AIR,), {**FOUND, "air_softness": 2e3, QUICKNESS: 0.2}, DELIVERY)
+    assert all(one.model.rates is QUICK_FLOW_FORM.rates for one in asked)  # type: ignore[attr-defined]
+    assert all(QUICKNESS in one.model.unknowns for one in asked)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("by_mass", [True, False])
+def test_what_another_delivery_promises_is_asked_in_the_balance_of_the_fit(
+    by_mass: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Asked in the other one, a sound pump promised a gain of 30,000 where a fit left the sensors' noise."""
+    asked = list[tuple[bool, tuple[object, ...]]]()
+
+    def noted(row: GreyBoxLog, *given: object) -> object:
+        asked.append((balances_mass(row), given[3:]))
+        return predicted_gains.NO_GAIN
+
+    monkeypatch.setattr(explain, "predicted_gain_beside", noted)
+    values = {**FOUND, "air_softness": 2e3}
+    if not by_mass:
+        values = {name: value for name, value in values.items() if name != STIFFNESS}
+    explain._delivery_open(wide(), SimpleNamespace(together=(AIR,), values=values, delays={}))  # type: ignore[arg-type]
+    assert asked == [(by_mass, (STIFFNESS,) if by_mass else ())]
+
+
+def test_air_is_tried_whatever_its_slopes_promise() -> None:
+    gains = {AIR.name: 0.0, OFFSET.name: 0.0}
+    assert explain._promising_enough([AIR, OFFSET], gains, 10.0) == [AIR]
 
 
 def test_what_a_worn_pump_at_one_speed_promises_does_not_hang_on_the_step_of_its_slopes(
