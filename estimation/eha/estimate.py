@@ -102,7 +102,7 @@ def finding_of(log: CleanLog, found: BulkModulusEstimate, rig: Rig) -> Finding:
         notes=(
             *left_out(log, found),
             *absences(found),
-            *without_numbers(explained(found, rig.parameters), found.outcome),
+            *explained(found, rig.parameters),
             *another_oil(found.value if found.gate.passed else None, rig.parameters),
             *found.rig_notes,
         ),
@@ -134,21 +134,6 @@ def explained(found: BulkModulusEstimate, parameters: EhaParameters) -> tuple[No
     """
     strange = () if found.explanation is None else notes_of(found.explanation, parameters)
     return (*strange, *(note for note in found.remarks if note.code not in NOT_TOLD))
-
-
-def without_numbers(notes: tuple[Note, ...], outcome: Outcome) -> tuple[Note, ...]:
-    """Return notes without what a worn pump would do to leakage and bulk modulus, where a log determines neither.
-
-    Parameters
-    ----------
-    notes : tuple of Note
-        What is said of the fit.
-    outcome : Outcome
-        Of the verb that says it.
-    """
-    if outcome is not Outcome.NOT_OBSERVABLE:
-        return notes
-    return tuple(note for note in notes if note.code is not RigCode.WEAR_NOT_EXCLUDED)
 
 
 def absences(found: BulkModulusEstimate) -> tuple[Note, ...]:

@@ -165,9 +165,10 @@ def html_table(frame: pd.DataFrame, columns: Columns, caption: str, *, cards: bo
 
 def _worded(cell: Markup) -> Markup:
     """Return a cell of a column of words, which is no narrow one."""
-    if ' class="' in cell.split(">", 1)[0]:
-        return Markup(cell.replace(' class="', ' class="words ', 1))  # noqa: S704 - it is markup already
-    return Markup(cell.replace("<td", '<td class="words"', 1))  # noqa: S704
+    text = str(cell)  # markup would escape what it is given
+    if ' class="' in text.split(">", 1)[0]:
+        return Markup(text.replace(' class="', ' class="words ', 1))  # noqa: S704 - it is markup already
+    return Markup(text.replace("<td", '<td class="words"', 1))  # noqa: S704
 
 
 def folded_tables(frame: pd.DataFrame, columns: Columns, by: str, count: str) -> Markup:

@@ -14,7 +14,7 @@ import numpy as np
 
 from estimation.eha.bulk_modulus import EstimateOptions
 from estimation.eha.entrained_air import amount_of_air, with_air
-from estimation.eha.estimate import estimated, explained, finding_of, refused, without_numbers
+from estimation.eha.estimate import estimated, explained, finding_of, refused
 from estimation.eha.explanation_notes import OUTSIDE, at_pump_speed, of_another_rod, rig_set_right, set_right
 from estimation.eha.result import BulkModulusEstimate
 from estimation.eha.rig_share import SOFT, scaled_responses, with_total
@@ -109,7 +109,9 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     verdict = models_verdict(scores, log.record)
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
     unsure = (*_doubtful_rig(plain.parameters), *estimate.rig_notes)
-    strange = without_numbers(case.strange, verdict.outcome)
+    strange = case.strange
+    if verdict.outcome is Outcome.NOT_OBSERVABLE:  # a worn pump would change numbers that the log does not determine
+        strange = tuple(note for note in strange if note.code is not RigCode.WEAR_NOT_EXCLUDED)
     notes = (*log.left_out, *strange, *verdict.notes, *absent, *unsure)
     found = replace(found, outcome=verdict.outcome, notes=notes, channels=scores.channels)
     if mistakes := log.mistakes or tuple(one for one in estimate.gate.reasons if isinstance(one.code, ChannelCode)):
