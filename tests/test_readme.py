@@ -1,5 +1,6 @@
 """README and the page of verbs run as printed, print what they quote, and quote no number that is not measured."""
 
+import json
 import re
 import shlex
 import subprocess
@@ -76,6 +77,18 @@ def test_the_readme_quotes_what_its_five_commands_print(done: Callable[[Path], l
     ]
     for (command, text), one in zip(shown, done(README), strict=True):
         assert words(text) in words(one.stdout + one.stderr), command
+
+
+@pytest.mark.parametrize("page", ["README.md", *(f"docs/{name}.md" for name in ("identification", "limits", "severities"))])
+def test_a_command_within_a_sentence_names_a_verb_and_options_that_there_are(page: str) -> None:
+    options = json.loads((ROOT / "docs" / "interface.json").read_text(encoding="utf-8"))["options"]
+    told = re.findall(r"`hydrostate ([^`]+)`", (ROOT / page).read_text(encoding="utf-8"))
+    assert told
+    for line in told:
+        said = line.split()
+        verb = next((verb for verb in (" ".join(said[:2]), said[0]) if verb in options), None)
+        assert verb is not None, line
+        assert {word.partition("=")[0] for word in said if word.startswith("--")} <= set(options[verb]), line
 
 
 def test_the_readmes_script_runs_as_printed(
