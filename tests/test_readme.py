@@ -79,7 +79,9 @@ def test_the_readme_quotes_what_its_five_commands_print(done: Callable[[Path], l
         assert words(text) in words(one.stdout + one.stderr), command
 
 
-@pytest.mark.parametrize("page", ["README.md", *(f"docs/{name}.md" for name in ("identification", "limits", "severities"))])
+@pytest.mark.parametrize(
+    "page", ["README.md", *(f"docs/{name}.md" for name in ("identification", "limits", "severities"))]
+)
 def test_a_command_within_a_sentence_names_a_verb_and_options_that_there_are(page: str) -> None:
     options = json.loads((ROOT / "docs" / "interface.json").read_text(encoding="utf-8"))["options"]
     told = re.findall(r"`hydrostate ([^`]+)`", (ROOT / page).read_text(encoding="utf-8"))

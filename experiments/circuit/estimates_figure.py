@@ -45,7 +45,7 @@ def draw_bulk_modulus(tables: Mapping[str, pd.DataFrame]) -> Figure:
         heights = condition_rows(axis, list(dict.fromkeys(estimates["condition"])))
         rows = estimates[estimates["form"] == form]
         first = rows.iloc[0]
-        pressure = "dp logged" if first["pressure_logged"] else "dp not logged"
+        pressure = "with pressure" if first["pressure_logged"] else "no pressure"
         axis.set(title=f"{form} form, {first['drive']}, {pressure}", xlabel="effective bulk modulus [MPa]")
         _estimates_of(axis, rows, heights, FORM_COLOURS[form])
         truth = float(first["truth_pa"]) / MEGA
@@ -66,5 +66,11 @@ def _estimates_of(axis: Axes, rows: pd.DataFrame, heights: Mapping[str, float], 
         values = found.dropna(subset=["value_pa"])
         if values.empty:
             words, place = in_words(str(found["outcome"].iloc[0])), ("axes fraction", "data")
-            axis.annotate(words, (0.5, height), xycoords=place, ha="center", va="center", color=GREY, fontsize=8)
+            look = {"ha": "center", "va": "center", "color": GREY, "fontsize": 8}
+            ground = {
+                "facecolor": "white",
+                "edgecolor": "none",
+                "pad": 1.5,
+            }  # the line of the truth ends before the words
+            axis.annotate(words, (0.5, height), xycoords=place, bbox=ground, **look)
         draw_intervals(axis, values, height, 3.0, lambda _: colour)

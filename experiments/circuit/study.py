@@ -83,10 +83,10 @@ _REFIT = (
     "level",
     Column("coefficient", words=spaced),
     "published",
-    "went_in",
+    Column("went_in", "simulated with"),
     "refitted",
     Column("low", "95 % interval", of_row=interval("low", "high")),
-    Column("covered", "covers"),
+    Column("covered", "interval covers"),
 )
 
 COLUMNS: Mapping[str, Columns] = {
@@ -96,7 +96,7 @@ COLUMNS: Mapping[str, Columns] = {
         Column("value", "circuit"),
         Column("expected", "implied by Tables 2 to 4"),
         "published",
-        "unit",
+        Column("unit", words=lambda unit: "ratio" if unit == "1" else unit),
     ),
     "figure 3 velocity against leakage throttle": (
         Column("throttle_a_v", "throttle A"),
@@ -113,10 +113,10 @@ COLUMNS: Mapping[str, Columns] = {
     "figure 11 modelled chambers": (
         CONDITION,
         Column("value_pa", "bulk modulus", "MPa", 1e-6, 5),
-        Column("std_pa", "its deviation", "MPa", 1e-6, 3),
+        Column("std_pa", "standard deviation", "MPa", 1e-6, 3),
         Column("error_percent", "error", "%", digits=2),
         Column("z", "error over deviation", digits=2),
-        Column("gate_passed", "gate passes"),
+        Column("gate_passed", "passes the check"),
     ),
 }
 

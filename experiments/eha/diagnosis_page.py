@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from experiments.eha.plain_verdict import causes, of_another_size, sureness, verdict, what_to_do
+from experiments.eha.plain_verdict import causes, of_another_size, reasons_apart, sureness, verdict, what_to_do
 from experiments.eha.verdict_words import SHOWN, amount, library_sentence
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.page.charts import Charts
@@ -48,6 +48,7 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "title": verdict(result),
         "to_do": what_to_do(result),
         "sureness": sureness(result),
+        "reasons": reasons_apart(result),
         "another_size": of_another_size(result),
         "library": library_sentence(result),
         "not_told": [sentence(said) for said in result["not_told"]],
@@ -59,7 +60,9 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "rows": severity_rows(told, found.healthy, found.evidence.diagnosis.limits, SHOWN),
         "amounts": {name: amount(one).replace("-", MINUS) for name, one in result["severity"].items()},
         "not_determined": [
-            SHOWN[name] for name, one in found.severities.items() if one.value is None or name in unseen
+            SHOWN[name].removesuffix(", at most")
+            for name, one in found.severities.items()
+            if one.value is None or name in unseen
         ],
         "changed": found.since is not None,
         "charts": {

@@ -180,9 +180,10 @@ def sureness(result: Mapping[str, Any]) -> str:
         Sentences.
     """
     if result["unknown"]:
-        reasons = "; ".join(causes(result))
+        told = causes(result)
+        reasons = f": {told[0]}." if len(told) == 1 else ":" if told else "."
         if of_another_size(result) and any(one["code"] == BESIDE for one in result["notes"]):
-            return sentence(reasons)
+            return sentence(causes(result)[0])
         if of_another_size(result):
             sizes = " and ".join(f"{name} {size:g}" for name, size in _raised(result).items())
             return (
@@ -190,9 +191,21 @@ def sureness(result: Mapping[str, Any]) -> str:
                 f"{sizes}, where 1 is minor and 2 is major."
             )
         if _named(result):
-            return f"This is none of the nine conditions, so do not rely on the numbers below: {reasons}."
-        return f"Do not rely on anything on this page: {reasons}."
+            return f"This is none of the nine conditions, so do not rely on the numbers below{reasons}"
+        return f"Do not rely on anything on this page{reasons}"
     return " ".join(one for one in (how_sure(result), _cost(result), _since(result)) if one)
+
+
+def reasons_apart(result: Mapping[str, Any]) -> list[str]:
+    """Return the reasons against a verdict as sentences, where there are several; one stands in `sureness`.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of a diagnosis.
+    """
+    told = causes(result) if result["unknown"] and not of_another_size(result) else []
+    return [sentence(one) for one in told] if len(told) > 1 else []
 
 
 def causes(result: Mapping[str, Any]) -> list[str]:

@@ -32,6 +32,9 @@ ALIKE = 0.99
 """Share of the likeliest condition's probability from which another is as likely [fraction]: the log tells nothing that
 would set them apart, and calibrated probabilities are not known better."""
 
+NEXT_LINE = "\n" + 12 * " "
+"""Between reasons, and between pieces of advice: each has its line, below the first."""
+
 NEAREST = "UNKNOWN: none of the nine conditions fits; the nearest is "
 """How a verdict begins that something speaks against."""
 
@@ -45,12 +48,18 @@ def verdict_lines(result: Mapping[str, Any]) -> list[str]:
         What it is, the same for a mechanic, how bad in leakage, in friction and oil, whether it is reliable, what to
         do next, and what the library of transfer functions says where it says anything.
     """
-    from experiments.eha.plain_verdict import verdict  # here, since an estimate needs nothing of it
+    from experiments.eha.plain_verdict import of_another_size, verdict  # here, since an estimate needs nothing of it
 
     library = library_sentence(result)
+    doubted = result["unknown"] and not of_another_size(result)
     return [
         f"{visible_name(result['file'])}: {headline(result)}",
         f"  verdict   {verdict(result)}",
+        *(
+            ["  numbers   do not rely on them: they are those of the nearest model, which does not fit the log"]
+            if doubted
+            else []
+        ),
         f"  leakage   {amounts(result, ('leakage_flow', 'velocity_lost'))}",
         f"  friction  {amounts(result, ('added_friction', 'pressure_rise'))}",
         f"  oil       {amounts(result, ('bulk_modulus',))}",
@@ -214,16 +223,16 @@ def believed(result: Mapping[str, Any]) -> str:
     if result["unknown"]:
         told = causes(result)
         more = len(result["reasons"]) - len(told)
-        return f"no: {'; '.join(told)}{f'; {more} more in --json, which may follow from this' if more else ''}"
-    return "; ".join(["yes: a circuit in one of the nine conditions reproduces the log", *result["not_told"]])
+        return f"no: {NEXT_LINE.join(told)}{f'; {more} more in --json, which may follow from this' if more else ''}"
+    return NEXT_LINE.join(["yes: a circuit in one of the nine conditions reproduces the log", *result["not_told"]])
 
 
 def next_step(result: Mapping[str, Any]) -> str:
-    """Return what to do next, as sentences, the most important first."""
+    """Return what to do next, a sentence a line, the most important first."""
     from experiments.eha.plain_verdict import of_another_size, work_on
 
     work, advice = work_on(result), [sentence(one) for one in result["advice"]]
-    return " ".join([*advice, *work] if of_another_size(result) else [*work, *advice])
+    return NEXT_LINE.join([*advice, *work] if of_another_size(result) else [*work, *advice])
 
 
 def library_sentence(result: Mapping[str, Any]) -> str:

@@ -1,5 +1,7 @@
 """The nine-condition library: its models beside Table 6, four structures compared, and the clock of the test."""
 
+import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
@@ -8,6 +10,7 @@ from experiments.page.figure_files import Drawings
 from experiments.page.frames import Tables
 from experiments.page.style import (
     BESIDE_CONDITIONS,
+    BLACK,
     BLUE,
     GREEN,
     GREY,
@@ -35,6 +38,9 @@ COMPARED = {
     "weight_above_percent": ("criterion's weight above 25 Hz", "share [%]"),
 }
 """Panels of the comparison: column, title and axis."""
+
+CLOCK_MARKS = "os^Dvp<P*X"
+"""A mark for each test, which colour alone does not tell apart."""
 
 
 def _draw_structures(tables: Tables) -> Figure:
@@ -79,8 +85,8 @@ def _draw_orders(tables: Tables) -> Figure:
     Two panels, one row a condition.
     """
     orders = tables["orders"]
-    margins = Margins(left=BESIDE_CONDITIONS.left, top=0.65)
-    figure, (values, fits) = panels("What the data say of the order", 1, 2, 4.2, margins, sharey=True)
+    margins = Margins(left=BESIDE_CONDITIONS.left, top=0.65, bottom=0.8)
+    figure, (values, fits) = panels("What the data say of the order", 1, 2, 4.5, margins, sharey=True)
     level = condition_levels(values, orders["condition"])
     condition_levels(fits, orders["condition"])
     for k, (colour, mark) in enumerate(list(STRUCTURE_MARKS.values())[:3], 1):
@@ -95,18 +101,24 @@ def _draw_orders(tables: Tables) -> Figure:
     fits.axvline(0.0, color=GREY, linewidth=1.0, linestyle=(0, (4, 3)), zorder=0)
     fits.set(title="output error of higher order than first", xlabel="fit gained over first order [percentage points]")
     for axis in (values, fits):
-        axis.legend(loc="best")
+        axis.legend(loc="upper right", bbox_to_anchor=(1.0, -0.16), ncols=3, handletextpad=0.1)
     return figure
 
 
 def _draw_clocks(tables: Tables) -> Figure:
     """Draw how certain each test's clock makes the gain, by frequency."""
-    clocks = tables["clocks"].sort_values("at_25_hz")
+    tests = tables["clocks"]
+    switched = tests[tests["input"].str.endswith(" ms")]
+    switched = switched.iloc[np.argsort([float(name.split()[0]) for name in switched["input"]])]
+    clocks = pd.concat([switched, tests.drop(switched.index)])
     columns = [name for name in clocks.columns if name.startswith("at_")]
     frequencies = [float(name.split("_")[1]) for name in columns]
     figure, (axis,) = panels("Predicted deviation of the gain after one test", 1, 1, 3.6, Margins(left=0.9, right=2.2))
-    for _, row, colour in shaded(enumerate(clocks.to_dict("records")), 0.9):
-        axis.plot(frequencies, [100.0 * row[name] for name in columns], "o-", color=colour, label=row["input"])
+    shades = [colour for _, _, colour in shaded(enumerate(switched["input"]))]
+    looks = [*((colour, "-") for colour in shades), *((BLACK, ":") for _ in range(len(clocks) - len(shades)))]
+    for row, (colour, line), mark in zip(clocks.to_dict("records"), looks, CLOCK_MARKS, strict=False):
+        gain = [100.0 * row[name] for name in columns]
+        axis.plot(frequencies, gain, mark + line, color=colour, label=row["input"], markersize=5)
     axis.set(yscale="log")
     axis.set_yticks([0.02, 0.05, 0.1, 0.2], ["0.02", "0.05", "0.1", "0.2"])
     axis.yaxis.set_minor_formatter(NullFormatter())

@@ -25,24 +25,23 @@ def structure_sentences(found: pd.DataFrame) -> tuple[str, str, str]:
     most = max(rows["behind_percent"].max() for rows in others)
     ahead = sum(int((rows["one_step_percent"] > ours["one_step_percent"]).sum()) for rows in others)
     weight = {name: rows["weight_above_percent"].mean() for name, rows in of.items()}
-    rivals = ", ".join(f"{weight[name]:.0f} % of that of {name}" for name in of if name != "output-error")
+    rivals = ", ".join(f"{name} has {weight[name]:.0f} %" for name in of if name != "output-error")
     gain = 100.0 * (of["ARX"]["dc_gain"] / ours["dc_gain"]).min()
     return (
         f"Running free, output error is best in {int(ours['best'].sum())} of {len(ours)} conditions and never more "
         f"than {behind['output-error'].max():.2g} percentage points behind the best. ARX is {behind['ARX'].min():.2g} "
-        f"to {behind['ARX'].max():.2g} points behind; ARMAX and Box-Jenkins are {median:.2g} behind in the median "
-        f"condition and {most:.2g} at most.",
-        f"One step ahead it is the other way round: these two predict the next sample better than output error in "
-        f"{ahead} of {2 * len(ours)} cases, because they lean on the last samples measured. A library is run on a log "
-        "to see which condition explains it, and has no measured output to lean on.",
-        "Why: output error minimises the error of just that free run. The others minimise the error one step ahead, in "
-        "which an error of the transfer function counts by the input's power over that of the noise model. What a "
-        "linear model leaves of a rubbing piston is slow, so the weight moves to high frequencies: above "
-        f"{PAPER_BANDWIDTH:g} Hz lie {weight['output-error']:.0f} % of output error's criterion, which is the drive's "
-        f"share of power there, and {rivals}, on average. Where the plant is nearly linear all weights lead to nearly "
-        "one model; where friction dominates they do not. ARX cannot choose its weight: its noise must pass through "
-        f"the plant's poles. The sensor's does not, and the fitted gain falls to {gain:.0f} % of output error's "
-        "at worst.",
+        f"to {behind['ARX'].max():.2g} points behind; ARMAX and Box-Jenkins are {median:.2g} points behind in the "
+        f"median condition and {most:.2g} points at most.",
+        f"One step ahead, ARMAX and Box-Jenkins predict better than output error in {ahead} of {2 * len(ours)} cases, "
+        "because they use the last measured samples. A library runs free on a log, so it has no measured output "
+        "to use.",
+        "Why: output error minimises the error of the free run. The others minimise the error one step ahead, which "
+        "weighs each frequency by the input's power over that of the noise model. Friction leaves a slow residual, "
+        f"which the noise model takes up, so the weight moves to high frequencies. Above {PAPER_BANDWIDTH:g} Hz, "
+        f"output error has {weight['output-error']:.0f} % of its weight on average, as the drive has of its power; {rivals}. "
+        "Weights hardly matter for a nearly linear plant, and much under friction. ARX assumes that noise passes "
+        "through the plant's poles, but sensor noise does not: the fitted gain falls to as little as "
+        f"{gain:.0f} % of output error's.",
     )
 
 
@@ -67,10 +66,9 @@ def order_sentences(found: pd.DataFrame) -> tuple[str, str]:
         f"The paper finds order {PAPER_ORDER}, the authors' earlier work order {EARLIER_ORDER}. Here the singular "
         f"values that stand above their noise floor say order {by_values}; the second value reaches {second.min():.2g} "
         f"to {second.max():.2g} of the floor. BIC asks for {by_bic}, but a second pole is worth {gained.min():.2g} to "
-        f"{gained.max():.2g} percentage points of fit: what is missing is not a pole but friction and the relief "
-        "valve, which no linear order describes, and with enough samples BIC buys poles for them. Around a mean "
-        f"the library keeps what BIC prefers among orders 1 and 2 whose poles and gain the data determine, order "
-        f"{kept}.",
+        f"{gained.max():.2g} percentage points of fit: BIC adds poles for friction and the relief valve, which "
+        "no linear order describes. Of orders 1 and 2, the library keeps the one that BIC prefers among those whose "
+        f"poles and gain the data determine: order {kept}.",
         f"The gain is 3 dB down at {free.min():.1f} to {free.max():.1f} Hz without added friction and at "
         f"{stiff.min():.1f} to {stiff.max():.1f} Hz with it. The paper's {PAPER_BANDWIDTH:g} Hz are judged from its "
         "Figures 5 and 6 (errata E14).",
@@ -87,10 +85,11 @@ def clock_sentences(found: pd.DataFrame) -> tuple[str]:
     """
     at, steady = (found.set_index("input")[name] for name in ("at_25_hz", "steady_state"))
     return (
-        f"A clock of 200 ms, 5 Hz read literally, leaves the gain at 25 Hz {at['200 ms'] / at['10 ms']:.1f} times less "
-        f"certain than one of 10 ms and {at['200 ms'] / at['20 ms']:.1f} times less than one of 20 ms; the steady gain "
-        f"becomes {steady['10 ms'] / steady['200 ms']:.1f} times more certain than at 10 ms. A maximum-length sequence "
-        f"made for 25 Hz comes within {100.0 * (at[MADE_FOR] / at.min() - 1.0):.0f} % of the best test there.",
+        f"The paper's 5 Hz clock, read literally, holds each level for 200 ms. At 25 Hz, the gain is then "
+        f"{at['200 ms'] / at['10 ms']:.1f} times as uncertain as with 10 ms, and {at['200 ms'] / at['20 ms']:.1f} "
+        f"times as uncertain as with 20 ms; the steady gain is {steady['10 ms'] / steady['200 ms']:.1f} times less "
+        "uncertain than with 10 ms. A maximum-length sequence made for 25 Hz is there within "
+        f"{100.0 * (at[MADE_FOR] / at.min() - 1.0):.0f} % of the best test.",
     )
 
 

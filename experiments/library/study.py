@@ -59,13 +59,16 @@ def _roots(frame: pd.DataFrame) -> Rows:
     for condition, of_one in frame.groupby("condition", sort=False):
         row = {"condition": str(condition)}
         for (kind, source), roots in of_one.groupby(["kind", "source"]):
-            row[f"{kind}s, {source}"] = "; ".join(_root(root) for root in roots.to_dict("records"))
+            above = [root for root in roots.to_dict("records") if root["imag"] >= 0.0]  # one of each complex pair
+            row[f"{kind}s, {source}"] = "; ".join(_root(root) for root in above)
         yield row
 
 
 def _root(root: Row) -> str:
     text = _with_spread(root["real"], root["real_spread"])
-    return f"{text}, {_with_spread(root['imag'], root['imag_spread'])} i" if abs(root["imag"]) > 0.0 else text
+    if not root["imag"] > 0.0:
+        return text
+    return f"pair: real {text}, imaginary {_with_spread(root['imag'], root['imag_spread'])}"
 
 
 def _with_spread(value: float, spread: float) -> str:
@@ -97,12 +100,12 @@ def _at_frequency(name: str) -> Column | None:
 COLUMNS: Mapping[str, Columns] = {
     "library": (
         CONDITION,
-        Column("dc_gain", "steady gain", "mm/s per rad/s, 95 %", of_row=_gain),
-        Column("published_gain_low", "Table 6", "mm/s per rad/s, by rounding", of_row=_printed_gain),
+        Column("dc_gain", "steady gain", "mm/s per rad/s, ± 95 %", of_row=_gain),
+        Column("published_gain_low", "gain, Table 6", "mm/s per rad/s, by rounding", of_row=_printed_gain),
         Column("bandwidth_hz", "3 dB down", digits=3),
-        Column("published_bandwidth_hz", "Table 6", digits=3),
+        Column("published_bandwidth_hz", "3 dB down, Table 6", digits=3),
         Column("jump_ratio", "b0 / gain", "ratio", digits=2),
-        Column("published_jump_ratio", "Table 6", "ratio", digits=2),
+        Column("published_jump_ratio", "b0 / gain, Table 6", "ratio", digits=2),
         Column("fit_percent", digits=3),
     ),
     "roots by condition": (CONDITION, "poles, library", "poles, Table 6", "zeros, library", "zeros, Table 6"),
@@ -126,7 +129,7 @@ COLUMNS: Mapping[str, Columns] = {
     "clocks": (
         *(Column("input", "test"), _at_frequency),
         Column("steady_state", "steady", "% of gain", 100.0, 2),
-        Column("violations", "what it breaks", words=lambda text: text or "nothing"),
+        Column("violations", "limits exceeded", words=lambda text: text or "none"),
     ),
 }
 

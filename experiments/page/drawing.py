@@ -41,7 +41,7 @@ def diamonds(axis: Axes, x: Any, y: Any, label: str | None = None) -> None:
     axis.plot(x, y, "D", color=ORANGE, markeredgecolor=BLACK, markersize=7, label=label)
 
 
-def shaded(groups: Iterable[tuple[Hashable, Any]], last: float = 0.88) -> Iterator[tuple[float, Any, Colour]]:
+def shaded(groups: Iterable[tuple[Hashable, Any]], last: float = 0.7) -> Iterator[tuple[float, Any, Colour]]:
     """Give a series of curves their colours, dark to light.
 
     Parameters
@@ -49,7 +49,8 @@ def shaded(groups: Iterable[tuple[Hashable, Any]], last: float = 0.88) -> Iterat
     groups : iterable of tuple
         Of each curve its value and its rows, as `groupby` gives them.
     last : float
-        Where the colours end, between 0 and 1 [dimensionless].
+        Where the colours end, between 0 and 1 [dimensionless]; lighter ones cannot be read on white, nor turned round
+        on black.
 
     Yields
     ------

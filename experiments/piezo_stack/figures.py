@@ -99,7 +99,7 @@ def _draw_loaded(tables: Tables) -> Figure:
     _curves(right, tables["figure 14 flow over load"], "frequency_hz", speeds, across="load_kg")
     left.set(title="Figure 13: the quoted point is at 20 kg", xlabel="frequency [Hz]")
     right.set(title="Figure 14", xlabel="load [kg]")
-    left.legend(loc="upper left")
+    left.legend(loc="lower right")
     right.legend(loc="upper right")
     return figure
 

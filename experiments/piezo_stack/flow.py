@@ -228,7 +228,7 @@ LIMITS: Mapping[str, tuple[str, ...]] = {
     "oil bulk modulus": ("bulk_modulus",),
     "oil viscosity": ("viscosity",),
     "chamber volume": ("chamber_height", "dead_volume"),
-    "stack stroke a volt": ("free_stroke_a_volt",),
+    "stack stroke per volt": ("free_stroke_a_volt",),
     "stack stiffness": ("stack_stiffness",),
     "hysteresis": ("hysteresis",),
     "piston area": ("piston_area",),

@@ -63,8 +63,12 @@ def _find(settings: StackSettings, track: Track) -> Found:
     return Found(tables)
 
 
+def _parameter(name: str) -> str:
+    return spaced(name).replace(" a volt", " per volt")
+
+
 def _told(percent: float) -> Cell | str:
-    return number(percent, 2) if np.isfinite(percent) else Cell("not told", "bad")
+    return number(percent, 2) if np.isfinite(percent) else Cell("not determined", "bad")
 
 
 RIG = PiezoStackParameters()
@@ -76,11 +80,11 @@ COLUMNS: Mapping[str, Columns] = {
     ),
     "figure 12 left out": (
         "calibration",
-        Column("flow_max_l_min", "largest flow, told", "L/min", digits=3),
-        Column("flow_20kg_l_min", "flow with 20 kg, told", "L/min", digits=3),
-        Column("best_high_hz", "best frequency at 1.0 MPa, told", "Hz", digits=3),
-        Column("best_low_hz", "best frequency at 0.6 MPa, told", "Hz", digits=3),
-        Column("ratio", "flow at 100 V over 140 V, predicted", digits=3),
+        Column("flow_max_l_min", "largest flow", "L/min", digits=3),
+        Column("flow_20kg_l_min", "flow with 20 kg", "L/min", digits=3),
+        Column("best_high_hz", "best frequency at 1.0 MPa", "Hz", digits=3),
+        Column("best_low_hz", "best frequency at 0.6 MPa", "Hz", digits=3),
+        Column("ratio", "flow at 100 V over 140 V, predicted", "ratio", digits=3),
         Column("best_weak_hz", "best frequency at 100 V, predicted", "Hz", digits=3),
     ),
     "figure 10 loop widths": (
@@ -95,7 +99,7 @@ COLUMNS: Mapping[str, Columns] = {
         Column("output_power_w", "lifting power", digits=3),
     ),
     "hysteresis parameters": (
-        Column("parameter", words=spaced),
+        Column("parameter", words=_parameter),
         "truth",
         Column("printed", "as printed", digits=3),
         "fitted",
@@ -106,11 +110,11 @@ COLUMNS: Mapping[str, Columns] = {
     "what loops tell": (
         "loop",
         Column("samples", "samples a cycle", words=lambda count: f"{count:,}"),
-        lambda name: Column(name, f"{spaced(name)} [%]", words=_told),
+        lambda name: Column(name, f"{_parameter(name)} [%]", words=_told),
     ),
     "identifiability": (Column("frequency_hz", "drive"), "sensors", lambda name: Column(name, unit="%", digits=2)),
     "rig": (
-        Column("parameter", "name", words=spaced),
+        Column("parameter", "name", words=_parameter),
         "value",
         Column("unit", words=pretty_unit),
         *("meaning", "source"),

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
-from experiments.eha.plain_verdict import sureness, verdict, what_to_do, work_on
+from experiments.eha.plain_verdict import reasons_apart, sureness, verdict, what_to_do, work_on
 from experiments.eha.verdict_words import believed
 from faults.conditions import CONDITIONS
 from faults.notes import AdviceCode, AgainstCode
@@ -111,8 +111,15 @@ def test_what_may_follow_from_a_frozen_sensor_is_not_said_beside_it() -> None:
     reasons: list[Any] = [str(follows), str(froze)]
     result = said_of("normal", unknown=True, notes=notes, reasons=reasons, not_told=[])
     assert sureness(result) == f"Do not rely on anything on this page: {froze}."
+    assert reasons_apart(result) == []
     assert believed(result) == f"no: {froze}; 1 more in --json, which may follow from this"
     assert believed({**result, "notes": notes[:1], "reasons": reasons[:1]}) == f"no: {follows}"
+
+
+def test_several_reasons_against_a_verdict_are_a_list() -> None:
+    result = said_of("normal", unknown=True, notes=[], reasons=["one does not fit", "nor does another"])
+    assert sureness(result) == "Do not rely on anything on this page:"
+    assert reasons_apart(result) == ["One does not fit.", "Nor does another."]
 
 
 def test_soft_oil_is_in_the_verdict_and_leaves_something_to_repair() -> None:

@@ -8,6 +8,7 @@ from estimation.finding import Change, Finding, Gate, Outcome, Quantity
 from experiments.eha.entries import diagnosis_entries
 from experiments.eha.plain_verdict import verdict
 from experiments.eha.verdict_words import (
+    NEXT_LINE,
     SHOWN,
     amount,
     believed,
@@ -106,7 +107,7 @@ def test_conditions_that_a_log_does_not_tell_apart_are_not_told_as_one_that_was_
 def test_a_verdict_that_something_speaks_against_says_so_first_and_why() -> None:
     entries = diagnosis_entries(found_as("minor_leakage", against=AGAINST))
     assert headline(entries).startswith("UNKNOWN: none of the nine conditions fits; the nearest is minor leakage")
-    assert believed(entries) == "no: " + "; ".join(map(str, AGAINST))
+    assert believed(entries) == "no: " + NEXT_LINE.join(map(str, AGAINST))
     assert next_step(entries) == sentence(str(AdviceCode.CHECK_RIG.note()))
     sound = diagnosis_entries(found_as("minor_leakage"))
     assert believed(sound).startswith("yes: ")
@@ -159,6 +160,15 @@ def test_an_unknown_verdict_gives_no_plain_probability_and_nothing_to_repair() -
     assert "probability" not in said[0]
     assert "% if it had to be one of them" in said[0]
     assert not any("pump and piston seal" in line for line in said)
+
+
+def test_the_numbers_of_an_unknown_log_are_preceded_by_a_warning() -> None:
+    warned = "  numbers   do not rely on them: they are those of the nearest model, which does not fit the log"
+    for against, there in ((AGAINST, True), ((), False)):
+        entries = diagnosis_entries(with_library(found_as("minor_leakage", against=against), "minor_leakage"))
+        said = verdict_lines({"file": "run.csv", **entries})
+        assert (warned in said) is there
+        assert not there or said.index(warned) < next(i for i, line in enumerate(said) if line.startswith("  leakage"))
 
 
 def test_the_library_agrees_or_names_another_and_changes_no_verdict() -> None:

@@ -83,7 +83,7 @@ def test_the_sentences_say_what_the_table_holds(tables: Mapping[str, pd.DataFram
     who, _, why = structure_sentences(tables["structures"])
     arx = tables["structures"].set_index(["structure", "condition"]).loc["ARX"]
     assert f"{arx['behind_percent'].min():.2g} to {arx['behind_percent'].max():.2g} points behind" in who
-    assert f"{arx['weight_above_percent'].mean():.0f} % of that of ARX" in why
+    assert f"ARX has {arx['weight_above_percent'].mean():.0f} %" in why
 
 
 def test_the_page_needs_nothing_beside_it_and_shows_every_figure(tables: Mapping[str, pd.DataFrame]) -> None:
