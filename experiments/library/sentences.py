@@ -38,7 +38,8 @@ def structure_sentences(found: pd.DataFrame) -> tuple[str, str, str]:
         "Why: output error minimises the error of the free run. The others minimise the error one step ahead, which "
         "weighs each frequency by the input's power over that of the noise model. Friction leaves a slow residual, "
         f"which the noise model takes up, so the weight moves to high frequencies. Above {PAPER_BANDWIDTH:g} Hz, "
-        f"output error has {weight['output-error']:.0f} % of its weight on average, as the drive has of its power; {rivals}. "
+        f"output error has {weight['output-error']:.0f} % of its weight on average, as the drive has of its "
+        f"power; {rivals}. "
         "Weights hardly matter for a nearly linear plant, and much under friction. ARX assumes that noise passes "
         "through the plant's poles, but sensor noise does not: the fitted gain falls to as little as "
         f"{gain:.0f} % of output error's.",
