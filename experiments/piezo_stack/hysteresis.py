@@ -77,9 +77,9 @@ def loop_card(p: PiezoStackParameters) -> Rows:
     """
     for samples in (FEW_SAMPLES, SAMPLES):
         for loop, cycles, from_rest in (
-            ("one loop, from rest", 1, True),
+            ("one loop that begins at rest", 1, True),
             ("one closed loop", 1, False),
-            ("three loops, from rest", CYCLES, True),
+            ("three loops that begin at rest", CYCLES, True),
         ):
             voltage = 0.5 * LARGE * (1.0 - np.cos(2.0 * np.pi * np.arange(cycles * samples + 1) / samples))
             bounds = loop_bounds(p, voltage, NOISE, from_rest=from_rest)

@@ -8,7 +8,7 @@ import pandas as pd
 
 from experiments.page.frames import Tables, parameter_table
 from experiments.page.numbers import number, pretty_unit
-from experiments.page.tables import Cell, Column, Columns, interval, spaced
+from experiments.page.tables import Cell, Column, Columns, interval, right, spaced
 from experiments.papers.verdict import TONES
 from experiments.piezo_stack import flow
 from experiments.piezo_stack.card import identifiability_card
@@ -67,8 +67,8 @@ def _parameter(name: str) -> str:
     return spaced(name).replace(" a volt", " per volt")
 
 
-def _told(percent: float) -> Cell | str:
-    return number(percent, 2) if np.isfinite(percent) else Cell("not determined", "bad")
+def _told(percent: float) -> Cell:
+    return right(number(percent, 2)) if np.isfinite(percent) else Cell("not determined", "bad")
 
 
 RIG = PiezoStackParameters()
@@ -110,7 +110,7 @@ COLUMNS: Mapping[str, Columns] = {
     "what loops tell": (
         "loop",
         Column("samples", "samples a cycle", words=lambda count: f"{count:,}"),
-        lambda name: Column(name, f"{_parameter(name)} [%]", words=_told),
+        lambda name: Column(name, _parameter(name), "%", words=_told),
     ),
     "identifiability": (Column("frequency_hz", "drive"), "sensors", lambda name: Column(name, unit="%", digits=2)),
     "rig": (

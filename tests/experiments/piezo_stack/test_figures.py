@@ -115,7 +115,7 @@ def test_a_loop_of_the_stack_is_fitted_within_its_interval_and_what_the_procedur
     assert ((table["low"] <= table["truth"]) & (table["truth"] <= table["high"])).tolist() == table["covered"].tolist()
     assert table["error_percent"].abs().max() < 5.0
     told = stack_tables["what loops tell"].groupby("loop")
-    assert set(told.groups) == {"one loop, from rest", "one closed loop", "three loops, from rest"}
+    assert set(told.groups) == {"one loop that begins at rest", "one closed loop", "three loops that begin at rest"}
 
 
 def test_quoted_numbers_have_a_role_and_a_verdict(stack_tables: Tables) -> None:
