@@ -154,7 +154,7 @@ def _apart(outlooks: Sequence[Outlook]) -> str:
     if days is None:
         return ""
     told = f"{24.0 * days:.2g} h" if days < 1.0 else f"{days:.3g} day{'' if f'{days:.3g}' == '1' else 's'}"
-    return f", {told}"
+    return f", every {told}"
 
 
 def _forecast(one: Outlook, newest: LogRow) -> dict[str, str]:

@@ -88,7 +88,7 @@
       const more = part === null && left ? `alarms are possible after ${left}\u00a0s more of motion` : "an alarm is raised at 100 %";
       tiles.push(tile(`${balanceWords(balance)}: how close to an alarm`, value, unit, more));
     }
-    tiles.push(tile("rows", String(point.rows), "", `${point.gaps} gaps, ${point.left_out} left out, ${digits(point.time_s)}\u00a0s`));
+    tiles.push(tile("rows", point.rows.toLocaleString("en"), "", `${point.gaps} gaps, ${point.left_out} left out, ${digits(point.time_s)}\u00a0s`));
     gauges.replaceChildren(...tiles);
   }
 
@@ -99,7 +99,8 @@
     histories.append(figure);
     const line = { stroke: css("blue"), width: 1, points: { show: false } };
     const axis = { stroke: css("soft"), grid: { stroke: css("line"), width: 1 }, space: 20 };
-    const share = { range: (_, least, most) => [0, Math.max(100, most ?? 0)] }; // up to an alarm, at the least
+    const share = { range: (_, least, most) => [0, Math.max(110, most ?? 0)] }; // up to an alarm, at the least
+    const alarm = { stroke: css("bad"), width: 1, dash: [6, 4], points: { show: false } };
     const made = new uPlot(
       {
         width: figure.clientWidth || 320,
@@ -108,10 +109,10 @@
         cursor: { show: false },
         scales: { x: { time: false }, y: two ? {} : share },
         axes: [{ ...axis, space: 60, label: "time of the stream [s]", labelSize: 18, labelFont: "12px sans-serif" }, { ...axis, size: 64, values: (_, ticks) => ticks.map(digits) }],
-        series: two ? [{}, line, line] : [{}, line],
+        series: two ? [{}, line, line] : [{}, line, alarm],
         bands: two ? [{ series: [2, 1], fill: `${css("blue")}44` }] : [],
       },
-      two ? [[], [], []] : [[], []],
+      [[], [], []],
       figure,
     );
     charts.set(label, made);
@@ -133,7 +134,7 @@
     for (const balance of Object.keys(last.scores)) {
       const shares = points.map((one) => share(one, balance));
       if (shares.every((one) => one === null)) continue; // it is learnt still
-      chart(`${balanceWords(balance)}: how close to an alarm`, "%", false).setData([times, shares]);
+      chart(`${balanceWords(balance)}: how close to an alarm`, "%", false).setData([times, shares, times.map(() => 100)]);
     }
     document.documentElement.classList.add("live-drawn");
   }
