@@ -29,16 +29,16 @@ class SensorCode(Code):
         "in {rows} was used"
     )
     DROPOUT = (
-        "all channels repeat their last sample, and then {channel} jumps: the logger missed {rows} rows in {count} "
-        "places; the repeated rows were left out"
+        "the logger missed {rows} rows (places: {count}): all channels repeat their last sample, and then {channel} "
+        "jumps; the repeated rows were left out"
     )
     SENT_TWICE = (
         "the logger wrote {rows} rows a second time, under later times (places in the log: {count}); the copies were "
         "left out"
     )
     HELD_ALONE = (
-        "{channel} repeats its last value for {seconds:.3g} s in all while other channels go on ({count} times, first "
-        "at {begin_s:.3g} s); the repeated values were left out"
+        "{channel} repeats its last value for {seconds:.3g} s in all while other channels go on (places: {count}, the "
+        "first at {begin_s:.3g} s); the repeated values were left out"
     )
     ROWS_LOST = (
         "{jumped} jump from one row to the next at {where} s, farther than piston and oil can go: the logger lost rows "
@@ -83,7 +83,9 @@ class ChannelCode(Code):
         "{channel}: the values are {factor:.3g} times what {against} would give, which looks like {slip}; give the "
         "column's unit (NAME:UNIT under [columns] in the rig file, or --columns CHANNEL=NAME:UNIT)"
     )
-    CHANNEL_MISREAD = "{channel}: the log fits the rig only once {slip} is set right (--columns CHANNEL=NAME:UNIT)"
+    CHANNEL_MISREAD = (
+        "{channel} looks like {slip}: with that set right, the log fits the rig (--columns CHANNEL=NAME:UNIT)"
+    )
     UNIT_CHANGES = (
         "{channel}: from {begin_s:.3g} s on, noise is about {factor:.3g} times what it was, as when the column's unit "
         "changes within the log; cut the log there, and read each part by itself"
@@ -153,9 +155,8 @@ class EstimateCode(Code):
         "fit could not correct this: bulk modulus may be several percent too low"
     )
     RIG_CONTRADICTED = (
-        "the piston moves as if the pump delivered about {percent:.0f} % of its displacement: the rig file is that of "
-        "another actuator, or its pump displacement or piston area is wrong, or the unit or scale of motor speed or "
-        "position"
+        "the piston moves as if the pump delivered about {percent:.0f} % of its displacement: check pump displacement "
+        "and piston area in the rig file, and unit and scale of motor speed and position"
     )
     TEETH_LEFT = (
         "the pressure residuals follow the shaft angle, as with a flow ripple of {percent:.0f} % from the pump's teeth "
@@ -200,9 +201,8 @@ class EstimateCode(Code):
     )
     AT_PHYSICAL_BOUND = "{state} ended at its physical limit ({value:.3g} {unit})"
     PRESSURE_ABSENT = (
-        "without differential_pressure_pa the estimate rests on how the piston starts, stops and rings, so it needs a "
-        "correct friction model, which cannot be assumed for an unknown actuator; while the piston sticks, the log "
-        "says nothing about the oil (errata E13)"
+        "without differential_pressure_pa the estimate depends on the friction model, which may be wrong for your "
+        "actuator; while the piston sticks, the log says nothing about the oil (errata E13)"
     )
     PRESSURE_UNUSED = "the acceleration form does not use differential_pressure_pa, and fails at reversals (errata E9)"
 
@@ -255,8 +255,8 @@ class RigCode(Code):
         "per bar as at a small drop; the fit includes this"
     )
     MAKEUP_UNSEEN = (
-        "the make-up valve of chamber {side} never opened, so this log does not show whether it is stuck shut; a "
-        "drive that draws oil into chamber {side} would"
+        "the make-up valve of chamber {side} never opened, so this log does not show whether it is stuck shut: use a "
+        "drive that draws oil into chamber {side}"
     )
     SPEED_OFFSET = (
         "motor_speed_rad_s reads {offset_rad_s:.3g|rpm} ± {half_width:.2g|rpm} rpm too much; the offset was subtracted"
@@ -304,8 +304,8 @@ class RigCode(Code):
         "stuck open"
     )
     PORTS_DRAIN_APART = (
-        "chamber A loses {drain_a:.2g|L/(min bar)} and chamber B {drain_b:.2g|L/(min bar)} L/(min bar) to the inner "
-        "circuit: the case of a sound pump drains up to {sound:.2g|L/(min bar)} L/(min bar), so this is no fault"
+        "no fault: chamber A loses {drain_a:.2g|L/(min bar)} and chamber B {drain_b:.2g|L/(min bar)} L/(min bar) to "
+        "the inner circuit, and the case of a sound pump drains up to {sound:.2g|L/(min bar)} L/(min bar)"
     )
     OIL_STIFFER = (
         "bulk modulus is {ratio:.3g} times that in the rig file; the conditions were compared at the measured value"
@@ -331,20 +331,20 @@ class RigCode(Code):
         "be worn or chipped; the fit includes this"
     )
     PUMP_STARVES = (
-        "above a motor speed of {from_rad_s:.3g|rpm} rpm the pump delivers less than its displacement, at "
-        "{fastest_rad_s:.3g|rpm} rpm {percent:.1f} ± {half_width:.1g} % less: it fills badly (low inlet pressure, "
-        "blocked suction line, cold oil); the fit includes this"
+        "above a motor speed of {from_rad_s:.3g|rpm} rpm the pump delivers less than its displacement ({percent:.1f} ± "
+        "{half_width:.1g} % less at {fastest_rad_s:.3g|rpm} rpm): it fills badly (low inlet pressure, blocked suction "
+        "line, cold oil); the fit includes this"
     )
     LEAKAGE_LIFTS = (
-        "above a differential pressure of {from_pa:.3g|bar} bar, leakage grows faster than pressure, at "
-        "{highest_pa:.3g|bar} bar to {factor:.2g} times the usual: a seal lifts or a valve opens; the fit includes this"
+        "above a differential pressure of {from_pa:.3g|bar} bar, leakage grows faster than pressure ({factor:.2g} "
+        "times the usual at {highest_pa:.3g|bar} bar): a seal lifts or a valve opens; the fit includes this"
     )
     LEAKS_ONE_WAY = (
         "leakage is {factor:.2g} times as large while chamber {side} is loaded: a relief or check valve of that side "
         "may leak; the fit includes this"
     )
     CHECKS_CRACK = (
-        "on average the make-up valves open {crack_pa:.3g|bar} ± {half_width_pa:.2g|bar} bar below the accumulator "
-        "pressure in the rig file; that of chamber {side} {later_pa:.3g|bar} ± {later_half_width_pa:.2g|bar} bar lower"
+        "the make-up valves open {crack_pa:.3g|bar} ± {half_width_pa:.2g|bar} bar below the rig file's accumulator "
+        "pressure (mean of both), that of chamber {side} {later_pa:.3g|bar} ± {later_half_width_pa:.2g|bar} bar lower"
     )
-    EXPLAINED_OTHERWISE = "other explanations that fit the log about as well: {count}; the interval includes them"
+    EXPLAINED_OTHERWISE = "other explanations fit the log about as well ({count}); the interval includes them"

@@ -65,8 +65,8 @@ class ClassCode(Code):
         "without pressure, leakage and friction are known only up to one common factor; the intervals include the "
         "spread of this factor among actuators of one kind"
     )
-    LEAKAGE_AND_BIAS_ALIKE = "the log does not separate the leakage coefficient from the flow bias"
-    VELOCITY_LOST_TOLD = "the log does determine the velocity lost: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
+    LEAKAGE_AND_BIAS_ALIKE = "the log does not separate leakage coefficient and flow bias (a constant loss of the pump)"
+    VELOCITY_LOST_TOLD = "the velocity lost is known: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
     OIL_STIFFER_CLASS = (
         "without pressure, the circuit that fits has {ratio:.2g} times the bulk modulus in the rig file (another oil, "
         "or a wrong rig file); the conditions were compared around that"
@@ -89,8 +89,8 @@ class ClassCode(Code):
     MODELS_ALIKE = "no class: the models of all conditions move alike under this drive; drive the actuator in steps"
     NO_CIRCUIT = "no circuit can be fitted with this rig file, so there are scores but no probabilities: {reason}"
     VOLUME_FOR_STROKE = (
-        "the rig file's chamber_volume has no room for its stroke: it must be {percent:.0f} % larger at least, and the "
-        "circuits were fitted with that; measure chamber_volume and stroke"
+        "chamber_volume in the rig file has no room for the stroke: it must be {percent:.0f} % larger at least, and "
+        "the circuits were fitted with that; measure chamber_volume and stroke"
     )
     NO_PROBABILITIES = "no probabilities: {reason}"
     LOAD_ON_ROD = (

@@ -7,10 +7,9 @@ class IdentificationCode(Code):
     """Notes on an identified model, or on the signals that it was identified from."""
 
     PISTON_RESTS = (
-        "{output!r} rests in {measured:.0%} of the samples in which {input!r} drives it; a second-order model rests in "
-        "{linear:.0%}. The piston sticks, and extra poles imitate the pause, so order {order} is not that of the "
-        "plant. The fits by order are {fits}: give the order, or drive the piston around a mean speed that keeps it "
-        "moving"
+        "the piston sticks: {output!r} rests in {measured:.0%} of the samples in which {input!r} drives it (a "
+        "second-order model: {linear:.0%}). Extra poles imitate the pauses, so order {order} is not that of the plant "
+        "(fit by order: {fits}): give the order, or drive the piston around a mean speed"
     )
     FEEDBACK = (
         "input {input!r} follows the noise of {output!r} (p = {p_value:.1g}): the data seem to come from a closed loop,"
@@ -26,8 +25,8 @@ class IdentificationCode(Code):
     )
     INPUT_BRIDGED = "input {channel!r} lacks {count} of {total} samples: they were interpolated linearly"
     LOG_INTERPOLATED = (
-        "the log has a sample every {sample_time_s:.4g} s and was interpolated to {wanted_s:.4g} s: an input that is "
-        "held between samples becomes a ramp, so judge a model by a log of its own sample time, or fit with --resample"
+        "the log was interpolated from {sample_time_s:.4g} s to {wanted_s:.4g} s per sample, which turns a held input "
+        "into ramps: judge a model by a log of its own sample time, or fit with --resample"
     )
     INPUT_SPLIT = (
         "input {channel!r} lacks {count} of {total} samples that cannot be interpolated: the log was split into "
@@ -46,21 +45,21 @@ class IdentificationCode(Code):
         "from the covariance are too narrow; use dc_gain_interval, or a lower order"
     )
     TIME_CONSTANT_BEYOND_RECORD = (
-        "the model of order {order} has a time constant of {time_constant_s:.3g} s, longer than the longest record "
-        "or the period of its inputs ({duration_s:.3g} s), and no simpler model was found: its steady gain means "
-        "nothing"
+        "the steady gain means nothing: the model of order {order} has a time constant of {time_constant_s:.3g} s, "
+        "longer than the longest record or the period of its inputs ({duration_s:.3g} s), and no simpler model was "
+        "found"
     )
     SLOW_MODELS_PASSED_OVER = (
         "a simpler model was chosen: {count} others had a time constant longer than the record or the period of its "
         "inputs ({duration_s:.3g} s)"
     )
     INTEGRATES = (
-        "{output!r} integrates its input over the whole record: the model has a pole close to 1, so its steady gain "
-        "means nothing"
+        "the steady gain means nothing: {output!r} integrates its input over the whole record, so the model has a pole "
+        "close to 1"
     )
     SLOWER_THAN_PERIOD = (
-        "the model of {output!r} has a time constant of {time_constant_s:.3g} s, longer than its inputs take to repeat "
-        "themselves ({duration_s:.3g} s): its steady gain comes from the start of the record alone"
+        "the steady gain comes from the start of the record alone: the model of {output!r} has a time constant of "
+        "{time_constant_s:.3g} s, and its inputs repeat themselves after {duration_s:.3g} s"
     )
     SIMPLER_MODEL_TAKEN = (
         "the model of order {order} has a pole and a zero that nearly cancel, or a gain that is not determined; a "
@@ -72,50 +71,50 @@ class IdentificationCode(Code):
         "(--structure output-error) may do better"
     )
     LINEAR_STANDS_IN = (
-        "these inputs do not determine the nonlinear model of {output!r}: its run is uncertain by {undetermined:.0%} "
-        "of the output's deviation in the fitted logs, and a linear model errs by {linear:.0%}, so the linear model "
-        "was simulated instead; fit a log with inputs like these, or see the nonlinear run with --structure {structure}"
+        "the linear model of {output!r} was simulated, because these inputs do not determine the nonlinear one: that "
+        "is uncertain by {undetermined:.0%} of the output's deviation in the fitted logs, and the linear one errs by "
+        "{linear:.0%}; fit a log with inputs like these, or see the nonlinear run with --structure {structure}"
     )
     NO_NONLINEARITY = (
         "neither dead zone nor saturation nor backlash at the input predicts {output!r} better on held-back data: the "
         "linear model was chosen"
     )
     SIGN_NOT_MEASURED = (
-        "{output!r} seems to be measured without its sign: a linear model before its absolute value leaves {left:.0%} "
-        "of the error of the linear model on held-back data; use --structure wiener, or log the sign"
+        "{output!r} seems to be measured without its sign: log the sign, or use --structure wiener, which leaves "
+        "{left:.0%} of the linear model's error on held-back data"
     )
     UNRELATED = (
         "the inputs explain {output!r} no better than the same inputs in a shuffled order: the output drifts by itself,"
         " and a slow model imitates the drift; do not rely on the model"
     )
     RANDOM_WALK = (
-        "{output!r} wanders by itself like a random walk or a drift, by {rmse:.3g} (root mean square): the model was "
-        "fitted to changes from sample to sample, so that this does not spoil its gain and poles; its offset and the "
-        "fit of its free run say nothing of other logs"
+        "{output!r} wanders by itself (random walk or drift, {rmse:.3g} root mean square): the model was fitted to "
+        "changes from sample to sample; its offset and the fit of its free run do not hold for other logs"
     )
     WALK_FOLLOWED = (
-        "{output!r} wanders by itself like a random walk or a drift, which {structure} follows with its poles: they "
-        "and the gain may be anything; use --structure output-error, which is then fitted to changes"
+        "{output!r} wanders by itself (random walk or drift), and {structure} follows this with its poles: do not rely "
+        "on poles and gain; use --structure output-error, which is then fitted to changes"
     )
     OFFSETS_DIFFER = (
-        "the offset of {output!r} differs from log to log ({above} beside their mean): each log was given its own, and "
-        "the model has their mean, so its level says nothing of other logs"
+        "the offset of {output!r} differs from log to log ({above} beside their mean): each log has its own, and the "
+        "model their mean, so its level does not hold for other logs"
     )
     OUTLIERS = (
         "{count} of {total} samples of {output!r} stand out from their neighbours and decide what is fitted: if the "
         "sensor is at fault there, leave their cells empty and identify again"
     )
     INPUTS_ALIKE = (
-        "input {channel!r} is a linear function of {others}: the log does not tell their effects apart, so how the "
-        "gain is shared between them means nothing; leave one out, or log inputs that differ"
+        "input {channel!r} is a linear function of {others}, so how the gain is shared between them means nothing: "
+        "leave one out, or log inputs that differ"
     )
     ANSWERS_LATE = (
         "{output!r} seems to answer {input!r} after {dead_time_s:.4g} s, more than a fifth of the log, which is too "
-        "long to be judged: a model behind it leaves {left:.0%} of the error; try --delay {samples}, or a longer log"
+        "long to be judged (a model with this delay leaves {left:.0%} of the error): try --delay {samples}, or a "
+        "longer log"
     )
     NOTHING_ANSWERED = (
-        "{logs} has at most {longest} samples in one piece, and the model of {output!r} a dead time of {dead_time}: "
-        "all outputs answer inputs from before the log, so there is no fit"
+        "there is no fit: {logs} has at most {longest} samples in one piece, and the model of {output!r} a dead time "
+        "of {dead_time}, so all outputs answer inputs from before the log"
     )
     NO_FIT = "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): do not rely on it"
 

@@ -28,18 +28,18 @@ class LogCode(Code):
     )
     SAMPLES_MASKED = "{channel} is missing in {count} of {total} samples ({percent:.2g} %); those samples are not used"
     LOST_VALUE = (
-        "{channel} is {value:.6g} in {count} of {total} samples, far from all others, as a logger writes it for a lost "
-        "sample; those samples are not used"
+        "{channel} is {value:.6g} in {count} of {total} samples, far from all others, as loggers write it for lost "
+        "samples; those samples are not used"
     )
     CHANNEL_SLOWER = "{channel} was logged more slowly than the others, with one value in {rows} rows"
     CHANNEL_LEFT_OUT = "{channel} is missing in {count} of {total} samples ({percent:.2g} %); the channel is not used"
     CHANNEL_LOGGED_IN_PART = (
         "{channel} is logged only from {begin_s:.4g} s to {end_s:.4g} s; only this part of the log is used"
     )
-    LINES_SKIPPED = "lines skipped between rows of data (comments, or the header again): {count}"
-    ROWS_LEFT_OUT = "lines left out because they hold no row of data: {count} (the first is line {line}: {said!r})"
+    LINES_SKIPPED = "comments or repeated headers between the rows of data were skipped (lines: {count})"
+    ROWS_LEFT_OUT = "lines that are no rows of data were left out (lines: {count}, the first is {line}: {said!r})"
     CELLS_NO_NUMBERS = (
-        "cells of column {column!r} that are no numbers and were not used: {count} (the first is {said!r} in "
+        "column {column!r} has cells that are no numbers; they were not used (cells: {count}, the first is {said!r} in "
         "{where} {place})"
     )
     CHANNEL_OF_TEXT = "{channel} is not used, because column {column!r} holds text, such as {text!r}"
@@ -47,12 +47,12 @@ class LogCode(Code):
         "{channel} jumps by {hours:+g} h at row {row}, as when a clock is set to summer time or back; the rows were "
         "taken as evenly spaced"
     )
-    TIME_IS_DATES = "column {column!r} says no unit; it was read in {unit}, in which it begins at {began}"
+    TIME_IS_DATES = "column {column!r} has no unit; it was read in {unit}, so the log begins at {began}"
     TIME_RAN_OVER = (
-        "{channel} falls back by {span_s:.10g} s as a counter that runs over does ({count} times, first at row {row}); "
-        "the rows were taken as one course"
+        "{channel} falls back by {span_s:.10g} s, like a counter that overflows (places: {count}, the first at row "
+        "{row}); the rows were read as one log"
     )
-    END_LEFT_OUT = "lines left out after row {taken}, the last row of data: {count}"
+    END_LEFT_OUT = "the lines after row {taken}, the last row of data, were left out (lines: {count})"
     COLUMNS_ABSENT = "the rig file names columns that the log does not have: {columns}"
     COLUMN_OVERLOOKED = (
         "column {column!r} was not used, but it may be {channel}; if it is, name it under [columns] in the rig file, "

@@ -212,7 +212,7 @@ def test_a_file_cut_short_is_refused_or_loses_its_last_row_with_a_word(tmp_path:
     content = (tmp_path / name).read_bytes()
     (tmp_path / name).write_bytes(content[: len(content) // 2 - 3])
     if name == "run.csv":
-        with pytest.warns(LogWarning, match="left out after row 49, the last row of data: 1"):
+        with pytest.warns(LogWarning, match="the lines after row 49, the last row of data, were left out .lines: 1."):
             assert len(read_record(tmp_path / name)) == 49
     else:
         refused(tmp_path / name, "cannot be read as")

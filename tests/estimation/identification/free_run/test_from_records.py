@@ -118,7 +118,7 @@ def test_bridged_samples_of_all_parts_are_told_once() -> None:
 def test_a_log_that_is_slower_than_a_model_says_that_it_is_interpolated() -> None:
     record = log(binary())
     half = Record(2.0 * T, {name: record[name][::2] for name in ("u", "y")})
-    with pytest.warns(LogWarning, match="a sample every 0.02 s and was interpolated to 0.01 s") as said:
+    with pytest.warns(LogWarning, match="interpolated from 0.02 s to 0.01 s per sample") as said:
         data = channels_of([half], ["u"], "y", T)
     assert {one.filename for one in said} == {__file__}
     assert data.y[0].size == pytest.approx(N, abs=1)

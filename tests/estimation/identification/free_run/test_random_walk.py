@@ -60,7 +60,7 @@ def test_the_gain_of_an_output_that_wanders_is_within_its_interval(seed: int, no
 
 
 def test_it_is_warned_of() -> None:
-    with pytest.warns(LogWarning, match="'y' wanders by itself like a random walk"):
+    with pytest.warns(LogWarning, match="'y' wanders by itself .random walk"):
         identify_channels(log(16801), order=1, delay=1)
 
 

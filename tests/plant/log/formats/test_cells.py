@@ -35,7 +35,7 @@ def test_the_first_text_in_a_column_is_named_with_its_row() -> None:
 
 def test_one_text_in_a_hundred_cells_is_missing_with_a_note() -> None:
     cells = np.array([*map(str, range(99)), "x"], dtype=object)
-    with pytest.warns(LogWarning, match=r"cells of column 'speed' .*: 1 \(the first is 'x' in row 100\)"):
+    with pytest.warns(LogWarning, match=r"column 'speed' has cells .*\(cells: 1, the first is 'x' in row 100\)"):
         assert np.flatnonzero(np.isnan(numbers(cells, "speed", "a.csv"))).tolist() == [99]
 
 

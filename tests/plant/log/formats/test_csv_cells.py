@@ -70,7 +70,7 @@ def test_a_cut_last_row_and_sums_below_the_data_are_left_out(after: list[str], e
 
 def test_sums_below_the_data_are_no_part_of_any_column_that_is_shown(tmp_path: Path) -> None:
     (table,) = open_tables(written(tmp_path, *ROWS, "Mean,1,2,3"))
-    with pytest.warns(LogWarning, match="left out after row 1500, .*: 1"):
+    with pytest.warns(LogWarning, match="lines after row 1500, .*: 1"):
         found = table.numbers()
     assert {place: len(values) for place, values in found.items()} == dict.fromkeys((0, 1, 2), len(ROWS))
 
