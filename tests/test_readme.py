@@ -55,6 +55,15 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path], list[Run]
     return of
 
 
+def test_the_first_screen_is_two_sentences_a_picture_and_two_commands() -> None:
+    first = README.read_text(encoding="utf-8").split("\n## ")[0]
+    opening, picture, block, *_ = first.split("\n\n", 1)[1].split("\n\n")
+    assert len(re.findall(r"\.(?=\s|$)", opening)) == 2
+    assert picture.startswith("![")
+    assert [line.split("#")[0].strip() for line in block.splitlines()[1:-1]] == ["make study", "make test"]
+    assert first.count("![") == first.count("```sh") == 1
+
+
 def test_the_pages_show_every_verb_that_works_on_logs() -> None:
     assert {"simulate", "estimate", "identify", "diagnose"} <= {line[0] for line in commands(README)}
     assert {"inspect", "watch", "isolability", "conditions"} <= {line[0] for line in commands(VERBS)}

@@ -17,8 +17,8 @@ from experiments.page.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY
 
 MILLI, ML_MIN = 1e3, 6e7
 
-ELECTRODES = {"a1_v": ORANGE, "a2_v": GREY, "a3_v": BLUE, "a4_v": VERMILION}
-"""Electrodes that are drawn, and their colours; A5, A6 and A7 lie on A3, A2 and A1."""
+ELECTRODES = {"a1_v": (ORANGE, "-"), "a2_v": (GREY, "--"), "a3_v": (BLUE, "-"), "a4_v": (VERMILION, ":")}
+"""Electrodes that are drawn, and their colours and lines; A5, A6 and A7 lie on A3, A2 and A1."""
 
 CYCLE: Sequence[Course] = (
     (
@@ -29,7 +29,7 @@ CYCLE: Sequence[Course] = (
             ("chamber_5_pa", VERMILION, "chamber 5"),
         ),
     ),
-    (("opening [1]", 1.0), (("valve_4", GREEN, "valve 4, before chamber 4"), ("valve_5", BLUE, "valve 5, behind"))),
+    (("opening, share", 1.0), (("valve_4", GREEN, "valve 4, before chamber 4"), ("valve_5", BLUE, "valve 5, behind"))),
     (
         ("flow [ml/min]", ML_MIN),
         (
@@ -44,8 +44,8 @@ CYCLE: Sequence[Course] = (
 
 def _swept(flow: Axes, sensing: Axes, sweep: pd.DataFrame, across: str, label: str, **marks: Any) -> None:
     flow.plot(sweep[across], ML_MIN * sweep["flow_m3_s"], color=BLUE, **marks)
-    for column, colour in ELECTRODES.items():
-        sensing.plot(sweep[across], sweep[column], color=colour, label=column[:2].upper())
+    for column, (colour, line) in ELECTRODES.items():
+        sensing.plot(sweep[across], sweep[column], color=colour, linestyle=line, label=column[:2].upper())
     flow.set(xlabel=label, ylabel="flow [ml/min]")
     sensing.set(xlabel=label, ylabel="sensing voltage, amplitude [V]", ylim=(0.0, None))
     sensing.legend(loc="lower left", ncols=2)
