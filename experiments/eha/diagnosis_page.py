@@ -42,6 +42,7 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
     unseen = not_determined([note.code for note in found.not_told])
     told = {name: one for name, one in found.severities.items() if name not in unseen}
     shares = sorted(found.probabilities.items(), key=lambda item: -item[1])
+    doubted = result["unknown"] and not of_another_size(result)  # what a fit that is no fit tells is nothing
     facts = {
         "result": result,
         "file": name,
@@ -51,7 +52,7 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "reasons": reasons_apart(result),
         "another_size": of_another_size(result),
         "library": library_sentence(result),
-        "not_told": [sentence(said) for said in result["not_told"]],
+        "not_told": [sentence(said) for said in result["not_told"]] if not doubted else [],
         "warnings": [sentence(said) for said in _beside(result)],
         "shares": [
             (in_words(condition), 100.0 * share, percent_text(share), share < LEAST_SHARE)

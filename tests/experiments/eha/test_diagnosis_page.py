@@ -60,12 +60,20 @@ def test_severities_of_a_log_that_no_fit_explains_are_marked_as_not_reliable(
 ) -> None:
     found, log = diagnosed
     unknown = diagnosis_page(
-        {"file": "run.csv", "rig": "paper", **diagnosis_entries(found), "unknown": True, "reasons": []},
+        {
+            "file": "run.csv",
+            "rig": "paper",
+            **diagnosis_entries(found),
+            "unknown": True,
+            "reasons": [],
+            "not_told": ["one thing is not told"],
+        },
         replace(found, unknown=True),
         log,
     )
     assert "if the actuator is in one of the nine" not in unknown
     assert "None of the nine conditions fits the log." in unknown
+    assert "One thing is not told." not in unknown
     assert len(re.findall("<input[^>]* data-doubted>", unknown)) == unknown.count('class="limit"') > 0
     assert not re.search("<input[^>]* data-doubted>", page)
 
