@@ -29,7 +29,7 @@ CYCLE: Sequence[Course] = (
             ("chamber_5_pa", VERMILION, "chamber 5"),
         ),
     ),
-    (("opening, share", 1.0), (("valve_4", GREEN, "valve 4, before chamber 4"), ("valve_5", BLUE, "valve 5, behind"))),
+    (("opening [share]", 1.0), (("valve_4", GREEN, "valve 4, before chamber 4"), ("valve_5", BLUE, "valve 5, behind"))),
     (
         ("flow [ml/min]", ML_MIN),
         (

@@ -130,5 +130,5 @@ def draw_scores(scores: pd.DataFrame) -> Figure:
     axis.set_xticks(range(len(scores.columns)), [in_short(name) for name in scores.columns], rotation=30)
     axis.set_yticks(range(len(scores)), [in_words(str(name)) for name in scores.index])
     axis.set(xlabel="model", ylabel="true condition")
-    figure.colorbar(image, ax=axis, label="error over the size of the signals", pad=0.01, aspect=30)
+    figure.colorbar(image, ax=axis, label="error over the size of the signals [ratio]", pad=0.01, aspect=30)
     return figure
