@@ -13,7 +13,6 @@ from experiments.eha.plain_verdict import WRONG_INPUT
 from experiments.log_pages.entries import quantity_entry
 from experiments.page.condition_names import in_words
 from faults.diagnosis.diagnose import diagnose_log
-from faults.diagnosis.not_told import not_determined
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.rig import Rig
 from plant.errors import LogWarning
@@ -92,11 +91,10 @@ def _why_unknown(found: Finding) -> str:
 def _severities(found: Finding) -> dict[str, Any]:
     """Return the severities that the log determines, each with its healthy value and its limit."""
     healthy, limits = found.healthy, found.evidence.diagnosis.limits
-    unseen = not_determined([note.code for note in found.not_told])
     return {
         name: {**quantity_entry(one), "healthy": float(healthy[name]), "limit": limits.get(name)}
         for name, one in found.severities.items()
-        if name not in unseen and (one.value is None or math.isfinite(one.value))
+        if one.value is None or math.isfinite(one.value)
     }
 
 

@@ -17,7 +17,6 @@ from experiments.page.sentences import sentence
 from experiments.page.severity_rows import severity_rows
 from experiments.page.words import in_words
 from faults.diagnosis.circuits.blocks import blocks_of
-from faults.diagnosis.not_told import not_determined
 
 if TYPE_CHECKING:
     from estimation.finding import Finding
@@ -39,8 +38,6 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         Entries of the diagnosis, and ``file``.
     """
     name = Path(result["file"]).name
-    unseen = not_determined([note.code for note in found.not_told])
-    told = {name: one for name, one in found.severities.items() if name not in unseen}
     shares = sorted(found.probabilities.items(), key=lambda item: -item[1])
     doubted = result["unknown"] and not of_another_size(result)  # what a fit that is no fit tells is nothing
     facts = {
@@ -58,12 +55,10 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
             (in_words(condition), 100.0 * share, percent_text(share), share < LEAST_SHARE)
             for condition, share in shares
         ],
-        "rows": severity_rows(told, found.healthy, found.evidence.diagnosis.limits, SHOWN),
+        "rows": severity_rows(found.severities, found.healthy, found.evidence.diagnosis.limits, SHOWN),
         "amounts": {name: amount(one).replace("-", MINUS) for name, one in result["severity"].items()},
         "not_determined": [
-            SHOWN[name].removesuffix(", at most")
-            for name, one in found.severities.items()
-            if one.value is None or name in unseen
+            SHOWN[name].removesuffix(", at most") for name, one in found.severities.items() if one.value is None
         ],
         "changed": found.since is not None,
         "charts": {

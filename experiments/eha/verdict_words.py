@@ -168,11 +168,7 @@ def amounts(result: Mapping[str, Any], names: Sequence[str]) -> str:
     str
         In the units of a shop.
     """
-    from faults.diagnosis.not_told import not_determined  # here, since an estimate needs nothing of it
-
-    unseen = not_determined([one["code"] for one in result["notes"]])
-    told = {name: "not determined" if name in unseen else amount(result["severity"][name]) for name in names}
-    return "; ".join(f"{SHOWN[name]} {words}" for name, words in told.items())
+    return "; ".join(f"{SHOWN[name]} {amount(result['severity'][name])}" for name in names)
 
 
 def amount(one: Mapping[str, Any]) -> str:

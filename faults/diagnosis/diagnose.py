@@ -35,6 +35,7 @@ from faults.diagnosis.circuits.blocks import LONGEST
 from faults.diagnosis.failed_search import doubts_after
 from faults.diagnosis.known_losses import by_the_balance
 from faults.diagnosis.models_verdict import models_verdict, ranked
+from faults.diagnosis.not_told import without_undetermined
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import healthy_severities, limits_of, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
@@ -187,7 +188,12 @@ def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tupl
     notes, board = found.notes, diagnosis.scoreboard
     if (stop := board.blocks.stop) is not None:
         notes = (*notes, ClassCode.END_STOP.note(reach_mm=1e3 * stop))
-    severity = _severities(diagnosis, case.estimate, case.healthy, case.rig, pressure=PRESSURE in found.channels)
+    pressure = PRESSURE in found.channels
+    severity = _severities(diagnosis, case.estimate, case.healthy, case.rig, pressure=pressure)
+    not_told = (*diagnosis.not_told, *found.not_told)
+    if not _oil_is_the_circuits(case.estimate, pressure=pressure):
+        not_told = tuple(note for note in not_told if note.code is not ClassCode.BULK_MODULUS_NOT_VISIBLE)
+    severity = without_undetermined(severity, [note.code for note in not_told])
     known = case.estimate.gate.passed and not against
     oil = oil_advice(severity, diagnosis.healthy, diagnosis.limits, case.healthy.chamber_volume) if known else ()
     volume = volume_advice(case.strange, case.healthy, case.written)
@@ -201,7 +207,7 @@ def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tupl
         against=against,
         severities=severity,
         healthy=diagnosis.healthy,
-        not_told=(*diagnosis.not_told, *found.not_told),
+        not_told=not_told,
         since=board.onset,
         advice=(*oil, *volume, *further),
     )
@@ -314,12 +320,9 @@ def _another_oil(value: float | None, estimate: BulkModulusEstimate, healthy: Eh
 def _severities(
     diagnosis: Diagnosis, estimate: BulkModulusEstimate, healthy: EhaParameters, rig: Rig, *, pressure: bool
 ) -> Mapping[str, Quantity]:
-    """Return the severities, with the estimated bulk modulus and the uncertainty of the rig.
-
-    Where the check refuses a filter, or the fit of motion without pressure, the circuit's own bulk modulus stays.
-    """
+    """Return the severities, with the estimated bulk modulus and the uncertainty of the rig."""
     oil = estimate.quantity
-    if not estimate.gate.passed and not (pressure and estimate.form == "flow"):
+    if _oil_is_the_circuits(estimate, pressure=pressure):
         laws = scaled_responses(healthy, {}, pressure=pressure)["bulk_modulus"]
         oil = with_total(diagnosis.severity["bulk_modulus"], laws, estimate.spreads)
     found = with_bulk_modulus(diagnosis.severity, oil, actuator_of(healthy))
@@ -340,3 +343,8 @@ def _without_class(found: Finding, log: CleanLog, scores: Scores, against: tuple
         advice=advice_for(log.record, {}, against, (), scores.channels),
         evidence=EhaEvidence(found.evidence, scores, None),
     )
+
+
+def _oil_is_the_circuits(estimate: BulkModulusEstimate, *, pressure: bool) -> bool:
+    """Return whether bulk modulus is the circuit's: a filter, or a fit of motion without pressure, was refused."""
+    return not estimate.gate.passed and not (pressure and estimate.form == "flow")

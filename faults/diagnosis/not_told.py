@@ -61,14 +61,28 @@ def not_determined(codes: Collection[object]) -> frozenset[str]:
 
     Examples
     --------
-    >>> sorted(not_determined(["friction_not_visible"])), sorted(not_determined(["one_scale"]))
-    (['added_friction', 'pressure_rise', 'velocity_lost'], [])
+    >>> sorted(not_determined(["friction_not_visible"])), sorted(not_determined(["bulk_modulus_not_visible"]))
+    (['added_friction', 'pressure_rise', 'velocity_lost'], ['bulk_modulus', 'entrained_air'])
     """
     said = set(map(str, codes))
-    if str(ClassCode.FRICTION_NOT_VISIBLE) not in said:
-        return frozenset()
+    friction = str(ClassCode.FRICTION_NOT_VISIBLE) in said
     # without pressure, a piston that yields on its seals shows bulk modulus over friction alone
-    return OF_FRICTION | OF_OIL if str(ClassCode.ONE_SCALE) in said else OF_FRICTION
+    oil = str(ClassCode.BULK_MODULUS_NOT_VISIBLE) in said or (friction and str(ClassCode.ONE_SCALE) in said)
+    return (OF_FRICTION if friction else frozenset()) | (OF_OIL if oil else frozenset())
+
+
+def without_undetermined(found: Mapping[str, Quantity], codes: Collection[object]) -> Mapping[str, Quantity]:
+    """Return severities, without a number where the log determines none: it would be the prior's.
+
+    Parameters
+    ----------
+    found : Mapping[str, Quantity]
+        Severities [each in its unit].
+    codes : collection of Code or str
+        Of what the log does not tell.
+    """
+    unseen = not_determined(codes)
+    return {name: Quantity(None, one.unit) if name in unseen else one for name, one in found.items()}
 
 
 def _velocity_lost(speed: Quantity) -> list[Note]:

@@ -14,6 +14,7 @@ from experiments.eha.entries import diagnosis_entries
 from experiments.eha.verdict_words import verdict_lines
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.diagnose import diagnose_log
+from faults.diagnosis.not_told import without_undetermined
 from faults.notes import ClassCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -80,7 +81,8 @@ def test_severities_of_a_log_that_no_fit_explains_are_marked_as_not_reliable(
 
 def test_severities_of_which_the_log_says_nothing_are_in_no_state(diagnosed: tuple[Finding, Record]) -> None:
     found, log = diagnosed
-    unseen = replace(found, not_told=(ClassCode.FRICTION_NOT_VISIBLE.note(),))
+    codes = [ClassCode.FRICTION_NOT_VISIBLE]
+    unseen = replace(found, severities=without_undetermined(found.severities, codes))
     page = diagnosis_page({"file": "run.csv", "rig": "bench 7", **diagnosis_entries(unseen)}, unseen, log)
     assert re.findall('<input class="limit"[^>]*name="([a-z_]+)"', page) == [
         "leakage_flow",

@@ -8,7 +8,7 @@ from estimation.finding import Quantity
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import WEAK
-from faults.diagnosis.not_told import what_is_not_told
+from faults.diagnosis.not_told import what_is_not_told, without_undetermined
 from faults.diagnosis.severity import severities
 from faults.notes import ClassCode
 from plant.eha.steady_state import steady_state
@@ -71,3 +71,11 @@ def test_the_velocity_that_is_lost_is_told_with_its_interval() -> None:
     lost = known["velocity_lost"]
     assert lost.ci95 is not None
     assert (said.data["percent"], said.data["low"], said.data["high"]) == (lost.value, *lost.ci95)
+
+
+def test_what_the_log_does_not_narrow_has_no_number_since_it_would_be_the_priors() -> None:
+    known = severities(fits(NARROW), ACTUATOR)
+    told = without_undetermined(known, [ClassCode.BULK_MODULUS_NOT_VISIBLE])
+    assert told["bulk_modulus"] == Quantity(None, "Pa")
+    assert {name for name in known if told[name] != known[name]} == {"bulk_modulus", "entrained_air"}
+    assert without_undetermined(known, [ClassCode.ONE_SCALE]) == known

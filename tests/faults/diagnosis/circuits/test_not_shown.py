@@ -7,7 +7,6 @@ from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import WEAK
 from faults.diagnosis.circuits.not_shown import BLIND, FRICTION_LAW, not_shown
 from faults.diagnosis.diagnose import diagnose_log
-from faults.diagnosis.not_told import not_determined
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
@@ -32,4 +31,5 @@ def test_a_stuck_piston_without_pressure_has_no_soft_oil_whatever_holds_it() -> 
     found = diagnose_log(log.replace(**{PRESSURE: None}), Rig())
     assert not found.unknown
     assert found.condition == "minor_leakage"
-    assert {"bulk_modulus", "added_friction"} <= not_determined([note.code for note in found.not_told])
+    undetermined = {name for name, one in found.severities.items() if one.value is None and one.ci95 is None}
+    assert {"bulk_modulus", "added_friction"} <= undetermined
