@@ -94,7 +94,7 @@ def _severities(found: Finding) -> dict[str, Any]:
     return {
         name: {**quantity_entry(one), "healthy": float(healthy[name]), "limit": limits.get(name)}
         for name, one in found.severities.items()
-        if one.value is None or math.isfinite(one.value)
+        if one.value is not None and math.isfinite(one.value)
     }
 
 
