@@ -66,11 +66,8 @@ def _estimates_of(axis: Axes, rows: pd.DataFrame, heights: Mapping[str, float], 
         values = found.dropna(subset=["value_pa"])
         if values.empty:
             words, place = in_words(str(found["outcome"].iloc[0])), ("axes fraction", "data")
-            look = {"ha": "center", "va": "center", "color": GREY, "fontsize": 8}
-            ground = {
-                "facecolor": "white",
-                "edgecolor": "none",
-                "pad": 1.5,
-            }  # the line of the truth ends before the words
-            axis.annotate(words, (0.5, height), xycoords=place, bbox=ground, **look)
+            told = axis.annotate(words, (0.5, height), xycoords=place, ha="center", va="center", color=GREY, fontsize=8)
+            told.set_bbox(
+                {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
+            )  # the truth's line ends before the words
         draw_intervals(axis, values, height, 3.0, lambda _: colour)
