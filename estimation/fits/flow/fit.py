@@ -12,7 +12,7 @@ from estimation.fits.flow.belief import hopeless_cost, play_explained, wanted_co
 from estimation.fits.flow.log import homed_at_stop, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
-from estimation.fits.flow.misread import CorrectedLogs
+from estimation.fits.flow.misread import UNLIKE_SLIPS, CorrectedLogs
 from estimation.fits.flow.other_minimum import lower_minimum, smaller_accumulator
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer
 from estimation.fits.flow.search import MAKEUP_TRIED
@@ -174,22 +174,27 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
         if (stiff := stiffer(logged, plain)) is not None:
             start = replace(start, parameters=stiff, bulk_modulus=stiff.bulk_modulus, valley=None)
             continue
-        foreign = not start.turns_read and not corrected.is_kin(plain, plain.best)
-        if foreign and plain.explains(plain.best) and corrected.misread(plain, plain.best) is not None:
-            return Answered(plain, (), (), None)
         asked, open_ends = _asked(plain, sensed, traits)
         try:
             with work.counted():
+                if not start.turns_read and _misread(corrected, plain, asked, traits):
+                    return Answered(plain, (), (), None)
                 strange = _strange(plain, asked, traits) if asked else None
         except WorkSpentError:
             return Answered(plain, asked, open_ends, None, ended=True)
-        sound = strange is not None and corrected.is_sound(plain, strange)
-        if foreign and not sound and corrected.misread(plain, plain.best) is not None:
-            return Answered(plain, (), (), None)
         elsewhere = strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))
         if elsewhere is None:
             return Answered(plain, asked, open_ends, strange)
         start = elsewhere
+
+
+def _misread(corrected: CorrectedLogs, plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> bool:
+    """Return whether slips explain a log, and nothing strange that no slip looks like does."""
+    if corrected.misread(plain, plain.best, paired=not corrected.is_kin(plain, plain.best)) is None:
+        return False
+    unlike = [one for one in asked if one.name in UNLIKE_SLIPS]
+    strange = None if plain.explains(plain.best) or not unlike else _strange(plain, unlike, traits)
+    return strange is None or not corrected.is_sound(plain, strange)
 
 
 def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequence[Hypothesis], Sequence[Note]]:

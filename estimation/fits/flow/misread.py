@@ -5,25 +5,34 @@ whose piston hardly moves, has too little of them. The flow form may even explai
 pump that loses more than it pumps. So where a fit ends there, slips are corrected in turn and the log is fitted again.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import log as ln
-from typing import NamedTuple
+from operator import itemgetter
 
 import numpy as np
 
+from estimation.fits.flow.guesses import guesses_about
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits
+from estimation.fits.flow.search import GUESSED_WITHIN, ROUGH_ENOUGH, flow_starts
+from estimation.fits.flow.slips import PAIRS, SLIPS, Slip, set_right
+from estimation.fits.greybox.descent import descend
 from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.side_by_side import LANES
 from estimation.fits.hypotheses import CHECKS_CRACK, MAKEUP_BENDS, OFFSET, PRESSURE_DRIFT
 from estimation.fits.hypothesis_search.explain import WORTH, Explanation
-from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
-from estimation.log_checks.channel_physics import LENGTHS, RPM, TURNS
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
 from estimation.log_checks.flow_balance import MOST_LOST
+from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.notes import ChannelCode
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
+
+Slips = tuple[Slip, ...]
 
 FOREIGN, KIN = 7.0, 3.0
 """Times the rig file's bulk modulus, or its inverse, from which a slip is looked for, and up to which one that is set
@@ -52,52 +61,13 @@ UNLIKE_SLIPS = frozenset({OFFSET.name, PRESSURE_DRIFT.name, CHECKS_CRACK.name, M
 ROUNDING = 1e-9
 """Difference of logarithms that rounding may leave [dimensionless]."""
 
-TURNED = "a wrong sign of {} (-UNIT)"
-"""What is said of a channel that counts the other way."""
+HOPEFUL, MOST_FITTED = 10.0, 4
+"""Rough misfit up to which a slip that is set right may explain a log, as a mean squared normalised residual
+[dimensionless], and how many slips are fitted at most [count]; judged. Of right slips the rough misfit is 1.0 to 1.2,
+of wrong ones 2 to 3,000."""
 
-PRESSURES: Mapping[float, str] = {
-    1e-2: "kPa read as bar",
-    1e-1: "bar read as MPa",
-    10.0: "MPa read as bar",
-    100.0: "bar read as kPa",
-    1e3: "kPa read as Pa",
-    1e5: "bar read as Pa",
-}
-"""Slips of a pressure's unit, by what the values are to be multiplied with."""
-
-
-class Slip(NamedTuple):
-    """A mistake in how a channel was read.
-
-    Parameters
-    ----------
-    channel : str
-        Which.
-    said : str
-        What it looks like.
-    factor : float
-        What sets it right [dimensionless]; 0 where the channel is `other`.
-    other : str
-        Channel under whose heading it is; empty where it is under its own.
-    """
-
-    channel: str
-    said: str
-    factor: float
-    other: str = ""
-
-
-SLIPS: Sequence[Slip] = (
-    Slip(SPEED, TURNED.format(SPEED), -1.0),
-    *(Slip(SPEED, said, times) for times, said in TURNS.items()),
-    Slip(SPEED, "krpm read as rad/s", 1e3 / RPM),
-    Slip(PRESSURE, TURNED.format(PRESSURE), -1.0),
-    *(Slip(PRESSURE, said, times) for times, said in PRESSURES.items()),
-    Slip(POSITION, TURNED.format(POSITION), -1.0),
-    Slip(POSITION, LENGTHS[1e3], 1e-3),
-    Slip(POSITION, f"{VELOCITY} in the place of {POSITION}", 0.0, VELOCITY),
-)
-"""Mistakes that are tried."""
+EVALUATIONS = 40
+"""Evaluations of the model by which a slip is judged roughly [count]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +85,7 @@ class CorrectedLogs:
     logged: Logged
     rig: EhaParameters
 
-    def misread(self, plain: PlainFits, found: GreyBoxFit) -> Note | None:
+    def misread(self, plain: PlainFits, found: GreyBoxFit, *, paired: bool = True) -> Note | None:
         """Return the slips that make a log one of the rig's, where a fit says that it is none as it was read.
 
         Parameters
@@ -124,15 +94,17 @@ class CorrectedLogs:
             The log's fits by the plain form.
         found : GreyBoxFit
             The fit that is believed most.
+        paired : bool
+            Whether two slips together are tried where none alone explains the log.
 
         Returns
         -------
         Note or None
-            None where the fit is one of the rig's kin, no slip makes it so, or pressure does not change.
+            None where the fit explains the log as one of the rig's kin, no slip does, or pressure does not change.
         """
-        if self.is_kin(plain, found) or not _pressed(self.logged):
+        if (plain.explains(found) and self.is_kin(plain, found)) or not _pressed(self.logged):
             return None
-        slips = [slip for slip, one in self._explained if _lost_to(found, one) < WORTH]
+        slips = _likeliest(self._single, found) or (_likeliest(self._double, found) if paired else [])
         return _told(slips) if slips else None
 
     def is_kin(self, plain: PlainFits, found: GreyBoxFit) -> bool:
@@ -160,18 +132,54 @@ class CorrectedLogs:
         return UNLIKE_SLIPS.issuperset(strange.names) and self.is_kin(plain, strange.fit)
 
     @cached_property
-    def _explained(self) -> Sequence[tuple[Slip, GreyBoxFit]]:
-        """The slips without which the log is one of the rig's, each with its fit."""
+    def _single(self) -> Sequence[tuple[Slips, GreyBoxFit]]:
+        return self._explained([(slip,) for slip in SLIPS])
+
+    @cached_property
+    def _double(self) -> Sequence[tuple[Slips, GreyBoxFit]]:
+        return self._explained(PAIRS)
+
+    def _explained(self, tried: Sequence[Slips]) -> Sequence[tuple[Slips, GreyBoxFit]]:
+        """Return the slips without which the log is one of the rig's, each with its fit."""
         begun, rig = _beginning(self.logged), self.rig
-        fits = [(slip, one) for slip in SLIPS if (one := _right_with(slip, begun, rig)) is not None]
+        hopeful = _hopeful(tried, begun, rig)
+        fits = [(slips, one) for slips in hopeful if (one := _right_with(slips, begun, rig)) is not None]
         if begun is self.logged:
             return fits
-        return [(slip, one) for slip, _ in fits if (one := _right_with(slip, self.logged, rig)) is not None]
+        return [(slips, one) for slips, _ in fits if (one := _right_with(slips, self.logged, rig)) is not None]
 
 
-def _told(slips: Sequence[Slip]) -> Note:
-    channels = dict.fromkeys(slip.channel for slip in slips)
-    said = " or ".join(slip.said for slip in slips)
+def _likeliest(explained: Sequence[tuple[Slips, GreyBoxFit]], found: GreyBoxFit) -> Sequence[Slips]:
+    """Return the slips that explain a log no worse than a fit of it as it was read, and than each other."""
+    fits = [found, *(one for _, one in explained)]
+    return [slips for slips, one in explained if all(_lost_to(other, one) < WORTH for other in fits)]
+
+
+def _hopeful(tried: Sequence[Slips], logged: Logged, rig: EhaParameters) -> Sequence[Slips]:
+    """Return the slips that may explain a log once they are set right, by what a rough search of each leaves."""
+    left: list[tuple[float, Slips]] = []
+    for slips in tried:
+        right = _sliding(slips, logged, rig)
+        misfit = np.inf if right is None else _rough_misfit(right, rig)
+        if misfit < HOPEFUL:
+            left.append((max(misfit, 1.0 / misfit) if misfit > 0.0 else np.inf, slips))
+    return [slips for _, slips in sorted(left, key=itemgetter(0))[:MOST_FITTED]]
+
+
+def _rough_misfit(logged: Logged, rig: EhaParameters) -> float:
+    """Return the misfit of the balance by volume from the likeliest guess on, with long model steps [dimensionless]."""
+    log = logged.seen_at(rig).taken_at(rig.bulk_modulus)
+    form = relieving(FLOW_FORM) if reaches_relief(log.measured, rig.relief_pressure) else FLOW_FORM
+    problem = FreedProblem.of(form, log.coarsened())
+    guesses = guesses_about({STIFFNESS: 0.0, **flow_starts(rig, rig.bulk_modulus)[0]}, form, rig)
+    likeliest = guesses[int(np.argmin(problem.costs(guesses, LANES)))]
+    found = descend(problem.at, likeliest, EVALUATIONS, flow_bounds(form, guesses, log), ROUGH_ENOUGH, GUESSED_WITHIN)
+    return 2.0 * found.cost / problem.blocks
+
+
+def _told(found: Sequence[Slips]) -> Note:
+    channels = dict.fromkeys(" and ".join(slip.channel for slip in slips) for slips in found)
+    said = " or ".join(" and ".join(slip.said for slip in slips) for slips in found)
     return ChannelCode.CHANNEL_MISREAD.note(channel=" or ".join(channels), slip=said)
 
 
@@ -214,12 +222,18 @@ def _beginning(logged: Logged) -> Logged:
     return logged if samples >= len(record) else replace(logged, record=record.slice(0, samples))
 
 
-def _right_with(slip: Slip, logged: Logged, rig: EhaParameters) -> GreyBoxFit | None:
-    """Return the fit of a log whose slip is set right, where it explains the log as one of the rig's."""
-    set_right = _set_right(slip, logged)
-    if set_right is None or not _slides_as_well(set_right.record, logged.record, rig):
+def _sliding(slips: Slips, logged: Logged, rig: EhaParameters) -> Logged | None:
+    """Return a log with slips set right, None where it has no such channels, or its pressure then moves no piston."""
+    right = set_right(slips, logged)
+    return right if right is not None and _slides_as_well(right.record, logged.record, rig) else None
+
+
+def _right_with(slips: Slips, logged: Logged, rig: EhaParameters) -> GreyBoxFit | None:
+    """Return the fit of a log whose slips are set right, where it explains the log as one of the rig's."""
+    right = _sliding(slips, logged, rig)
+    if right is None:
         return None
-    plain = plain_fits(set_right, FitStart(rig, rig.bulk_modulus))
+    plain = plain_fits(right, FitStart(rig, rig.bulk_modulus))
     return plain.best if plain.explains(plain.best) and _kin(plain.best, rig, KIN, 0.0) else None
 
 
@@ -236,16 +250,3 @@ def _slides_as_well(right: Record, read: Record, rig: EhaParameters) -> bool:
         return abs(ln(pressure * rig.piston_area / rig.friction_coulomb)) if pressure > 0.0 else np.inf
 
     return off(right) <= off(read) + ROUNDING
-
-
-def _set_right(slip: Slip, logged: Logged) -> Logged | None:
-    record, variances = logged.record, logged.variances
-    if slip.other:
-        if slip.other not in record:
-            return None
-        changed, noise = record[slip.other], variances.get(slip.other, np.nan)
-    else:
-        changed, noise = slip.factor * record[slip.channel], slip.factor**2 * variances[slip.channel]
-    if not np.isfinite(noise):
-        return None
-    return Logged(record.replace(**{slip.channel: changed}), {**variances, slip.channel: noise}, logged.uncertainties)

@@ -6,12 +6,12 @@ that explains the log, nothing else is searched; else searches begin at leakages
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
-from math import ceil, prod
+from math import ceil
 
 import numpy as np
 
 from estimation.arrays import IntArray
+from estimation.fits.flow.guesses import guesses_about
 from estimation.fits.flow.log import DRAIN_START, OPENING_START, carried, outruns_pump
 from estimation.fits.flow.other_minimum import FINISHING, Found, completed_form, from_minimum, nearest
 from estimation.fits.flow.swept import swept_evenly
@@ -41,14 +41,6 @@ MAKEUP_TRIED = (1e-9, 1e-13)
 
 LEAD_START = 1e-5
 """First guess of the motor's lead on the straight line between samples [s]."""
-
-GUESSED: Mapping[str, Sequence[float]] = {
-    "leakage_coefficient": (1.0, 2.5, 5.0, 8.0, 12.5),
-    "flow_bias": (1.0, 3.5, 6.0),
-    "bulk_modulus": (0.7, 1.0, 1.3),
-}
-"""Multiples of the first start's unknowns in the guesses of which the likeliest is followed [dimensionless]: from the
-healthy actuator to the worst of Table 3, leakage and flow bias as of the paper's rig."""
 
 GUESSED_WITHIN = 0.3
 """First radius of a search from the likeliest guess [dimensionless]: half the distance between guesses of leakage."""
@@ -290,27 +282,11 @@ def _guess(
     """
     search = _search(log)
     around = {STIFFNESS: 0.0, **starts[0]}
-    guesses = _guesses_about(around, problem.model, parameters)
+    guesses = guesses_about(around, problem.model, parameters)
     likeliest = guesses[int(np.argmin(problem.costs(guesses, LANES)))]
     bounds = flow_bounds(problem.model, guesses, log)
     found = descend(problem.at, likeliest, search.evaluations, bounds, search.near_enough, GUESSED_WITHIN)
     return problem.model.values(found.theta), explained(problem, found)
-
-
-def _guesses_about(around: Mapping[str, float], model: GreyBoxModel, p: EhaParameters) -> list[Array]:
-    """Return all guesses about a start, each coordinate of which is made once."""
-    places = [model.unknowns.index(name) for name in GUESSED]
-
-    def times(name: str, factor: float) -> float:
-        return factor * around[name] if name == "bulk_modulus" else faulty_coefficient(p, name, around[name], factor)
-
-    tried = [
-        [model.theta({**around, name: times(name, factor)})[place] for factor in factors]
-        for place, (name, factors) in zip(places, GUESSED.items(), strict=True)
-    ]
-    guesses = np.tile(model.theta(around), (prod(map(len, tried)), 1))
-    guesses[:, places] = list(product(*tried))
-    return list(guesses)
 
 
 def _search(log: GreyBoxLog) -> Search:

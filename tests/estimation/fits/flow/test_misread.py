@@ -11,10 +11,11 @@ from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.finding import Outcome
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import misread as misread_module
-from estimation.fits.flow.misread import FOREIGN, KIN, SLIPS, CorrectedLogs, Slip
+from estimation.fits.flow.misread import FOREIGN, KIN, CorrectedLogs
 from estimation.fits.flow.plain import FitStart, Logged
+from estimation.fits.flow.slips import SLIPS, Slip
 from estimation.fits.greybox.work_limit import Work
-from estimation.fits.hypotheses import DELIVERY
+from estimation.fits.hypotheses import DELIVERY, OFFSET
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
 from estimation.log_checks.channel_physics import RPM, channel_mistakes
 from estimation.notes import ChannelCode
@@ -62,17 +63,18 @@ def test_slips_are_tried_once_and_first_where_the_pump_has_turned_for_two_second
     seen: list[int] = []
     fit = made_fit(50.0, 0.01 * RIG.bulk_modulus, 1e5)
 
-    def right_with(slip: Slip, logged: Logged, _: EhaParameters) -> Any:
+    def right_with(slips: tuple[Slip, ...], logged: Logged, _: EhaParameters) -> Any:
         seen.append(len(logged.record))
-        return fit if slip is SLIPS[0] else None
+        return fit if slips == (SLIPS[0],) else None
 
     monkeypatch.setattr(misread_module, "SLIPS", SLIPS[:1])
+    monkeypatch.setattr(misread_module, "_rough_misfit", lambda *_: 1.0)
     monkeypatch.setattr(misread_module, "_right_with", right_with)
     speed, position = np.ones(5000), np.zeros(5000)
     speed[:rests], position[:missing] = 0.0, np.nan
     record = Record(1e-3, {SPEED: speed, POSITION: position, PRESSURE: np.arange(5000.0)})
     plain: Any = SimpleNamespace(explains=lambda _: False)
-    corrected = CorrectedLogs(Logged(record, {PRESSURE: 1.0}), RIG)
+    corrected = CorrectedLogs(Logged(record, {SPEED: 1.0, POSITION: 1.0, PRESSURE: 1.0}), RIG)
     assert [bool(corrected.misread(plain, fit)) for _ in range(2)] == [True, True]
     assert seen == lengths
     dead = CorrectedLogs(Logged(record, {PRESSURE: float(np.var(record[PRESSURE]))}), RIG)
@@ -92,7 +94,7 @@ def test_a_log_that_is_fitted_anew_is_asked_for_slips_anew(monkeypatch: pytest.M
         logged=nothing,
         is_kin=lambda _, found: found == "kin",
         is_sound=lambda *_: True,
-        misread=lambda _, found: found == "foreign" or None,
+        misread=lambda _, found, **_named: found == "foreign" or None,
     )
     answer = flow_fit._answered(corrected, FitStart(RIG, 2e8), nothing, nothing, Work())
     assert (answer.plain.best, answer.asked, plains) == ("foreign", (), [])
@@ -108,14 +110,15 @@ def test_slips_are_tried_of_what_nothing_explains_unless_an_offset_of_pressure_d
     nothing: Any = None
     monkeypatch.setattr(flow_fit, "plain_fits", lambda *_: plain)
     monkeypatch.setattr(flow_fit, "stiffer", lambda *_: None)
-    monkeypatch.setattr(flow_fit, "_asked", lambda *_: ((DELIVERY,), ()))
-    monkeypatch.setattr(flow_fit, "_strange", lambda *_: strange)
+    monkeypatch.setattr(flow_fit, "_asked", lambda *_: ((DELIVERY, OFFSET), ()))
+    by_offset = named == OFFSET.name
+    monkeypatch.setattr(flow_fit, "_strange", lambda _, asked, __: strange if by_offset or len(asked) > 1 else None)
     monkeypatch.setattr(flow_fit, "_elsewhere", lambda *_: None)
     monkeypatch.setattr(flow_fit, "quieter", lambda *_: None)
     monkeypatch.setattr(CorrectedLogs, "is_kin", lambda _, __, found: found == "kin")
-    monkeypatch.setattr(CorrectedLogs, "misread", lambda *_: True)
+    monkeypatch.setattr(CorrectedLogs, "misread", lambda *_, **_named: True)
     answer = flow_fit._answered(CorrectedLogs(nothing, RIG), FitStart(RIG, 2e8), nothing, nothing, Work())
-    assert (answer.strange is strange) == (named == "pressure_offset")
+    assert (answer.strange is strange) == by_offset
 
 
 @pytest.mark.parametrize("noise", [0.0, 2e3])

@@ -13,7 +13,7 @@ from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO
 from estimation.fits.hypothesis_search.predicted_gains import predicted_gain, predicted_gains
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.completed_flow import CRACKS
-from estimation.models.flow import MASS_FLOW_FORM, STIFFNESS
+from estimation.models.flow import MASS_FLOW_FORM
 from experiments.open_benchmark.logger import PLAIN, Logger
 from experiments.open_benchmark.machine import Machine
 from experiments.open_benchmark.run import TICK, run
@@ -196,21 +196,3 @@ def test_what_the_orifices_of_make_up_valves_leave_is_put_on_no_sensor() -> None
     assert fit.explanation is not None
     assert fit.explanation.names == ("makeup_bends",)
     assert fit.parameters["bulk_modulus"][0] == pytest.approx(Machine().bulk_modulus, rel=0.004)
-
-
-def test_guesses_about_a_start_go_as_far_above_it_as_the_paper_rig_is_from_healthy_to_worst() -> None:
-    p = EhaParameters()
-    start = {"leakage_coefficient": 2e-13, "flow_bias": 3e-6, "bulk_modulus": 1e9, "makeup_conductance": 1e-9}
-    around = {STIFFNESS: 0.0, **flow_starts(p, 1e9)[0], **start}
-    guesses = flow_search._guesses_about(around, MASS_FLOW_FORM, p)  # pyright: ignore[reportPrivateUsage]
-    found = [MASS_FLOW_FORM.values(guess) for guess in guesses]
-    assert len({tuple(one.values()) for one in found}) == len(found) == 45
-    assert found[0]["bulk_modulus"] == pytest.approx(0.7e9)
-    assert found[-1] == pytest.approx(
-        {
-            **found[0],
-            "leakage_coefficient": 2e-13 + 11.5 * p.leakage_coefficient,
-            "flow_bias": 3e-6 + 5.0 * p.flow_bias,
-            "bulk_modulus": 1.3e9,
-        }
-    )

@@ -1,0 +1,128 @@
+"""Mistakes in how a log's channels were read, alone and two at a time, and a log with them set right.
+
+Pressure over stiffness is all that a flow balance holds of a pressure, so that units which differ by a factor of two
+are one slip: oil has no stiffness that tells them apart.
+"""
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from estimation.fits.flow.plain import Logged
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
+from estimation.log_checks.channel_physics import LENGTHS, RPM, TURNS
+
+DEGREES = 180.0 / np.pi
+"""Degrees in a radian [dimensionless]."""
+
+PSI = 6894.757
+"""A pound-force per square inch [Pa]."""
+
+PRESSURES: Mapping[float, str] = {
+    1e-1: "bar read as MPa, psi read as bar or kPa read as psi",
+    10.0: "MPa read as bar, bar read as psi or psi read as kPa",
+    1e-2: "kPa read as bar or psi read as MPa",
+    100.0: "bar read as kPa or MPa read as psi",
+    1e-3: "Pa read as kPa or kPa read as MPa",
+    1e3: "kPa read as Pa or MPa read as kPa",
+    1.0 / PSI: "Pa read as psi",
+    PSI: "psi read as Pa",
+    1e-5: "Pa read as bar",
+    1e5: "bar read as Pa",
+    1e-6: "Pa read as MPa",
+    1e6: "MPa read as Pa",
+}
+"""Slips of a pressure's unit, by about what the values are to be multiplied with."""
+
+SPEEDS: Mapping[float, str] = {
+    **TURNS,
+    1e3 / RPM: "krpm read as rad/s",
+    1.0 / DEGREES: "deg/s read as rad/s",
+    1.0 / 6.0: "deg/s read as rpm",
+    60.0: "rev/s read as rpm",
+}
+"""The same of a speed's unit."""
+
+POSITIONS: Mapping[float, str] = {1e-3: LENGTHS[1e3], 1e3: LENGTHS[1e-3]}
+"""The same of a position's unit."""
+
+
+class Slip(NamedTuple):
+    """A mistake in how a channel was read.
+
+    Parameters
+    ----------
+    channel : str
+        Which.
+    said : str
+        What it looks like.
+    factor : float
+        What sets it right [dimensionless]; 0 where the channel is `other`.
+    other : str
+        Channel under whose heading it is; empty where it is under its own.
+    """
+
+    channel: str
+    said: str
+    factor: float
+    other: str = ""
+
+
+def _turned(channel: str) -> Slip:
+    return Slip(channel, f"a wrong sign of {channel} (-UNIT)", -1.0)
+
+
+def _units(channel: str, units: Mapping[float, str]) -> list[Slip]:
+    return [Slip(channel, said, times) for times, said in units.items()]
+
+
+SLIPS: Sequence[Slip] = (
+    _turned(SPEED),
+    *_units(SPEED, SPEEDS),
+    _turned(PRESSURE),
+    *_units(PRESSURE, PRESSURES),
+    _turned(POSITION),
+    *_units(POSITION, POSITIONS),
+    Slip(POSITION, f"{VELOCITY} in the place of {POSITION}", 0.0, VELOCITY),
+)
+"""Mistakes that are tried."""
+
+USUAL_SPEEDS = (-1.0, 1.0 / RPM, RPM)
+"""Those of a speed, by what sets them right, that are tried together with one of another channel [dimensionless]."""
+
+PAIRS: Sequence[tuple[Slip, Slip]] = tuple(
+    (one, two)
+    for one, two in combinations([slip for slip in SLIPS if slip.channel != SPEED or slip.factor in USUAL_SPEEDS], 2)
+    if one.channel != two.channel and not (one.factor < 0.0 and two.factor < 0.0) and not (one.other or two.other)
+)
+"""Two mistakes that are tried together. Two wrong signs are one of the third channel."""
+
+
+def set_right(slips: Sequence[Slip], logged: Logged) -> Logged | None:
+    """Return a log with slips set right.
+
+    Parameters
+    ----------
+    slips : sequence of Slip
+        The slips, of different channels.
+    logged : Logged
+        The log.
+
+    Returns
+    -------
+    Logged or None
+        None where the log has no channel to put in another's place.
+    """
+    record, variances = logged.record, dict(logged.variances)
+    for slip in slips:
+        if slip.other and slip.other not in record:
+            return None
+        source, times = (slip.other, 1.0) if slip.other else (slip.channel, slip.factor)
+        noise = times**2 * variances.get(source, np.nan)
+        if not np.isfinite(noise):
+            return None
+        variances[slip.channel] = noise
+        record = record.replace(**{slip.channel: times * logged.record[source]})
+    return Logged(record, variances, logged.uncertainties)
