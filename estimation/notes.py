@@ -95,24 +95,6 @@ class ChannelCode(Code):
     )
 
 
-class GuessCode(Code):
-    """Why a column of a strange log may be a channel; columns count from 1."""
-
-    CALLED_SO = "its name says so"
-    DATES = "it holds dates or times of the day"
-    UNIT_FITS = "{unit} is a unit of this channel"
-    UNIT_GUESSED = "no unit is given; in {unit} its size is usual: check the unit"
-    INCREASES = "it increases by {step:.6g} from row to row"
-    HAS_SLOPE = "column {column} is its slope (correlation {correlation:.3f})"
-    IS_SLOPE = "it is the slope of column {column} (correlation {correlation:.3f})"
-    FOLLOWS = "it follows the motion in column {column} (correlation {correlation:.2f})"
-    OPPOSES = (
-        "it goes against the motion in column {column} (correlation {correlation:.2f}): if its sensor is reversed, put "
-        "a minus before its unit"
-    )
-    IS_DIFFERENCE = "it is the difference of columns {one} and {other}"
-
-
 class EstimateCode(Code):
     """Notes on an estimate of bulk modulus: what speaks against it, or what it lacks."""
 
@@ -140,7 +122,9 @@ class EstimateCode(Code):
     PRESSURE_RESIDUALS_LARGE = (
         "the flow balance does not explain the log: the pressure residuals are {ratio:.1f} times the sensor's noise"
     )
-    PRESSURE_RESIDUALS_SMALL = "pressure residuals are {ratio:.1f} times smaller than position noise in oil so stiff"
+    PRESSURE_RESIDUALS_SMALL = (
+        "pressure fits {ratio:.1f} times better than the noise of position_m allows: so close a fit is not believed"
+    )
     PRESSURE_RESIDUALS_CORRELATED = (
         "the flow balance leaves something out: successive pressure residuals have a correlation of {correlation:.2f} "
         "(noise alone: 0)"
@@ -200,6 +184,15 @@ class EstimateCode(Code):
         "{state} still changed by {moved:.3g} {unit} over the last fifth of the log: the estimate has not settled"
     )
     AT_PHYSICAL_BOUND = "{state} ended at its physical limit ({value:.3g} {unit})"
+    NOTHING_MOVES = "neither the pump nor the piston moves noticeably in this log: bulk modulus is not observable"
+    PISTON_STANDS_STILL = (
+        "the piston moves by only {moved_m:.2g|mm} mm, while the pump turns enough for {pumped_m:.3g|mm} mm: it is "
+        "stuck, or leakage takes all that is pumped; no motion confirms the units of motor speed and pressure"
+    )
+    STILL_AND_FOREIGN = (
+        "bulk modulus seems {ratio:.2g} times that in the rig file, but while the piston stands still, such oil cannot "
+        "be told from a wrong unit of motor speed or pressure"
+    )
     PRESSURE_ABSENT = (
         "without differential_pressure_pa the estimate depends on the friction model, which may be wrong for your "
         "actuator; while the piston sticks, the log says nothing about the oil (errata E13)"

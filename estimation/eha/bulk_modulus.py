@@ -12,6 +12,7 @@ from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate
 from estimation.eha.named_methods import NAMED
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide, without_number
 from estimation.eha.rig_share import fitted_responses, scaled_responses, with_wear
+from estimation.eha.still_piston import at_rest_throughout, unless_stuck
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
 from estimation.fits.flow.fit import FLOW_CHANNELS, REPORTED, fit_flow, require_flow_channels
@@ -198,6 +199,8 @@ def estimate_clean(
     if automatic and form == "motion" and (bound := rigid_bound(log, parameters)) > LARGEST_BOUND:
         unseen = without_number(Outcome.NOT_OBSERVABLE, (too_wide(bound),), form, MOTION_CHANNELS, bound)
         return _doubting_sensors(unseen, log)
+    if form == "flow" and (still := at_rest_throughout(log.record, parameters)):
+        return _doubting_sensors(without_number(Outcome.NOT_OBSERVABLE, still, form, FLOW_CHANNELS), log)
     fit = None if filtering else _fit(log, parameters, form, guess, spreads, chosen=options.method == LEAST_SQUARES)
     if fit is not None and (slips := _channel_slips(fit, parameters)):
         return without_number(Outcome.MISMATCH, slips, form, FITTED[form][1])
@@ -216,7 +219,8 @@ def estimate_clean(
         require_known("form", form, FORMS)
         how = options.filter_options
         found = estimate_by_filter(log, parameters, FORMS[form], guess, options.start_std, how)
-    return _doubting_sensors(unless_another_rig(_with_rig(found, parameters, spreads), log, parameters), log)
+    found = unless_another_rig(_with_rig(found, parameters, spreads), log, parameters)
+    return _doubting_sensors(unless_stuck(found, log.record, parameters) if form == "flow" else found, log)
 
 
 def _fit(

@@ -13,7 +13,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
-from estimation.notes import GuessCode
+from estimation.log_checks.notes import GuessCode
 from plant.eha.model import EhaParameters
 from plant.log.columns import CHANNELS, TIME, UNITS
 from plant.log.guess import Guess, guessed, points_by_name

@@ -177,7 +177,7 @@ def without_unit(tables: Sequence[Mapping[str, Any]]) -> list[str]:
     tables : sequence of Mapping
         Entries of ``tables``.
     """
-    from estimation.notes import GuessCode
+    from estimation.log_checks.notes import GuessCode
 
     rows = (row for one in tables for row in one["columns"])
     return [row["name"] for row in rows if any(why["code"] == GuessCode.UNIT_GUESSED for why in row["why"])]

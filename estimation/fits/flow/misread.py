@@ -26,6 +26,8 @@ from estimation.fits.hypothesis_search.explain import WORTH, Explanation
 from estimation.fits.hypothesis_search.wide_problem import flow_bounds
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
 from estimation.log_checks.flow_balance import MOST_LOST
+from estimation.log_checks.sliding_pressure import beyond_sliding, sliding_pressure
+from estimation.log_checks.standstill import travels
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.notes import ChannelCode
 from plant.eha.model import EhaParameters
@@ -52,7 +54,7 @@ ALIKE = 0.1
 """Share by which two fits' blocks may differ in number where their costs are compared [fraction]."""
 
 FELT = 4.0
-"""Variance of a pressure over that of its noise from which it changes [dimensionless]: twice the noise; judged. A dead
+"""Variance of a channel over that of its noise from which it changes [dimensionless]: twice the noise; judged. A dead
 sensor shows its noise alone, and any slower pump explains that."""
 
 UNLIKE_SLIPS = frozenset({OFFSET.name, PRESSURE_DRIFT.name, CHECKS_CRACK.name, MAKEUP_BENDS.name})
@@ -65,6 +67,9 @@ HOPEFUL, MOST_FITTED = 10.0, 4
 """Rough misfit up to which a slip that is set right may explain a log, as a mean squared normalised residual
 [dimensionless], and how many slips are fitted at most [count]; judged. Of right slips the rough misfit is 1.0 to 1.2,
 of wrong ones 2 to 3,000."""
+
+HOPELESS = 300.0
+"""The same of the likeliest guess, from which on no search is made [dimensionless]: of right slips it is 2 to 120."""
 
 EVALUATIONS = 40
 """Evaluations of the model by which a slip is judged roughly [count]."""
@@ -102,7 +107,7 @@ class CorrectedLogs:
         Note or None
             None where the fit explains the log as one of the rig's kin, no slip does, or pressure does not change.
         """
-        if (plain.explains(found) and self.is_kin(plain, found)) or not _pressed(self.logged):
+        if (plain.explains(found) and self.is_kin(plain, found)) or not _changes(self.logged, PRESSURE):
             return None
         slips = _likeliest(self._single, found) or (_likeliest(self._double, found) if paired else [])
         return _told(slips) if slips else None
@@ -117,7 +122,8 @@ class CorrectedLogs:
         found : GreyBoxFit
             The fit.
         """
-        return _kin(found, self.rig, FOREIGN, SURELY if plain.explains(found) else 0.0)
+        times = KIN if _pressure_off(self.logged.record, found, self.rig) else FOREIGN
+        return _kin(found, self.rig, times, SURELY if plain.explains(found) else 0.0)
 
     def is_sound(self, plain: PlainFits, strange: Explanation) -> bool:
         """Return whether what is strange makes the log one of the rig's, and is nothing that a slip looks like.
@@ -156,9 +162,18 @@ def _likeliest(explained: Sequence[tuple[Slips, GreyBoxFit]], found: GreyBoxFit)
 
 
 def _hopeful(tried: Sequence[Slips], logged: Logged, rig: EhaParameters) -> Sequence[Slips]:
-    """Return the slips that may explain a log once they are set right, by what a rough search of each leaves."""
+    """Return the slips that may explain a log once they are set right, by what a rough search of each leaves.
+
+    Noise tells no unit of position, and a piston that stands still none of speed and pressure.
+    """
     left: list[tuple[float, Slips]] = []
+    gone, changes = travels(logged.record, rig), _changes(logged, POSITION)
+    still = not changes or (gone is not None and gone.still)
     for slips in tried:
+        mended = {slip.channel: slip for slip in slips}.get(POSITION)
+        scaled = any(slip.factor > 0.0 for slip in slips)
+        if not (changes or mended.other) if mended else still and scaled:
+            continue
         right = _sliding(slips, logged, rig)
         misfit = np.inf if right is None else _rough_misfit(right, rig)
         if misfit < HOPEFUL:
@@ -167,14 +182,21 @@ def _hopeful(tried: Sequence[Slips], logged: Logged, rig: EhaParameters) -> Sequ
 
 
 def _rough_misfit(logged: Logged, rig: EhaParameters) -> float:
-    """Return the misfit of the balance by volume from the likeliest guess on, with long model steps [dimensionless]."""
+    """Return the misfit of the balance by volume from the likeliest guess on, with long model steps [dimensionless].
+
+    It is infinite where that guess is hopeless already, and where the search ends at oil that is no kin of the rig's.
+    """
     log = logged.seen_at(rig).taken_at(rig.bulk_modulus)
     form = relieving(FLOW_FORM) if reaches_relief(log.measured, rig.relief_pressure) else FLOW_FORM
     problem = FreedProblem.of(form, log.coarsened())
     guesses = guesses_about({STIFFNESS: 0.0, **flow_starts(rig, rig.bulk_modulus)[0]}, form, rig)
-    likeliest = guesses[int(np.argmin(problem.costs(guesses, LANES)))]
-    found = descend(problem.at, likeliest, EVALUATIONS, flow_bounds(form, guesses, log), ROUGH_ENOUGH, GUESSED_WITHIN)
-    return 2.0 * found.cost / problem.blocks
+    costs = problem.costs(guesses, LANES)
+    if 2.0 * np.min(costs) > HOPELESS * problem.blocks:
+        return np.inf
+    bounds = flow_bounds(form, guesses, log)
+    found = descend(problem.at, guesses[int(np.argmin(costs))], EVALUATIONS, bounds, ROUGH_ENOUGH, GUESSED_WITHIN)
+    modulus = form.values(found.theta)["bulk_modulus"]
+    return 2.0 * found.cost / problem.blocks if 1.0 / FOREIGN < modulus / rig.bulk_modulus < FOREIGN else np.inf
 
 
 def _told(found: Sequence[Slips]) -> Note:
@@ -206,8 +228,16 @@ def _kin(fit: GreyBoxFit, rig: EhaParameters, times: float, surely: float) -> bo
     return abs(ln(modulus / rig.bulk_modulus)) - surely * std < ln(times)
 
 
-def _pressed(logged: Logged) -> bool:
-    return bool(np.nanvar(logged.record[PRESSURE]) > FELT * logged.variances[PRESSURE])
+def _changes(logged: Logged, channel: str) -> bool:
+    return bool(np.nanvar(logged.record[channel]) > FELT * logged.variances[channel])
+
+
+def _pressure_off(record: Record, found: GreyBoxFit, rig: EhaParameters) -> bool:
+    """Return whether friction speaks for a pressure off in the same sense as a fit's oil is from the rig's."""
+    if (gone := travels(record, rig)) is None or gone.still:
+        return False
+    beyond = beyond_sliding(sliding_pressure(record, rig))
+    return beyond > 0.0 if found.values["bulk_modulus"] > rig.bulk_modulus else beyond < 0.0
 
 
 def _beginning(logged: Logged) -> Logged:
@@ -238,15 +268,10 @@ def _right_with(slips: Slips, logged: Logged, rig: EhaParameters) -> GreyBoxFit 
 
 
 def _slides_as_well(right: Record, read: Record, rig: EhaParameters) -> bool:
-    """Return whether a corrected pressure is no further from what the rig's friction takes than it was as read.
+    """Return whether a corrected pressure is no further from what the rig's friction takes than it was as read."""
 
-    Only this tells a unit from oil as many times as stiff: a flow balance holds pressure over stiffness. Conditions
-    change friction less than any unit does.
-    """
+    def off(record: Record) -> tuple[float, float]:
+        ratio = sliding_pressure(record, rig)
+        return abs(beyond_sliding(ratio)), abs(ln(ratio)) - ROUNDING if ratio > 0.0 else np.inf
 
-    def off(record: Record) -> float:
-        turning = np.abs(record[SPEED]) > TURNING * np.nanmax(np.abs(record[SPEED]))
-        pressure = np.nanmedian(np.abs(record[PRESSURE][turning]))
-        return abs(ln(pressure * rig.piston_area / rig.friction_coulomb)) if pressure > 0.0 else np.inf
-
-    return off(right) <= off(read) + ROUNDING
+    return off(right) <= off(read)

@@ -1,8 +1,4 @@
-"""Mistakes in how a log's channels were read, alone and two at a time, and a log with them set right.
-
-Pressure over stiffness is all that a flow balance holds of a pressure, so that units which differ by a factor of two
-are one slip: oil has no stiffness that tells them apart.
-"""
+"""Mistakes in how a log's channels were read, one or two at a time, and a log with them set right."""
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
@@ -21,20 +17,26 @@ PSI = 6894.757
 """A pound-force per square inch [Pa]."""
 
 PRESSURES: Mapping[float, str] = {
-    1e-1: "bar read as MPa, psi read as bar or kPa read as psi",
-    10.0: "MPa read as bar, bar read as psi or psi read as kPa",
-    1e-2: "kPa read as bar or psi read as MPa",
-    100.0: "bar read as kPa or MPa read as psi",
-    1e-3: "Pa read as kPa or kPa read as MPa",
     1e3: "kPa read as Pa or MPa read as kPa",
-    1.0 / PSI: "Pa read as psi",
     PSI: "psi read as Pa",
-    1e-5: "Pa read as bar",
     1e5: "bar read as Pa",
-    1e-6: "Pa read as MPa",
     1e6: "MPa read as Pa",
+    PSI / 1e3: "psi read as kPa",
+    1e2: "bar read as kPa",
+    1e5 / PSI: "bar read as psi",
+    1e6 / PSI: "MPa read as psi",
+    10.0: "MPa read as bar",
+    1e-3: "Pa read as kPa or kPa read as MPa",
+    1.0 / PSI: "Pa read as psi",
+    1e-5: "Pa read as bar",
+    1e-6: "Pa read as MPa",
+    1e3 / PSI: "kPa read as psi",
+    1e-2: "kPa read as bar",
+    PSI / 1e5: "psi read as bar",
+    PSI / 1e6: "psi read as MPa",
+    0.1: "bar read as MPa",
 }
-"""Slips of a pressure's unit, by about what the values are to be multiplied with."""
+"""Slips of a pressure's unit, by what the values are to be multiplied with."""
 
 SPEEDS: Mapping[float, str] = {
     **TURNS,

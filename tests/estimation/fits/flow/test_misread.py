@@ -150,15 +150,16 @@ def test_a_short_log_of_oil_that_is_soft_accuses_no_channel(softer: float) -> No
     ],
 )
 def test_a_fit_is_none_of_the_rigs_where_its_oil_or_what_its_pump_loses_is_surely_beyond_it(
-    times: float, std: float, lost: float, explained: bool, kin: bool
+    times: float, std: float, lost: float, explained: bool, kin: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(misread_module, "_pressure_off", lambda *_: False)
     assert KIN < FOREIGN
     modulus = times * RIG.bulk_modulus
     values = {"bulk_modulus": modulus, "leakage_coefficient": 4e-12, "flow_bias": lost * RIG.flow_bias}
     deviations = {"bulk_modulus": std * modulus, "leakage_coefficient": 1e-13, "flow_bias": 1e-8}
     fit = replace(made_fit(50.0, modulus, 1e5), values=values, std=deviations)
     plain: Any = SimpleNamespace(explains=lambda _: explained)
-    nothing: Any = None
+    nothing: Any = SimpleNamespace(record=None)
     assert CorrectedLogs(nothing, RIG).is_kin(plain, fit) is kin
 
 

@@ -1,0 +1,21 @@
+"""Notes of a look at the columns of an unknown log."""
+
+from plant.notes import Code
+
+
+class GuessCode(Code):
+    """Why a column of a strange log may be a channel; columns count from 1."""
+
+    CALLED_SO = "its name says so"
+    DATES = "it holds dates or times of the day"
+    UNIT_FITS = "{unit} is a unit of this channel"
+    UNIT_GUESSED = "no unit is given; in {unit} its size is usual: check the unit"
+    INCREASES = "it increases by {step:.6g} from row to row"
+    HAS_SLOPE = "column {column} is its slope (correlation {correlation:.3f})"
+    IS_SLOPE = "it is the slope of column {column} (correlation {correlation:.3f})"
+    FOLLOWS = "it follows the motion in column {column} (correlation {correlation:.2f})"
+    OPPOSES = (
+        "it goes against the motion in column {column} (correlation {correlation:.2f}): if its sensor is reversed, put "
+        "a minus before its unit"
+    )
+    IS_DIFFERENCE = "it is the difference of columns {one} and {other}"

@@ -1,0 +1,60 @@
+"""`sliding_pressure(record, p)`: pressure under which a piston slides, over what the rig's Coulomb friction takes.
+
+A balance of flows holds pressure over stiffness, so it cannot tell a unit of pressure from oil as many times as stiff.
+Friction can: no piston slides at a pressure that its friction does not let it, and few at one many times as high.
+"""
+
+from math import log as ln
+
+import numpy as np
+
+from estimation.log_checks.channel_blocks import channel_blocks
+from estimation.log_checks.channel_physics import MIDDLE
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+SLIDING = 0.1
+"""Share of the highest velocity from which a piston slides [fraction]."""
+
+LEAST, MOST = 0.8, 6.0
+"""Times the pressure that takes the rig's Coulomb friction at which its pistons slide [dimensionless]; judged: faults
+and speed raise friction, and a rig file may have a fifth too much of it. Loads may need more."""
+
+
+def sliding_pressure(record: Record, p: EhaParameters) -> float:
+    """Return the median pressure while the piston slides, over what the rig's Coulomb friction takes.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    p : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    float
+        Their ratio; 1 where position or pressure is not logged, or never changes [dimensionless].
+    """
+    blocks = channel_blocks(record, p, MIDDLE)
+    if blocks.slope is None or blocks.pressure is None or not np.any(blocks.slope):
+        return 1.0
+    size = np.abs(blocks.slope)
+    pressure = float(np.median(np.abs(blocks.pressure[size > SLIDING * size.max()])))
+    return pressure * p.piston_area / p.friction_coulomb
+
+
+def beyond_sliding(ratio: float) -> float:
+    """Return how far a ratio is below the least at which pistons slide (negative), or above the most [logarithm].
+
+    Parameters
+    ----------
+    ratio : float
+        See `sliding_pressure` [dimensionless].
+
+    Examples
+    --------
+    >>> beyond_sliding(1.0), round(beyond_sliding(0.08), 3), round(beyond_sliding(60.0), 3)
+    (0.0, -2.303, 2.303)
+    """
+    return min(ln(max(ratio, 1e-12) / LEAST), 0.0) + max(ln(max(ratio, 1e-12) / MOST), 0.0)
