@@ -11,9 +11,9 @@ from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.finding import Outcome
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow import misread as misread_module
-from estimation.fits.flow.misread import FOREIGN, KIN, CorrectedLogs
+from estimation.fits.flow.misread import FOREIGN, KIN, MOST_FITTED, CorrectedLogs
 from estimation.fits.flow.plain import FitStart, Logged
-from estimation.fits.flow.slips import SLIPS, Slip
+from estimation.fits.flow.slips import DEGREES, PSI, SLIPS, Slip
 from estimation.fits.greybox.work_limit import Work
 from estimation.fits.hypotheses import DELIVERY, OFFSET
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
@@ -173,3 +173,33 @@ def test_oil_seven_times_as_stiff_as_the_rigs_is_no_pressure_in_another_unit(mon
     assert abs(found.value / (1.05 * FOREIGN * RIG.bulk_modulus) - 1.0) < 0.02
     (note,) = estimate_bulk_modulus(log().replace(**{PRESSURE: 10.0 * log()[PRESSURE]}), RIG).gate.reasons
     assert "bar read as MPa" in str(note)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "channel", "said"),
+    [
+        ({SPEED: RPM, PRESSURE: -1.0}, f"{SPEED} and {PRESSURE}", "rpm read as rad/s and a wrong sign of"),
+        ({PRESSURE: 1e3 / PSI}, PRESSURE, "psi read as kPa"),
+        ({SPEED: DEGREES}, SPEED, "deg/s read as rad/s"),
+    ],
+)
+def test_a_unit_of_a_factor_that_oils_differ_by_and_two_slips_together_are_named(
+    wrong: dict[str, float], channel: str, said: str
+) -> None:
+    """Psi read as kPa passed with a bulk modulus 85 % too low."""
+    sound = log()
+    read = sound.replace(**{name: times * sound[name] for name, times in wrong.items()})
+    (note,) = estimate_bulk_modulus(read, RIG).gate.reasons
+    assert note.code == ChannelCode.CHANNEL_MISREAD
+    assert note.data["channel"] == channel
+    assert said in str(note)
+
+
+def test_slips_that_a_rough_search_refutes_are_not_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    fitted: list[tuple[Slip, ...]] = []
+    whole = misread_module._right_with
+    monkeypatch.setattr(misread_module, "_right_with", lambda slips, *rest: fitted.append(slips) or whole(slips, *rest))
+    read = log().replace(**{PRESSURE: -log()[PRESSURE]})
+    assert not estimate_bulk_modulus(read, RIG).gate.passed
+    assert [slips[0].factor for slips in fitted if slips[0].channel == PRESSURE] == [-1.0]
+    assert len(fitted) <= MOST_FITTED

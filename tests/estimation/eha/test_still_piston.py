@@ -1,0 +1,48 @@
+"""A piston that stands still is told as that, not as a slip or as another oil."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from estimation.finding import Outcome
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
+from estimation.notes import EstimateCode
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+RIG = EhaParameters()
+
+
+def seized() -> Record:
+    """Return two seconds of steps under a piston that no pressure moves."""
+    rng, p = np.random.default_rng(8), replace(RIG, friction_coulomb=1e6)
+    return simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+
+
+def test_a_seized_piston_is_told_beside_a_bulk_modulus_like_the_rigs() -> None:
+    found = estimate_bulk_modulus(seized(), RIG)
+    assert found.value == pytest.approx(RIG.bulk_modulus, rel=0.05)
+    assert EstimateCode.PISTON_STANDS_STILL in [note.code for note in found.remarks]
+
+
+@pytest.mark.parametrize(("channel", "times"), [(SPEED, 1.0 / 6.28), (PRESSURE, 10.0)])
+def test_a_unit_of_speed_or_pressure_behind_a_seized_piston_gives_no_bulk_modulus(channel: str, times: float) -> None:
+    log = seized()
+    found = estimate_bulk_modulus(log.replace(**{channel: times * log[channel]}), RIG)
+    assert (found.value, found.gate.passed, found.outcome) == (None, False, Outcome.NOT_OBSERVABLE)
+    assert EstimateCode.STILL_AND_FOREIGN in [note.code for note in found.gate.reasons]
+
+
+def test_a_pressure_that_drifts_while_nothing_moves_tells_no_bulk_modulus() -> None:
+    rng, n = np.random.default_rng(1), 5000
+    noise = {SPEED: 0.1, POSITION: 1e-6, VELOCITY: 1e-3, PRESSURE: 2e3}
+    still = {name: size * rng.standard_normal(n) for name, size in noise.items()}
+    still[PRESSURE] += np.linspace(0.0, 1e5, n)
+    found = estimate_bulk_modulus(Record(1e-3, still), RIG)
+    assert (found.value, found.outcome) == (None, Outcome.NOT_OBSERVABLE)
+    assert [note.code for note in found.gate.reasons] == [EstimateCode.NOTHING_MOVES]

@@ -1,0 +1,31 @@
+"""Pressure under which a piston slides tells a unit of pressure from oil."""
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
+from estimation.log_checks.sliding_pressure import LEAST, MOST, beyond_sliding, sliding_pressure
+from faults.conditions import CONDITIONS, parameters_for
+from plant.eha.drives import make_drive
+from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+
+RIG = EhaParameters()
+
+
+@pytest.mark.parametrize("condition", ["normal", "major_leakage", "major_friction"])
+@pytest.mark.parametrize("drive", ["steps", "multisine"])
+def test_pistons_of_all_conditions_slide_at_what_friction_takes(condition: str, drive: str) -> None:
+    p, rng = parameters_for(CONDITIONS[condition]), np.random.default_rng(3)
+    log = simulate(CIRCUIT, make_drive(drive, 4.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    ratio = sliding_pressure(log, RIG)
+    assert LEAST < ratio < MOST
+    assert beyond_sliding(ratio) == 0.0
+    assert beyond_sliding(0.1 * ratio) < 0.0
+
+
+def test_a_piston_that_stands_still_tells_nothing() -> None:
+    still = {SPEED: np.ones(500), POSITION: np.zeros(500), PRESSURE: np.linspace(0.0, 1e5, 500)}
+    assert sliding_pressure(Record(1e-3, still), RIG) == 1.0

@@ -1,0 +1,38 @@
+"""How far a piston and its pump went."""
+
+import numpy as np
+import pytest
+
+from estimation.log_checks.channel_names import POSITION, SPEED
+from estimation.log_checks.standstill import travels
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
+
+RIG = EhaParameters()
+
+
+@pytest.mark.parametrize(
+    ("speed", "travel", "still", "at_rest", "stuck"),
+    [
+        (0.0, 0.0, True, True, False),
+        (0.4, 0.0, True, True, False),
+        (100.0, 0.0, True, False, True),
+        (1.0, 0.0, True, False, False),
+        (0.0, 0.01, False, False, False),
+        (100.0, 0.05, False, False, False),
+    ],
+)
+def test_a_piston_that_stands_still_is_stuck_only_where_its_pump_turns(
+    speed: float, travel: float, still: bool, at_rest: bool, stuck: bool
+) -> None:
+    """An offset of the speed is no turning pump."""
+    time, noise = np.arange(2000) * 1e-3, np.random.default_rng(1).standard_normal((2, 2000))
+    channels = {SPEED: np.full(2000, speed) + 0.1 * noise[0], POSITION: travel * np.sin(6.0 * time) + 1e-5 * noise[1]}
+    gone = travels(Record(1e-3, channels), RIG)
+    assert gone is not None
+    assert (gone.still, gone.at_rest, gone.stuck) == (still, at_rest, stuck)
+    assert gone.piston == pytest.approx(2.0 * travel, abs=2e-5 + 0.01 * travel)
+
+
+def test_nothing_is_said_without_position() -> None:
+    assert travels(Record(1e-3, {SPEED: np.ones(2000)}), RIG) is None
