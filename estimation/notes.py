@@ -86,6 +86,10 @@ class ChannelCode(Code):
     CHANNEL_MISREAD = (
         "{channel} looks like {slip}: with that set right, the log fits the rig (--columns CHANNEL=NAME:UNIT)"
     )
+    NO_SUCH_OIL = (
+        "{channel}: bulk modulus seems {ratio:.2g} times that in the rig file, which no oil has: a unit or sign of "
+        "pressure or motor speed is wrong"
+    )
     UNIT_CHANGES = (
         "{channel}: from {begin_s:.3g} s on, noise is about {factor:.3g} times what it was, as when the column's unit "
         "changes within the log; cut the log there, and read each part by itself"

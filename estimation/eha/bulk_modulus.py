@@ -9,10 +9,10 @@ import numpy as np
 
 from estimation.eha.another_rig import unless_another_rig
 from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
+from estimation.eha.foreign_oil import at_rest_throughout, unless_foreign
 from estimation.eha.named_methods import NAMED
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide, without_number
 from estimation.eha.rig_share import fitted_responses, scaled_responses, with_wear
-from estimation.eha.still_piston import at_rest_throughout, unless_stuck
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
 from estimation.fits.flow.fit import FLOW_CHANNELS, REPORTED, fit_flow, require_flow_channels
@@ -220,7 +220,7 @@ def estimate_clean(
         how = options.filter_options
         found = estimate_by_filter(log, parameters, FORMS[form], guess, options.start_std, how)
     found = unless_another_rig(_with_rig(found, parameters, spreads), log, parameters)
-    return _doubting_sensors(unless_stuck(found, log.record, parameters) if form == "flow" else found, log)
+    return _doubting_sensors(unless_foreign(found, log.record, parameters) if form == "flow" else found, log)
 
 
 def _fit(

@@ -1,4 +1,4 @@
-"""`unless_stuck(...)`: what a piston that stands still says of bulk modulus, and what it does not.
+"""`unless_foreign(...)`: a bulk modulus that no oil has, or that a piston which stands still leaves open.
 
 A motion confirms the units of speed and pressure: the piston goes as far as it is pumped, and slides from the pressure
 on that friction takes. Oil that is compressed behind a piston that stands still is known on their scale alone.
@@ -10,8 +10,10 @@ from math import log as ln
 from estimation.eha.result import BulkModulusEstimate, without_number
 from estimation.finding import Outcome
 from estimation.fits.flow.misread import KIN
+from estimation.log_checks.channel_names import PRESSURE
+from estimation.log_checks.channel_physics import PRESSURE_OFF
 from estimation.log_checks.standstill import travels
-from estimation.notes import EstimateCode
+from estimation.notes import ChannelCode, EstimateCode
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
@@ -36,8 +38,8 @@ def at_rest_throughout(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     return (EstimateCode.NOTHING_MOVES.note(),) if gone is not None and gone.at_rest else ()
 
 
-def unless_stuck(found: BulkModulusEstimate, record: Record, p: EhaParameters) -> BulkModulusEstimate:
-    """Return an estimate with what a piston that stands still leaves open.
+def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters) -> BulkModulusEstimate:
+    """Return an estimate, without a number where its oil is none.
 
     Parameters
     ----------
@@ -51,13 +53,21 @@ def unless_stuck(found: BulkModulusEstimate, record: Record, p: EhaParameters) -
     Returns
     -------
     BulkModulusEstimate
-        Without a number where the oil is no kin of the rig file's.
+        Without a number where no oil is like that, or, of a piston that stands still, where it is no kin of the rig's.
     """
+    if found.value is None:
+        return found
+    ratio = found.value / p.bulk_modulus
+    if not 1.0 / PRESSURE_OFF < ratio < PRESSURE_OFF:
+        return _without(found, Outcome.MISMATCH, ChannelCode.NO_SUCH_OIL.note(channel=PRESSURE, ratio=ratio))
     gone = travels(record, p)
-    if found.value is None or gone is None or not gone.still:
+    if gone is None or not gone.still:
         return found
     said = (EstimateCode.PISTON_STANDS_STILL.note(moved_m=gone.piston, pumped_m=gone.pump),) if gone.stuck else ()
-    if abs(ln(found.value / p.bulk_modulus)) < ln(KIN):
+    if abs(ln(ratio)) < ln(KIN):
         return replace(found, remarks=(*found.remarks, *said))
-    reasons = (*said, EstimateCode.STILL_AND_FOREIGN.note(ratio=found.value / p.bulk_modulus), *found.gate.reasons)
-    return without_number(Outcome.NOT_OBSERVABLE, reasons, found.form, found.channels, found.bound)
+    return _without(found, Outcome.NOT_OBSERVABLE, *said, EstimateCode.STILL_AND_FOREIGN.note(ratio=ratio))
+
+
+def _without(found: BulkModulusEstimate, outcome: Outcome, *said: Note) -> BulkModulusEstimate:
+    return without_number(outcome, (*said, *found.gate.reasons), found.form, found.channels, found.bound)

@@ -1,4 +1,4 @@
-"""A piston that stands still is told as that, not as a slip or as another oil."""
+"""A bulk modulus that no oil has is none, and a piston that stands still is told as that."""
 
 from dataclasses import replace
 
@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from estimation.eha.foreign_oil import unless_foreign
 from estimation.finding import Outcome
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
-from estimation.notes import EstimateCode
+from estimation.notes import ChannelCode, EstimateCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
@@ -46,3 +47,12 @@ def test_a_pressure_that_drifts_while_nothing_moves_tells_no_bulk_modulus() -> N
     found = estimate_bulk_modulus(Record(1e-3, still), RIG)
     assert (found.value, found.outcome) == (None, Outcome.NOT_OBSERVABLE)
     assert [note.code for note in found.gate.reasons] == [EstimateCode.NOTHING_MOVES]
+
+
+def test_bulk_modulus_that_no_oil_has_is_a_mistake_of_a_channel() -> None:
+    """Bar read as Pa are less than any sensor's noise, so that no slip is tried; it passed with 820 Pa."""
+    whole = estimate_bulk_modulus(seized(), RIG)
+    for times in (1e-5, 100.0):
+        found = unless_foreign(replace(whole, value=times * RIG.bulk_modulus), seized(), RIG)
+        assert (found.value, found.outcome) == (None, Outcome.MISMATCH)
+        assert ChannelCode.NO_SUCH_OIL in [note.code for note in found.gate.reasons]
