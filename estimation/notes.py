@@ -188,7 +188,9 @@ class EstimateCode(Code):
         "{state} still changed by {moved:.3g} {unit} over the last fifth of the log: the estimate has not settled"
     )
     AT_PHYSICAL_BOUND = "{state} ended at its physical limit ({value:.3g} {unit})"
-    NOTHING_MOVES = "neither the pump nor the piston moves noticeably in this log: bulk modulus is not observable"
+    PUMP_AND_PISTON_REST = (
+        "neither the pump nor the piston moves noticeably in this log: bulk modulus is not observable"
+    )
     PISTON_STANDS_STILL = (
         "the piston moves by only {moved_m:.2g|mm} mm, while the pump turns enough for {pumped_m:.3g|mm} mm: it is "
         "stuck, or leakage takes all that is pumped; no motion confirms the units of motor speed and pressure"

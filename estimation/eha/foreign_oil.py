@@ -35,7 +35,7 @@ def at_rest_throughout(record: Record, p: EhaParameters) -> tuple[Note, ...]:
         Empty where one of them moves.
     """
     gone = travels(record, p)
-    return (EstimateCode.NOTHING_MOVES.note(),) if gone is not None and gone.at_rest else ()
+    return (EstimateCode.PUMP_AND_PISTON_REST.note(),) if gone is not None and gone.at_rest else ()
 
 
 def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters) -> BulkModulusEstimate:

@@ -46,7 +46,7 @@ def test_a_pressure_that_drifts_while_nothing_moves_tells_no_bulk_modulus() -> N
     still[PRESSURE] += np.linspace(0.0, 1e5, n)
     found = estimate_bulk_modulus(Record(1e-3, still), RIG)
     assert (found.value, found.outcome) == (None, Outcome.NOT_OBSERVABLE)
-    assert [note.code for note in found.gate.reasons] == [EstimateCode.NOTHING_MOVES]
+    assert [note.code for note in found.gate.reasons] == [EstimateCode.PUMP_AND_PISTON_REST]
 
 
 def test_bulk_modulus_that_no_oil_has_is_a_mistake_of_a_channel() -> None:
