@@ -164,17 +164,16 @@ def _likeliest(explained: Sequence[tuple[Slips, GreyBoxFit]], found: GreyBoxFit)
 def _hopeful(tried: Sequence[Slips], logged: Logged, rig: EhaParameters) -> Sequence[Slips]:
     """Return the slips that may explain a log once they are set right, by what a rough search of each leaves.
 
-    Noise tells no unit of position, and a piston that stands still none of speed and pressure.
+    Noise tells no unit of position, and a piston that then stands still tells none at all.
     """
     left: list[tuple[float, Slips]] = []
-    gone, changes = travels(logged.record, rig), _changes(logged, POSITION)
-    still = not changes or (gone is not None and gone.still)
+    changes = _changes(logged, POSITION)
     for slips in tried:
-        mended = {slip.channel: slip for slip in slips}.get(POSITION)
-        scaled = any(slip.factor > 0.0 for slip in slips)
-        if not (changes or mended.other) if mended else still and scaled:
+        if any(slip.channel == POSITION and not _changes(logged, slip.other or POSITION) for slip in slips):
             continue
         right = _sliding(slips, logged, rig)
+        if right is not None and any(slip.factor > 0.0 for slip in slips) and (not changes or _still(right, rig)):
+            continue
         misfit = np.inf if right is None else _rough_misfit(right, rig)
         if misfit < HOPEFUL:
             left.append((max(misfit, 1.0 / misfit) if misfit > 0.0 else np.inf, slips))
@@ -228,8 +227,15 @@ def _kin(fit: GreyBoxFit, rig: EhaParameters, times: float, surely: float) -> bo
     return abs(ln(modulus / rig.bulk_modulus)) - surely * std < ln(times)
 
 
+def _still(logged: Logged, rig: EhaParameters) -> bool:
+    gone = travels(logged.record, rig)
+    return gone is not None and gone.still
+
+
 def _changes(logged: Logged, channel: str) -> bool:
-    return bool(np.nanvar(logged.record[channel]) > FELT * logged.variances[channel])
+    """Return whether a channel is there and shows more than its noise."""
+    there = channel in logged.record and channel in logged.variances
+    return there and bool(np.nanvar(logged.record[channel]) > FELT * logged.variances[channel])
 
 
 def _pressure_off(record: Record, found: GreyBoxFit, rig: EhaParameters) -> bool:
