@@ -25,6 +25,8 @@ from faults.diagnosis.beyond_nine.other_faults import DELIVERIES, faults_outside
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_fit import nominal_runs
 from faults.diagnosis.circuits.class_regions import fit_classes, is_stuck
 from faults.diagnosis.evidence import Scoreboard, bounded
 from faults.notes import AgainstCode, ClassCode
@@ -37,6 +39,10 @@ OFFSETS = {OFFSET.name, "pressure_drift"}
 SUREST = 0.99
 """Most that slopes make a worn pump likely to which no search led [probability]; judged. They hold to first order, and
 the nine conditions keep their order below it."""
+
+FLOW_SCALE = np.array([{"leakage": 1.0, "bias": 1.0, "bulk_modulus": -1.0}.get(name, 0.0) for name in COORDINATES])
+"""Direction in which all flows of a piston that hardly moves scale with what the pump delivers [dimensionless]: where
+wear is left open, this is why, and pumps that differ explain the log alike along it."""
 
 UNLIKELY = math.log(1e-3)
 """Log-likelihood of a delivery below the likeliest one's from which no circuit is fitted with it [dimensionless]."""
@@ -205,12 +211,14 @@ def probabilities_over_wear(
     likely[deliveries < left.least] = -math.inf
     likely -= np.max(likely)
     healthy, scores, kept = actuator.circuit, [board.fits.scores], [likely[0]]
+    runs = nominal_runs(board.blocks, actuator)
     for share, one in zip(DELIVERIES, likely[1:], strict=True):
         if one < UNLIKELY:
             continue
         kept.append(one)
         worn = replace(healthy, pump_displacement=share * healthy.pump_displacement)
-        fits = fit_classes(board.blocks, replace(actuator, circuit=worn), start=board.fits.best.coordinates)
+        start = board.fits.best.coordinates + math.log(share) * FLOW_SCALE
+        fits = fit_classes(board.blocks, replace(actuator, circuit=worn), runs=runs, start=start)
         scores.append(fits.scores)
     return summed_over_wear(board, np.array(scores), calibration, np.array(kept))
 

@@ -185,6 +185,7 @@ def fit_freely(
     start: Array | PointFit | None = None,
     gained: float = GAINED,
     wanted: float = float("inf"),
+    promising: float = PROMISING,
 ) -> PointFit:
     """Fit the circuit to a log with next to no prior.
 
@@ -204,6 +205,8 @@ def fit_freely(
     wanted : float
         Cost above which the circuit is of no use [dimensionless]: the search ends where all steps that are left would
         not bring it down to that, gaining each what the last one did or the next one promises.
+    promising : float
+        Gain in log-likelihood that a step must promise to be tried [dimensionless].
 
     Returns
     -------
@@ -219,13 +222,13 @@ def fit_freely(
     step, promised, reach, last = centre, 0.0, 0.0, float("inf")
     least = least_misfit(blocks)
     for left in range(ROUNDS, 0, -1):  # a step that gains nothing is taken a third as long
-        if best.cost - least < PROMISING:  # the sensors' noise is all that is left
+        if best.cost - least < promising:  # the sensors' noise is all that is left
             break
         if reach == 0.0:
             step, reach = _step(blocks, best, centre, pull), 1.0
             promised = _promised(blocks, best, centre, pull, step)
             # a circuit of no numbers is run for ever
-            if promised < PROMISING or not np.all(np.isfinite(step)):
+            if promised < promising or not np.all(np.isfinite(step)):
                 break
             if best.cost - left * max(promised, last) > wanted:
                 break
@@ -235,7 +238,7 @@ def fit_freely(
             best, reach, last = there, 0.0, gain
             if gain < gained:
                 break
-        elif reach < SHORTEST or _most_gained(promised, reach, gain) < PROMISING:
+        elif reach < SHORTEST or _most_gained(promised, reach, gain) < promising:
             break
         else:
             reach *= 0.3

@@ -20,6 +20,7 @@ from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import (
     GAINED,
     LASTING,
+    PROMISING,
     STARTS,
     WEAK,
     WITHIN,
@@ -166,7 +167,7 @@ def fit_classes(
         What the nine nominal circuits do [m/s, Pa]; run here if not given.
     start : ndarray, shape (7,), optional
         Coordinates of a circuit near by [dimensionless]: one search begins there, in place of one from each condition
-        that is near, and ends where it gains little.
+        that is near, and ends where it gains or promises little.
     wanted : float
         Cost above which a circuit is of no use, see `fit_freely` [dimensionless].
 
@@ -180,13 +181,13 @@ def fit_classes(
     nominal = np.array([misfit(blocks, run, one) for run, one in zip(runs, errors, strict=True)])
     order = np.argsort(nominal)[: STARTS if start is None else 1]
     near = [int(i) for i in order if nominal[i] <= nominal[order[0]] + len(blocks.velocity)]
-    gained = GAINED if start is None else ROUGHLY_GAINED
+    gained, promising = (GAINED, PROMISING) if start is None else (ROUGHLY_GAINED, GAINED)
     fits: list[PointFit] = []
     for name in [list(CONDITIONS)[place] for place in near or [int(order[0])]]:
         if not fits or not explains(blocks, fits[-1]):
-            fits.append(fit_freely(blocks, actuator, name, start, gained, wanted))
+            fits.append(fit_freely(blocks, actuator, name, start, gained, wanted, promising))
         elif about(blocks, actuator, name, fits[-1]).cost < fits[-1].cost:  # the same circuit is nearer to this one
-            fits.append(fit_freely(blocks, actuator, name, fits[-1], gained))
+            fits.append(fit_freely(blocks, actuator, name, fits[-1], gained, promising=promising))
     stuck, first = is_stuck(blocks, actuator), min(fits, key=lambda fit: fit.cost)
     if start is None and blocks.pressure is not None and not stuck and creeps(blocks, first):
         nearest = int(np.argmax(region_scores(first, believed_information(first, blocks), actuator)))
