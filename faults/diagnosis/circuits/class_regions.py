@@ -187,7 +187,7 @@ def fit_classes(
         if not fits or not explains(blocks, fits[-1]):
             fits.append(fit_freely(blocks, actuator, name, start, gained, wanted, promising))
         elif about(blocks, actuator, name, fits[-1]).cost < fits[-1].cost:  # the same circuit is nearer to this one
-            fits.append(fit_freely(blocks, actuator, name, fits[-1], gained, promising=promising))
+            fits.append(fit_freely(blocks, actuator, name, fits[-1], gained))
     stuck, first = is_stuck(blocks, actuator), min(fits, key=lambda fit: fit.cost)
     if start is None and blocks.pressure is not None and not stuck and creeps(blocks, first):
         nearest = int(np.argmax(region_scores(first, believed_information(first, blocks), actuator)))

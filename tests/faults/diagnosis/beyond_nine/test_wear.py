@@ -19,6 +19,8 @@ from faults.diagnosis.beyond_nine.wear import chance_of_wear, probabilities_over
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.circuit_runs import COORDINATES
+from faults.diagnosis.circuits.class_fit import nominal_runs
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.evidence import Scoreboard, bounded, weigh
 from faults.notes import AgainstCode, ClassCode
@@ -73,9 +75,12 @@ def test_conditions_are_summed_over_pumps_by_what_is_presumed_of_them(monkeypatc
     scores = {share: np.random.default_rng(round(10.0 * share)).normal(size=9) for share in DELIVERIES}
     sound = RIG.circuit.pump_displacement
 
-    def fitted(_: Any, actuator: Any, start: Any) -> Any:
-        assert np.array_equal(start, board.fits.best.coordinates)
+    def fitted(_: Any, actuator: Any, runs: Any, start: Any) -> Any:
+        assert runs is nominal_runs(one, RIG)  # another pump has the same nearest condition: nine runs less
         share = round(actuator.circuit.pump_displacement / sound, 6)
+        led = dict(zip(COORDINATES, np.exp(start - board.fits.best.coordinates), strict=True))
+        scaled = {"leakage": share, "bias": share, "bulk_modulus": 1.0 / share}  # all flows, as what is pumped
+        assert led == pytest.approx({name: scaled.get(name, 1.0) for name in COORDINATES})
         return SimpleNamespace(scores=scores[share])
 
     monkeypatch.setattr(wear, "fit_classes", fitted)
