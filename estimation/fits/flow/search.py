@@ -45,6 +45,10 @@ LEAD_START = 1e-5
 GUESSED_WITHIN = 0.3
 """First radius of a search from the likeliest guess [dimensionless]: half the distance between guesses of leakage."""
 
+LED_WITHIN = 1.0
+"""First radius of a search on the whole log [dimensionless]: it begins where the log's beginning or another balance
+led. Of longer first steps, up to 30, two thirds were taken back, at three to five evaluations each."""
+
 SCREENED_SECONDS = 4.0
 """Starts are compared on the beginning of the log, at least so long: it tells a wrong valley from a right one [s]."""
 
@@ -189,6 +193,7 @@ def _ended(one: Found, log: GreyBoxLog) -> Found:
     """Return the end of a search whose last steps use short model steps throughout."""
     problem, point, bounds = one
     ending = with_steps(problem, log.steps)
+    ending.take_slopes(problem, point.theta)
     evaluations = FINISHING if explained(problem, point) else 1
     return ending, descend(ending.at, point.theta, evaluations, bounds), bounds
 
@@ -294,7 +299,7 @@ def _search(log: GreyBoxLog) -> Search:
     near_enough = NEAR_ENOUGH if log.passes_on else ROUGH_ENOUGH
     speed = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
     screened = driven_samples(speed, ceil(SCREENED_SECONDS / log.sample_time))
-    return Search(screened=screened, near_enough=near_enough)
+    return Search(screened=screened, near_enough=near_enough, radius=LED_WITHIN)
 
 
 def _searched(

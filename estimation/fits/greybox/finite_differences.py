@@ -1,0 +1,66 @@
+"""Normal equations by finite differences: residuals at a point and at its neighbours run side by side."""
+
+from functools import cache
+
+import numpy as np
+
+from estimation.fits.greybox.normal_loops import fill_differences, sum_normal_equations
+from estimation.fits.greybox.problem import OUTLIER, STRAIGHT
+from plant.arrays import Array
+
+
+@cache
+def neighbours(unknowns: int) -> Array:
+    """Return the directions from a point to itself and to its neighbours, a row each.
+
+    Parameters
+    ----------
+    unknowns : int
+        How many coordinates it has.
+    """
+    return np.eye(unknowns + 1, unknowns, -1)
+
+
+def differences(found: Array, unknowns: int, nudge: float) -> tuple[Array, Array]:
+    """Return the residuals at a point and their slopes.
+
+    Parameters
+    ----------
+    found : ndarray, shape (outputs, blocks, lanes)
+        Residuals at the point, and at its neighbours one after another [dimensionless].
+    unknowns : int
+        How many neighbours count.
+    nudge : float
+        How far away they are [dimensionless].
+
+    Returns
+    -------
+    tuple of ndarray, shapes (outputs, blocks) and (outputs, blocks, unknowns)
+        Both [dimensionless].
+    """
+    here, slopes = np.empty(found.shape[:2]), np.empty((*found.shape[:2], unknowns))
+    fill_differences(found, nudge, here, slopes)
+    return here, slopes
+
+
+def summed(found: Array, unknowns: int, nudge: float) -> tuple[float, Array, Array]:
+    """Return cost, gradient and lower triangle of ``J'J``; see `estimation.fits.greybox.problem.weighed`.
+
+    Parameters
+    ----------
+    found : ndarray, shape (outputs, blocks, lanes)
+        As of `differences` [dimensionless].
+    unknowns : int
+        How many neighbours count.
+    nudge : float
+        How far away they are [dimensionless].
+
+    Returns
+    -------
+    tuple of (float, ndarray of shape (unknowns,), ndarray of shape (unknowns, unknowns))
+        As a kernel gives them.
+    """
+    lanes, those = found.shape[-1], slice(1, 1 + unknowns)
+    away, gradient, gram = np.empty((4, lanes)), np.zeros(lanes), np.zeros((unknowns, lanes))
+    cost = sum_normal_equations(found, OUTLIER, STRAIGHT, away, gradient, gram)
+    return cost, gradient[those] / nudge, np.tril(gram[:, those]) / nudge**2
