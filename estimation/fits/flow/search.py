@@ -23,6 +23,7 @@ from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.greybox.side_by_side import LANES
 from estimation.fits.greybox.spared_steps import sparing_steps, with_steps
+from estimation.fits.hypothesis_search.decimation import FEW, LONG_STEP, cost_over_noise, decimated
 from estimation.fits.hypothesis_search.fault_guesses import (
     FAULTS_TRIED,
     faulty_coefficient,
@@ -48,6 +49,10 @@ GUESSED_WITHIN = 0.3
 LED_WITHIN = 1.0
 """First radius of a search on the whole log [dimensionless]: it begins where the log's beginning or another balance
 led. Of longer first steps, up to 30, two thirds were taken back, at three to five evaluations each."""
+
+FAR_OFF, SLIGHT = 3.0, 0.02
+"""Half the sum of squares over what noise alone makes of it, from which a search first goes down on a decimated log,
+and the share of it that a further step must promise there [dimensionless]."""
 
 SCREENED_SECONDS = 4.0
 """Starts are compared on the beginning of the log, at least so long: it tells a wrong valley from a right one [s]."""
@@ -318,6 +323,8 @@ def _searched(
     problem = FreedProblem.of(form, afar)
     guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in starts]
     bounds = flow_bounds(form, guesses, afar)
+    if alone:
+        guesses = [_nearer(problem, guesses[0], bounds, search)]
     if not log.passes_on:
         point = roughly(problem, guesses, search, bounds, wanted, hopeful=hopeful, screen=screen)
         return _Rough(problem, point, bounds)
@@ -329,3 +336,17 @@ def _searched(
     bounds = flow_bounds(form, guesses, log)
     again = [point.theta] if alone else [*guesses, point.theta]
     return _Rough(problem, roughly(problem, again, search, bounds, wanted), bounds)
+
+
+def _nearer(problem: Problem, guess: Array, bounds: tuple[Array, Array], search: Search) -> Array:
+    """Return a guess, or where a search from one that leaves much comes on a decimated log, at a quarter of the cost.
+
+    A relief valve that opens within so long a step makes slopes of chance.
+    """
+    log, every = problem.log, round(LONG_STEP / problem.log.sample_time)
+    if len(log.drives) < FEW or every < 2 or "relief_pressure" in problem.model.unknowns:
+        return guess
+    at = remembered(problem.on(decimated(log, every)).at)
+    if cost_over_noise(log, at(guess).cost) < FAR_OFF:
+        return guess
+    return descend(at, guess, search.evaluations, bounds, search.near_enough, search.radius, least_share=SLIGHT).theta
