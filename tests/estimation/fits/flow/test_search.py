@@ -3,6 +3,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from estimation.fits.flow import rough_search
 from estimation.fits.flow import search as flow_search
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log, outruns_pump
@@ -48,7 +49,7 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         counts.append(len(guesses))
         return roughly(problem, guesses, *others, **more)  # pyright: ignore[reportArgumentType] -- as it came
 
-    monkeypatch.setattr(flow_search, "roughly", counted)
+    monkeypatch.setattr(rough_search, "roughly", counted)
     return counts
 
 
@@ -59,7 +60,7 @@ def test_a_log_that_the_likeliest_guess_explains_is_fitted_as_by_a_search_from_e
     log = seen(recorded(condition))
     quick = balanced(log, HEALTHY, STARTS)
     assert max(tried) == 1
-    monkeypatch.setattr(flow_search, "_explains", lambda _: False)
+    monkeypatch.setattr(rough_search, "_explains", lambda _: False)
     whole = balanced(log, HEALTHY, STARTS)
     assert max(tried) > len(STARTS)
     assert len(quick) == len(whole)
@@ -97,8 +98,8 @@ def test_a_guess_that_leads_into_a_wrong_valley_is_not_followed_over_the_whole_l
     quick = balanced(log, HEALTHY, STARTS)
     assert tried == [len(STARTS), 1, 1]
     tried.clear()
-    guess = flow_search._guess  # pyright: ignore[reportPrivateUsage]
-    monkeypatch.setattr(flow_search, "_guess", lambda *given: (guess(*given)[0], True))
+    guess = rough_search._guess  # pyright: ignore[reportPrivateUsage]
+    monkeypatch.setattr(rough_search, "_guess", lambda *given: (guess(*given)[0], True))
     followed = balanced(log, HEALTHY, STARTS)
     assert tried == [1, 1, 1, len(STARTS) + 1, 1, 1]
     for one, other in zip(quick, followed, strict=True):

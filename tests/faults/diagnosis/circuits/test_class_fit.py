@@ -124,3 +124,10 @@ def test_nominal_circuits_of_a_log_run_once_and_nobody_changes_them() -> None:
     assert not first.flags.writeable
     others = replace(ACTUATOR, conditions=ACTUATOR.conditions + 0.1)
     assert not np.array_equal(class_fit.nominal_runs(log(), others), first)
+
+
+def test_a_search_tries_no_step_that_promises_too_little() -> None:
+    start = ACTUATOR.conditions[list(CONDITIONS).index("minor_leakage")] + 0.2
+    first = class_fit._at(log(), ACTUATOR, ACTUATOR.conditions[list(CONDITIONS).index("minor_leakage")], start, PULL)
+    assert fit_freely(log(), ACTUATOR, "minor_leakage", start, promising=1e9).cost == pytest.approx(first.cost)
+    assert fit_freely(log(), ACTUATOR, "minor_leakage", start, promising=1.0).cost < first.cost - 1.0

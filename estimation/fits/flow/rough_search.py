@@ -1,0 +1,208 @@
+"""`rough_optima(log, ...)`: where balances of the flow form are nearest to a log, with long model steps.
+
+The likeliest of many coarse guesses is followed first, for a run without slopes is cheap. Where it leads to a point
+that explains the log, nothing else is searched; else searches begin at leakages and flow biases of all conditions.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+
+from estimation.fits.flow.guesses import guesses_about
+from estimation.fits.greybox.descent import Point, descend, remembered
+from estimation.fits.greybox.driven import driven_samples
+from estimation.fits.greybox.fit import NEAR_ENOUGH, Search, explained, roughly
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.problem import Problem
+from estimation.fits.greybox.side_by_side import LANES
+from estimation.fits.hypothesis_search.decimation import FEW, LONG_STEP, cost_over_noise, decimated
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds
+from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS, reaches_relief, relieving
+from estimation.models.greybox import GreyBoxModel
+from plant.arrays import Array
+from plant.eha.model import EhaParameters
+from plant.spare_processors import each
+
+GUESSED_WITHIN = 0.3
+"""First radius of a search from the likeliest guess [dimensionless]: half the distance between guesses of leakage."""
+
+LED_WITHIN = 1.0
+"""First radius of a search on the whole log [dimensionless]: it begins where the log's beginning or another balance
+led. Of longer first steps, up to 30, two thirds were taken back, at three to five evaluations each."""
+
+FAR_OFF, SLIGHT = 3.0, 0.02
+"""Half the sum of squares over what noise alone makes of it, from which a search first goes down on a decimated log,
+and the share of it that a further step must promise there [dimensionless]."""
+
+SCREENED_SECONDS = 4.0
+"""Starts are compared on the beginning of the log, at least so long: it tells a wrong valley from a right one [s]."""
+
+ROUGH_ENOUGH = 0.05
+"""Half the sum of squares that a further step must promise while model steps are long [dimensionless]: their errors put
+the optimum off by more. With 0.3 logs of a sine, whose valleys are flat, took twice as many short steps after."""
+
+UNLIKELY = 36.0
+"""Difference of log-likelihood from which a form of the balance counts for nothing beside the other [dimensionless]."""
+
+RIVAL = 2.0 * UNLIKELY
+"""The same between searches with long model steps, which have errors [dimensionless]."""
+
+
+@dataclass(frozen=True, eq=False)
+class RoughOptimum:
+    """Optimum of one balance with long model steps.
+
+    Parameters
+    ----------
+    problem : Problem
+        The balance of the log, as it was searched.
+    point : Point
+        The optimum.
+    bounds : tuple of ndarray, shape (unknowns,)
+        Lowest and highest coordinates of the search [dimensionless].
+    """
+
+    problem: Problem
+    point: Point
+    bounds: tuple[Array, Array]
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """The unknowns, with an accumulator's stiffness where the balance has none [SI]."""
+        return {STIFFNESS: 0.0, **self.problem.model.values(self.point.theta)}
+
+
+def rough_optima(
+    log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]
+) -> list[RoughOptimum]:
+    """Return the optima of the balances with long model steps.
+
+    A single rod may pump up both chambers, beyond what a balance of volumes follows. If none explains its log, that by
+    mass leads, and counts if it comes far lower.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    starts : sequence of Mapping[str, float]
+        Where searches begin [SI].
+
+    Returns
+    -------
+    list of RoughOptimum
+        By volume, by mass, and by volume in held chambers.
+    """
+    relieved = reaches_relief(log.measured, parameters.relief_pressure)
+    volume, mass, held = (relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM))
+    rough = _led([volume, mass, held], log, parameters, starts)
+    if not parameters.area_difference or any(map(_explains, rough)):
+        return rough
+    by_mass, by_volume, of_held = _led([mass, volume, held], log, parameters, starts)
+    least = min(one.point.cost for one in rough)
+    return [by_volume, by_mass, of_held] if by_mass.point.cost < least - RIVAL else rough
+
+
+def _led(
+    forms: Sequence[GreyBoxModel], log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]
+) -> list[RoughOptimum]:
+    """Return the optima of the balances with long model steps, each searched from that of the first."""
+    afar = log.taken_at(parameters.bulk_modulus)
+    begun = FreedProblem.of(forms[0], afar.beginning(_search(afar).screened).coarsened())
+    guess, near = _guess(begun, afar, parameters, starts)
+    screen = remembered(begun.at)
+    if not near:  # in a wrong valley the whole log takes all steps that there are
+        first = _searched(forms[0], log, afar, starts, hopeful=True, screen=screen)
+        if _explains(first):
+            return [first, *_others(forms[1:], log, afar, first)]
+    first = _searched(forms[0], log, afar, [guess], alone=True)
+    others = _others(forms[1:], log, afar, first, alone=True)
+    if _explains(first) or _explains(others[0]):
+        return [first, *others]
+    first = _searched(forms[0], log, afar, [*starts, first.values], screen=screen)
+    return [first, *_others(forms[1:], log, afar, first)]
+
+
+def _others(
+    forms: Sequence[GreyBoxModel], log: GreyBoxLog, afar: GreyBoxLog, first: RoughOptimum, *, alone: bool = False
+) -> list[RoughOptimum]:
+    """Return the optima of other forms, searched from that of the first, as far as they may count beside it."""
+    wanted = first.point.cost + RIVAL
+    return each(lambda form: _searched(form, log, afar, [first.values], alone=alone, wanted=wanted), forms)
+
+
+def _explains(one: RoughOptimum) -> bool:
+    return explained(one.problem, one.point)
+
+
+def _guess(
+    problem: FreedProblem, log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]
+) -> tuple[Mapping[str, float], bool]:
+    """Return the optimum from the most likely guess about the first start, and whether it explains the log.
+
+    Of the log its beginning is looked at, which the problem holds.
+    """
+    search = _search(log)
+    around = {STIFFNESS: 0.0, **starts[0]}
+    guesses = guesses_about(around, problem.model, parameters)
+    likeliest = guesses[int(np.argmin(problem.costs(guesses, LANES)))]
+    bounds = flow_bounds(problem.model, guesses, log)
+    found = descend(problem.at, likeliest, search.evaluations, bounds, search.near_enough, GUESSED_WITHIN)
+    return problem.model.values(found.theta), explained(problem, found)
+
+
+def _search(log: GreyBoxLog) -> Search:
+    # where the noise moves with bulk modulus, steps promise less than they give
+    near_enough = NEAR_ENOUGH if log.passes_on else ROUGH_ENOUGH
+    speed = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
+    screened = driven_samples(speed, ceil(SCREENED_SECONDS / log.sample_time))
+    return Search(screened=screened, near_enough=near_enough, radius=LED_WITHIN)
+
+
+def _searched(
+    form: GreyBoxModel,
+    log: GreyBoxLog,
+    afar: GreyBoxLog,
+    starts: Sequence[Mapping[str, float]],
+    *,
+    alone: bool = False,
+    wanted: float = np.inf,
+    hopeful: bool = False,
+    screen: Callable[[Array], Point] | None = None,
+) -> RoughOptimum:
+    """Return the best that is found from starts, at first with noise of position as it is at the rig's bulk modulus."""
+    search = _search(log)
+    problem = FreedProblem.of(form, afar)
+    guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in starts]
+    bounds = flow_bounds(form, guesses, afar)
+    if alone:
+        guesses = [_nearer(problem, guesses[0], bounds, search)]
+    if not log.passes_on:
+        point = roughly(problem, guesses, search, bounds, wanted, hopeful=hopeful, screen=screen)
+        return RoughOptimum(problem, point, bounds)
+    point = roughly(problem, guesses, search, bounds, hopeful=hopeful, screen=screen)
+    if np.isinf(point.cost):
+        return RoughOptimum(problem, point, bounds)
+    problem, modulus = problem.on(log), form.values(point.theta)["bulk_modulus"]
+    guesses = [form.theta({STIFFNESS: 0.0, **start, "bulk_modulus": modulus}) for start in starts]
+    bounds = flow_bounds(form, guesses, log)
+    again = [point.theta] if alone else [*guesses, point.theta]
+    return RoughOptimum(problem, roughly(problem, again, search, bounds, wanted), bounds)
+
+
+def _nearer(problem: Problem, guess: Array, bounds: tuple[Array, Array], search: Search) -> Array:
+    """Return a guess, or where a search from one that leaves much comes on a decimated log, at a quarter of the cost.
+
+    A relief valve that opens within so long a step makes slopes of chance.
+    """
+    log, every = problem.log, round(LONG_STEP / problem.log.sample_time)
+    if len(log.drives) < FEW or every < 2 or "relief_pressure" in problem.model.unknowns:
+        return guess
+    at = remembered(problem.on(decimated(log, every)).at)
+    if cost_over_noise(log, at(guess).cost) < FAR_OFF:
+        return guess
+    return descend(at, guess, search.evaluations, bounds, search.near_enough, search.radius, least_share=SLIGHT).theta
