@@ -5,7 +5,7 @@ that explains the log, nothing else is searched; else searches begin at leakages
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
@@ -160,7 +160,7 @@ def _search(log: GreyBoxLog) -> Search:
     near_enough = NEAR_ENOUGH if log.passes_on else ROUGH_ENOUGH
     speed = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
     screened = driven_samples(speed, ceil(SCREENED_SECONDS / log.sample_time))
-    return Search(screened=screened, near_enough=near_enough, radius=LED_WITHIN)
+    return Search(screened=screened, near_enough=near_enough)
 
 
 def _searched(
@@ -180,6 +180,7 @@ def _searched(
     guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in starts]
     bounds = flow_bounds(form, guesses, afar)
     if alone:
+        search = replace(search, radius=LED_WITHIN)
         guesses = [_nearer(problem, guesses[0], bounds, search)]
     if not log.passes_on:
         point = roughly(problem, guesses, search, bounds, wanted, hopeful=hopeful, screen=screen)
