@@ -13,6 +13,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
+from estimation.fits.flow import rough_search
 from estimation.fits.flow import search as flow_search
 from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox import fit as greybox_fit
@@ -190,10 +191,11 @@ def plan_of_the_flow_form() -> dict[str, Any]:
             ("some are disturbed", lambda k: 1e5 + 30.0 * (k % 3)),
         ):
             with (
-                planned(cost, flow_search, greybox_fit) as plan,
+                planned(cost, flow_search, rough_search, greybox_fit) as plan,
                 patch.object(flow_search, "concluded", concluded),
                 patch.object(FreedProblem, "costs", lambda _, thetas, _lanes: np.arange(len(thetas))),
                 patch.object(flow_search, "each", lambda work, items: [work(item) for item in items]),
+                patch.object(rough_search, "each", lambda work, items: [work(item) for item in items]),
                 patch.object(greybox_fit, "each", lambda work, items: [work(item) for item in items]),
             ):
                 found = flow_search.balanced(one, PAPER, flow_starts(PAPER, 2e8)[:3])

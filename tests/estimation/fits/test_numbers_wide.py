@@ -11,7 +11,8 @@ import pytest
 
 from estimation.fits.flow import asked_hypotheses
 from estimation.fits.flow.asked_hypotheses import hypotheses_asked, near_starts
-from estimation.fits.flow.search import _guess, _search, flow_starts
+from estimation.fits.flow.rough_search import _guess, _search
+from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, PRESUMED
