@@ -17,6 +17,11 @@ def neighbours(unknowns: int) -> Array:
     ----------
     unknowns : int
         How many coordinates it has.
+
+    Returns
+    -------
+    ndarray, shape (1 + unknowns, unknowns)
+        Zeros, then a unit along each coordinate [dimensionless].
     """
     return np.eye(unknowns + 1, unknowns, -1)
 

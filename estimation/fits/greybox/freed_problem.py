@@ -118,7 +118,7 @@ class FreedProblem(Problem):
         parts = np.split(found, len(thetas), axis=-1)
         return [self._point(at, *weighed(*self._slopes(part, at))) for at, part in zip(thetas, parts, strict=True)]
 
-    def take_slopes(self, other: Problem, theta: Array) -> None:
+    def _take_over(self, other: Problem, theta: Array) -> None:
         """Take over slopes; what is left takes `LANES` equal runs, whose kernel is known: one costs as much."""
         if isinstance(other, FreedProblem) and len(theta) >= LANES:
             variance = self._variances(theta)

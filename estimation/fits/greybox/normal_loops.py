@@ -52,6 +52,11 @@ def sum_normal_equations(
         Zeros, to which the gradient is added, times the distance to each neighbour; the point itself comes first.
     gram : ndarray, shape (unknowns, lanes)
         Zeros, to which ``J'J`` is added, times the distances to both neighbours; likewise.
+
+    Returns
+    -------
+    float
+        The cost [dimensionless].
     """
     cost, pulling, counts = 0.0, np.zeros(4), np.zeros(4)
     blocks, lanes = found.shape[1], away.shape[1]

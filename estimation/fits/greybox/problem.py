@@ -109,6 +109,10 @@ class Problem:
         theta : ndarray, shape (unknowns,)
             The point, one of the last two at which it was run [dimensionless].
         """
+        self._take_over(other, theta)
+
+    def _take_over(self, other: "Problem", theta: Array) -> None:
+        """Keep nothing: exact sensitivities come with the run."""
 
     def at(self, theta: Array) -> Point:
         """Return the misfit at a point.
