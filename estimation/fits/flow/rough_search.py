@@ -33,7 +33,7 @@ LED_WITHIN = 1.0
 """First radius of a search on the whole log [dimensionless]: it begins where the log's beginning or another balance
 led. Of longer first steps, up to 30, two thirds were taken back, at three to five evaluations each."""
 
-FAR_OFF, SLIGHT = 3.0, 0.02
+FAR_OFF, SLIGHT = 6.0, 0.02
 """Half the sum of squares over what noise alone makes of it, from which a search first goes down on a decimated log,
 and the share of it that a further step must promise there [dimensionless]."""
 
