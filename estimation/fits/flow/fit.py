@@ -299,6 +299,7 @@ def _elsewhere(plain: PlainFits, strange: Explanation) -> FitStart | None:
 
 def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, traits: LogTraits) -> FormFit:
     """Return the fit of a log with what is strange about it taken up."""
+    strange = strange.in_detail
     one = strange.fit
     modulus, bound = one.values["bulk_modulus"], one.std["bulk_modulus"] / one.values["bulk_modulus"]
     if PLAY.name in strange.names:
@@ -311,7 +312,7 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
     if {AIR.name, AIR_MIDWAY.name} & set(strange.names):
         left = float(np.hypot(left, BUBBLES))
     most = share_lost(plain.log, one.values, plain.start.parameters.pump_displacement, strange.names)
-    found, correlation = with_lumped(strange.values, [one], np.ones(1), plain.start.parameters)
+    found, correlation = with_lumped(strange.values, strange.fits, weights_of(strange.fits), plain.start.parameters)
     return FormFit(
         parameters=with_structure(with_small_ripple(found, one.small_teeth), left),
         bound=bound,

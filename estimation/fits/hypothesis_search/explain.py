@@ -4,26 +4,22 @@ A log that the plain flow form does not explain is fitted under the hypotheses t
 of, then under the others, then under pairs with the likeliest; what is freed without need only widens the interval.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeAlias
 
 import numpy as np
 
 from estimation.fits.greybox.descent import Point
-from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, START_LOAD, VOLUME, Hypothesis
 from estimation.fits.hypothesis_search.coarse_search import coarsened, vanished_values
 from estimation.fits.hypothesis_search.compatible_hypotheses import compatible_hypotheses
+from estimation.fits.hypothesis_search.conclusion import Accepted, conclude, is_explained
 from estimation.fits.hypothesis_search.decimation import FEW, Decimation, cost_over_noise, decimation_for
 from estimation.fits.hypothesis_search.decimation_limit import decimation_limit
 from estimation.fits.hypothesis_search.explanation import Explanation, Trial
 from estimation.fits.hypothesis_search.final_fits import ALIKE, REACHED, with_less_lag
-from estimation.fits.hypothesis_search.form_fit import weighed
 from estimation.fits.hypothesis_search.predicted_gains import (
-    NO_GAIN,
-    PredictedGain,
     by_predicted_gain,
     predicted_gain_beside,
 )
@@ -40,13 +36,10 @@ from estimation.fits.hypothesis_search.stuck_valve import stuck_instead
 from estimation.fits.hypothesis_search.wide_log import (
     balanced_by,
     delayed,
-    usual_pressure,
     usual_values,
     widened,
 )
 from estimation.fits.hypothesis_search.wide_problem import freed, own_starts
-from estimation.models.flow import STIFFNESS
-from estimation.models.wide_flow import GROWTH, grown_leakage
 from plant.eha.model import EhaParameters
 
 DEFERRED = 4.0
@@ -65,9 +58,6 @@ sought together [dimensionless]; judged."""
 
 WORTH = 10.0
 """Gain in log-likelihood below which a hypothesis is not accepted [dimensionless]."""
-
-
-Accepted: TypeAlias = Callable[[GreyBoxFit], bool]
 
 
 def explain(
@@ -117,35 +107,27 @@ def explain(
     left = cost_over_noise(wide, plain.cost)
     spared = Decimation(decimation_limit(wide, starts[0], decimation_for(wide, left)), left, starts)
     finished = _alone(wide, plain.cost, (likely, others, gains), spared, accepted, useful)
-    if finished[0].fits and not _explained(finished[0], accepted):
+    if finished[0].fits and not is_explained(finished[0], accepted):
         finished = ranked([*finished, *filter(None, [with_less_lag(wide, finished[0])])])
     if paired and finished[0].cost < hopeless and not _by_itself(wide, finished[0], accepted):
         first, second = finished[0], finished[1] if len(finished) > 1 else None
         pairs = _paired(wide, first, starts[0], accepted)
-        near = cost_over_noise(wide, first.cost) < NEARLY or (pairs and _explained(pairs[0], accepted))
+        near = cost_over_noise(wide, first.cost) < NEARLY or (pairs and is_explained(pairs[0], accepted))
         as_good = second and second.cost <= NEARLY_AS_GOOD * first.cost and not _same(first, second)
-        sought = not (pairs and _explained(pairs[0], accepted) and cost_over_noise(wide, pairs[0].cost) < NOISE)
+        sought = not (pairs and is_explained(pairs[0], accepted) and cost_over_noise(wide, pairs[0].cost) < NOISE)
         if second and near and as_good and sought:
             pairs += _paired(wide, second, starts[0], accepted, rivalled=min(one.cost for one in (first, *pairs)))
         finished = _distinct([first, *pairs])
         if begun := [one for one in asked if one.from_first_sample and one.free == START_LOAD.free]:
             finished = _distinct([*finished, *_rig_and_load(wide, begun[0], finished[0], spared, accepted)])
-    if _explained(finished[0], accepted):
-        stuck = [one for one in stuck_instead(wide, finished[0], spared, WORTH) if _explained(one, accepted)]
+    if is_explained(finished[0], accepted):
+        stuck = [one for one in stuck_instead(wide, finished[0], spared, WORTH) if is_explained(one, accepted)]
         finished = [*stuck, *finished[len(stuck) :]]
     best = finished[0]
     if not best.fits:
         return None
     rivals = [one for one in finished[1:] if one.fits and one.cost < best.cost + ALIKE]
-    found = weighed([fit for one in (best, *rivals) for fit in one.fits])
-    values = {name: (value, best.fit.std[name]) for name, value in best.fit.values.items()} | dict(found)
-    if any(name in values for name in GROWTH):  # what is told of a leakage is what it is at the end
-        ended = float(grown_leakage(1.0, *(values.get(name, (0.0, 0.0))[0] for name in GROWTH)))
-        value, std = values["leakage_coefficient"]
-        values["leakage_coefficient"] = ended * value, ended * std
-    names = tuple(one.name for one in best.together)
-    open_by = _delivery_open(wide, best)
-    return Explanation(names, values, best.delays, best.fit, len(rivals), usual_pressure(log, parameters), open_by)
+    return conclude(wide, parameters, (best, *rivals), accepted)
 
 
 def _alone(
@@ -181,7 +163,7 @@ def _alone(
         finished = refined(log, first, spared=spared)
         return ranked([*finished, *refined(log, second, finished[0].cost, spared)])
     finished = refined(log, ended, spared=spared._replace(starts=promising_starts(starts, begun)), useful=useful)
-    if _explained(finished[0], accepted):  # a stuck valve was told as a small step of leakage, at 1.1 times the noise
+    if is_explained(finished[0], accepted):  # a stuck valve was told as a small step of leakage, at 1.1 times the noise
         others = [one for one in others if one.far] if cost_over_noise(log, finished[0].cost) > NOISE else []
     if not others:
         return finished
@@ -246,13 +228,13 @@ def _paired(
         return _better(first, ranked([*pairs, *refined(late, others, known, spared, useful)]), least)
     pairs = refined(late, ended, least, spared, useful)
     useful = _as_useful(pairs, useful)
-    if faint and not (pairs and _explained(pairs[0], accepted) and cost_over_noise(log, pairs[0].cost) < NOISE):
+    if faint and not (pairs and is_explained(pairs[0], accepted) and cost_over_noise(log, pairs[0].cost) < NOISE):
         wanted = NEARLY * min([least, *(one.cost for one in pairs[:1])])
         distant = [[*screen(late, (*first.together, one), begun, wanted, spared.every)] for one in far]
         distant = [ways for ways in distant if min(one.cost for one in ways) < wanted]
         pairs = ranked([*pairs, *likeliest(late, distant, wanted / NEARLY, spared, useful)]) if distant else pairs
         useful = _as_useful(pairs, useful)
-    if not pairs or not _explained(pairs[0], accepted):
+    if not pairs or not is_explained(pairs[0], accepted):
         known = min([least, *(one.cost for one in pairs[:1])])
         if faint:
             needed = first.cost - min(NEARLY_AS_GOOD * known, REACHED * first.cost / left)
@@ -272,11 +254,11 @@ def _rig_and_load(
     A load is no error of a rig file, so two errors may come beside it. Searched one after the other, each of the three
     takes up what belongs to the others. They are sought together only where no two hypotheses explain the log.
     """
-    if _explained(best, accepted):
+    if is_explained(best, accepted):
         return []
     together = DELIVERY, VOLUME, load
     tried = [*screen(log, together, spared.starts, every=spared.every)]
-    return [one for one in likeliest(log, [tried], best.cost, spared) if _explained(one, accepted)]
+    return [one for one in likeliest(log, [tried], best.cost, spared) if is_explained(one, accepted)]
 
 
 def _better(first: Trial, pairs: Iterable[Trial], least: float) -> list[Trial]:
@@ -304,16 +286,12 @@ def _plain_point(log: GreyBoxLog, plain: Mapping[str, float]) -> Point:
     return problem.at(problem.model.theta({**usual_values(log), **plain}))
 
 
-def _explained(tried: Trial, accepted: Accepted) -> bool:
-    return not tried.void and bool(tried.fits) and accepted(tried.fit)
-
-
 def _by_itself(log: GreyBoxLog, tried: Trial, accepted: Accepted) -> bool:
     """Return whether a set of hypotheses explains a log, and is no worn pump that stands for a wrong area.
 
     An area is the ratio of what is delivered and of a volume: both are asked for then.
     """
-    if not _explained(tried, accepted):
+    if not is_explained(tried, accepted):
         return False
     if tried.together != (DELIVERY,):
         return True
@@ -330,16 +308,6 @@ def _begun_again(log: GreyBoxLog, first: Trial) -> Mapping[str, float]:
     """Return the end of a search with long model steps as the next start, its vanished values reset."""
     ended = first.coarse or first.values
     return {**ended, **vanished_values(log, ended)}
-
-
-def _delivery_open(log: GreyBoxLog, best: Trial) -> PredictedGain:
-    """Return the predicted gain of another pump delivery beside an explanation of a log, in its balance."""
-    if DELIVERY.free[0] in best.values:
-        return NO_GAIN
-    row, more = delayed(log, best.delays), (STIFFNESS,) if STIFFNESS in best.values else ()
-    if not any(STIFFNESS in one.beside for one in best.together):  # else it is freed in either balance
-        row = balanced_by(row, float(bool(more)))
-    return predicted_gain_beside(row, best.together, best.values, DELIVERY, *more)
 
 
 def _distinct(tried: Iterable[Trial]) -> list[Trial]:

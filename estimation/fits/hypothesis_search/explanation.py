@@ -1,6 +1,6 @@
 """A set of hypotheses on trial, and the explanation of a log that comes out."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -73,20 +73,33 @@ class Explanation:
         Value and standard deviation by parameter, in SI.
     delays : Mapping[str, float]
         Times by which channels come late beside their lags [s].
-    fit : GreyBoxFit
-        The fit under them.
+    fits : tuple of GreyBoxFit
+        The fits that values are weighed over: first that under them by the likelier balance.
     rivals : int
         How many other sets of hypotheses explain the log about as well.
     stated_pressure : float
         Absolute pressure that bulk modulus is stated at, where the oil holds air [Pa].
     delivery_open : PredictedGain
         What another delivery of the pump promises beside them; nothing where that is part of the explanation.
+    detailing : callable
+        Works out `in_detail`, for which the log is fitted further: of most explanations costs alone are read.
     """
 
     names: tuple[str, ...]
     values: Mapping[str, tuple[float, float]]
     delays: Mapping[str, float]
-    fit: GreyBoxFit
+    fits: tuple[GreyBoxFit, ...]
     rivals: int
     stated_pressure: float
     delivery_open: PredictedGain = NO_GAIN
+    detailing: Callable[[], "Explanation | None"] = lambda: None
+
+    @property
+    def fit(self) -> GreyBoxFit:
+        """The fit under them."""
+        return self.fits[0]
+
+    @property
+    def in_detail(self) -> "Explanation":
+        """The same with what matters to the last digits alone freed, see `with_details`."""
+        return self.detailing() or self

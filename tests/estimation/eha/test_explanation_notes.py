@@ -35,7 +35,7 @@ PRESSURE = "differential_pressure_pa"
 
 def explanation(*names: str, delay: float = 0.0, rivals: int = 0, **values: tuple[float, float]) -> Explanation:
     fit: Any = None
-    return Explanation(names, values, {PRESSURE: delay}, fit, rivals, STATED)
+    return Explanation(names, values, {PRESSURE: delay}, (fit,), rivals, STATED)
 
 
 def told(*names: str, delay: float = 0.0, rivals: int = 0, **values: tuple[float, float]) -> Note:

@@ -29,7 +29,7 @@ def explanation(
     names: tuple[str, ...], delays: dict[str, float] | None = None, rivals: int = 0, **values: Any
 ) -> Explanation:
     fit: Any = None
-    return Explanation(names, values, {PRESSURE: 0.0, **(delays or {})}, fit, rivals, 3e5)
+    return Explanation(names, values, {PRESSURE: 0.0, **(delays or {})}, (fit,), rivals, 3e5)
 
 
 VALUES: dict[str, tuple[float, float]] = {
