@@ -35,7 +35,6 @@ LAMINAR_BELOW = 1e4
 SHORTEST_LAG = 1e-6
 """Lag of a pressure sensor that has none [s]."""
 
-
 COURSES = ("side_of_play", "play_by_pressure", "play_at_once", "play_sprung")
 """Courses of the piston in its encoder's play, see `estimation.fits.greybox.play.crossings`."""
 
@@ -99,26 +98,36 @@ def _bubbles(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool) 
     return air / above * exp(p.air_quickness * log(above / ATMOSPHERE)) if quick else air / above
 
 
-def _oil(pressure: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
-    """Return the tangent bulk modulus of oil alone [Pa], to which by mass its volume is proportional."""
-    return p.bulk_modulus - p.by_mass * (pressure - (p.stated_pressure if quick else ATMOSPHERE))
+def _before(air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
+    """Return the volume of the air that the stated bulk modulus holds, over that of its oil [dimensionless]."""
+    return where(p.air_onset < 0.0, _bubbles(p.stated_pressure, air, p, quick=quick), 0.0)
+
+
+def _liquid(air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
+    """Return the share of the stated oil's compliance that is the liquid's, and not its air's [fraction]."""
+    slope = 1.0 - p.air_quickness if quick else 1.0
+    return 1.0 - p.bulk_modulus * slope * _before(air, p, quick=quick) / p.stated_pressure
+
+
+def _room(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
+    """Return bulk modulus times the volume of oil and bubbles over that when stated, which is 1 by volume [Pa]."""
+    grown = p.by_mass * (_bubbles(pressure, air, p, quick=quick) - _before(air, p, quick=quick))
+    squeezed = pressure - (p.stated_pressure if quick else ATMOSPHERE)
+    return p.bulk_modulus * (1.0 + grown) - p.by_mass * squeezed * _liquid(air, p, quick=quick)
 
 
 def _stiffness(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool = False) -> Scalar:
     """Return the tangent bulk modulus of a chamber [Pa]: liquid, air that softens as 1/p^2 or so, and vapour.
 
-    `bulk_modulus` is that at `stated_pressure`, air included; the liquid's where air gets in midway. By mass both are
-    of the room that the oil fills, bubbles included.
+    `bulk_modulus` is that at `stated_pressure`, air included; the liquid's where air gets in midway. By mass it is of
+    the room that the oil fills, bubbles included.
     """
     above = maximum(pressure, 0.05 * VAPOUR)
     ratio, bubbles = VAPOUR / above, _bubbles(pressure, air, p, quick=quick)
     short = ratio * ratio
-    before = where(p.air_onset < 0.0, _bubbles(p.stated_pressure, air, p, quick=quick), 0.0)
     slope = 1.0 - p.air_quickness if quick else 1.0
-    softer = slope * (bubbles / above - before / p.stated_pressure)
-    oil = _oil(pressure, p, quick=quick)
-    room = 1.0 + p.by_mass * (bubbles - before)
-    return oil * room / maximum(1.0 + short * short + softer * oil, STIFFEST)
+    softer = slope * (bubbles / above - _before(air, p, quick=quick) / p.stated_pressure)
+    return _room(pressure, air, p, quick=quick) / maximum(1.0 + short * short + softer * p.bulk_modulus, STIFFEST)
 
 
 def _rates(
@@ -137,8 +146,7 @@ def _rates(
     next_x = next_read + p.position_lag * next_rate + 0.5 * p.position_play * next_side
     velocity, position = (next_x - x) / step, x + share * (next_x - x) - p.position_zero
     delivered = delivered_flow(speeds, _ahead(p), step, share)
-    area_1, area_2 = piston_areas(p)
-    volume_1, volume_2 = chamber_volumes(position, p)
+    (area_1, area_2), (volume_1, volume_2) = piston_areas(p), chamber_volumes(position, p)
     dp = p1 - p2
     pumped = delivered * compressed(where(delivered > 0.0, dp, -dp) / p.bulk_modulus, p.pump_compression)
     elapsed = begun + share * (next_begun - begun)
@@ -158,7 +166,8 @@ def _rates(
     into_2 = fed_2 - p.drain_share_b * drain * (p2 - supply)
     air = _air(elapsed, p)
     freed = _bubbles(p2, air, p, quick=quick) - _bubbles(p1, air, p, quick=quick)
-    swelling_1, swelling_2 = (p.by_mass * (dp / _oil(one, p, quick=quick) + freed) for one in (p1, p2))
+    swells = dp * _liquid(air, p, quick=quick) + p.bulk_modulus * freed
+    swelling_1, swelling_2 = (p.by_mass * swells / _room(one, air, p, quick=quick) for one in (p1, p2))
     at_1, at_2 = port_flows(pumped, leaked, dp, (swelling_1, swelling_2))
     rise = _stiffness(p1, air, p, quick=quick) * (at_1 - area_1 * velocity + into_1) / volume_1
     fall = _stiffness(p2, air, p, quick=quick) * (area_2 * velocity - at_2 + into_2) / volume_2
@@ -318,33 +327,17 @@ wide form is asked of too, pay for no roots and no powers."""
 
 LINEAR = {
     "speed_lead": 1e-5,
-    "pressure_lag": 1e-3,
-    "speed_lag": 1e-3,
-    "position_lag": 1e-3,
+    **dict.fromkeys(("pressure_lag", "speed_lag", "position_lag"), 1e-3),
     "position_play": 1e-5,
-    **dict.fromkeys(CROSSED, 1.0),
-    "pressure_offset": 1e4,
-    "pressure_drift": 1e4,
+    **dict.fromkeys((*CROSSED, *GROWTH, "leakage_before", "pump_compression", "pilot_share"), 1.0),
+    **dict.fromkeys(("pressure_offset", "pressure_drift", "start_level", "crack_pressure", "crack_difference"), 1e4),
     "position_zero": 1e-2,
     "start_pressure": 1e5,
-    "start_level": 1e4,
     "air_softness": 1e2,
-    "air_onset": 0.1,
-    QUICKNESS: 0.1,
-    "leakage_growth": 1.0,
-    "leakage_bend": 1.0,
-    "leakage_rise": 1.0,
-    "leakage_before": 1.0,
-    "step_at": 0.1,
-    "leakage_turbulent": 0.1,
-    "pump_compression": 1.0,
-    "crack_pressure": 1e4,
-    "crack_difference": 1e4,
+    **dict.fromkeys(("air_onset", QUICKNESS, "step_at", "leakage_turbulent"), 0.1),
+    **dict.fromkeys(("area_difference", "volume_difference"), 0.1),
     **dict.fromkeys(CRACKS, USUAL_CRACK),
     BEND: USUAL_BEND,
-    "area_difference": 0.1,
-    "volume_difference": 0.1,
-    "pilot_share": 1.0,
     STIFFNESS: 1e8,
 }
 """Parameters that may be zero or negative, each with a typical size [SI]."""

@@ -43,17 +43,19 @@ def by_the_balance(diagnosis: Diagnosis, estimate: BulkModulusEstimate, record: 
     -------
     Diagnosis
         With the leakage and the flow bias of the one, and the friction of the other, each where it is told better than
-        by the circuit. The same one where the balance of flows does not explain the log without further causes, or
-        where the circuit is not that of the whole log: its leakage drifts or changes.
+        by the circuit; leakage and flow bias only where no further cause is needed. The same one where the balance of
+        flows does not explain the log, or where the circuit is not that of the whole log: its leakage drifts or
+        changes.
     """
-    losses, blocks = known_losses(estimate), diagnosis.scoreboard.blocks
+    blocks, circuits = diagnosis.scoreboard.blocks, diagnosis.severity
     changes = blocks.course is not None or blocks.earlier is not None or diagnosis.scoreboard.onset is not None
-    if losses is None or changes or diagnosis.scoreboard.drift is not None or diagnosis.told_by is None:
+    if not _balances(estimate) or changes or diagnosis.scoreboard.drift is not None or diagnosis.told_by is None:
         return diagnosis
-    circuits = diagnosis.severity
-    severity = diagnosis.told_by(losses, None)
-    if extent(severity["leakage_flow"]) >= extent(circuits["leakage_flow"]):
-        losses, severity = None, circuits
+    losses, severity = known_losses(estimate), circuits
+    if losses is not None:
+        severity = diagnosis.told_by(losses, None)
+        if extent(severity["leakage_flow"]) >= extent(circuits["leakage_flow"]):
+            losses, severity = None, circuits
     rubbing = friction_by_forces(record, p, actuator_of(p).rated)
     if rubbing is not None:
         rubbed = diagnosis.told_by(losses, rubbing)
@@ -73,6 +75,11 @@ def _told_better(rubbed: Mapping[str, Quantity], severity: Mapping[str, Quantity
     return all(narrower) and all(isfinite(extent(rubbed[name])) for name in OF_FRICTION)
 
 
+def _balances(estimate: BulkModulusEstimate) -> bool:
+    """Return whether the balance of flows explains a log, further causes taken up."""
+    return estimate.form == "flow" and estimate.outcome is Outcome.OK and estimate.gate.passed
+
+
 def known_losses(estimate: BulkModulusEstimate) -> KnownLosses | None:
     """Return leakage and flow bias of a log as the balance of flows tells them.
 
@@ -81,8 +88,7 @@ def known_losses(estimate: BulkModulusEstimate) -> KnownLosses | None:
     KnownLosses or None
         None where the balance was not fitted, is refused, or needs a further cause to explain the log.
     """
-    told = estimate.form == "flow" and estimate.outcome is Outcome.OK and estimate.gate.passed
-    if not told or estimate.explanation is not None or not set(LOSSES) <= set(estimate.others):
+    if not _balances(estimate) or estimate.explanation is not None or not set(LOSSES) <= set(estimate.others):
         return None
     values, deviations = np.array([estimate.others[name] for name in LOSSES]).T
     relative = deviations / values

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from estimation.models.wide_flow import VAPOUR, WIDE_FLOW_FORM, _stiffness
+from estimation.models.wide_flow import QUICK_FLOW_FORM, VAPOUR, WIDE_FLOW_FORM, WideFlowParameters, _stiffness
 from plant.components.oil import ATMOSPHERE
 
 
@@ -45,3 +45,39 @@ def test_bubbles_are_squeezed_as_their_exponent_says_and_bulk_modulus_is_that_at
     by_mass = SimpleNamespace(**vars(p) | {"by_mass": 1.0})
     at_stated = _stiffness(stated, air, by_mass, quick=True)
     assert at_stated == pytest.approx(p.bulk_modulus, rel=1e-5)
+
+
+@pytest.mark.parametrize("quick", [False, True])
+def test_oil_with_bubbles_that_is_pumped_across_is_lost_nowhere(quick: bool) -> None:
+    share, liquid, stated = 0.02, 2e8, 7e5
+    exponent = 1.3 if quick else 1.0
+    slope = 1.0 / exponent
+
+    def bubbles(at: float) -> float:
+        return share * (ATMOSPHERE / at) ** slope
+
+    def room(at: float) -> float:
+        """Of liquid and bubbles, over that at the stated pressure (at atmospheric pressure for isothermal ones)."""
+        return 1.0 + bubbles(at) - bubbles(stated) - (at - (stated if quick else ATMOSPHERE)) / liquid
+
+    p = WideFlowParameters(
+        bulk_modulus=1.0 / (1.0 / liquid + slope * bubbles(stated) / stated),
+        by_mass=1.0,
+        air_softness=share * ATMOSPHERE,
+        air_quickness=1.0 - slope,
+        stated_pressure=stated,
+        case_leakage=0.0,
+        makeup_conductance=0.0,
+    )
+    pressures, volume, step = (9e5, 3e5), 2.0 * p.chamber_volume, 1e-3
+    still = ((0.0, 0.0),) * 4
+    drives = ((100.0, 100.0), (0.0, 0.0), (0.5, 0.5), (0.0, 0.0), *still, step)
+    form = QUICK_FLOW_FORM if quick else WIDE_FLOW_FORM
+    rates = form.rates((*pressures, 0.0, p.accumulator_pressure), drives, SimpleNamespace(**vars(p)), 0.0)
+
+    def gained(at: float, rate: float) -> float:
+        return volume * (1.0 / room(at + 1e-3 * rate) - 1.0 / room(at - 1e-3 * rate)) / 2e-3
+
+    into, out_of = (gained(at, rate) for at, rate in zip(pressures, rates[:2], strict=True))
+    assert into > 0.0
+    assert into + out_of == pytest.approx(0.0, abs=2e-3 * into)

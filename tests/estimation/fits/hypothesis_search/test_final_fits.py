@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from estimation.fits.greybox.descent import Point
-from estimation.fits.hypotheses import OFFSET, PRESSURE_LATE
+from estimation.fits.hypotheses import AIR_MIDWAY, CHECKS_CRACK, OFFSET, PRESSURE_LATE
 from estimation.fits.hypothesis_search import final_fits
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.final_fits import ALIKE, CLOSE, FAR_BEHIND
+from estimation.models.completed_flow import CRACKS
 from tests.estimation.fits.short_logs import made_fit
 
 
@@ -90,3 +91,30 @@ def test_what_stays_far_behind_is_given_up(cost: float, searches: int, monkeypat
     final_fits._to_its_end(problem, begun, np.zeros(1), useful=useful)  # pyright: ignore[reportPrivateUsage]
     assert len(costs) == 2 - searches
     assert ended == [problem.at]
+
+
+@pytest.mark.parametrize(("cost", "std", "kept"), [(80.0, 1.1e5, True), (80.0, 3e4, False), (95.0, 1.1e5, False)])
+def test_valves_are_freed_at_the_end_unless_they_chatter_or_the_set_fits_worse(
+    cost: float, std: float, kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = Trial((OFFSET,), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {}, {}, {}, (made_fit(90.0, 2e8, 1e5),))
+    before = replace(before, values={OFFSET.free[0]: 1e5})
+    freed: list[str] = []
+
+    def further(_: Any, tried: Trial, __: float, *details: str) -> Trial:
+        freed.extend(details)
+        return replace(tried, point=replace(tried.point, cost=cost), fits=(made_fit(cost, 2e8, std),))
+
+    monkeypatch.setattr(final_fits, "final_fit", further)
+    nothing: Any = None
+    told = final_fits.with_details(nothing, before)
+    assert {*CRACKS} < {*freed}
+    assert told.cost == (cost if kept else before.cost)
+
+
+def test_valves_that_a_set_frees_itself_are_not_freed_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(final_fits, "final_fit", lambda *_: pytest.fail("fitted again"))
+    nothing: Any = None
+    for own in (CHECKS_CRACK, AIR_MIDWAY):
+        tried = Trial((own,), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {}, {}, {})
+        assert final_fits.with_details(nothing, tried) is tried
