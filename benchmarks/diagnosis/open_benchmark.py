@@ -15,7 +15,7 @@ import pandas as pd
 
 from experiments.open_benchmark.folders import write_set
 from experiments.open_benchmark.kinds import KINDS, SPLITS, VERSION, drawn_pairs
-from experiments.open_benchmark.score import score_set, summary
+from experiments.open_benchmark.score import coverage, score_set, summary
 
 NONE_WANTED = ("silent_beta", "silent_class", "false_unknown", "false_since")
 """Counts that are wanted to be zero where pressure is logged."""
@@ -30,6 +30,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--pairs", type=int, default=0, help="logs of two kinds at once, in place of single ones")
     parser.add_argument("--without", type=int, default=0, help="of them scored without pressure too")
     parser.add_argument("--folder", nargs="+", type=Path, default=[], help="sets to score in place of made ones")
+    parser.add_argument("--coverage", action="store_true", help="also a line a kind and quantity on its intervals")
     parser.add_argument("--rows", type=Path, help="CSV file for a row a log")
     options = parser.parse_args(arguments)
     print(f"open benchmark {VERSION}, {options.split if not options.folder else 'given'} sets", flush=True)
@@ -37,6 +38,8 @@ def main(arguments: list[str]) -> int:
         rows = scored(options, Path(made))
     if options.rows:
         pd.DataFrame(rows).to_csv(options.rows, index=False)
+    if options.coverage:
+        print(coverage(rows).to_string(index=False, float_format="%.2f"))
     table = summary(rows)
     counts = table[table["pressure"]][list(NONE_WANTED)].sum()
     for name, count in counts.items():

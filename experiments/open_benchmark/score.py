@@ -7,6 +7,7 @@ from typing import Any
 
 import pandas as pd
 
+from estimation.finding import NORMAL_95
 from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class, named
 from experiments.open_benchmark.loaders import read_truth, rows_of
 from experiments.python_user.log import Log
@@ -20,6 +21,12 @@ FAILED: Mapping[str, Any] = {"outcome": "failed"}
 
 OF_PRESSURE = "pressure_"
 """What the names of kinds begin with of which the pressure sensor alone is strange: without pressure they are plain."""
+
+Z = "z_"
+"""What the names of columns of errors over their deviations begin with."""
+
+LOSSES = ("leakage_coefficient", "flow_bias")
+"""What `estimate` tells beside bulk modulus."""
 
 COEFFICIENTS: Mapping[str, str] = {
     "leakage_coefficient": "leak_coeff",
@@ -55,8 +62,10 @@ def score_set(folder: Path, count: int, *, pressure: bool) -> Iterator[dict[str,
         row = {"set": folder.name, "file": truth["file"], "input": truth["input"], "pressure": pressure}
         row |= judge_bulk_modulus(estimate, truth) | judge_class(diagnosis, truth)
         row["named"] = named(str(truth.get("named", "")), estimate, diagnosis)
-        hits = _severities(diagnosis, truth, rig) if int(truth["sev"] or 0) else []
-        yield {**row, "severities": len(hits), "covered_severities": sum(hits), "seconds": process_time() - began}
+        errors = _errors(estimate, diagnosis, truth, rig) if int(truth["sev"] or 0) else {}
+        hits = [abs(z) <= NORMAL_95 for name, z in errors.items() if name not in LOSSES]
+        row |= {"severities": len(hits), "covered_severities": sum(hits), "seconds": process_time() - began}
+        yield row | {f"{Z}{name}": z for name, z in errors.items()}
 
 
 def without_pressure(truth: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -97,18 +106,59 @@ def _asked(log: Log, verb: str, pressure: bool) -> Mapping[str, Any]:
         return {**FAILED, "message": str(error)}
 
 
-def _severities(said: Mapping[str, Any], truth: Mapping[str, Any], healthy: EhaParameters) -> list[bool]:
-    """Return which severities' intervals cover what they truly are, by the project's own definition of each."""
+def _errors(
+    estimated: Mapping[str, Any], said: Mapping[str, Any], truth: Mapping[str, Any], healthy: EhaParameters
+) -> dict[str, float]:
+    """Return the error of what both verbs tell over its deviation given the rig, by name: 0 within a range of truths.
+
+    Severities are meant by the project's own definition of each. Losses count where the estimate passes its check.
+    """
     from dataclasses import replace
 
     actuator = actuator_of(healthy)
     true = replace(healthy, **{name: float(truth[column]) for name, column in COEFFICIENTS.items()})
     exact = severities_at(coordinates_of(true, actuator.rated), actuator)
     told = {name: one["ci95"] for name, one in (said.get("severity") or {}).items() if name != "entrained_air"}
-    ends = {name: ci for name, ci in told.items() if ci is not None and None not in ci}
-    oil = float(truth["beta_lo"]), float(truth["beta_hi"])
-    ranges = {name: oil if name == "bulk_modulus" else (exact[name], exact[name]) for name in ends}
-    return [ci[0] <= ranges[name][1] and ci[1] >= ranges[name][0] for name, ci in ends.items()]
+    ranges = {name: (exact[name], exact[name]) for name in told}
+    ranges["bulk_modulus"] = float(truth["beta_lo"]), float(truth["beta_hi"])
+    if (estimated.get("gate") or {}).get("passed"):
+        states = estimated.get("states") or {}
+        told |= {name: states[name]["ci95"] for name in LOSSES if name in states}
+        ranges |= {name: (getattr(true, name), getattr(true, name)) for name in LOSSES}
+    ends = {name: ci for name, ci in told.items() if ci is not None and None not in ci and ci[0] < ci[1]}
+    return {name: _beyond(ci, ranges[name]) for name, ci in ends.items()}
+
+
+def _beyond(ci: Sequence[float], truths: tuple[float, float]) -> float:
+    """Return how far the middle of an interval is from the nearest of a range of truths, in its deviations."""
+    middle = 0.5 * (ci[0] + ci[1])
+    return NORMAL_95 * (middle - min(max(middle, truths[0]), truths[1])) / (0.5 * (ci[1] - ci[0]))
+
+
+def coverage(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """Return a line a set and quantity: how often 95 % intervals given the rig cover, and whether they are too narrow.
+
+    Parameters
+    ----------
+    rows : sequence of Mapping
+        As `score_set` yields them.
+
+    Returns
+    -------
+    pandas.DataFrame
+        ``z`` is the error over its deviation by root mean square, 1 where intervals are right [dimensionless].
+    """
+    table, lines = pd.DataFrame(rows), list[dict[str, Any]]()
+    columns = [str(one) for one in table.columns if str(one).startswith(Z)]
+    for (name, pressure), part in table.groupby(["set", "pressure"], sort=False):
+        for column in columns:
+            z = part[column].dropna().astype(float)
+            if len(z):
+                which = {"set": name, "pressure": pressure, "quantity": column.removeprefix(Z), "numbers": len(z)}
+                covered = int((z.abs() <= NORMAL_95).sum())
+                size, worst = float((z**2).mean() ** 0.5), float(max(z, key=abs))
+                lines.append(which | {"covered": covered, "z": size, "mean_z": float(z.mean()), "largest": worst})
+    return pd.DataFrame(lines)
 
 
 def summary(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:

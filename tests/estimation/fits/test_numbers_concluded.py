@@ -19,7 +19,7 @@ from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.play import ShownPlay
 from estimation.fits.hypotheses import BEGUN, HYPOTHESES, MAY_HIDE
-from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.explanation import Explanation, Trial
 from estimation.fits.hypothesis_search.fit_objections import fit_explains_all
 from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, PredictedGain, slopes_of
 from estimation.fits.hypothesis_search.wide_log import widened
@@ -54,7 +54,7 @@ def concluded(
 ) -> Any:
     """Return what is told of a log by its plain fits, and by one under hypotheses."""
     values = {name: (value, strange.std[name]) for name, value in strange.values.items() if name in strange.std}
-    explanation = SimpleNamespace(names=names, values=values, fit=strange, delivery_open=open_by)
+    explanation = Explanation(names, values, {}, (strange,), 0, 1e6, open_by)
     asked: list[Any] = []
 
     def explained(*_: Any, asked: Any, paired: bool, by_mass: bool, **__: Any) -> Any:

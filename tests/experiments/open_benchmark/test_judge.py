@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class, named
-from experiments.open_benchmark.score import summary
+from experiments.open_benchmark.score import coverage, summary
 
 TRUTH = {"beta_lo": "2e8", "beta_hi": "2.1e8", "accept": "normal;unknown"}
 
@@ -87,3 +87,11 @@ def test_the_summary_counts_logs_by_set_and_sensors() -> None:
     row |= {"set": "a", "pressure": True, "named": None, "severities": 2, "covered_severities": 1, "seconds": 1.0}
     (line,) = summary([row, row | {"silent_class": False}]).to_dict("records")
     assert (line["logs"], line["silent_beta"], line["silent_class"], line["severities_%"]) == (2, 2, 1, 50.0)
+
+
+def test_coverage_is_of_each_quantity_of_a_set_and_leaves_out_what_was_not_told() -> None:
+    told = [{"z_leakage_flow": 1.0}, {"z_leakage_flow": -3.0}, {"z_flow_bias": 0.5}]
+    (leakage, bias) = coverage([row | {"set": "a", "pressure": True} for row in told]).to_dict("records")
+    assert (leakage["quantity"], leakage["numbers"], leakage["covered"]) == ("leakage_flow", 2, 1)
+    assert (leakage["z"], leakage["largest"]) == (pytest.approx(5.0**0.5), -3.0)
+    assert (bias["quantity"], bias["numbers"], bias["covered"]) == ("flow_bias", 1, 1)

@@ -252,6 +252,6 @@ def test_a_speed_that_is_late_and_one_that_is_early_are_one_where_they_came_to_o
 def test_a_pump_that_delivers_less_beside_another_volume_may_be_a_wrong_area(
     one: Any, gain: float, alone: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(explain, "_explained", lambda *_: True)
+    monkeypatch.setattr(explain, "is_explained", lambda *_: True)
     monkeypatch.setattr(explain, "predicted_gain_beside", lambda *_: PredictedGain(gain, 1.0, 1.0))
     assert explain._by_itself(LONG, tried(9.0, together=(one,)), lambda _: True) is alone  # pyright: ignore[reportPrivateUsage]

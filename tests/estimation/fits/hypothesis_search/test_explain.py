@@ -10,7 +10,7 @@ import pytest
 
 from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
-from estimation.fits.hypothesis_search import coarse_search, explain, final_fits, ranking, screening
+from estimation.fits.hypothesis_search import coarse_search, conclusion, explain, final_fits, ranking, screening
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.final_fits import CLOSE, NEVER, ROUNDS
 from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN
@@ -206,9 +206,9 @@ def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
     monkeypatch.setattr(explain, "decimation_for", lambda *_: 1)
     monkeypatch.setattr(explain, "cost_over_noise", lambda *_: chi)
     monkeypatch.setattr(explain, "_paired", paired)
-    monkeypatch.setattr(explain, "weighed", lambda _: {})
-    monkeypatch.setattr(explain, "usual_pressure", lambda *_: 0.0)
-    monkeypatch.setattr(explain, "_delivery_open", lambda *_: NO_GAIN)
+    monkeypatch.setattr(conclusion, "weighed", lambda _: {})
+    monkeypatch.setattr(conclusion, "usual_pressure", lambda *_: 0.0)
+    monkeypatch.setattr(conclusion, "_delivery_open", lambda *_: NO_GAIN)
     monkeypatch.setattr(explain, "ALIKE", 4.0)
     nothing: Any = None
     found = explain.explain(nothing, nothing, [{}], lambda fit: fit.cost < least, hopeless=hopeless)

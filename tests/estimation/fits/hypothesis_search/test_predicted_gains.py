@@ -8,7 +8,7 @@ from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox import freed_problem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import AIR, DELIVERY, MAKEUP_BLOCKED, MAY_HIDE, OFFSET
-from estimation.fits.hypothesis_search import explain, predicted_gains
+from estimation.fits.hypothesis_search import conclusion, explain, predicted_gains
 from estimation.fits.hypothesis_search.predicted_gains import by_predicted_gain, predicted_gain, predicted_gain_beside
 from estimation.fits.hypothesis_search.wide_log import balances_mass
 from estimation.fits.hypothesis_search.wide_problem import freed
@@ -69,11 +69,11 @@ def test_what_another_delivery_promises_is_asked_in_the_balance_of_the_fit(
         asked.append((balances_mass(row), given[3:]))
         return predicted_gains.NO_GAIN
 
-    monkeypatch.setattr(explain, "predicted_gain_beside", noted)
+    monkeypatch.setattr(conclusion, "predicted_gain_beside", noted)
     values = {**FOUND, "air_softness": 2e3}
     if not by_mass:
         values = {name: value for name, value in values.items() if name != STIFFNESS}
-    explain._delivery_open(wide(), SimpleNamespace(together=(AIR,), values=values, delays={}))  # type: ignore[arg-type]
+    conclusion._delivery_open(wide(), SimpleNamespace(together=(AIR,), values=values, delays={}))  # type: ignore[arg-type]
     assert asked == [(by_mass, (STIFFNESS,) if by_mass else ())]
 
 
