@@ -12,8 +12,10 @@ from math import isfinite
 
 import numpy as np
 
+from estimation.eha.explanation_notes import lateness
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Outcome, Quantity
+from estimation.log_checks.channel_names import POSITION, PRESSURE
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.known_friction import friction_by_forces
@@ -56,7 +58,7 @@ def by_the_balance(diagnosis: Diagnosis, estimate: BulkModulusEstimate, record: 
         severity = diagnosis.told_by(losses, None)
         if extent(severity["leakage_flow"]) >= extent(circuits["leakage_flow"]):
             losses, severity = None, circuits
-    rubbing = friction_by_forces(record, p, actuator_of(p).rated)
+    rubbing = None if _was_late(estimate) else friction_by_forces(record, p, actuator_of(p).rated)
     if rubbing is not None:
         rubbed = diagnosis.told_by(losses, rubbing)
         if _told_better(rubbed, severity):
@@ -78,6 +80,12 @@ def _told_better(rubbed: Mapping[str, Quantity], severity: Mapping[str, Quantity
 def _balances(estimate: BulkModulusEstimate) -> bool:
     """Return whether the balance of flows explains a log, further causes taken up."""
     return estimate.form == "flow" and estimate.outcome is Outcome.OK and estimate.gate.passed
+
+
+def _was_late(estimate: BulkModulusEstimate) -> bool:
+    """Return whether pressure or position came late: a lag that is set right as a delay leaves errors at reversals."""
+    found = estimate.explanation
+    return found is not None and any(lateness(found, channel) != 0.0 for channel in (PRESSURE, POSITION))
 
 
 def known_losses(estimate: BulkModulusEstimate) -> KnownLosses | None:

@@ -10,6 +10,7 @@ import pytest
 
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Gate, Outcome, Quantity
+from estimation.fits.hypothesis_search.explanation import Explanation
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.known_losses import by_the_balance, known_losses
 from faults.diagnosis.severity import severities
@@ -47,6 +48,10 @@ def diagnosis(**changed: Any) -> Diagnosis:
     return Diagnosis({}, (), told_by(None, None), {}, {}, (), board, told_by)
 
 
+def explained(**delays: float) -> Explanation:
+    return Explanation(("made up",), {}, delays, (), 0, 1e6)
+
+
 def told(one: Diagnosis, by: BulkModulusEstimate, log: Record = NOTHING) -> Diagnosis:
     return by_the_balance(one, by, log, RIG)
 
@@ -66,6 +71,15 @@ def test_friction_is_that_of_the_balance_of_forces_where_it_knows_it_better() ->
     assert extent(forces["added_friction"]) < 0.5 * extent(circuit["added_friction"])
     assert extent(forces["pressure_rise"]) < 0.5 * extent(circuit["pressure_rise"])
     assert forces["leakage_flow"] == circuit["leakage_flow"]
+
+
+def test_forces_tell_friction_beside_another_cause_too_but_not_where_pressure_came_late() -> None:
+    circuit = diagnosis().severity
+    found = told(diagnosis(), estimate(explanation=explained()), sliding()).severity
+    assert found["added_friction"].value == pytest.approx(WHOLE - HEALTHY, abs=20.0)
+    assert found["leakage_flow"] == circuit["leakage_flow"]
+    late = explained(differential_pressure_pa=2e-3)
+    assert told(diagnosis(), estimate(explanation=late), sliding()).severity == circuit
 
 
 def test_the_circuits_friction_stays_where_the_balance_of_forces_has_no_steady_state() -> None:
@@ -92,7 +106,7 @@ def test_notes_of_others_than_the_circuit_stay() -> None:
         {"form": "motion"},
         {"outcome": Outcome.MISMATCH},
         {"gate": Gate(False, ())},
-        {"explanation": object()},
+        {"explanation": explained()},
         {"others": {}},
         {"others": {"leakage_coefficient": (LEAKAGE, np.inf), "flow_bias": (BIAS, 1e-3 * BIAS)}},
     ],
