@@ -19,13 +19,14 @@ KIND = "eha"
 
 NOT_THE_LOGS = {
     EstimateCode.BOUND_TOO_WIDE,
+    EstimateCode.PRESSURE_RESIDUALS_SMALL,
     EstimateCode.POSITION_RESIDUALS_LARGE,
     EstimateCode.FRICTION_LAWS_DISAGREE,
     EstimateCode.FORCES_ON_ANY_SCALE,
     EstimateCode.WEAKLY_HELD,
 }
-"""Reasons of a gate that speak against bulk modulus alone: the log holds too little of it, or it depends on how the
-piston starts and stops, which decides no condition."""
+"""Reasons of a gate that speak against bulk modulus alone: the log holds too little of it, its oil is too stiff for the
+noise of position, or it depends on how the piston starts and stops, which decides no condition."""
 
 LARGEST_SHARE = 0.06
 """Share of the motion that a fit without pressure may leave where anything is concluded from the log [fraction]: as

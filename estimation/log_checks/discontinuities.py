@@ -43,6 +43,9 @@ BROKEN = 8.0
 STOPS = 0.1
 """Share of its way up to a stop that a piston goes on behind it, or stays short of it [fraction]; judged."""
 
+SOFT_STOP = 1e-3
+"""Share of a log's travel by which a stop yields [fraction]; judged."""
+
 REST = 10
 """Rows that position repeats before it jumps if it was held by its logger [samples]."""
 
@@ -165,8 +168,9 @@ def _meets_stop(record: Record, row: int) -> bool:
     if first < 0 or last >= len(position):
         return False
     came, went = abs(position[before] - position[first]), abs(position[last] - position[after])
-    ends = np.nanmin(position), np.nanmax(position)
-    return bool(went < STOPS * came and min(abs(position[after] - end) for end in ends) < STOPS * came)
+    low, high = float(np.nanmin(position)), float(np.nanmax(position))
+    beside = max(STOPS * came, SOFT_STOP * (high - low))
+    return bool(went < STOPS * came and min(position[after] - low, high - position[after]) < beside)
 
 
 def _without(values: Array, rows: list[int]) -> Array:

@@ -23,6 +23,7 @@ from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.notes import ChannelCode, RigCode
 from faults.diagnosis.advice import advice_for, oil_advice, volume_advice
+from faults.diagnosis.beyond_nine.accumulator import whatever_accumulator
 from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
 from faults.diagnosis.beyond_nine.balance_refused import class_without_balance
 from faults.diagnosis.beyond_nine.drift import over_drift
@@ -269,7 +270,8 @@ def _of_clean(log: CleanLog, parameters: EhaParameters) -> Diagnosis:
 
 def _judged(log: CleanLog, parameters: EhaParameters, case: _Case, plain: _Plain) -> Loaded:
     """Return a diagnosis with the pump delivery that the balance of flow gives."""
-    found = _diagnosed(log, parameters, case.estimate, plain)
+    around = partial(_diagnosed, log, estimate=case.estimate, plain=plain)
+    found = whatever_accumulator(around(parameters), around)
     told = whatever_the_pump_delivers(found.diagnosis, actuator_of(found.parameters), case.estimate, case.strange)
     return found._replace(diagnosis=told)
 

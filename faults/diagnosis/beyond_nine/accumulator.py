@@ -1,0 +1,98 @@
+"""`whatever_accumulator(found, again)`: a single rod whose inner circuit holds less gas, or more, than is assumed.
+
+No rig file tells the gas of the inner circuit's accumulator. A single rod takes oil from it at every stroke and gives
+it back, and its pressure, which the low side of the piston has, swings by bars where there is little gas. The balance
+of flows hardly feels that, the force on the piston does: circuits with another accumulator left a fifth to a third of
+the velocity of such logs.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from faults.conditions import CONDITIONS
+from faults.diagnosis.beyond_nine.load import Loaded
+from faults.diagnosis.circuits.actuator import Actuator, actuator_of
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.diagnosis.circuits.circuit_runs import COLUMN, parameter_rows, predicted
+from faults.diagnosis.circuits.class_fit import LASTING, fit_freely, misfit
+from faults.diagnosis.circuits.class_regions import ClassFits
+from faults.diagnosis.circuits.out_of_model import unexplained
+from faults.notes import AgainstCode
+from plant.eha.circuit_parameters import CircuitParameters, oil_demand
+from plant.eha.model import EhaParameters
+
+TRIED, ROUNDS = 8, 2
+"""Accumulators that are run side by side, and how often, each time between the neighbours of the best [count]."""
+
+LARGEST = 30.0
+"""Most gas that is tried, over what is assumed [dimensionless]: its pressure then stays as it is."""
+
+
+def whatever_accumulator(found: Loaded, again: Callable[[EhaParameters], Loaded]) -> Loaded:
+    """Return a diagnosis with the accumulator under which a circuit follows the log of a single rod.
+
+    Parameters
+    ----------
+    found : Loaded
+        A diagnosis, and the actuator around which circuits were fitted.
+    again : callable
+        ``again(parameters)``: the diagnosis around another actuator.
+
+    Returns
+    -------
+    Loaded
+        The same where a circuit follows the log already, or none does with another accumulator.
+    """
+    if _followed(found) or not found.parameters.area_difference:
+        return found
+    board = found.diagnosis.scoreboard
+    fed = fed_otherwise(board.blocks, board.fits, actuator_of(found.parameters))
+    if fed is None:
+        return found
+    other = again(fed)
+    return other if _followed(other) else found
+
+
+def fed_otherwise(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> CircuitParameters | None:
+    """Return the healthy circuit with an accumulator under which circuits follow a log that they do not follow else.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    fits : ClassFits
+        The circuits fitted to it around the actuator.
+    actuator : Actuator
+        The healthy actuator.
+
+    Returns
+    -------
+    CircuitParameters or None
+        None without pressure, where nothing else tells valves from it, and where no accumulator helps.
+    """
+    if blocks.pressure is None:
+        return None
+    circuit, best = actuator.circuit, fits.best
+    rows = np.repeat(parameter_rows(best.coordinates[None], circuit, actuator.rated), TRIED, axis=0)
+    ends, gas, left = (oil_demand(circuit), LARGEST * circuit.accumulator_gas), 0.0, np.inf
+    for _ in range(ROUNDS):
+        tried = np.geomspace(*ends, TRIED)
+        rows[:, COLUMN["accumulator_gas"]] = tried
+        misfits = [misfit(blocks, run) for run in predicted(blocks, rows)]
+        place = int(np.argmin(misfits))
+        gas, left = float(tried[place]), misfits[place]
+        ends = tried[max(place - 1, 0)], tried[min(place + 1, TRIED - 1)]
+    if not left < misfit(blocks, best.fitted) - LASTING:
+        return None
+    fed = replace(circuit, accumulator_gas=gas)
+    nearest = list(CONDITIONS)[int(np.argmax(fits.scores))]
+    around = replace(actuator, circuit=fed)
+    fit = fit_freely(blocks, around, nearest)
+    return None if unexplained(blocks, replace(fits, best=fit), around) else fed
+
+
+def _followed(found: Loaded) -> bool:
+    """Return whether a circuit follows the log."""
+    return all(note.code is not AgainstCode.UNEXPLAINED for note in found.diagnosis.against)
