@@ -14,7 +14,7 @@ from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
 from estimation.fits.flow.misread import UNLIKE_SLIPS, CorrectedLogs
 from estimation.fits.flow.other_minimum import lower_minimum, smaller_accumulator
-from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer
+from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer, with_shorter_steps
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
@@ -173,6 +173,9 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
         plain = plain_fits(logged, start)
         if (stiff := stiffer(logged, plain)) is not None:
             start = replace(start, parameters=stiff, bulk_modulus=stiff.bulk_modulus, valley=None)
+            continue
+        if (shorter := with_shorter_steps(plain)) is not None:
+            start = shorter
             continue
         asked, open_ends = _asked(plain, sensed, traits)
         try:

@@ -68,13 +68,6 @@ NOISY_BLOCK = 5e-3
 ms, 50 um of noise put bulk modulus of leaky actuators up to 4 % low, with 5 ms 2.5 %."""
 
 
-PILOTED = 4.0
-"""How many times shorter steps are where a pilot holds make-up valves open [dimensionless]. At no load both sides float
-at the inner circuit's pressure, each holding the other's valve open by turns. With steps of 0.25 ms the model chatters
-there, by up to 150 deviations of the noise at the true values; with a quarter of that noise is all that is left of most
-such logs."""
-
-
 def without_strays(record: Record) -> tuple[Record, Mapping[str, float]]:
     """Return the flow form's channels without gross outliers, and their variances.
 
@@ -158,7 +151,7 @@ def flow_log(
         FLOW_FORM,
         record,
         flow_parameters(parameters),
-        longest_step=longest_step(parameters),
+        longest_step=LONGEST_STEP,
         variances={**variances, **quiet},
         uncertainties=uncertainties,
     )
@@ -185,14 +178,9 @@ def flow_log(
         },
         within=WITHIN,
     )
-    log = pumped_evenly(averaged(log, longest_step(parameters), _block(log, parameters)), log, parameters)
+    log = pumped_evenly(averaged(log, LONGEST_STEP, _block(log, parameters)), log, parameters)
     felt = log.noise[0].passed_on * parameters.bulk_modulus > FELT_NOISE * log.noise[0].variance ** 0.5
     return _noisy(log, parameters, record) if felt else log.taken_at(parameters.bulk_modulus)
-
-
-def longest_step(p: EhaParameters) -> float:
-    """Return the longest step of the model [s]: shorter where a pilot opens make-up valves, see `PILOTED`."""
-    return LONGEST_STEP / PILOTED if p.pilot_share else LONGEST_STEP
 
 
 def _noisy(log: GreyBoxLog, p: EhaParameters, record: Record) -> GreyBoxLog:

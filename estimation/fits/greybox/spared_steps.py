@@ -92,6 +92,29 @@ def spared(problem: Problem, theta: Array) -> Problem:
     return with_steps(problem, sparing_steps(problem, theta))
 
 
+def largest_step_error(problem: Problem, theta: Array, finer: int) -> float:
+    """Return the largest error of a log's model steps, as shorter ones show it, near a point.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    theta : ndarray, shape (unknowns,)
+        The point [dimensionless].
+    finer : int
+        How many times shorter those are [count].
+
+    Returns
+    -------
+    float
+        Of a block's residual, in standard deviations of its noise [dimensionless].
+    """
+    log = problem.log
+    rows = [log.parameters] * min(1 + len(theta), LANES)
+    short, usual = (problem.on(one).residuals_of(theta, rows)[0] for one in (log.stepped(finer * log.steps), log))
+    return float(np.max(np.abs(short - usual)))
+
+
 def _long_step_errors(problem: Problem, theta: Array) -> Array:
     """Return the error of one long step up to each sample, over the noise, shape (n,) [dimensionless].
 
