@@ -128,9 +128,9 @@ def smaller_accumulator(
     """
     usual = stiffest_accumulator(vars(parameters))
     for fit in sorted(fits, key=lambda one: one.cost):
-        if CRACKS[0] in fit.values and fit.values.get(STIFFNESS, 0.0) > usual / BEYOND:
+        if fit.values.get(STIFFNESS, 0.0) > usual / BEYOND:
             bent = BEND in fit.values
-            values = {BEND: 0.0, **fit.values, STIFFNESS: SMALLER * usual}
+            values = {BEND: 0.0, **dict.fromkeys(CRACKS, 0.0), **fit.values, STIFFNESS: SMALLER * usual}
             problem, point, _ = from_minimum(fit.model, log, values, bent=bent)
             if point.cost < wanted:
                 return {**values, **problem.model.values(point.theta)}
