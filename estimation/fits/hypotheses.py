@@ -111,7 +111,7 @@ VOLUME = Hypothesis("volume", ("chamber_volume",))
 
 START_LOAD = Hypothesis("start_load", ("start_pressure", "start_level"))
 
-BEGUN = replace(START_LOAD, from_first_sample=True)
+BEGUN = replace(START_LOAD, from_first_sample=True, by_mass=True, beside=(STIFFNESS,))
 """The same of a log that begins under load or in motion."""
 
 LEAST_PLAY = 5e-6

@@ -198,7 +198,8 @@ def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
     log = logged.seen_at(parameters)
     if start.turns_read:
         log = with_turns_read(log, parameters)
-    log = log.stepped(start.finer * log.steps)
+    if start.finer > 1:
+        log = replace(log, steps=start.finer * log.steps, long_steps=start.finer // 2 * int(np.max(log.steps)))
     starts = flow_starts(parameters, max(start.bulk_modulus, LEAST_GUESS * parameters.bulk_modulus))
     explains = partial(fit_explains, noisy=log.passes_on)
     largest, _ = limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))

@@ -251,14 +251,15 @@ def _rig_and_load(
 ) -> list[Trial]:
     """Return a load at the start of a log together with a pump and chambers that the rig file has wrong.
 
-    A load is no error of a rig file, so two errors may come beside it. Searched one after the other, each of the three
-    takes up what belongs to the others. They are sought together only where no two hypotheses explain the log.
+    A load is no error of a rig file, so two errors may come beside it. Searched one after the other, each takes up what
+    belongs to the others. They are sought only where no two hypotheses explain the log, and to their end, whatever two
+    leave.
     """
     if is_explained(best, accepted):
         return []
     together = DELIVERY, VOLUME, load
     tried = [*screen(log, together, spared.starts, every=spared.every)]
-    return [one for one in likeliest(log, [tried], best.cost, spared) if is_explained(one, accepted)]
+    return [one for one in likeliest(log, [tried], spared=spared) if is_explained(one, accepted)]
 
 
 def _better(first: Trial, pairs: Iterable[Trial], least: float) -> list[Trial]:
