@@ -238,8 +238,8 @@ def _fit(
     traits = LogTraits(loaded, begins_in_motion(record), log.filtered, log.speed_held)
     fit = fit_flow(record, parameters, guess, doubted, log.variances, traits)
     ended = any(note.code == EstimateCode.SEARCH_ENDED for note in fit.reasons)
-    doubted = bool(fit.reasons) and not ended  # a load that leaks off at once hides no noise: the plain form explains all
-    return None if loaded and fit.explanation is None and doubted else fit  # a filter needs no state at rest
+    plain = not fit.reasons  # to the noise: a load that leaks off at once leaves nothing strange
+    return None if loaded and fit.explanation is None and not (ended or plain) else fit  # a filter needs no rest
 
 
 def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusEstimate:

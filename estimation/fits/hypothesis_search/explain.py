@@ -252,8 +252,7 @@ def _rig_and_load(
     """Return a load at the start of a log together with a pump and chambers that the rig file has wrong.
 
     A load is no error of a rig file, so two errors may come beside it. Searched one after the other, each takes up what
-    belongs to the others. They are sought only where no two hypotheses explain the log, and to their end, whatever two
-    leave.
+    belongs to the others. They are sought only where no two explain the log, and to their end, whatever two leave.
     """
     if is_explained(best, accepted):
         return []
