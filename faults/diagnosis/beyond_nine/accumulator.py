@@ -16,18 +16,22 @@ from faults.diagnosis.beyond_nine.load import Loaded
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COLUMN, parameter_rows, predicted
-from faults.diagnosis.circuits.class_fit import LASTING, fit_freely, misfit
+from faults.diagnosis.circuits.class_fit import LASTING, PointFit, fit_freely, misfit
 from faults.diagnosis.circuits.class_regions import ClassFits
 from faults.diagnosis.circuits.out_of_model import unexplained
 from faults.notes import AgainstCode
 from plant.eha.circuit_parameters import CircuitParameters, oil_demand
 from plant.eha.model import EhaParameters
 
-TRIED, ROUNDS = 8, 2
-"""Accumulators that are run side by side, and how often, each time between the neighbours of the best [count]."""
+TRIED, ROUNDS, PASSES = 8, 2, 3
+"""Accumulators that are run side by side; how often, each time between the neighbours of the best; and how often at
+most a circuit is fitted with the best [count]."""
 
 LARGEST = 30.0
 """Most gas that is tried, over what is assumed [dimensionless]: its pressure then stays as it is."""
+
+ABOUT = 2.0
+"""How many times more gas, or less, is tried once a circuit was fitted with some [dimensionless]."""
 
 
 def whatever_accumulator(found: Loaded, again: Callable[[EhaParameters], Loaded]) -> Loaded:
@@ -74,9 +78,23 @@ def fed_otherwise(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Circui
     """
     if blocks.pressure is None:
         return None
-    circuit, best = actuator.circuit, fits.best
-    rows = np.repeat(parameter_rows(best.coordinates[None], circuit, actuator.rated), TRIED, axis=0)
-    ends, gas, left = (oil_demand(circuit), LARGEST * circuit.accumulator_gas), 0.0, np.inf
+    nearest, fed, best = list(CONDITIONS)[int(np.argmax(fits.scores))], actuator, fits.best
+    ends = oil_demand(actuator.circuit), LARGEST * actuator.circuit.accumulator_gas
+    for _ in range(PASSES):
+        gas, left = _likeliest_gas(blocks, fed, best, ends)
+        if not left < misfit(blocks, best.fitted) - LASTING:
+            break
+        fed = replace(fed, circuit=replace(fed.circuit, accumulator_gas=gas))
+        best = min((fit_freely(blocks, fed, nearest, start) for start in (None, best.coordinates)), key=_cost)
+        ends = gas / ABOUT, gas * ABOUT
+    return None if fed is actuator or unexplained(blocks, replace(fits, best=best), fed) else fed.circuit
+
+
+def _likeliest_gas(blocks: Blocks, actuator: Actuator, fit: PointFit, ends: tuple[float, float]) -> tuple[float, float]:
+    """Return the gas between two ends with which a fitted circuit follows a log best [m^3], and what that leaves."""
+    circuit = actuator.circuit
+    rows = np.repeat(parameter_rows(fit.coordinates[None], circuit, actuator.rated), TRIED, axis=0)
+    gas, left = 0.0, np.inf
     for _ in range(ROUNDS):
         tried = np.geomspace(*ends, TRIED)
         rows[:, COLUMN["accumulator_gas"]] = tried
@@ -84,13 +102,11 @@ def fed_otherwise(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Circui
         place = int(np.argmin(misfits))
         gas, left = float(tried[place]), misfits[place]
         ends = tried[max(place - 1, 0)], tried[min(place + 1, TRIED - 1)]
-    if not left < misfit(blocks, best.fitted) - LASTING:
-        return None
-    fed = replace(circuit, accumulator_gas=gas)
-    nearest = list(CONDITIONS)[int(np.argmax(fits.scores))]
-    around = replace(actuator, circuit=fed)
-    fit = fit_freely(blocks, around, nearest)
-    return None if unexplained(blocks, replace(fits, best=fit), around) else fed
+    return gas, left
+
+
+def _cost(fit: PointFit) -> float:
+    return fit.cost
 
 
 def _followed(found: Loaded) -> bool:

@@ -1,0 +1,66 @@
+"""A single rod breathes from the inner circuit's accumulator, whose gas no rig file tells."""
+
+from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from faults.diagnosis.beyond_nine.accumulator import fed_otherwise, whatever_accumulator
+from faults.diagnosis.circuits.actuator import Actuator, actuator_of
+from faults.diagnosis.circuits.blocks import Blocks, blocks_of
+from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
+from faults.diagnosis.circuits.out_of_model import unexplained
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.drives import chirp
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.sensors.sensors import BENCH
+from tests.estimation.fits.flow.test_plain import PILOTED, SPEED
+from tests.faults.diagnosis.short_logs import ACTUATOR, blocks, classes
+
+LITTLE = replace(circuit_of(PILOTED), accumulator_gas=1.5e-4, accumulator_oil=1.5e-4, leakage_coefficient=6.86e-11)
+
+
+@cache
+def of_rod() -> tuple[Blocks, Actuator, ClassFits]:
+    """Return a log of the rod with little gas, and circuits that have a litre of it."""
+    actuator = actuator_of(replace(LITTLE, accumulator_gas=1e-3, accumulator_oil=1e-3))
+    speed = chirp(4.0, 5e-4, SPEED, 0.3, 1.0)
+    record = simulate(CIRCUIT, speed, 5e-4, LITTLE, sensors=BENCH, rng=np.random.default_rng(1))
+    log = blocks_of(record)
+    return log, actuator, fit_classes(log, actuator)
+
+
+def test_a_rod_is_followed_with_the_gas_that_its_log_shows() -> None:
+    log, actuator, fits = of_rod()
+    assert unexplained(log, fits, actuator)
+    fed = fed_otherwise(log, fits, actuator)
+    assert fed is not None
+    assert fed.accumulator_gas == pytest.approx(LITTLE.accumulator_gas, rel=0.1)
+    assert replace(fed, accumulator_gas=1e-3) == actuator.circuit
+    assert fed_otherwise(replace(log, pressure=None), fits, actuator) is None
+
+
+def test_no_other_gas_is_told_of_a_log_that_it_does_not_explain() -> None:
+    assert fed_otherwise(blocks(), classes(), ACTUATOR) is None
+
+
+def test_nothing_is_asked_where_circuits_follow_or_both_sides_are_alike() -> None:
+    log, actuator, fits = of_rod()
+    left = tuple(unexplained(log, fits, actuator))
+    board = SimpleNamespace(blocks=log, fits=fits)
+
+    def found(against: tuple[Any, ...], parameters: Any) -> Any:
+        return SimpleNamespace(diagnosis=SimpleNamespace(against=against, scoreboard=board), parameters=parameters)
+
+    def again(parameters: Any) -> Any:
+        assert parameters.accumulator_gas < 1e-3
+        return found((), parameters)
+
+    followed, alike, asked = found((), actuator.circuit), found(left, ACTUATOR.circuit), found(left, actuator.circuit)
+    assert whatever_accumulator(followed, again) is followed
+    assert whatever_accumulator(alike, again) is alike
+    assert whatever_accumulator(asked, again).diagnosis.against == ()
+    assert whatever_accumulator(asked, lambda _: found(left, actuator.circuit)) is asked
