@@ -92,8 +92,8 @@ def spared(problem: Problem, theta: Array) -> Problem:
     return with_steps(problem, sparing_steps(problem, theta))
 
 
-def largest_step_error(problem: Problem, theta: Array, finer: int) -> float:
-    """Return the largest error of a log's model steps, as shorter ones show it, near a point.
+def step_errors(problem: Problem, theta: Array, finer: int) -> Array:
+    """Return the errors of a log's model steps, as shorter ones show them, near a point.
 
     Parameters
     ----------
@@ -106,13 +106,13 @@ def largest_step_error(problem: Problem, theta: Array, finer: int) -> float:
 
     Returns
     -------
-    float
-        Of a block's residual, in standard deviations of its noise [dimensionless].
+    ndarray, shape (outputs, blocks)
+        Of each block's residual, in standard deviations of its noise [dimensionless].
     """
     log = problem.log
     rows = [log.parameters] * min(1 + len(theta), LANES)
     short, usual = (problem.on(one).residuals_of(theta, rows)[0] for one in (log.stepped(finer * log.steps), log))
-    return float(np.max(np.abs(short - usual)))
+    return usual - short
 
 
 def _long_step_errors(problem: Problem, theta: Array) -> Array:
