@@ -258,6 +258,8 @@ def _chatters(log: GreyBoxLog, fit: GreyBoxFit, least: float) -> bool:
 
 def _leaps(fit: GreyBoxFit) -> bool:
     """Return whether single blocks tell far more of bulk modulus than those that tell most after them."""
+    if not fit.slopes.size:
+        return False
     slopes = np.sort(np.abs(fit.slopes[:, fit.model.unknowns.index("bulk_modulus")]))[-BESIDE_STEEP:]
     return bool(slopes[-1] > STEEP * slopes[0])
 
