@@ -15,7 +15,8 @@ from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide, 
 from estimation.eha.rig_share import fitted_responses, scaled_responses, with_wear
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
-from estimation.fits.flow.fit import FLOW_CHANNELS, REPORTED, fit_flow, require_flow_channels
+from estimation.fits.flow.fit import REPORTED, fit_flow
+from estimation.fits.flow.log import FLOW_CHANNELS, require_flow_channels
 from estimation.fits.flow.log_traits import LogTraits
 from estimation.fits.hypothesis_search.form_fit import FormFit
 from estimation.fits.hypothesis_search.pump_delivery import delivered

@@ -31,8 +31,9 @@ from faults.diagnosis.beyond_nine.load import Loaded, under_load
 from faults.diagnosis.beyond_nine.wear import whatever_the_pump_delivers
 from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuit_verdict import Diagnosis
-from faults.diagnosis.circuits.actuator import actuator_of, with_room
+from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import LONGEST
+from faults.diagnosis.doubtful_entries import doubtful_entries
 from faults.diagnosis.failed_search import doubts_after
 from faults.diagnosis.known_losses import by_the_balance
 from faults.diagnosis.models_verdict import models_verdict, ranked
@@ -48,12 +49,6 @@ from plant.errors import LogError, RigError
 from plant.log.record import Record
 from plant.notes import Note, distinct
 from plant.spare_processors import begun
-
-PUMP_AND_PISTON, ANOTHER = ("pump_displacement", "piston_area"), 0.1
-"""Entries that make another actuator, by more than this share [fraction]: judged, twice what an area is off at most."""
-
-HEALTHY = ("leakage_coefficient", "flow_bias", "friction_quadratic", "friction_linear", "friction_coulomb")
-"""Entries from which a class and its severities count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +105,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     scores = plain.scores_of(log, case.as_a_whole)
     verdict = models_verdict(scores, log.record)
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
-    unsure = (*_doubtful_rig(plain.parameters), *estimate.rig_notes)
+    unsure = (*doubtful_entries(plain.parameters), *estimate.rig_notes)
     strange = case.strange
     if verdict.outcome is Outcome.NOT_OBSERVABLE:  # a worn pump would change numbers that the log does not determine
         strange = tuple(note for note in strange if note.code is not RigCode.WEAR_NOT_EXCLUDED)
@@ -289,21 +284,6 @@ def _diagnosed(log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEs
     if estimate.form != "flow" or not estimate.gate.passed:
         return Loaded(of(parameters, 0.0), parameters)
     return under_load(of, parameters, estimate)
-
-
-def _doubtful_rig(p: EhaParameters) -> tuple[Note, ...]:
-    """Return notes on entries of a rig file that do not go together."""
-    larger = with_room(p).chamber_volume / p.chamber_volume - 1.0
-    tight = (ClassCode.VOLUME_FOR_STROKE.note(percent=100.0 * larger),) if larger > 0.0 else ()
-    return (*_healthy_of_the_paper(p), *tight)
-
-
-def _healthy_of_the_paper(p: EhaParameters) -> tuple[Note, ...]:
-    """Return a note where a rig file leaves the healthy values of the paper beside another pump or piston."""
-    of_paper = EhaParameters()
-    another = any(abs(getattr(p, name) / getattr(of_paper, name) - 1.0) > ANOTHER for name in PUMP_AND_PISTON)
-    left = all(getattr(p, name) == getattr(of_paper, name) for name in HEALTHY)
-    return (ClassCode.HEALTHY_OF_THE_PAPER.note(),) if another and left else ()
 
 
 def _another_oil(value: float | None, estimate: BulkModulusEstimate, healthy: EhaParameters) -> Note | None:

@@ -9,7 +9,7 @@ import numpy as np
 from estimation.fits.flow.agreement import Answered, agreed, wanted_of
 from estimation.fits.flow.asked_hypotheses import ALWAYS_ASKED, MOST_ASKED, hypotheses_asked, near_starts
 from estimation.fits.flow.belief import hopeless_cost, play_explained, wanted_cost
-from estimation.fits.flow.log import homed_at_stop, without_strays
+from estimation.fits.flow.log import homed_at_stop, require_flow_channels, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
 from estimation.fits.flow.misread import UNLIKE_SLIPS, CorrectedLogs
@@ -44,12 +44,8 @@ from estimation.models.completed_flow import CRACKS, balances_mass
 from estimation.models.flow import HELD_FLOW_FORM
 from estimation.notes import EstimateCode
 from plant.eha.model import EhaParameters
-from plant.errors import LogError
 from plant.log.record import Record
 from plant.notes import Note
-
-FLOW_CHANNELS = ("position_m", "differential_pressure_pa")
-"""Channels that the flow form needs beside motor speed."""
 
 REPORTED = ("leakage_coefficient", "flow_bias")
 """What is worth telling of the parameters found along with bulk modulus."""
@@ -78,19 +74,6 @@ motion form does. With `BY_MASS` the likeliest on 876 logs of our plants and of 
 BY_MASS = 2.0
 """Weight of the balance by mass before a log is seen, that of each other being 1 [dimensionless]: oil is denser under
 pressure, but simulators and textbooks balance volumes."""
-
-
-def require_flow_channels(record: Record) -> None:
-    """Refuse a record without the channels that the flow form needs.
-
-    Raises
-    ------
-    LogError
-        If one is missing.
-    """
-    lacking = [channel for channel in FLOW_CHANNELS if channel not in record]
-    if lacking:
-        raise LogError(f"the flow form needs {' and '.join(FLOW_CHANNELS)}, the record lacks {', '.join(lacking)}")
 
 
 def fit_flow(

@@ -25,7 +25,11 @@ from estimation.models.flow_parameters import flow_parameters
 from estimation.models.inner_circuit import BEND
 from estimation.stretches import stretches
 from plant.eha.model import EhaParameters, piston_areas
+from plant.errors import LogError
 from plant.log.record import Record
+
+FLOW_CHANNELS = ("position_m", "differential_pressure_pa")
+"""Channels that the flow form needs beside motor speed."""
 
 OPENING_START = 1e3
 """First guess of the drop at which a make-up check valve is half open [Pa]."""
@@ -66,6 +70,19 @@ which time [s]. Of 100 training logs without a constant load none is 0.95, of 20
 NOISY_BLOCK = 5e-3
 """Length over which residuals are averaged then [s]: what they say of bulk modulus is slower, the noise is not. With 1
 ms, 50 um of noise put bulk modulus of leaky actuators up to 4 % low, with 5 ms 2.5 %."""
+
+
+def require_flow_channels(record: Record) -> None:
+    """Refuse a record without the channels that the flow form needs.
+
+    Raises
+    ------
+    LogError
+        If one is missing.
+    """
+    lacking = [channel for channel in FLOW_CHANNELS if channel not in record]
+    if lacking:
+        raise LogError(f"the flow form needs {' and '.join(FLOW_CHANNELS)}, the record lacks {', '.join(lacking)}")
 
 
 def without_strays(record: Record) -> tuple[Record, Mapping[str, float]]:

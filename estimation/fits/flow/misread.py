@@ -15,7 +15,8 @@ import numpy as np
 
 from estimation.fits.flow.guesses import guesses_about
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits
-from estimation.fits.flow.search import GUESSED_WITHIN, ROUGH_ENOUGH, flow_starts
+from estimation.fits.flow.rough_search import GUESSED_WITHIN, ROUGH_ENOUGH
+from estimation.fits.flow.search import flow_starts
 from estimation.fits.flow.slips import PAIRS, SLIPS, Slip, set_right
 from estimation.fits.greybox.descent import descend
 from estimation.fits.greybox.fit import GreyBoxFit

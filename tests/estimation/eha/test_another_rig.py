@@ -8,7 +8,7 @@ from estimation.eha.another_rig import rig_contradicted, unless_another_rig
 from estimation.eha.estimate import estimate_log
 from estimation.eha.result import too_wide, without_number
 from estimation.finding import Outcome
-from estimation.fits.flow.fit import FLOW_CHANNELS
+from estimation.fits.flow.log import FLOW_CHANNELS
 from estimation.log_checks.clean import clean_log
 from estimation.notes import EstimateCode
 from experiments.eha.entries import estimate_entries

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from faults.diagnosis.circuits.actuator import actuator_of, with_room
-from faults.diagnosis.diagnose import _doubtful_rig
+from faults.diagnosis.doubtful_entries import doubtful_entries
 from faults.notes import ClassCode
 from plant.eha.circuit_parameters import longest_stroke
 from plant.eha.model import EhaParameters
@@ -20,7 +20,7 @@ def test_chambers_have_room_for_the_stroke(stroke: float | None, larger: float) 
     """With a volume 27 % too small in the rig file of a single rod no circuit fitted, and the class was unknown."""
     rig = replace(PAPER, stroke=stroke)
     assert with_room(rig).chamber_volume == pytest.approx(larger * PAPER.chamber_volume)
-    (*said,) = _doubtful_rig(rig)
+    (*said,) = doubtful_entries(rig)
     assert [round(note.data["percent"]) for note in said if note.code is ClassCode.VOLUME_FOR_STROKE] == (
         [30] if larger > 1.0 else []
     )

@@ -1,0 +1,27 @@
+"""Entries of a rig file that do not go together."""
+
+from faults.diagnosis.circuits.actuator import with_room
+from faults.notes import ClassCode
+from plant.eha.model import EhaParameters
+from plant.notes import Note
+
+PUMP_AND_PISTON, ANOTHER = ("pump_displacement", "piston_area"), 0.1
+"""Entries that make another actuator, by more than this share [fraction]: judged, twice what an area is off at most."""
+
+HEALTHY = ("leakage_coefficient", "flow_bias", "friction_quadratic", "friction_linear", "friction_coulomb")
+"""Entries from which a class and its severities count."""
+
+
+def doubtful_entries(p: EhaParameters) -> tuple[Note, ...]:
+    """Return notes on entries of a rig file that do not go together."""
+    larger = with_room(p).chamber_volume / p.chamber_volume - 1.0
+    tight = (ClassCode.VOLUME_FOR_STROKE.note(percent=100.0 * larger),) if larger > 0.0 else ()
+    return (*_healthy_of_the_paper(p), *tight)
+
+
+def _healthy_of_the_paper(p: EhaParameters) -> tuple[Note, ...]:
+    """Return a note where a rig file leaves the healthy values of the paper beside another pump or piston."""
+    of_paper = EhaParameters()
+    another = any(abs(getattr(p, name) / getattr(of_paper, name) - 1.0) > ANOTHER for name in PUMP_AND_PISTON)
+    left = all(getattr(p, name) == getattr(of_paper, name) for name in HEALTHY)
+    return (ClassCode.HEALTHY_OF_THE_PAPER.note(),) if another and left else ()
