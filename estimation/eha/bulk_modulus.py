@@ -200,7 +200,7 @@ def estimate_clean(
     if automatic and form == "motion" and (bound := rigid_bound(log, parameters)) > LARGEST_BOUND:
         unseen = without_number(Outcome.NOT_OBSERVABLE, (too_wide(bound),), form, MOTION_CHANNELS, bound)
         return _doubting_sensors(unseen, log)
-    if form == "flow" and (still := at_rest_throughout(log.record, parameters)):
+    if automatic and form == "flow" and not filtering and (still := at_rest_throughout(log.record, parameters)):
         return _doubting_sensors(without_number(Outcome.NOT_OBSERVABLE, still, form, FLOW_CHANNELS), log)
     fit = None if filtering else _fit(log, parameters, form, guess, spreads, chosen=options.method == LEAST_SQUARES)
     if fit is not None and (slips := _channel_slips(fit, parameters)):

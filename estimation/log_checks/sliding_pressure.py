@@ -10,6 +10,7 @@ import numpy as np
 
 from estimation.log_checks.channel_blocks import channel_blocks
 from estimation.log_checks.channel_physics import MIDDLE
+from estimation.log_checks.order import median
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 
@@ -40,8 +41,7 @@ def sliding_pressure(record: Record, p: EhaParameters) -> float:
     if blocks.slope is None or blocks.pressure is None or not np.any(blocks.slope):
         return 1.0
     size = np.abs(blocks.slope)
-    pressure = float(np.median(np.abs(blocks.pressure[size > SLIDING * size.max()])))
-    return pressure * p.piston_area / p.friction_coulomb
+    return median(np.abs(blocks.pressure[size > SLIDING * size.max()])) * p.piston_area / p.friction_coulomb
 
 
 def beyond_sliding(ratio: float) -> float:
@@ -51,6 +51,11 @@ def beyond_sliding(ratio: float) -> float:
     ----------
     ratio : float
         See `sliding_pressure` [dimensionless].
+
+    Returns
+    -------
+    float
+        Logarithm of how many times; 0 where pistons slide at it [dimensionless].
 
     Examples
     --------

@@ -5,7 +5,7 @@ that explains the log, nothing else is searched; else searches begin at leakages
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
@@ -28,10 +28,6 @@ from plant.spare_processors import each
 
 GUESSED_WITHIN = 0.3
 """First radius of a search from the likeliest guess [dimensionless]: half the distance between guesses of leakage."""
-
-LED_WITHIN = 1.0
-"""First radius of a search on the whole log [dimensionless]: it begins where the log's beginning or another balance
-led. Of longer first steps, up to 30, two thirds were taken back, at three to five evaluations each."""
 
 FAR_OFF, SLIGHT = 6.0, 0.02
 """Half the sum of squares over what noise alone makes of it, from which a search first goes down on a decimated log,
@@ -180,7 +176,6 @@ def _searched(
     guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in starts]
     bounds = flow_bounds(form, guesses, afar)
     if alone:
-        search = replace(search, radius=LED_WITHIN)
         guesses = [_nearer(problem, guesses[0], bounds, search)]
     if not log.passes_on:
         point = roughly(problem, guesses, search, bounds, wanted, hopeful=hopeful, screen=screen)
@@ -206,4 +201,4 @@ def _nearer(problem: Problem, guess: Array, bounds: tuple[Array, Array], search:
     at = remembered(problem.on(decimated(log, every)).at)
     if cost_over_noise(log, at(guess).cost) < FAR_OFF:
         return guess
-    return descend(at, guess, search.evaluations, bounds, search.near_enough, search.radius, least_share=SLIGHT).theta
+    return descend(at, guess, search.evaluations, bounds, search.near_enough, least_share=SLIGHT).theta

@@ -1,11 +1,10 @@
-"""Normal equations by finite differences: residuals at a point and at its neighbours run side by side."""
+"""Slopes by finite differences: residuals at a point and at its neighbours run side by side."""
 
 from functools import cache
 
 import numpy as np
 
-from estimation.fits.greybox.normal_loops import fill_differences, sum_normal_equations
-from estimation.fits.greybox.problem import OUTLIER, STRAIGHT
+from estimation.fits.greybox.normal_loops import fill_differences
 from plant.arrays import Array
 
 
@@ -46,26 +45,3 @@ def differences(found: Array, unknowns: int, nudge: float) -> tuple[Array, Array
     here, slopes = np.empty(found.shape[:2]), np.empty((*found.shape[:2], unknowns))
     fill_differences(found, nudge, here, slopes)
     return here, slopes
-
-
-def summed(found: Array, unknowns: int, nudge: float) -> tuple[float, Array, Array]:
-    """Return cost, gradient and lower triangle of ``J'J``; see `estimation.fits.greybox.problem.weighed`.
-
-    Parameters
-    ----------
-    found : ndarray, shape (outputs, blocks, lanes)
-        As of `differences` [dimensionless].
-    unknowns : int
-        How many neighbours count.
-    nudge : float
-        How far away they are [dimensionless].
-
-    Returns
-    -------
-    tuple of (float, ndarray of shape (unknowns,), ndarray of shape (unknowns, unknowns))
-        As a kernel gives them.
-    """
-    lanes, those = found.shape[-1], slice(1, 1 + unknowns)
-    away, gradient, gram = np.empty((4, lanes)), np.zeros(lanes), np.zeros((unknowns, lanes))
-    cost = sum_normal_equations(found, OUTLIER, STRAIGHT, away, gradient, gram)
-    return cost, gradient[those] / nudge, np.tril(gram[:, those]) / nudge**2

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from estimation.arrays import IntArray
 from estimation.fits.greybox.chance import largest_chi_square
-from estimation.fits.greybox.descent import FIRST_RADIUS, Point, descend
+from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.deviations import Information, believed, covariance_of, information
 from estimation.fits.greybox.lateness import changes_beside, lateness, left_by
 from estimation.fits.greybox.log import GreyBoxLog
@@ -118,8 +118,6 @@ class Search:
         Evaluations of the model that a finalist may take.
     near_enough : float
         Half the sum of squares that a further step must promise [dimensionless].
-    radius : float
-        Length of the longest first step on the whole log [dimensionless].
     """
 
     screened: int = SCREENED_SAMPLES
@@ -127,7 +125,6 @@ class Search:
     finalists: int = 2
     evaluations: int = 40
     near_enough: float = NEAR_ENOUGH
-    radius: float = FIRST_RADIUS
 
 
 DEFAULT_SEARCH = Search()
@@ -204,7 +201,7 @@ def roughly(
         if samples < len(log.measured):
             at = screen if screen and samples == search.screened else problem.on(log.beginning(samples)).at
             return descend(at, guess, evaluations, bounds, search.near_enough)
-        return descend(whole.at, guess, evaluations, bounds, search.near_enough, search.radius, wanted)
+        return descend(whole.at, guess, evaluations, bounds, search.near_enough, wanted=wanted)
 
     if len(guesses) > 1:
         screened = each(lambda guess: descended(guess, search.screened, search.screening), guesses)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from estimation.fits.greybox.descent import Point
-from estimation.fits.greybox.finite_differences import differences, neighbours, summed
+from estimation.fits.greybox.finite_differences import differences, neighbours
 from estimation.fits.greybox.kernel import compile_kernel
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import OUTLIER, Problem, weighed
@@ -262,8 +262,6 @@ class FreedProblem(Problem):
             found = self._residuals(self._rows(self._nudged(theta), parameters), drives, variance)
             if own and found.shape[1] <= MOST_REMEMBERED:
                 self._last = [*self._last[-1:], (theta.copy(), variance, found)]
-        if self._placed is None and not errors.size and not slopes.size:
-            return summed(found, len(theta), NUDGE)
         here, columns = self._slopes(found, theta)
         if errors.size:
             errors[...] = here

@@ -218,8 +218,9 @@ def test_without_position_a_refused_filter_leaves_the_circuits_bulk_modulus() ->
 def test_where_nothing_moves_pump_wear_is_no_matter() -> None:
     rng, count = np.random.default_rng(17410), 1500
     noise = {"motor_speed_rad_s": 0.05, "position_m": 1e-6, PRESSURE: 2e3}
-    still = Record(1e-3, {name: size * rng.standard_normal(count) for name, size in noise.items()})
-    found = diagnose_log(still, RIG)
+    still = {name: size * rng.standard_normal(count) for name, size in noise.items()}
+    still["motor_speed_rad_s"] += 2.0 * np.sin(2.0 * np.pi * 2e-3 * np.arange(count))  # 0.1 mm of the piston
+    found = diagnose_log(Record(1e-3, still), RIG)
     assert found.outcome is Outcome.NOT_OBSERVABLE
     assert RigCode.WEAR_NOT_EXCLUDED not in codes(found)
     assert RigCode.WEAR_NOT_EXCLUDED in {note.code for note in found.evidence.estimate.remarks}

@@ -1,24 +1,17 @@
-"""Normal equations that are summed as they come are those of the slopes."""
+"""A point's neighbours, and the slopes that residuals there give."""
 
 import numpy as np
-import pytest
 
-from estimation.fits.greybox.finite_differences import differences, neighbours, summed
-from estimation.fits.greybox.freed_problem import NUDGE
-from estimation.fits.greybox.problem import weighed
+from estimation.fits.greybox.finite_differences import differences, neighbours
 
 
-@pytest.mark.parametrize(("unknowns", "lanes"), [(7, 8), (8, 16)])
-@pytest.mark.parametrize("blocks", [1, 4, 501, 502, 503])  # four blocks at a time, and what is left of them
-def test_sums_are_those_of_slopes_that_are_laid_out(unknowns: int, lanes: int, blocks: int) -> None:
-    rng = np.random.default_rng(blocks)
-    here = 2.0 * rng.normal(size=(2, blocks, 1))  # every seventh counts linearly
-    found = here + NUDGE * rng.normal(size=(2, blocks, lanes))
-    cost, gradient, gram = summed(found, unknowns, NUDGE)
-    told = weighed(*differences(found, unknowns, NUDGE))
-    assert cost == pytest.approx(told[0], rel=1e-12)
-    np.testing.assert_allclose(gradient, told[1], rtol=1e-9, atol=1e-9 * np.abs(told[1]).max())
-    np.testing.assert_allclose(gram, told[2], rtol=1e-9, atol=1e-9 * np.abs(told[2]).max())
+def test_slopes_are_those_of_residuals_that_grow_evenly() -> None:
+    rng, nudge = np.random.default_rng(0), 1e-4
+    here, slopes = rng.normal(size=(2, 5)), rng.normal(size=(2, 5, 3))
+    lanes = np.concatenate([here[..., None], here[..., None] + nudge * slopes, np.full((2, 5, 4), np.nan)], axis=-1)
+    found = differences(lanes, 3, nudge)
+    np.testing.assert_array_equal(found[0], here)
+    np.testing.assert_allclose(found[1], slopes, rtol=1e-9, atol=1e-10)
 
 
 def test_a_points_neighbours_are_one_a_coordinate() -> None:

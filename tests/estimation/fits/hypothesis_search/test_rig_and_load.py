@@ -42,7 +42,7 @@ def test_the_three_are_sought_together_only_where_nothing_explains_a_log_and_tol
         return [three]
 
     monkeypatch.setattr(explain, "screen", screened)
-    monkeypatch.setattr(explain, "likeliest", lambda _, tried, *__: tried[0])
+    monkeypatch.setattr(explain, "likeliest", lambda _, tried, **__: tried[0])
 
     def found(most: float) -> Any:
         given: Any = log, BEGUN, best, spared, lambda fit: fit <= most
