@@ -18,7 +18,6 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.greybox.side_by_side import LANES
-from estimation.fits.hypothesis_search.decimation import FEW, LONG_STEP, cost_over_noise, decimated
 from estimation.fits.hypothesis_search.wide_problem import flow_bounds
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
@@ -28,10 +27,6 @@ from plant.spare_processors import each
 
 GUESSED_WITHIN = 0.3
 """First radius of a search from the likeliest guess [dimensionless]: half the distance between guesses of leakage."""
-
-FAR_OFF, SLIGHT = 6.0, 0.02
-"""Half the sum of squares over what noise alone makes of it, from which a search first goes down on a decimated log,
-and the share of it that a further step must promise there [dimensionless]."""
 
 SCREENED_SECONDS = 4.0
 """Starts are compared on the beginning of the log, at least so long: it tells a wrong valley from a right one [s]."""
@@ -175,8 +170,6 @@ def _searched(
     problem = FreedProblem.of(form, afar)
     guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in starts]
     bounds = flow_bounds(form, guesses, afar)
-    if alone:
-        guesses = [_nearer(problem, guesses[0], bounds, search)]
     if not log.passes_on:
         point = roughly(problem, guesses, search, bounds, wanted, hopeful=hopeful, screen=screen)
         return RoughOptimum(problem, point, bounds)
@@ -188,17 +181,3 @@ def _searched(
     bounds = flow_bounds(form, guesses, log)
     again = [point.theta] if alone else [*guesses, point.theta]
     return RoughOptimum(problem, roughly(problem, again, search, bounds, wanted), bounds)
-
-
-def _nearer(problem: Problem, guess: Array, bounds: tuple[Array, Array], search: Search) -> Array:
-    """Return a guess, or where a search from one that leaves much comes on a decimated log, at a quarter of the cost.
-
-    A relief valve that opens within so long a step makes slopes of chance.
-    """
-    log, every = problem.log, round(LONG_STEP / problem.log.sample_time)
-    if len(log.drives) < FEW or every < 2 or "relief_pressure" in problem.model.unknowns:
-        return guess
-    at = remembered(problem.on(decimated(log, every)).at)
-    if cost_over_noise(log, at(guess).cost) < FAR_OFF:
-        return guess
-    return descend(at, guess, search.evaluations, bounds, search.near_enough, least_share=SLIGHT).theta

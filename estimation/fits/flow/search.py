@@ -152,7 +152,6 @@ def _ended(one: Found, log: GreyBoxLog) -> Found:
     """Return the end of a search whose last steps use short model steps throughout."""
     problem, point, bounds = one
     ending = with_steps(problem, log.steps)
-    ending.take_slopes(problem, point.theta)
     evaluations = FINISHING if explained(problem, point) else 1
     return ending, descend(ending.at, point.theta, evaluations, bounds), bounds
 

@@ -6,16 +6,16 @@ kernel without unknowns serves every hypothesis.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from estimation.fits.greybox.descent import Point
-from estimation.fits.greybox.finite_differences import differences, neighbours
 from estimation.fits.greybox.kernel import compile_kernel
 from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.normal_loops import fill_differences
 from estimation.fits.greybox.problem import OUTLIER, Problem, weighed
 from estimation.fits.greybox.ridge import Ridge
 from estimation.fits.greybox.side_by_side import LANES, MANY, ResidualsRun, compile_side_by_side, lanes_for
@@ -33,7 +33,7 @@ MOST_SIDE_BY_SIDE = 200_000
 """Longest log whose drives are copied once for each run side by side [samples]: some 30 MB."""
 
 MOST_REMEMBERED = 100_000
-"""Blocks of the longest log whose last runs are kept [count]: some 25 MB, and 40 with many unknowns."""
+"""Blocks of the longest log whose last slopes are kept [count]: some 15 MB."""
 
 
 class FreedProblem(Problem):
@@ -67,9 +67,8 @@ class FreedProblem(Problem):
         super().__init__(replace(model, unknowns=tuple(free), linear=sizes), log, partial(_by_itself, model))
         self._bare, self._sizes, self._ridge = model, linear, ridge
         self._most = LANES if model.jump else MANY  # with gaps, `MANY` take twice as long as `LANES`
-        self._last: list[tuple[Array, Array, Array]] = []
+        self._last: list[tuple[Array, Array, Array, Array]] = []
         self._columns = [parameter_names(model.parameters).index(name) for name in free]
-        self._lacks_some = not np.all(np.isfinite(log.measured))
         self._kernels: dict[int, ResidualsRun] = {}
         self._units = np.array([linear.get(name, np.nan) for name in free])
         self._logarithmic = np.isnan(self._units)
@@ -118,15 +117,6 @@ class FreedProblem(Problem):
         parts = np.split(found, len(thetas), axis=-1)
         return [self._point(at, *weighed(*self._slopes(part, at))) for at, part in zip(thetas, parts, strict=True)]
 
-    def _take_over(self, other: Problem, theta: Array) -> None:
-        """Take over slopes; what is left takes `LANES` equal runs, whose kernel is known: one costs as much."""
-        if isinstance(other, FreedProblem) and len(theta) >= LANES:
-            variance = self._variances(theta)
-            found = other._remembered(theta, variance)
-            if found is not None:
-                here = self.residuals_of(theta, [self.log.parameters] * LANES)[0]
-                self._last = [(theta.copy(), variance, found + (here - found[..., 0])[..., None])]
-
     def at_beside(self, theta: Array, known: Mapping[str, Array]) -> Point:
         """Return the misfit at a point at which the slopes of some unknowns are known, for a fit has found them.
 
@@ -147,7 +137,7 @@ class FreedProblem(Problem):
         rows = self._rows(self._nudged(theta)[[0, *(1 + place for place in asked)]], self.log.parameters)
         # what is asked beside it takes `MANY`, and a kernel takes longer to compile than this run
         rows = np.concatenate([rows, np.repeat(rows[-1:], max(0, LANES + 1 - len(rows)), axis=0)])
-        here, columns = differences(self._residuals(rows, None, self._variances(theta)), len(asked), NUDGE)
+        here, columns = _differences(self._residuals(rows, None, self._variances(theta)), len(asked))
         slopes = np.empty((*here.shape, len(names)))
         slopes[..., asked] = columns
         for place, name in enumerate(names):
@@ -257,12 +247,12 @@ class FreedProblem(Problem):
             errors[...] = self._residuals(self._rows(theta[None], parameters), drives, variance)[..., 0]
             return 0.0, np.zeros(0), np.zeros((0, 0))
         own = drives is None and parameters is self.log.parameters
-        found = self._remembered(theta, variance) if own else None
-        if found is None:
+        here, columns = self._remembered(theta, variance) if own else (None, None)
+        if here is None or columns is None:
             found = self._residuals(self._rows(self._nudged(theta), parameters), drives, variance)
-            if own and found.shape[1] <= MOST_REMEMBERED:
-                self._last = [*self._last[-1:], (theta.copy(), variance, found)]
-        here, columns = self._slopes(found, theta)
+            here, columns = self._slopes(found, theta)
+            if own and len(here[0]) <= MOST_REMEMBERED:
+                self._last = [*self._last[-1:], (theta.copy(), variance, here, columns)]
         if errors.size:
             errors[...] = here
         if slopes.size:
@@ -270,23 +260,23 @@ class FreedProblem(Problem):
             return 0.0, np.zeros(0), np.zeros((0, 0))
         return weighed(here, columns)
 
-    def _remembered(self, theta: Array, variance: Array) -> Array | None:
-        """Return the residuals at one of the last two points, where a search ends, and at its neighbours."""
-        for point, known, found in self._last:
+    def _remembered(self, theta: Array, variance: Array) -> tuple[Array, Array] | tuple[None, None]:
+        """Return the residuals and slopes at one of the last two points, where a search ends."""
+        for point, known, here, columns in self._last:
             if np.array_equal(point, theta) and np.array_equal(known, variance):
-                return found
-        return None
+                return here, columns
+        return None, None
 
     def _nudged(self, theta: Array) -> Array:
         """Return a point and its neighbours, a row each; one that is on a ridge lies along it."""
-        points = theta + NUDGE * neighbours(len(theta))
+        points = theta + NUDGE * _neighbours(len(theta))
         if self._placed is not None:
             self._placed.turn(points, theta, NUDGE)
         return points
 
     def _slopes(self, found: Array, theta: Array) -> tuple[Array, Array]:
         """Return the residuals at a point and their slopes, of those at `_nudged`."""
-        here, slopes = differences(found, len(theta), NUDGE)
+        here, slopes = _differences(found, len(theta))
         if self._placed is not None:
             self._placed.turn_back(slopes, theta)
         return here, slopes
@@ -317,7 +307,7 @@ class FreedProblem(Problem):
     def _side_by_side(self, rows: Array, drives: Array, variance: Array) -> Array:
         """Return the normalised residuals of up to `MANY` runs, shape (outputs, blocks, lanes)."""
         lanes = lanes_for(len(rows))
-        found = self._room(lanes, zero=self._lacks_some)  # room that is filled anyway is not cleared
+        found = self._room(lanes)
         filled = rows if len(rows) == lanes else np.concatenate([rows, np.repeat(rows[-1:], lanes - len(rows), axis=0)])
         with np.errstate(all="ignore"):  # a try that runs away is stepped back from
             gaps = (self.log.gaps,) if self._bare.jump else ()
@@ -344,3 +334,16 @@ def _misfits(errors: Array) -> Array:
     """Return half the sum of squares of each run, where outliers count linearly, shape (lanes,)."""
     weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)
     return np.einsum("ijk,ijk->k", (1.0 - 0.5 * weight) * weight * errors, errors)
+
+
+@cache
+def _neighbours(unknowns: int) -> Array:
+    """Return the directions from a point to itself and to its neighbours, a row each."""
+    return np.eye(unknowns + 1, unknowns, -1)
+
+
+def _differences(found: Array, unknowns: int) -> tuple[Array, Array]:
+    """Return the residuals at a point and their slopes, of the residuals there and at its neighbours."""
+    here, slopes = np.empty(found.shape[:2]), np.empty((*found.shape[:2], unknowns))
+    fill_differences(found, NUDGE, here, slopes)
+    return here, slopes

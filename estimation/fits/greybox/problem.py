@@ -99,21 +99,6 @@ class Problem:
         """Return the same problem of another log."""
         return type(self)(self.model, log)
 
-    def take_slopes(self, other: "Problem", theta: Array) -> None:
-        """Take over the slopes that another problem found at a point, where they cost more than what is left there.
-
-        Parameters
-        ----------
-        other : Problem
-            The same problem with other model steps, all but as exact.
-        theta : ndarray, shape (unknowns,)
-            The point, one of the last two at which it was run [dimensionless].
-        """
-        self._take_over(other, theta)
-
-    def _take_over(self, other: "Problem", theta: Array) -> None:
-        """Keep nothing: exact sensitivities come with the run."""
-
     def at(self, theta: Array) -> Point:
         """Return the misfit at a point.
 
@@ -245,9 +230,8 @@ class Problem:
         self._run(theta, errors, slopes)
         return errors, self._tilted(theta, errors, slopes).reshape(errors.size, len(theta))
 
-    def _room(self, *columns: int, zero: bool = True) -> Array:
-        room = np.zeros if zero else np.empty
-        return room((self.log.measured.shape[1], -(-len(self.log.measured) // self._block), *columns))
+    def _room(self, *columns: int) -> Array:
+        return np.zeros((self.log.measured.shape[1], -(-len(self.log.measured) // self._block), *columns))
 
     def _run(
         self,

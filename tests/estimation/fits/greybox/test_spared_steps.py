@@ -72,21 +72,3 @@ def test_nothing_is_spared_across_gaps_and_with_one_step_a_sample(log: GreyBoxLo
         problem = FreedProblem.of(fit.model, other)
         assert sparing_steps(problem, fit.theta) is other.steps
         assert with_steps(problem, other.steps) is problem
-
-
-def test_the_end_of_a_search_takes_the_slopes_that_it_has(log: GreyBoxLog, steps_taken: list[int]) -> None:
-    best = min(balanced(log, HEALTHY, STARTS), key=lambda fit: fit.cost)
-    problem = FreedProblem.of(best.model, log)
-    few = with_steps(problem, sparing_steps(problem, best.theta))
-    few.at(best.theta)
-    steps_taken.clear()
-    problem.take_slopes(few, best.theta)
-    there, exact = problem.at(best.theta), FreedProblem.of(best.model, log).at(best.theta)
-    assert len(steps_taken) == 2  # one for the residuals, and the exact one
-    assert there.cost == pytest.approx(exact.cost, rel=1e-12)
-    deviations = np.sqrt(np.diag(np.linalg.inv(exact.gram + 1e-9 * np.eye(len(best.theta)))))
-    assert np.max(np.abs(there.gradient - exact.gradient) * deviations) < 1e-3
-    np.testing.assert_allclose(there.gram, exact.gram, atol=2e-3 * np.max(np.diag(exact.gram)))
-    other = FreedProblem.of(best.model, log)
-    other.take_slopes(few, best.theta + 0.1)  # at which they are not known
-    assert len(steps_taken) == 2
