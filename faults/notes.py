@@ -27,6 +27,10 @@ class AgainstCode(Code):
         "a relief valve that opens early, so that the pump's flow escapes under load, explains the log better than any "
         "of the nine conditions"
     )
+    STUCK_OR_LEAKS = (
+        "the piston moves by only {moved_m:.2g|mm} mm, while the pump turns enough for {pumped_m:.3g|mm} mm: without "
+        "differential_pressure_pa the log does not tell whether the piston is stuck or leakage takes all that is pumped"
+    )
     SPEED_BIAS = "motor speed reads wrong by {bias_rad_s:+.3g|rpm} rpm"
     LOAD_UNTOLD = (
         "{load} on the rod that is not in the rig file would explain the log: if there is one, enter {entry} "
@@ -128,6 +132,7 @@ class AdviceCode(Code):
     CHECK_PUMP = "measure the pump's flow at low pressure; compare displacement and piston area with the rig file"
     INSPECT_BORE = "inspect the bore and the piston seal near position {at_mm:.3g} mm"
     INSPECT_PUMP = "inspect the teeth and the side plates of the pump"
+    FREE_PISTON = "check whether rod or piston is blocked, and log differential pressure: it tells that from leakage"
     CHECK_INLET = "check the pump's inlet: accumulator pressure, suction line, strainer, oil temperature"
     CHECK_VALVES = "check the seats of relief and check valves, and the piston seal"
     CHECK_MAKEUP = "check the make-up valve of chamber {side}: poppet, seat and spring"

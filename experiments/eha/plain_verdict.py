@@ -111,6 +111,8 @@ def _hindered(result: Mapping[str, Any]) -> str:
         return "a column of the log has a wrong sign, unit or name"
     if codes & WRONG_SENSORS:
         return "a sensor reads wrong"
+    if AgainstCode.STUCK_OR_LEAKS in codes:
+        return "the piston stands still, and without pressure the log does not tell why"
     if EstimateCode.RIG_CONTRADICTED in codes:
         return "the log and the rig file contradict each other"
     return "the log does not fit any known condition of this actuator"

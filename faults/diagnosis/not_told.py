@@ -4,10 +4,13 @@ from collections.abc import Collection, Mapping
 from math import inf, nan
 
 from estimation.finding import Quantity
+from estimation.log_checks.standstill import travels
 from faults.diagnosis.circuits.class_regions import ClassFits
 from faults.diagnosis.circuits.not_shown import FRICTION_LAW, not_shown
 from faults.diagnosis.severity import OF_FRICTION, OF_OIL
-from faults.notes import ClassCode
+from faults.notes import AgainstCode, ClassCode
+from plant.eha.model import EhaParameters
+from plant.log.record import Record
 from plant.notes import Note
 
 VAGUE = 3.0
@@ -44,6 +47,35 @@ def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure
     elif _width(flow) > VAGUE * extent(speed) / 100.0 and _width(flow) > 0.3:
         said += [ClassCode.LEAKAGE_AND_BIAS_ALIKE.note(), *lost]
     return said
+
+
+def stuck_or_leaks(record: Record, p: EhaParameters, not_told: Collection[Note]) -> tuple[Note, ...]:
+    """Return the reason against all nine conditions of a piston that stands still, where nothing tells why.
+
+    In the nine, friction yields to the relief pressure, so only leakage keeps the piston still. A blocked rod does so
+    as well. Pressure tells them apart, or friction that shows where the piston moves a little.
+
+    Parameters
+    ----------
+    record : Record
+        The log.
+    p : EhaParameters
+        The healthy actuator.
+    not_told : collection of Note
+        What the log does not determine.
+
+    Returns
+    -------
+    tuple of Note
+        None where pressure is logged, friction shows, or the piston moves.
+    """
+    said = {note.code for note in not_told}
+    if not said.issuperset({ClassCode.ONE_SCALE, ClassCode.FRICTION_NOT_VISIBLE}):
+        return ()
+    gone = travels(record, p)
+    if gone is None or not gone.stuck:
+        return ()
+    return (AgainstCode.STUCK_OR_LEAKS.note(moved_m=gone.piston, pumped_m=gone.pump),)
 
 
 def not_determined(codes: Collection[object]) -> frozenset[str]:

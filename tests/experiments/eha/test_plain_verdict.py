@@ -43,6 +43,7 @@ def test_every_condition_has_a_verdict_and_work_that_name_what_is_wrong(conditio
     [
         (ChannelCode.CHANNELS_SWAPPED.note(channel="a", other="b", correlation=0.9), "a wrong sign, unit or name."),
         (SensorCode.SENSORS_DISAGREE.note(difference_m_s=0.01), "a sensor reads wrong."),
+        (AgainstCode.STUCK_OR_LEAKS.note(moved_m=1e-5, pumped_m=0.04), "the log does not tell why."),
         (EstimateCode.RIG_CONTRADICTED.note(percent=129.0), "the log and the rig file contradict each other."),
         (AgainstCode.OIL_STIFF.note(share=2.0), "the log does not fit any known condition of this actuator."),
     ],

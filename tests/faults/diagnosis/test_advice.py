@@ -192,6 +192,7 @@ STARVES = RigCode.PUMP_STARVES.note(from_rad_s=80.0, percent=12.0, half_width=1.
         (RigCode.LEAKS_ONE_WAY.note(side="A", factor=4.0), AdviceCode.CHECK_VALVES.note()),
         (AgainstCode.PUMP_DELIVERS_LESS.note(percent=80.0), AdviceCode.CHECK_PUMP.note()),
         (AgainstCode.MAKEUP_STUCK.note(side="B"), AdviceCode.CHECK_MAKEUP.note(side="B")),
+        (AgainstCode.STUCK_OR_LEAKS.note(moved_m=1e-5, pumped_m=0.04), AdviceCode.FREE_PISTON.note()),
         (AgainstCode.MAKEUP_LEAKS.note(), AdviceCode.CHECK_MAKEUP.note(side="A or B")),
         (AgainstCode.OIL_SOFTENS.note(share=0.7, at_s=9.1), AdviceCode.FIND_AIR.note()),
         (AgainstCode.RELIEF_EARLY.note(), AdviceCode.CHECK_RELIEF.note()),

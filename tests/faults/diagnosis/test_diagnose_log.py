@@ -224,3 +224,14 @@ def test_where_nothing_moves_pump_wear_is_no_matter() -> None:
     assert found.outcome is Outcome.NOT_OBSERVABLE
     assert RigCode.WEAR_NOT_EXCLUDED not in codes(found)
     assert RigCode.WEAR_NOT_EXCLUDED in {note.code for note in found.evidence.estimate.remarks}
+
+
+@pytest.mark.parametrize("drive", ["steps", "prbs"])
+def test_a_blocked_rod_without_pressure_is_not_accused_of_leakage(drive: str) -> None:
+    rng, blocked = np.random.default_rng(11), replace(HEALTHY, friction_coulomb=6e4)
+    record = simulate(CIRCUIT, make_drive(drive, 3.0, 1e-3, HEALTHY, rng), 1e-3, blocked, sensors=BENCH, rng=rng)
+    hidden = dict.fromkeys((PRESSURE, "pressure_a_pa", "pressure_b_pa"))
+    found = diagnose_log(record.replace(**hidden), RIG)
+    assert found.unknown
+    assert AgainstCode.STUCK_OR_LEAKS in {note.code for note in found.against}
+    assert AdviceCode.FREE_PISTON in {note.code for note in found.advice}

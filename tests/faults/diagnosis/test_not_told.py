@@ -3,15 +3,17 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from estimation.finding import Quantity
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import WEAK
-from faults.diagnosis.not_told import what_is_not_told, without_undetermined
+from faults.diagnosis.not_told import stuck_or_leaks, what_is_not_told, without_undetermined
 from faults.diagnosis.severity import severities
-from faults.notes import ClassCode
+from faults.notes import AgainstCode, ClassCode
 from plant.eha.steady_state import steady_state
+from plant.log.record import Record
 from tests.faults.diagnosis.test_severity import ACTUATOR, NARROW, RIG, fits
 
 
@@ -52,6 +54,24 @@ def test_leakage_and_bias_that_trade_places_are_not_told_apart_but_the_velocity_
 
 def test_without_pressure_one_scale_is_never_told() -> None:
     assert not_told(NARROW, pressure=False) == {ClassCode.ONE_SCALE.name, ClassCode.VELOCITY_LOST_TOLD.name}
+
+
+@pytest.mark.parametrize(
+    ("said", "travel", "doubted"),
+    [
+        ((ClassCode.ONE_SCALE, ClassCode.FRICTION_NOT_VISIBLE), 1e-5, True),
+        ((ClassCode.ONE_SCALE, ClassCode.FRICTION_NOT_VISIBLE), 5e-3, False),
+        ((ClassCode.FRICTION_NOT_VISIBLE,), 1e-5, False),  # pressure is logged
+        ((ClassCode.ONE_SCALE,), 1e-5, False),
+    ],
+)
+def test_a_piston_that_stands_still_for_an_unknown_reason_has_no_condition(
+    said: tuple[ClassCode, ...], travel: float, doubted: bool
+) -> None:
+    time = 1e-3 * np.arange(2000)
+    turning = {"motor_speed_rad_s": 100.0 * np.sign(np.sin(3.0 * time)), "position_m": travel * np.sin(3.0 * time)}
+    found = stuck_or_leaks(Record(1e-3, turning), RIG, [code.note() for code in said])
+    assert [note.code for note in found] == ([AgainstCode.STUCK_OR_LEAKS] if doubted else [])
 
 
 def test_a_velocity_without_a_number_is_not_told() -> None:
