@@ -263,7 +263,8 @@ def _since(result: Mapping[str, Any]) -> str:
         before = in_words(result["condition_before"])
         since = f"{result['since_s']:.2f} s into the log ({low:.2f} to {high:.2f} s)"
         return f"The change came {since}; before, it was {before}."
-    return "" if result["condition"] == "normal" else "The fault was there before the log began."
+    named = set(_levels(result).values()) & {*LEAKS, *RUBS}
+    return "" if not named else "The fault was there before the log began."
 
 
 def what_to_do(result: Mapping[str, Any]) -> list[str]:

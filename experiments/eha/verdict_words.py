@@ -90,7 +90,9 @@ def headline(result: Mapping[str, Any]) -> str:
         nearest = f"{in_words(best)} ({percent_text(first)} % if it had to be one of them)"
         return f"{NEAREST}{nearest}, then {in_words(second)} ({percent_text(other)} %)"
     if len(as_likely := equally_likely(result)) > 1:
-        parts = [*_what_is_told(as_likely, result["probabilities"]), since(result)]
+        told = _what_is_told(as_likely, result["probabilities"])
+        faulty = result["since_s"] is not None or not told[0].startswith(f"{LEVELS_IN_WORDS['none']} ")
+        parts = [*told, since(result) if faulty else ""]
         return "; ".join(part for part in parts if part)
     parts = [
         f"{in_words(best)}, probability {percent_text(first)} %",
@@ -132,7 +134,8 @@ def _what_is_told(conditions: Sequence[str], shares: Mapping[str, float]) -> lis
     ((axis, level),) = told.items()
     (other,) = set(levels) - {axis}
     among = _or([LEVELS_IN_WORDS[one] for one in levels[other]])
-    percent = percent_text(sum(shares[one] for one in conditions))
+    wanted = getattr(CONDITIONS[conditions[0]], axis)
+    percent = percent_text(sum(share for one, share in shares.items() if getattr(CONDITIONS[one], axis) == wanted))
     return [f"{level} {axis}, probability {percent} %", f"{other} cannot be told: {among} {other} equally likely"]
 
 

@@ -143,6 +143,8 @@ def test_a_fault_says_what_it_costs_and_since_when() -> None:
     changed = said_of("minor_leakage", since_s=2.5, since_ci95_s=[2.4, 2.6], condition_before="normal")
     assert "The change came 2.50 s into the log (2.40 to 2.60 s); before, it was normal." in sureness(changed)
     assert "slower" not in sureness(said_of("normal"))
+    open_friction = {"normal": 0.3, "minor_friction": 0.35, "major_friction": 0.35}
+    assert "fault" not in sureness(said_of("major_friction", probabilities=open_friction))
 
 
 def test_an_unknown_log_gets_no_verdict_no_work_and_its_reasons() -> None:

@@ -86,7 +86,7 @@ AGAINST = (AgainstCode.SPEED_BIAS.note(bias_rad_s=3.0), AgainstCode.OIL_SOFT.not
     [
         (
             ("minor_leakage", "minor_leakage_minor_friction"),
-            "minor leakage, probability 96.0 %; friction cannot be",
+            "minor leakage, probability 96.6 %; friction cannot be",
         ),
         (("major_friction", "minor_leakage_major_friction"), "leakage cannot be told: normal or minor leakage equally"),
         (("normal", "minor_leakage_minor_friction"), "leakage and friction cannot be told: normal or minor leakage + "),
@@ -102,6 +102,14 @@ def test_conditions_that_a_log_does_not_tell_apart_are_not_told_as_one_that_was_
     assert "second most likely" not in headline(result)
     unlike = {**result, "probabilities": {**shares, alike[0]: 0.97 / len(alike)}}
     assert "second most likely" in headline(unlike)
+
+
+def test_where_the_part_that_is_told_is_normal_no_fault_is_present_since_before_the_log() -> None:
+    shares = {"normal": 0.3, "minor_friction": 0.35, "major_friction": 0.35}
+    result = {**diagnosis_entries(found_as("major_friction")), "probabilities": shares}
+    assert headline(result) == (
+        "normal leakage, probability > 99.9 %; friction cannot be told: minor or major friction equally likely"
+    )
 
 
 def test_a_verdict_that_something_speaks_against_says_so_first_and_why() -> None:
