@@ -31,6 +31,11 @@ class AgainstCode(Code):
         "the piston moves by only {moved_m:.2g|mm} mm, while the pump turns enough for {pumped_m:.3g|mm} mm: without "
         "differential_pressure_pa the log does not tell whether the piston is stuck or leakage takes all that is pumped"
     )
+    ROD_BLOCKED = (
+        "the piston moves by only {moved_m:.2g|mm} mm at a differential pressure of {held_pa:.3g|bar} bar, while major "
+        "friction yields at {yields_pa:.2g|bar} bar: rod or piston is blocked, the piston is at its stop, or a sensor "
+        "or its unit is wrong"
+    )
     SPEED_BIAS = "motor speed reads wrong by {bias_rad_s:+.3g|rpm} rpm"
     LOAD_UNTOLD = (
         "{load} on the rod that is not in the rig file would explain the log: if there is one, enter {entry} "
@@ -132,7 +137,7 @@ class AdviceCode(Code):
     CHECK_PUMP = "measure the pump's flow at low pressure; compare displacement and piston area with the rig file"
     INSPECT_BORE = "inspect the bore and the piston seal near position {at_mm:.3g} mm"
     INSPECT_PUMP = "inspect the teeth and the side plates of the pump"
-    FREE_PISTON = "check whether rod or piston is blocked, and log differential pressure: it tells that from leakage"
+    FREE_PISTON = "check whether rod or piston is blocked, then log again while the piston moves"
     CHECK_INLET = "check the pump's inlet: accumulator pressure, suction line, strainer, oil temperature"
     CHECK_VALVES = "check the seats of relief and check valves, and the piston seal"
     CHECK_MAKEUP = "check the make-up valve of chamber {side}: poppet, seat and spring"

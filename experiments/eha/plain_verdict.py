@@ -61,6 +61,7 @@ OUTSIDE: Mapping[str, str] = {
     str(RigCode.TOOTH_LEAKS): "The pump leaks once in each turn: one tooth may be worn.",
     str(RigCode.PUMP_STARVES): "The pump does not fill at high speed.",
     str(RigCode.LEAKAGE_LIFTS): "The actuator leaks more above some pressure: a seal lifts, or a valve opens.",
+    str(AgainstCode.ROD_BLOCKED): "The piston does not move at a pressure that major friction cannot hold.",
     str(RigCode.LEAKS_ONE_WAY): "The actuator leaks more in one direction: a valve may leak.",
 }
 """Faults that are none of the nine conditions, by the code of their note."""

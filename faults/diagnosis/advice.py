@@ -197,7 +197,7 @@ def _work_on(fault: Note) -> Note | None:
             return AdviceCode.INSPECT_PUMP.note()
         case RigCode.PUMP_STARVES:
             return AdviceCode.CHECK_INLET.note()
-        case AgainstCode.STUCK_OR_LEAKS:
+        case AgainstCode.STUCK_OR_LEAKS | AgainstCode.ROD_BLOCKED:
             return AdviceCode.FREE_PISTON.note()
         case RigCode.LEAKAGE_LIFTS | RigCode.LEAKS_ONE_WAY:
             return AdviceCode.CHECK_VALVES.note()

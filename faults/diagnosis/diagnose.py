@@ -37,7 +37,7 @@ from faults.diagnosis.doubtful_entries import doubtful_entries
 from faults.diagnosis.failed_search import doubts_after
 from faults.diagnosis.known_losses import by_the_balance
 from faults.diagnosis.models_verdict import models_verdict, ranked
-from faults.diagnosis.not_told import stuck_or_leaks, without_undetermined
+from faults.diagnosis.not_told import stands_still, without_undetermined
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import healthy_severities, limits_of, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
@@ -128,9 +128,9 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     stands = class_without_balance(left, diagnosis, estimate, actuator_of(around))
     if stands is not None:
         left, found = (), replace(found, notes=(*found.notes, stands))
-    still = stuck_or_leaks(log.record, case.healthy, diagnosis.not_told)
+    still = stands_still(log.record, case.healthy, diagnosis.not_told)
     against = distinct((*still, *left, *diagnosis.against))
-    if against:  # nominal models alone are no judges of a circuit with another oil, but they say what is off
+    if against and not still:  # nominal models are no judges of another oil, but say what is off if a piston moves
         against = distinct((*against, *verdict.against))
     return _with_class(found, case, diagnosis, against)
 

@@ -3,8 +3,13 @@
 from collections.abc import Collection, Mapping
 from math import inf, nan
 
+import numpy as np
+
 from estimation.finding import Quantity
+from estimation.log_checks.channel_blocks import channel_blocks
+from estimation.log_checks.channel_physics import MIDDLE
 from estimation.log_checks.standstill import travels
+from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuits.class_regions import ClassFits
 from faults.diagnosis.circuits.not_shown import FRICTION_LAW, not_shown
 from faults.diagnosis.severity import OF_FRICTION, OF_OIL
@@ -12,6 +17,10 @@ from faults.notes import AgainstCode, ClassCode
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
+
+HELD, BLOCKED = 95.0, 2.0
+"""Percentile of pressure that a still piston holds [%], and times that at which major friction yields from which the
+piston is blocked [dimensionless]; judged: friction at rest may be half as large again as while it slides."""
 
 VAGUE = 3.0
 """Ratio of relative widths from which a combination is known and its parts are not [dimensionless]."""
@@ -49,8 +58,8 @@ def what_is_not_told(fits: ClassFits, found: Mapping[str, Quantity], *, pressure
     return said
 
 
-def stuck_or_leaks(record: Record, p: EhaParameters, not_told: Collection[Note]) -> tuple[Note, ...]:
-    """Return the reason against all nine conditions of a piston that stands still, where nothing tells why.
+def stands_still(record: Record, p: EhaParameters, not_told: Collection[Note]) -> tuple[Note, ...]:
+    """Return the reason against all nine conditions of a piston that none of them keeps still, or that may be blocked.
 
     In the nine, friction yields to the relief pressure, so only leakage keeps the piston still. A blocked rod does so
     as well. Pressure tells them apart, or friction that shows where the piston moves a little.
@@ -67,15 +76,23 @@ def stuck_or_leaks(record: Record, p: EhaParameters, not_told: Collection[Note])
     Returns
     -------
     tuple of Note
-        None where pressure is logged, friction shows, or the piston moves.
+        None where friction shows, the piston moves, or pressure stays where friction may hold it.
     """
     said = {note.code for note in not_told}
-    if not said.issuperset({ClassCode.ONE_SCALE, ClassCode.FRICTION_NOT_VISIBLE}):
-        return ()
-    gone = travels(record, p)
+    gone = travels(record, p) if ClassCode.FRICTION_NOT_VISIBLE in said else None
     if gone is None or not gone.stuck:
         return ()
-    return (AgainstCode.STUCK_OR_LEAKS.note(moved_m=gone.piston, pumped_m=gone.pump),)
+    if ClassCode.ONE_SCALE in said:
+        return (AgainstCode.STUCK_OR_LEAKS.note(moved_m=gone.piston, pumped_m=gone.pump),)
+    pressure = channel_blocks(record, p, MIDDLE).pressure
+    if pressure is None or not len(pressure) or p.area_difference != 0.0:
+        return ()
+    held = float(np.percentile(np.abs(pressure), HELD))
+    rubs = parameters_for(CONDITIONS["major_friction"], p).friction_coulomb + abs(p.load_force)
+    yields = rubs / p.piston_area
+    if held < BLOCKED * yields:
+        return ()
+    return (AgainstCode.ROD_BLOCKED.note(moved_m=gone.piston, held_pa=held, yields_pa=yields),)
 
 
 def not_determined(codes: Collection[object]) -> frozenset[str]:

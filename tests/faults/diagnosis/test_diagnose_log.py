@@ -235,3 +235,6 @@ def test_a_blocked_rod_without_pressure_is_not_accused_of_leakage(drive: str) ->
     assert found.unknown
     assert AgainstCode.STUCK_OR_LEAKS in {note.code for note in found.against}
     assert AdviceCode.FREE_PISTON in {note.code for note in found.advice}
+    seen = diagnose_log(record, RIG)
+    assert seen.unknown
+    assert AgainstCode.ROD_BLOCKED in {note.code for note in seen.against}

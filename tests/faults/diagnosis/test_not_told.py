@@ -9,7 +9,7 @@ from estimation.finding import Quantity
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import WEAK
-from faults.diagnosis.not_told import stuck_or_leaks, what_is_not_told, without_undetermined
+from faults.diagnosis.not_told import stands_still, what_is_not_told, without_undetermined
 from faults.diagnosis.severity import severities
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.steady_state import steady_state
@@ -61,7 +61,6 @@ def test_without_pressure_one_scale_is_never_told() -> None:
     [
         ((ClassCode.ONE_SCALE, ClassCode.FRICTION_NOT_VISIBLE), 1e-5, True),
         ((ClassCode.ONE_SCALE, ClassCode.FRICTION_NOT_VISIBLE), 5e-3, False),
-        ((ClassCode.FRICTION_NOT_VISIBLE,), 1e-5, False),  # pressure is logged
         ((ClassCode.ONE_SCALE,), 1e-5, False),
     ],
 )
@@ -70,8 +69,20 @@ def test_a_piston_that_stands_still_for_an_unknown_reason_has_no_condition(
 ) -> None:
     time = 1e-3 * np.arange(2000)
     turning = {"motor_speed_rad_s": 100.0 * np.sign(np.sin(3.0 * time)), "position_m": travel * np.sin(3.0 * time)}
-    found = stuck_or_leaks(Record(1e-3, turning), RIG, [code.note() for code in said])
+    found = stands_still(Record(1e-3, turning), RIG, [code.note() for code in said])
     assert [note.code for note in found] == ([AgainstCode.STUCK_OR_LEAKS] if doubted else [])
+
+
+@pytest.mark.parametrize(("pressure", "travel", "blocked"), [(3e6, 1e-5, True), (3e5, 1e-5, False), (3e6, 5e-3, False)])
+def test_a_piston_that_stands_still_at_a_pressure_that_no_friction_of_the_nine_holds_is_blocked(
+    pressure: float, travel: float, blocked: bool
+) -> None:
+    time = 1e-3 * np.arange(2000)
+    sign = np.sign(np.sin(3.0 * time))
+    turning = {"motor_speed_rad_s": 100.0 * sign, "position_m": travel * np.sin(3.0 * time)}
+    record = Record(1e-3, {**turning, "differential_pressure_pa": pressure * sign})
+    found = stands_still(record, RIG, [ClassCode.FRICTION_NOT_VISIBLE.note()])
+    assert [note.code for note in found] == ([AgainstCode.ROD_BLOCKED] if blocked else [])
 
 
 def test_a_velocity_without_a_number_is_not_told() -> None:
