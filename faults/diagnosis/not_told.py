@@ -90,7 +90,7 @@ def stands_still(record: Record, p: EhaParameters, not_told: Collection[Note]) -
     held = float(np.percentile(np.abs(pressure), HELD))
     rubs = parameters_for(CONDITIONS["major_friction"], p).friction_coulomb + abs(p.load_force)
     yields = rubs / p.piston_area
-    if held < BLOCKED * yields:
+    if not held >= BLOCKED * yields:  # nor where gaps leave no number
         return ()
     return (AgainstCode.ROD_BLOCKED.note(moved_m=gone.piston, held_pa=held, yields_pa=yields),)
 
