@@ -35,10 +35,11 @@ def sliding_pressure(record: Record, p: EhaParameters) -> float:
     Returns
     -------
     float
-        Their ratio; 1 where position or pressure is not logged, or never changes [dimensionless].
+        Their ratio; 1 where position or pressure is not logged, or never changes, and where the rig's friction at rest
+        is none [dimensionless].
     """
     blocks = channel_blocks(record, p, MIDDLE)
-    if blocks.slope is None or blocks.pressure is None or not np.any(blocks.slope):
+    if blocks.slope is None or blocks.pressure is None or not np.any(blocks.slope) or p.friction_coulomb == 0.0:
         return 1.0
     size = np.abs(blocks.slope)
     return median(np.abs(blocks.pressure[size > SLIDING * size.max()])) * p.piston_area / p.friction_coulomb

@@ -215,10 +215,11 @@ def _kin(fit: GreyBoxFit, rig: EhaParameters, times: float, surely: float) -> bo
     """Return whether a fit's oil may be the rig's, and its pump loses no more than a leaky one does.
 
     A flow bias is a quarter of the rated flow at most. A leak that takes all of it before the piston slides is none of
-    an actuator that moves.
+    an actuator that moves; a piston without friction at rest slides at once, whatever leaks.
     """
     slides = rig.friction_coulomb / rig.piston_area
-    most = {"flow_bias": MOST_LOST * rig.rated_flow, "leakage_coefficient": rig.rated_flow / slides}
+    most_leaking = rig.rated_flow / slides if slides > 0.0 else np.inf
+    most = {"flow_bias": MOST_LOST * rig.rated_flow, "leakage_coefficient": most_leaking}
     if any(fit.values.get(name, 0.0) - surely * fit.std.get(name, 0.0) > largest for name, largest in most.items()):
         return False
     modulus = fit.values["bulk_modulus"]

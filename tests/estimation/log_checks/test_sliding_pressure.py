@@ -1,5 +1,7 @@
 """Pressure under which a piston slides tells a unit of pressure from oil."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -29,3 +31,8 @@ def test_pistons_of_all_conditions_slide_at_what_friction_takes(condition: str, 
 def test_a_piston_that_stands_still_tells_nothing() -> None:
     still = {SPEED: np.ones(500), POSITION: np.zeros(500), PRESSURE: np.linspace(0.0, 1e5, 500)}
     assert sliding_pressure(Record(1e-3, still), RIG) == 1.0
+
+
+def test_a_rig_without_friction_at_rest_tells_nothing() -> None:
+    slides = {SPEED: np.ones(500), POSITION: np.linspace(0.0, 0.01, 500), PRESSURE: np.full(500, 1e5)}
+    assert sliding_pressure(Record(1e-3, slides), replace(RIG, friction_coulomb=0.0)) == 1.0

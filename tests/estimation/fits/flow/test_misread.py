@@ -205,3 +205,13 @@ def test_slips_that_a_rough_search_refutes_are_not_fitted(monkeypatch: pytest.Mo
     assert not estimate_bulk_modulus(read, RIG).gate.passed
     assert [slips[0].factor for slips in fitted if slips[0].channel == PRESSURE] == [-1.0]
     assert len(fitted) <= MOST_FITTED
+
+
+@pytest.mark.parametrize(("times", "passed"), [(1.0, True), (-1.0, False)])
+def test_a_rig_file_without_friction_at_rest_is_fitted_and_names_slips(times: float, passed: bool) -> None:
+    """Both ended in a division by zero, on every log."""
+    sound = log()
+    read = sound.replace(**{PRESSURE: times * sound[PRESSURE]})
+    found = estimate_bulk_modulus(read, replace(RIG, friction_coulomb=0.0))
+    assert found.gate.passed == passed
+    assert [note.code for note in found.gate.reasons] == ([] if passed else [ChannelCode.CHANNEL_MISREAD])
