@@ -30,7 +30,7 @@ LAST = 4
 
 
 def sparing_steps(problem: Problem, theta: Array) -> IntArray:
-    """Return model steps up to each sample: one where that is as exact as several, near a point.
+    """Return model steps up to each sample: one, or `long_steps`, where that is as exact as several, near a point.
 
     Parameters
     ----------
@@ -45,13 +45,14 @@ def sparing_steps(problem: Problem, theta: Array) -> IntArray:
         Those of the log where nothing is to be spared, or it has gaps [count].
     """
     log = problem.log
-    if log.gaps.size or np.max(log.steps) == 1:
+    few = np.minimum(log.steps, log.long_steps)
+    if log.gaps.size or np.array_equal(few, log.steps):
         return log.steps
     errors = _long_step_errors(problem, theta)
     for felt in FELT_ERRORS:
         short = np.convolve(errors > felt, np.ones(2 * AROUND + 1), "same") > 0.0
         if np.mean(short) <= MOST_SHORT:
-            return np.where(short, log.steps, 1)
+            return np.where(short, log.steps, few)
     return log.steps
 
 
