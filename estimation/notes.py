@@ -87,8 +87,8 @@ class ChannelCode(Code):
         "{channel} looks like {slip}: with that set right, the log fits the rig (--columns CHANNEL=NAME:UNIT)"
     )
     NO_SUCH_OIL = (
-        "{channel}: bulk modulus seems {ratio:.2g} times that in the rig file, which no oil has: a unit or sign of "
-        "pressure or motor speed is wrong"
+        "{channel}: bulk modulus seems {ratio:.2g} times that in the rig file, and oils differ by far less: a unit or "
+        "sign of pressure or motor speed is wrong, or bulk_modulus in the rig file"
     )
     UNIT_CHANGES = (
         "{channel}: from {begin_s:.3g} s on, noise is about {factor:.3g} times what it was, as when the column's unit "

@@ -175,7 +175,7 @@ def estimate_message(found: "Finding") -> str:
     """
     from estimation.finding import NOT_OBSERVABLE_WITH_PRESSURE, OUTCOMES, Outcome
     from estimation.log_checks.channel_names import PRESSURE
-    from estimation.notes import ChannelCode, RigCode
+    from estimation.notes import ChannelCode, EstimateCode, RigCode
 
     modulus = found.quantities["bulk_modulus"]
     if modulus.value is None or modulus.ci95 is None:
@@ -186,6 +186,10 @@ def estimate_message(found: "Finding") -> str:
             return clauses(
                 [f"no value of bulk modulus: {volume}; correct chamber_volume, then estimate this log again"]
             )
+        at_rest = {EstimateCode.PUMP_AND_PISTON_REST, EstimateCode.PISTON_STANDS_STILL, EstimateCode.STILL_AND_FOREIGN}
+        still = [str(note) for note in found.gate.reasons if note.code in at_rest]
+        if seen and still and not mistakes:
+            return clauses([f"no value of bulk modulus: {still[0]}", *still[1:]])
         if found.outcome is Outcome.MISMATCH and found.gate.reasons and not mistakes:
             return clauses(
                 ["no value of bulk modulus: the model does not describe the log", *map(str, found.gate.reasons)]
