@@ -123,7 +123,9 @@ class CorrectedLogs:
         found : GreyBoxFit
             The fit.
         """
-        times = KIN if _pressure_off(self.logged.record, found, self.rig) else FOREIGN
+        stiffer = found.values["bulk_modulus"] > self.rig.bulk_modulus
+        alike = self._beyond > 0.0 if stiffer else self._beyond < 0.0  # friction speaks for a pressure off as oil does
+        times = KIN if alike else FOREIGN
         return _kin(found, self.rig, times, SURELY if plain.explains(found) else 0.0)
 
     def is_sound(self, plain: PlainFits, strange: Explanation) -> bool:
@@ -137,6 +139,12 @@ class CorrectedLogs:
             What is strange about the log.
         """
         return UNLIKE_SLIPS.issuperset(strange.names) and self.is_kin(plain, strange.fit)
+
+    @cached_property
+    def _beyond(self) -> float:
+        """How far pressure as read is beyond that at which pistons slide, see `beyond_sliding`; 0 of one at rest."""
+        gone = travels(self.logged.record, self.rig)
+        return 0.0 if gone is None or gone.still else beyond_sliding(sliding_pressure(self.logged.record, self.rig))
 
     @cached_property
     def _single(self) -> Sequence[tuple[Slips, GreyBoxFit]]:
@@ -238,14 +246,6 @@ def _changes(logged: Logged, channel: str) -> bool:
     """Return whether a channel is there and shows more than its noise."""
     there = channel in logged.record and channel in logged.variances
     return there and bool(np.nanvar(logged.record[channel]) > FELT * logged.variances[channel])
-
-
-def _pressure_off(record: Record, found: GreyBoxFit, rig: EhaParameters) -> bool:
-    """Return whether friction speaks for a pressure off in the same sense as a fit's oil is from the rig's."""
-    if (gone := travels(record, rig)) is None or gone.still:
-        return False
-    beyond = beyond_sliding(sliding_pressure(record, rig))
-    return beyond > 0.0 if found.values["bulk_modulus"] > rig.bulk_modulus else beyond < 0.0
 
 
 def _beginning(logged: Logged) -> Logged:

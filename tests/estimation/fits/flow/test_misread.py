@@ -154,7 +154,7 @@ def test_a_short_log_of_oil_that_is_soft_accuses_no_channel(softer: float) -> No
 def test_a_fit_is_none_of_the_rigs_where_its_oil_or_what_its_pump_loses_is_surely_beyond_it(
     times: float, std: float, lost: float, explained: bool, kin: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(misread_module, "_pressure_off", lambda *_: False)
+    monkeypatch.setattr(CorrectedLogs, "_beyond", 0.0)
     assert KIN < FOREIGN
     modulus = times * RIG.bulk_modulus
     values = {"bulk_modulus": modulus, "leakage_coefficient": 4e-12, "flow_bias": lost * RIG.flow_bias}
