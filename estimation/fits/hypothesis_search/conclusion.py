@@ -47,7 +47,7 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
         fits=fits,
         rivals=len(counted) - 1,
         stated_pressure=usual_pressure(log, parameters),
-        delivery_open=_delivery_open(log, best),
+        opening=partial(_delivery_open, log, best),
         detailing=partial(_detailed, log, parameters, counted, accepted),
     )
 

@@ -79,8 +79,8 @@ class Explanation:
         How many other sets of hypotheses explain the log about as well.
     stated_pressure : float
         Absolute pressure that bulk modulus is stated at, where the oil holds air [Pa].
-    delivery_open : PredictedGain
-        What another delivery of the pump promises beside them; nothing where that is part of the explanation.
+    opening : callable
+        Works out `delivery_open`, for which the log is linearised further.
     detailing : callable
         Works out `in_detail`, for which the log is fitted further: of most explanations costs alone are read.
     """
@@ -91,13 +91,18 @@ class Explanation:
     fits: tuple[GreyBoxFit, ...]
     rivals: int
     stated_pressure: float
-    delivery_open: PredictedGain = NO_GAIN
+    opening: Callable[[], PredictedGain] = lambda: NO_GAIN
     detailing: Callable[[], "Explanation | None"] = lambda: None
 
     @property
     def fit(self) -> GreyBoxFit:
         """The fit under them."""
         return self.fits[0]
+
+    @property
+    def delivery_open(self) -> PredictedGain:
+        """What another delivery of the pump promises beside them; nothing where that is part of the explanation."""
+        return self.opening()
 
     @property
     def in_detail(self) -> "Explanation":
