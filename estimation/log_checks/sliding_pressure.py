@@ -1,4 +1,4 @@
-"""`sliding_pressure(record, p)`: pressure under which a piston slides, over what the rig's Coulomb friction takes.
+"""`sliding_pressure(record, p)`: pressure under which a piston slides, over what the rig's friction takes.
 
 A balance of flows holds pressure over stiffness, so it cannot tell a unit of pressure from oil as many times as stiff.
 Friction can: no piston slides at a pressure that its friction does not let it, and few at one many times as high.
@@ -11,6 +11,7 @@ import numpy as np
 from estimation.log_checks.channel_blocks import channel_blocks
 from estimation.log_checks.channel_physics import MIDDLE
 from estimation.log_checks.order import median
+from plant.components.friction import quadratic_friction
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 
@@ -18,12 +19,12 @@ SLIDING = 0.1
 """Share of the highest velocity from which a piston slides [fraction]."""
 
 LEAST, MOST = 0.8, 6.0
-"""Times the pressure that takes the rig's Coulomb friction at which its pistons slide [dimensionless]; judged: faults
-and speed raise friction, and a rig file may have a fifth too much of it. Loads may need more."""
+"""Times the pressure that the rig's friction takes at which its pistons slide [dimensionless]; judged: faults raise
+friction, and a rig file may have a fifth too much of it. Loads may need more."""
 
 
 def sliding_pressure(record: Record, p: EhaParameters) -> float:
-    """Return the median pressure while the piston slides, over what the rig's Coulomb friction takes.
+    """Return the median pressure while the piston slides, over what the rig's friction takes at its speed.
 
     Parameters
     ----------
@@ -35,14 +36,17 @@ def sliding_pressure(record: Record, p: EhaParameters) -> float:
     Returns
     -------
     float
-        Their ratio; 1 where position or pressure is not logged, or never changes, and where the rig's friction at rest
-        is none [dimensionless].
+        Their ratio; 1 where position or pressure is not logged, or never changes, and where the rig has no friction
+        [dimensionless].
     """
     blocks = channel_blocks(record, p, MIDDLE)
-    if blocks.slope is None or blocks.pressure is None or not np.any(blocks.slope) or p.friction_coulomb == 0.0:
+    if blocks.slope is None or blocks.pressure is None or not np.any(blocks.slope):
         return 1.0
     size = np.abs(blocks.slope)
-    return median(np.abs(blocks.pressure[size > SLIDING * size.max()])) * p.piston_area / p.friction_coulomb
+    slides = size > SLIDING * size.max()
+    speed = np.minimum(size[slides], p.rated_flow / p.piston_area)  # beyond it position is in another unit
+    rubs = quadratic_friction(speed, 1.0, p.friction_quadratic, p.friction_linear, p.friction_coulomb)
+    return median(np.abs(blocks.pressure[slides]) * p.piston_area / rubs) if np.all(rubs > 0.0) else 1.0
 
 
 def beyond_sliding(ratio: float) -> float:

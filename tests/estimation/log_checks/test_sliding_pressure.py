@@ -33,6 +33,14 @@ def test_a_piston_that_stands_still_tells_nothing() -> None:
     assert sliding_pressure(Record(1e-3, still), RIG) == 1.0
 
 
-def test_a_rig_without_friction_at_rest_tells_nothing() -> None:
+def test_a_rig_without_friction_tells_nothing() -> None:
     slides = {SPEED: np.ones(500), POSITION: np.linspace(0.0, 0.01, 500), PRESSURE: np.full(500, 1e5)}
-    assert sliding_pressure(Record(1e-3, slides), replace(RIG, friction_coulomb=0.0)) == 1.0
+    smooth = replace(RIG, friction_coulomb=0.0, friction_linear=0.0, friction_quadratic=0.0)
+    assert sliding_pressure(Record(1e-3, slides), smooth) == 1.0
+
+
+def test_viscous_friction_takes_pressure_too() -> None:
+    """Over Coulomb friction alone the pressure was 10 times too high, so that oil 4 times as stiff accused its unit."""
+    rig, rng = replace(RIG, friction_coulomb=20.0, friction_linear=3000.0), np.random.default_rng(4)
+    log = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, rig, rng), 1e-3, rig, sensors=BENCH, rng=rng)
+    assert beyond_sliding(sliding_pressure(log, rig)) == 0.0
