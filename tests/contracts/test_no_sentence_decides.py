@@ -196,7 +196,7 @@ def test_the_logs_bring_up_notes_of_every_kind(
         "sensor_clipped",
         "outliers_left_out",
         "bound_too_wide",
-        "pressure_residuals_large",
+        "pump_and_piston_rest",
         "none_fits",
         "unexplained",
         "friction_not_visible",
