@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from experiments.eha.plain_verdict import causes, of_another_size, reasons_apart, sureness, verdict, what_to_do
+from experiments.eha.plain_verdict import (
+    causes,
+    is_doubted,
+    of_another_size,
+    reasons_apart,
+    sureness,
+    verdict,
+    what_to_do,
+)
 from experiments.eha.verdict_words import SHOWN, amount, library_sentence
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.page.charts import Charts
@@ -39,7 +47,6 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
     """
     name = Path(result["file"]).name
     shares = sorted(found.probabilities.items(), key=lambda item: -item[1])
-    doubted = result["unknown"] and not of_another_size(result)  # what a fit that is no fit tells is nothing
     facts = {
         "result": result,
         "file": name,
@@ -49,7 +56,7 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "reasons": reasons_apart(result),
         "another_size": of_another_size(result),
         "library": library_sentence(result),
-        "not_told": [sentence(said) for said in result["not_told"]] if not doubted else [],
+        "not_told": [sentence(said) for said in result["not_told"]] if not is_doubted(result) else [],
         "warnings": [sentence(said) for said in _beside(result)],
         "shares": [
             (in_words(condition), 100.0 * share, percent_text(share), share < LEAST_SHARE)

@@ -158,6 +158,17 @@ def _raised(result: Mapping[str, Any]) -> dict[str, float]:
     return {name: data[name] for data in sizes for name in ("leakage", "friction") if data[name] > 0.0}
 
 
+def is_doubted(result: Mapping[str, Any]) -> bool:
+    """Return whether no number of a diagnosis is to be relied on: they are those of a model that does not fit the log.
+
+    Parameters
+    ----------
+    result : Mapping
+        Entries of a diagnosis.
+    """
+    return bool(result["unknown"]) and not of_another_size(result)
+
+
 def of_another_size(result: Mapping[str, Any]) -> bool:
     """Return whether a circuit fits the log and only the size of its faults differs from the nine conditions.
 
@@ -207,7 +218,7 @@ def reasons_apart(result: Mapping[str, Any]) -> list[str]:
     result : Mapping
         Entries of a diagnosis.
     """
-    told = causes(result) if result["unknown"] and not of_another_size(result) else []
+    told = causes(result) if is_doubted(result) else []
     return [sentence(one) for one in told] if len(told) > 1 else []
 
 

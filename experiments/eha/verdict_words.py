@@ -48,16 +48,15 @@ def verdict_lines(result: Mapping[str, Any]) -> list[str]:
         What it is, the same for a mechanic, how bad in leakage, in friction and oil, whether it is reliable, what to
         do next, and what the library of transfer functions says where it says anything.
     """
-    from experiments.eha.plain_verdict import of_another_size, verdict  # here, since an estimate needs nothing of it
+    from experiments.eha.plain_verdict import is_doubted, verdict  # here, since an estimate needs nothing of it
 
     library = library_sentence(result)
-    doubted = result["unknown"] and not of_another_size(result)
     return [
         f"{visible_name(result['file'])}: {headline(result)}",
         f"  verdict   {verdict(result)}",
         *(
             ["  numbers   do not rely on them: they are those of the nearest model, which does not fit the log"]
-            if doubted
+            if is_doubted(result)
             else []
         ),
         f"  leakage   {amounts(result, ('leakage_flow', 'velocity_lost'))}",

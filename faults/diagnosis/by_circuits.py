@@ -15,7 +15,6 @@ from faults.diagnosis.circuits.two_sensors import sensors_disagree
 from faults.diagnosis.evidence import weigh
 from faults.diagnosis.not_told import what_is_not_told
 from faults.diagnosis.severity import healthy_severities, limits_of, severities
-from faults.notes import AgainstCode
 
 
 def diagnose_clean(log: CleanLog, actuator: Actuator, calibration: Calibration | None = None) -> Diagnosis:
@@ -42,7 +41,7 @@ def diagnose_clean(log: CleanLog, actuator: Actuator, calibration: Calibration |
     """
     numbers = shipped_calibration() if calibration is None else calibration
     found = _around(log, actuator, numbers)
-    if all(note.code is not AgainstCode.UNEXPLAINED for note in found.against):
+    if found.followed:
         return found
     other = another_sound_circuit(found.scoreboard.blocks, found.scoreboard.fits, actuator)
     return found if other is None else _around(log, other, numbers)

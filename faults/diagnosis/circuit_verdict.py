@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from estimation.finding import Quantity
 from faults.diagnosis.evidence import Scoreboard
 from faults.diagnosis.severity import KnownFriction, KnownLosses
+from faults.notes import AgainstCode
 from plant.notes import Note
 
 
@@ -46,6 +47,11 @@ class Diagnosis:
     def condition(self) -> str:
         """The most probable of the nine conditions."""
         return max(self.probabilities, key=lambda name: self.probabilities[name])
+
+    @property
+    def followed(self) -> bool:
+        """Whether the circuit follows the log, as far as one must."""
+        return all(note.code is not AgainstCode.UNEXPLAINED for note in self.against)
 
     @property
     def unknown(self) -> bool:

@@ -32,7 +32,6 @@ from estimation.log_checks.standstill import travels
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.notes import ChannelCode
 from plant.eha.model import EhaParameters
-from plant.log.record import Record
 from plant.notes import Note
 
 Slips = tuple[Slip, ...]
@@ -60,9 +59,6 @@ sensor shows its noise alone, and any slower pump explains that."""
 
 UNLIKE_SLIPS = frozenset({OFFSET.name, PRESSURE_DRIFT.name, CHECKS_CRACK.name, MAKEUP_BENDS.name})
 """Hypotheses that no slip looks like: they add to a pressure, or concern valves, and change no scale and no sign."""
-
-ROUNDING = 1e-9
-"""Difference of logarithms that rounding may leave [dimensionless]."""
 
 HOPEFUL, MOST_FITTED = 10.0, 4
 """Rough misfit up to which a slip that is set right may explain a log, as a mean squared normalised residual
@@ -143,8 +139,8 @@ class CorrectedLogs:
     @cached_property
     def _beyond(self) -> float:
         """How far pressure as read is beyond that at which pistons slide, see `beyond_sliding`; 0 of one at rest."""
-        gone = travels(self.logged.record, self.rig)
-        return 0.0 if gone is None or gone.still else beyond_sliding(sliding_pressure(self.logged.record, self.rig))
+        still = _still(self.logged, self.rig)
+        return 0.0 if still else beyond_sliding(sliding_pressure(self.logged.record, self.rig))
 
     @cached_property
     def _single(self) -> Sequence[tuple[Slips, GreyBoxFit]]:
@@ -176,11 +172,11 @@ def _hopeful(tried: Sequence[Slips], logged: Logged, rig: EhaParameters) -> Sequ
     Noise tells no unit of position, and a piston that then stands still tells none at all.
     """
     left: list[tuple[float, Slips]] = []
-    changes = _changes(logged, POSITION)
+    changes, as_read = _changes(logged, POSITION), _off_sliding(logged, rig)
     for slips in tried:
         if any(slip.channel == POSITION and not _changes(logged, slip.other or POSITION) for slip in slips):
             continue
-        right = _sliding(slips, logged, rig)
+        right = _sliding(slips, logged, rig, as_read)
         if right is not None and any(slip.factor > 0.0 for slip in slips) and (not changes or _still(right, rig)):
             continue
         misfit = np.inf if right is None else _rough_misfit(right, rig)
@@ -260,26 +256,25 @@ def _beginning(logged: Logged) -> Logged:
     return logged if samples >= len(record) else replace(logged, record=record.slice(0, samples))
 
 
-def _sliding(slips: Slips, logged: Logged, rig: EhaParameters) -> Logged | None:
-    """Return a log with slips set right, None where it has no such channels, or its pressure then moves no piston."""
+def _sliding(slips: Slips, logged: Logged, rig: EhaParameters, as_read: tuple[float, float]) -> Logged | None:
+    """Return a log with slips set right, None where it has no such channels, or its pressure then moves no piston.
+
+    Its pressure must be no further from what the rig's friction takes than it was as read (`_off_sliding`).
+    """
     right = set_right(slips, logged)
-    return right if right is not None and _slides_as_well(right.record, logged.record, rig) else None
+    return right if right is not None and _off_sliding(right, rig) <= as_read else None
 
 
 def _right_with(slips: Slips, logged: Logged, rig: EhaParameters) -> GreyBoxFit | None:
     """Return the fit of a log whose slips are set right, where it explains the log as one of the rig's."""
-    right = _sliding(slips, logged, rig)
+    right = _sliding(slips, logged, rig, _off_sliding(logged, rig))
     if right is None:
         return None
     plain = plain_fits(right, FitStart(rig, rig.bulk_modulus))
     return plain.best if plain.explains(plain.best) and _kin(plain.best, rig, KIN, 0.0) else None
 
 
-def _slides_as_well(right: Record, read: Record, rig: EhaParameters) -> bool:
-    """Return whether a corrected pressure is no further from what the rig's friction takes than it was as read."""
-
-    def off(record: Record) -> tuple[float, float]:
-        ratio = sliding_pressure(record, rig)
-        return abs(beyond_sliding(ratio)), abs(ln(ratio)) - ROUNDING if ratio > 0.0 else np.inf
-
-    return off(right) <= off(read)
+def _off_sliding(logged: Logged, rig: EhaParameters) -> tuple[float, float]:
+    """Return how far pressure is from where pistons slide, and from what the rig's friction takes [logarithms]."""
+    ratio = sliding_pressure(logged.record, rig)
+    return abs(beyond_sliding(ratio)), abs(ln(ratio)) if ratio > 0.0 else np.inf

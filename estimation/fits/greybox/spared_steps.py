@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.arrays import IntArray
+from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.greybox.side_by_side import LANES
 from plant.arrays import Array
@@ -111,9 +112,7 @@ def step_errors(problem: Problem, theta: Array, finer: int) -> Array:
         Of each block's residual, in standard deviations of its noise [dimensionless].
     """
     log = problem.log
-    rows = [log.parameters] * min(1 + len(theta), LANES)
-    short, usual = (problem.on(one).residuals_of(theta, rows)[0] for one in (log.stepped(finer * log.steps), log))
-    return usual - short
+    return _apart(problem, theta, log, log.stepped(finer * log.steps))
 
 
 def _long_step_errors(problem: Problem, theta: Array) -> Array:
@@ -124,6 +123,13 @@ def _long_step_errors(problem: Problem, theta: Array) -> Array:
     log = problem.log
     white = tuple(one.scaled(1.0, 0.0) for one in log.noise)
     bare = replace(log, measured=np.zeros(log.measured.shape), block=log.sample_time, noise=white, course=None)
-    rows = [log.parameters] * min(1 + len(theta), LANES)  # side by side, as a search has them: no kernel for these two
-    fine, rough = (problem.on(one).residuals_of(theta, rows)[0] for one in (bare, bare.coarsened()))
-    return np.max(np.abs(np.diff(rough - fine, axis=1, prepend=0.0)), axis=0)
+    errors = _apart(problem, theta, bare.coarsened(), bare)
+    return np.max(np.abs(np.diff(errors, axis=1, prepend=0.0)), axis=0)
+
+
+def _apart(problem: Problem, theta: Array, rough: GreyBoxLog, fine: GreyBoxLog) -> Array:
+    """Return what a log's residuals with some model steps have beyond those with others, shape (outputs, blocks)."""
+    # side by side, as a search has them: no kernel for these two
+    rows = [rough.parameters] * min(1 + len(theta), LANES)
+    there, exact = (problem.on(one).residuals_of(theta, rows)[0] for one in (rough, fine))
+    return there - exact

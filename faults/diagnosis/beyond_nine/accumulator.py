@@ -8,6 +8,7 @@ the velocity of such logs.
 
 from collections.abc import Callable
 from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -19,7 +20,6 @@ from faults.diagnosis.circuits.circuit_runs import COLUMN, parameter_rows, predi
 from faults.diagnosis.circuits.class_fit import LASTING, PointFit, fit_freely, misfit
 from faults.diagnosis.circuits.class_regions import ClassFits
 from faults.diagnosis.circuits.out_of_model import unexplained
-from faults.notes import AgainstCode
 from plant.eha.circuit_parameters import CircuitParameters, oil_demand
 from plant.eha.model import EhaParameters
 
@@ -49,14 +49,14 @@ def whatever_accumulator(found: Loaded, again: Callable[[EhaParameters], Loaded]
     Loaded
         The same where a circuit follows the log already, or none does with another accumulator.
     """
-    if _followed(found) or not found.parameters.area_difference:
+    if found.diagnosis.followed or not found.parameters.area_difference:
         return found
     board = found.diagnosis.scoreboard
     fed = fed_otherwise(board.blocks, board.fits, actuator_of(found.parameters))
     if fed is None:
         return found
     other = again(fed)
-    return other if _followed(other) else found
+    return other if other.diagnosis.followed else found
 
 
 def fed_otherwise(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> CircuitParameters | None:
@@ -85,7 +85,9 @@ def fed_otherwise(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Circui
         if not left < misfit(blocks, best.fitted) - LASTING:
             break
         fed = replace(fed, circuit=replace(fed.circuit, accumulator_gas=gas))
-        best = min((fit_freely(blocks, fed, nearest, start) for start in (None, best.coordinates)), key=_cost)
+        best = min(
+            (fit_freely(blocks, fed, nearest, start) for start in (None, best.coordinates)), key=attrgetter("cost")
+        )
         ends = gas / ABOUT, gas * ABOUT
     return None if fed is actuator or unexplained(blocks, replace(fits, best=best), fed) else fed.circuit
 
@@ -103,12 +105,3 @@ def _likeliest_gas(blocks: Blocks, actuator: Actuator, fit: PointFit, ends: tupl
         gas, left = float(tried[place]), misfits[place]
         ends = tried[max(place - 1, 0)], tried[min(place + 1, TRIED - 1)]
     return gas, left
-
-
-def _cost(fit: PointFit) -> float:
-    return fit.cost
-
-
-def _followed(found: Loaded) -> bool:
-    """Return whether a circuit follows the log."""
-    return all(note.code is not AgainstCode.UNEXPLAINED for note in found.diagnosis.against)

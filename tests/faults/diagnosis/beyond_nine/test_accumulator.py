@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from faults.diagnosis.beyond_nine.accumulator import fed_otherwise, whatever_accumulator
+from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
 from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
@@ -50,10 +51,10 @@ def test_no_other_gas_is_told_of_a_log_that_it_does_not_explain() -> None:
 def test_nothing_is_asked_where_circuits_follow_or_both_sides_are_alike() -> None:
     log, actuator, fits = of_rod()
     left = tuple(unexplained(log, fits, actuator))
-    board = SimpleNamespace(blocks=log, fits=fits)
+    board: Any = SimpleNamespace(blocks=log, fits=fits)
 
     def found(against: tuple[Any, ...], parameters: Any) -> Any:
-        return SimpleNamespace(diagnosis=SimpleNamespace(against=against, scoreboard=board), parameters=parameters)
+        return SimpleNamespace(diagnosis=Diagnosis({}, against, {}, {}, {}, (), board), parameters=parameters)
 
     def again(parameters: Any) -> Any:
         assert parameters.accumulator_gas < 1e-3
