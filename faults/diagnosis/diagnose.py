@@ -188,7 +188,7 @@ def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tupl
     pressure = PRESSURE in found.channels
     severity = _severities(diagnosis, case.estimate, case.healthy, case.rig, pressure=pressure)
     not_told = (*diagnosis.not_told, *found.not_told)
-    if not _oil_is_the_circuits(case.estimate, pressure=pressure):
+    if severity["bulk_modulus"].value is not None and not _oil_is_the_circuits(case.estimate, pressure=pressure):
         not_told = tuple(note for note in not_told if note.code is not ClassCode.BULK_MODULUS_NOT_VISIBLE)
     severity = without_undetermined(severity, [note.code for note in not_told])
     known = case.estimate.gate.passed and not against

@@ -7,12 +7,12 @@ from functools import cache, partial
 import numpy as np
 import pytest
 
-from estimation.eha.result import BulkModulusEstimate
+from estimation.eha.result import BulkModulusEstimate, too_wide, without_number
 from estimation.finding import Finding, Gate, Outcome
 from estimation.log_checks.clean import clean_log
 from estimation.notes import ChannelCode, EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis import diagnose
+from faults.diagnosis import by_circuits, diagnose, known_losses
 from faults.diagnosis.diagnose import diagnose_log
 from faults.notes import AdviceCode, AgainstCode, ClassCode
 from plant.eha.drives import make_drive
@@ -238,3 +238,18 @@ def test_a_blocked_rod_without_pressure_is_not_accused_of_leakage(drive: str) ->
     seen = diagnose_log(record, RIG)
     assert seen.unknown
     assert AgainstCode.ROD_BLOCKED in {note.code for note in seen.against}
+
+
+def test_that_the_drive_does_not_show_bulk_modulus_is_said_unless_the_balance_gives_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for module in (by_circuits, known_losses):
+        monkeypatch.setattr(module, "what_is_not_told", lambda *_, **__: [ClassCode.BULK_MODULUS_NOT_VISIBLE.note()])
+    record = log(duration=1.0)
+    unseen = without_number(Outcome.NOT_OBSERVABLE, (too_wide(0.1),), "flow", ("position_m", PRESSURE), 0.1)
+    refused = diagnose_log(record, RIG, (clean_log(record, HEALTHY), unseen))
+    assert ClassCode.BULK_MODULUS_NOT_VISIBLE in {note.code for note in refused.not_told}
+    assert refused.severities["bulk_modulus"].value is None
+    given = diagnose_log(record, RIG)
+    assert ClassCode.BULK_MODULUS_NOT_VISIBLE not in {note.code for note in given.not_told}
+    assert given.severities["bulk_modulus"] == given.quantities["bulk_modulus"]
