@@ -29,7 +29,7 @@ from estimation.fits.hypotheses import (
 )
 from estimation.fits.hypothesis_search.coarse_search import VANISHED
 from estimation.fits.hypothesis_search.explain import WORTH
-from estimation.fits.hypothesis_search.fit_objections import doubted, fit_explains
+from estimation.fits.hypothesis_search.fit_objections import doubted, fit_explains, is_too_close
 from estimation.fits.hypothesis_search.not_excluded import open_wear_note, share_lost
 from estimation.fits.hypothesis_search.predicted_gains import PredictedGain, predicted_gain, predicted_gains, slopes_of
 from estimation.models.completed_flow import CRACKS, balances_mass
@@ -99,6 +99,8 @@ def hypotheses_asked(
         return (), ()
     if loaded:  # a sensor that reads too much looks loaded at rest
         return (BEGUN, OFFSET_AT_REST), ()
+    if is_too_close(swinging, log.passes_on):
+        return (), ()
     if not fit_explains(swinging, log.passes_on) or most_late(swinging.late)[2] > WORTH:
         pulled = (MAKEUP_BENDS,) if outruns_pump(log, parameters) else ()
         return (BEGUN,) if moving else (*HYPOTHESES, *pulled), ()

@@ -80,7 +80,7 @@ def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
     largest, correlated = limits(noisy, fit.seen)
     if fit.chi_square[0] > largest:
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=fit.chi_square[0] ** 0.5))
-    if noisy and 0.0 < fit.chi_square[0] < QUIET:  # of a pressure that is 0 throughout nothing is left
+    if is_too_close(fit, noisy):
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_SMALL.note(ratio=fit.chi_square[0] ** -0.5))
     if abs(fit.autocorrelation[0]) > correlated and not _too_noisy(fit):
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_CORRELATED.note(correlation=fit.autocorrelation[0]))
@@ -90,6 +90,19 @@ def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
         when = "late" if late > 0.0 else "early"
         reasons.insert(0, EstimateCode.CHANNEL_LATE.note(channel=channel, milliseconds=1e3 * abs(late), when=when))
     return tuple(reasons)
+
+
+def is_too_close(fit: GreyBoxFit, noisy: bool) -> bool:
+    """Return whether a fit leaves far less than the noise of position makes: what is freed beside it leaves less still.
+
+    Parameters
+    ----------
+    fit : GreyBoxFit
+        The fit.
+    noisy : bool
+        Whether the position's noise counts with the slopes.
+    """
+    return noisy and 0.0 < fit.chi_square[0] < QUIET  # of a pressure that is 0 throughout nothing is left
 
 
 def _too_noisy(fit: GreyBoxFit) -> bool:
