@@ -84,6 +84,10 @@ class ClassCode(Code):
         "without differential_pressure_pa, other faults are not excluded: {faults} would explain the log about as "
         "well; {condition}"
     )
+    VELOCITY_CONTRADICTED = (
+        "{channel} and the slope of position_m differ by {difference_m_s:.2g|mm/s} mm/s; motor speed and pressure "
+        "agree with position_m, so {channel} is wrong: it was not used, check its sensor"
+    )
     BALANCE_REFUSED = (
         "bulk modulus is refused, but the class stands: a circuit follows velocity to {velocity_percent:.2g} % and "
         "pressure to {pressure_percent:.2g} %, and no worn pump, low relief valve or faulty make-up valve explains the "

@@ -72,6 +72,45 @@ def velocity_lateness(record: Record) -> float:
     return _lateness(*_compared(record[POSITION], record[VELOCITY], record.sample_time))
 
 
+def velocity_apart(record: Record) -> float:
+    """Return the difference between velocity and the slope of position over stretches of `STRETCH`.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with position and velocity.
+
+    Returns
+    -------
+    float
+        Root mean square [m/s]; 0 where too little of both is there.
+    """
+    apart, _ = _compared(record[POSITION], record[VELOCITY], record.sample_time)
+    return float(np.sqrt(np.mean(apart**2))) / STRETCH if len(apart) else 0.0
+
+
+def wrong_gain_explains(record: Record) -> float:
+    """Return the share of the difference between position and integrated velocity that one's wrong gain explains.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with position and velocity.
+
+    Returns
+    -------
+    float
+        Share of the squared difference over stretches of `STRETCH` [fraction]; 1 where they do not differ.
+    """
+    gained, swept, _ = _stretches(record[POSITION], record[VELOCITY], record.sample_time)
+    apart = gained - swept
+    both, left = float(apart @ apart), 0.0
+    if both > 0.0:
+        gain = float(apart @ gained) / max(float(gained @ gained), float(np.finfo(float).tiny))
+        left = float(np.sum((apart - gain * gained) ** 2)) / both
+    return 1.0 - left
+
+
 def _lateness(apart: Array, change: Array) -> float:
     squares = float(change @ change)
     return float(apart @ change) / squares if len(change) >= LEAST_STRETCHES and squares > 0.0 else 0.0
@@ -86,11 +125,17 @@ def _fastest(velocity: Array, sample_time: float) -> float:
 
 def _compared(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array]:
     """Return the excess of position's gain over integrated velocity, and velocity's change, for each stretch."""
+    gained, swept, change = _stretches(position, velocity, sample_time)
+    return gained - swept, change
+
+
+def _stretches(position: Array, velocity: Array, sample_time: float) -> tuple[Array, Array, Array]:
+    """Return position's gain, integrated velocity, and velocity's change, for each stretch."""
     rows = max(1, round(STRETCH / sample_time))
     gone = 0.5 * sample_time * (velocity[1:] + velocity[:-1])
     unknown = np.concatenate([[0], np.cumsum(np.isnan(gone))])
     swept = np.concatenate([[0.0], np.cumsum(np.nan_to_num(gone))])
     ends = np.arange(0, len(position), rows)
-    apart, change = np.diff((position - swept)[ends]), np.diff(velocity[ends])
-    there = np.isfinite(apart) & np.isfinite(change) & (np.diff(unknown[ends]) == 0)
-    return apart[there], change[there]
+    gained, went, change = np.diff(position[ends]), np.diff(swept[ends]), np.diff(velocity[ends])
+    there = np.isfinite(gained) & np.isfinite(change) & (np.diff(unknown[ends]) == 0)
+    return gained[there], went[there], change[there]

@@ -41,6 +41,7 @@ from faults.diagnosis.not_told import stands_still, without_undetermined
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import healthy_severities, limits_of, with_bulk_modulus
 from faults.diagnosis.severity_total import with_totals
+from faults.diagnosis.wrong_velocity import without_wrong_velocity
 from faults.eha.bank import mathematical_bank
 from faults.notes import ClassCode
 from plant.eha.model import EhaParameters
@@ -101,6 +102,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     plain = _begun(log, rig.parameters) if asked else _Plain(log, rig.parameters, None, None)
     estimate = estimated(log, rig, EstimateOptions())[1] if seen is None else seen[1]
     found, case = finding_of(log, estimate, rig), _set_right(log, rig, estimate)
+    again, cleaned = partial(diagnose_log, record, rig), log
     log, rig = case.log, case.rig
     scores = plain.scores_of(log, case.as_a_whole)
     verdict = models_verdict(scores, log.record)
@@ -122,6 +124,8 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
         without = _without_class(found, log, scores, distinct((*case.doubts, *verdict.against)))
         said = ClassCode.NO_CIRCUIT if isinstance(error, RigError) else ClassCode.NO_PROBABILITIES
         return replace(without, notes=(*found.notes, said.note(reason=error.message)))
+    if (sound := without_wrong_velocity(cleaned, diagnosis.against, estimate, case.strange)) is not None:
+        return again((sound, estimate))
     diagnosis = by_the_balance(_from_the_rigs_oil(diagnosis, case.healthy), estimate, log.record, case.healthy)
     found = replace(found, notes=(*found.notes, *named), evidence=EhaEvidence(estimate, scores, diagnosis))
     left = doubts_after(case.doubts, estimate, log, around, diagnosis.scoreboard)
