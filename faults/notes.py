@@ -133,6 +133,7 @@ class AdviceCode(Code):
         "the same log again"
     )
     CHECK_LOGGER = "check the logger and its wiring, then log again while the motor turns and the piston moves"
+    LOG_EVERY_ROW = "switch off dead band and compression of the logger for {channels}, then log again"
     CHECK_RIG = (
         "compare the rig file with the actuator (geometry, pump, relief valve, healthy leakage and friction) and check "
         "the scale of each sensor, then diagnose this log again"

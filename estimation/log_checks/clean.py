@@ -12,6 +12,7 @@ from estimation.log_checks.held import without_held
 from estimation.log_checks.held_alone import without_held_alone
 from estimation.log_checks.hum import without_hum
 from estimation.log_checks.late_velocity import without_late_velocity
+from estimation.log_checks.logged_on_change import logged_on_change
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances, rounded_variance
 from estimation.log_checks.outliers import without_gross_outliers
 from estimation.log_checks.position_range import without_position_beyond_range
@@ -120,7 +121,7 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     sound, offset = without_velocity_offset(sound)
     sound, late = without_late_velocity(sound)
     known = [name for name in MEASURED if name in sound]
-    objections = sensor_objections(sound, parameters)
+    objections = (*sensor_objections(sound, parameters), *logged_on_change(sampled))
     dead = any(note.data["channel"] == PRESSURE for note in objections)
     mistakes = changes or channel_mistakes(sound.replace(**{PRESSURE: None}) if dead else sound, parameters)
     if mistakes:  # a sensor cannot be judged by channels of another meaning

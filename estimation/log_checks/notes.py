@@ -1,4 +1,4 @@
-"""Notes of a look at the columns of an unknown log."""
+"""Notes of a look at the columns of an unknown log, and at how its logger wrote them."""
 
 from plant.notes import Code
 
@@ -19,3 +19,12 @@ class GuessCode(Code):
         "a minus before its unit"
     )
     IS_DIFFERENCE = "it is the difference of columns {one} and {other}"
+
+
+class LoggerCode(Code):
+    """Why a logger's way to write a channel leaves no measurement in each row."""
+
+    LOGGED_ON_CHANGE = (
+        "{channel} was logged only when it had changed by {percent:.2g} % of its standard deviation, and repeated in "
+        "between (dead band or compression of the logger)"
+    )

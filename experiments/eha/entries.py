@@ -159,9 +159,10 @@ def _notes(found: "Finding") -> dict[str, Any]:
 
 def _no_class_message(found: "Finding") -> str:
     """Say why a log is in no class: a sensor that is accused comes first, since no other drive mends it."""
+    from estimation.log_checks.notes import LoggerCode
     from estimation.notes import SensorCode
 
-    accused = [note for note in found.gate.reasons if isinstance(note.code, SensorCode)]
+    accused = [note for note in found.gate.reasons if isinstance(note.code, (SensorCode, LoggerCode))]
     return clauses(str(note) for note in (*accused, *(one for one in found.notes if one.code in NO_CLASS)))
 
 

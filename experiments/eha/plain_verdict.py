@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from estimation.log_checks.notes import LoggerCode
 from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
 from experiments.page.condition_names import in_words
 from experiments.page.sentences import left_unread, sentence
@@ -43,7 +44,7 @@ WRONG_SENSORS = frozenset(
 )
 """Codes of sensors of which nothing can be used."""
 
-WRONG_INPUT = WRONG_SENSORS.union(ChannelCode)
+WRONG_INPUT = WRONG_SENSORS.union(ChannelCode, LoggerCode)
 """Codes of sensors and columns that are wrong, from which other reasons against a verdict may follow."""
 
 BESIDE = str(AgainstCode.OUTSIDE_CONDITIONS)
@@ -112,6 +113,8 @@ def _hindered(result: Mapping[str, Any]) -> str:
         return "a column of the log has a wrong sign, unit or name"
     if codes & WRONG_SENSORS:
         return "a sensor reads wrong"
+    if codes & set(LoggerCode):
+        return "the logger left measurements out"
     if AgainstCode.STUCK_OR_LEAKS in codes:
         return "the piston stands still, and without pressure the log does not tell why"
     if EstimateCode.RIG_CONTRADICTED in codes:

@@ -6,6 +6,7 @@ import numpy as np
 
 from estimation.finding import Quantity
 from estimation.log_checks.channel_names import PRESSURE
+from estimation.log_checks.notes import LoggerCode
 from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
 from faults.notes import AdviceCode, AgainstCode, ClassCode
 from plant.eha.model import EhaParameters
@@ -172,6 +173,8 @@ def _mended(doubts: list[Note]) -> tuple[Note, ...]:
     if any(isinstance(note.code, ChannelCode) for note in doubts):
         named = dict.fromkeys(str(note.data["channel"]) for note in doubts if isinstance(note.code, ChannelCode))
         return (AdviceCode.MEND_COLUMNS.note(channels=" and ".join(named)),)
+    if sparse := [str(note.data["channel"]) for note in doubts if isinstance(note.code, LoggerCode)]:
+        return (AdviceCode.LOG_EVERY_ROW.note(channels=" and ".join(sparse)),)
     accused = dict.fromkeys(str(note.data["channel"]) for note in doubts if "channel" in note.data and _of_sensor(note))
     if any(note.code == SensorCode.SENSORS_DISAGREE for note in doubts):
         accused |= {"position_m": None, "velocity_m_s": None}
