@@ -171,14 +171,14 @@ class EstimateCode(Code):
         "squared {nis:.1f}, expected 1): model and log disagree, and the interval is too narrow"
     )
     INNOVATIONS_FOLLOW_DRIVE = (
-        "the residuals of {channel} have {excess:.3g} times the power of white noise near {frequency_hz:.3g} Hz, a "
-        "frequency of the drive: the model answers the drive differently from the log, and the interval is up to "
-        "{narrow:.2g} times too narrow"
+        "the residuals of {channel} have {excess:.3g} times the power of white noise between {least_hz:.4g} and "
+        "{most_hz:.4g} Hz, where the drive has power too: the model answers the drive differently from the log, and "
+        "the interval is up to {narrow:.2g} times too narrow"
     )
     INNOVATIONS_BESIDE_DRIVE = (
-        "the residuals of {channel} have {excess:.3g} times the power of white noise near {frequency_hz:.3g} Hz, which "
-        "is not a frequency of the drive: the model leaves out some friction, valve or electrical interference, and "
-        "the interval is up to {narrow:.2g} times too narrow"
+        "the residuals of {channel} have {excess:.3g} times the power of white noise between {least_hz:.4g} and "
+        "{most_hz:.4g} Hz, where the drive has almost none: the model leaves out a friction, a valve, a sensor's drift "
+        "or electrical interference, and the interval is up to {narrow:.2g} times too narrow"
     )
     ESTIMATE_WANDERS = (
         "estimates of {state} from different parts of the log differ by {ratio:.0f} times what the interval allows: "

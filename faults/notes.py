@@ -6,10 +6,10 @@ from plant.notes import Code
 class AgainstCode(Code):
     """Reasons against all nine conditions."""
 
-    UNEXPLAINED = "the circuit that fits best leaves {percent:.0f} % of the {channel} unexplained"
+    UNEXPLAINED = "the circuit that fits best is off by {percent:.0f} % of the measured {channel} (root mean square)"
     NONE_FITS = (
-        "none of the nine conditions fits: the best leaves {percent:.0f} % of the signal unexplained; check the rig "
-        "file and the columns' units"
+        "none of the nine conditions fits: the best model is off by {percent:.0f} % of the measured signal (root "
+        "mean square); check the rig file and the columns' units"
     )
     PUMP_OFF = (
         "the ratio of pump flow to piston flow differs by {percent:+.0f} % from the rig file: motor speed or position "

@@ -149,7 +149,14 @@ def _overconfidence(channel: str, nis: float) -> Note:
 
 def _structure(found: Whiteness) -> Note:
     code = EstimateCode.INNOVATIONS_FOLLOW_DRIVE if found.driven else EstimateCode.INNOVATIONS_BESIDE_DRIVE
-    return code.note(channel=found.channel, excess=found.excess, frequency_hz=found.frequency, narrow=found.excess**0.5)
+    return code.note(
+        channel=found.channel,
+        excess=found.excess,
+        frequency_hz=found.frequency,
+        least_hz=max(found.frequency - found.resolution, 0.0),
+        most_hz=found.frequency + found.resolution,
+        narrow=found.excess**0.5,
+    )
 
 
 def _unsettled(estimate: Estimate, state: str) -> list[Note]:

@@ -59,7 +59,9 @@ class Whiteness:
     threshold : float
         Excess that white innovations stay below but with probability `FALSE_ALARMS` [dimensionless].
     frequency : float
-        Where the largest power is [Hz].
+        Where the largest power is [Hz]; 0 for a drift slower than can be told.
+    resolution : float
+        How far apart frequencies can be told [Hz].
     driven : bool
         Whether the drive has at least a tenth of its strongest power there.
     ljung_box : float
@@ -78,6 +80,7 @@ class Whiteness:
     excess: float
     threshold: float
     frequency: float
+    resolution: float
     driven: bool
     ljung_box: float
     autocorrelation: float
@@ -140,6 +143,7 @@ def whiteness(estimate: Estimate, record: Record) -> tuple[Whiteness, ...]:
                 excess=max(0.0, float(power[peak]) - concentration * pattern * length / 2.0),
                 threshold=quantile / (2 * SEGMENTS),
                 frequency=peak / (length * record.sample_time),
+                resolution=1.0 / (length * record.sample_time),
                 driven=bool(driven[peak]),
                 ljung_box=_ljung_box(lags, count),
                 autocorrelation=float(lags[np.argmax(np.abs(lags))]),

@@ -149,7 +149,7 @@ def short_names(results: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def folded(text: str, width: int) -> str:
-    """Return a text whose lines end between words, what is folded set below the words that a name stands before.
+    """Return a text whose lines end between words, what is folded set below the first words, or those after a name.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def folded(text: str, width: int) -> str:
 
     lines: list[str] = []
     for line in text.split("\n"):
-        named = re.match(r" +\S+ {2,}", line)
+        named = re.match(r" {8,}| +\S+ {2,}", line)
         hang = " " * (len(named.group()) if named and len(named.group()) < width // 2 else 4)
         folder = textwrap.TextWrapper(width, subsequent_indent=hang, break_long_words=False, break_on_hyphens=False)
         lines += folder.wrap(line) or [""]

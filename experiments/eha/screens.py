@@ -10,6 +10,7 @@ from experiments.command.terminal import short_names, table
 from experiments.command.visible_text import visible_name
 from experiments.eha.entries import costs
 from experiments.eha.verdict_words import equally_likely, margin_word, verdict_lines
+from experiments.log_pages.screens import told_in_lines
 from experiments.page.condition_names import in_words
 from experiments.page.numbers import decimals_of
 
@@ -40,7 +41,7 @@ def estimates_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
     yield shown
     doubtful = [result for result in results if not result["gate"]["passed"]]
     if len(results) <= MOST_MESSAGES:
-        yield from (f"{visible_name(result['file'])}: {result['message']}" for result in doubtful)
+        yield from (told_in_lines(result, visible_name(result["file"])) for result in doubtful)
     elif doubtful:
         yield f"{len(doubtful)} of {len(results)} logs gave no reliable value; --json and --out give the reasons"
     yield from costs(results)
@@ -86,7 +87,7 @@ def diagnoses_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "I
         if detailed and judged and result["outcome"] == "ok" and result["expected"] is not None:
             yield f"  {_agreement(result)}"
         elif not judged or result["outcome"] != "ok" or result["expected"] is not None:
-            yield f"{visible_name(result['file'])}: {result['message']}"
+            yield told_in_lines(result, visible_name(result["file"]))
     notes = list(costs(results))
     yield from ["", *notes] if notes and detailed else notes
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from experiments.command.visible_text import visible_name
+from experiments.log_pages.screens import NEXT_LINE
 from experiments.page.condition_names import in_words
 from experiments.page.numbers import decimals_of, percent_text, shop_unit
 from experiments.page.sentences import sentence
@@ -31,9 +32,6 @@ MOST_DECIMALS = 3
 ALIKE = 0.99
 """Share of the likeliest condition's probability from which another is as likely [fraction]: the log tells nothing that
 would set them apart, and calibrated probabilities are not known better."""
-
-NEXT_LINE = "\n" + 12 * " "
-"""Between reasons, and between pieces of advice: each has its line, below the first."""
 
 NEAREST = "UNKNOWN: none of the nine conditions fits; the nearest is "
 """How a verdict begins that something speaks against."""

@@ -5,11 +5,18 @@ from math import ceil, floor, isfinite, log10
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.json_output import Result
-from experiments.command.terminal import table
+from experiments.command.terminal import clauses, table
 from experiments.command.visible_text import visible_name
+from experiments.log_pages.entries import NO_GATE
 from experiments.page.names_shown import quantity_name
 from experiments.page.numbers import percent_text, reader_unit
 from experiments.page.sentences import sentence
+
+NEXT_LINE = "\n" + 12 * " "
+"""Between reasons, and between pieces of advice: each has its line, below the first."""
+
+MOST_REASONS = 4
+"""Reasons against a result that a terminal shows [count]."""
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -40,7 +47,7 @@ def quantities_shown(results: Sequence[Result], options: Mapping[str, Any]) -> "
         yield shown
         sure = result.get("probabilities", {}).get(result.get("condition"))
         probable = "" if sure is None else f", probability {percent_text(sure)} %"
-        yield f"{about}: {result['outcome'].replace('_', ' ')}: {result['message']}{probable}"
+        yield told_in_lines(result, about, f"{result['outcome'].replace('_', ' ')}: ", probable)
         yield from (f"{about}: next: {one}" for one in result.get("advice", ()))
 
 
@@ -53,8 +60,42 @@ def messages_shown(results: Sequence[Result]) -> "Iterable[RenderableType]":
         One a log, with ``message`` and ``advice``.
     """
     for result in results:
-        yield f"{visible_name(result['file'])}: {result['message']}"
+        yield told_in_lines(result, visible_name(result["file"]))
         yield from (f"  next  {sentence(one)}" for one in result["advice"])
+
+
+def told_in_lines(result: Result, about: str, before: str = "", after: str = "") -> str:
+    """Return the message of a log, with each of several reasons against its result on a line of its own.
+
+    Parameters
+    ----------
+    result : Result
+        Its entries; the reasons are those of ``gate`` and, of a diagnosis, ``reasons``.
+    about : str
+        The log.
+    before, after : str
+        Words before and after the message.
+
+    Examples
+    --------
+    >>> said = "no value: the model does not describe the log"
+    >>> against = ["velocity reads wrong", "pressure lags"]
+    >>> log = {"message": f"{said}; velocity reads wrong; pressure lags", "gate": {"reasons": against}}
+    >>> print(told_in_lines(log, "run.csv"))
+    run.csv: no value: the model does not describe the log
+      reasons   velocity reads wrong
+                pressure lags
+    """
+    message = str(result["message"])
+    against = [*result.get("reasons", ()), *(result.get("gate") or NO_GATE)["reasons"]]
+    told = [one for one in dict.fromkeys(against) if one.rstrip(".") in message]
+    head, found, rest = message.partition(clauses(told) or "\n")
+    if not found or (not head and len(told) < 2):
+        return f"{about}: {before}{message}{after}"
+    opening = f"{before}{head}".rstrip(" :;") or "no result"
+    reasons = NEXT_LINE.join(told[:MOST_REASONS])
+    more = f"{NEXT_LINE}and {len(told) - MOST_REASONS} more, see --json" if len(told) > MOST_REASONS else ""
+    return f"{about}: {opening}{rest}{after}\n  reasons   {reasons}{more}"
 
 
 def _digits(ends: Sequence[float] | None) -> int:

@@ -32,6 +32,14 @@ def test_a_value_that_is_not_to_be_relied_on_is_called_doubtful_and_its_reason_i
     assert told.count("doubtful") == 1
 
 
+def test_the_reasons_against_a_value_stand_below_it_a_line_each() -> None:
+    against = {"message": "207 MPa; do not rely on it: friction; play", "gate": {"passed": False}}
+    against["gate"]["reasons"] = ["friction", "play"]
+    assert "run1.csv: 207 MPa; do not rely on it\n  reasons   friction\n            play" in shown(
+        [estimate(1, **against)]
+    )
+
+
 def test_a_log_without_a_value_or_an_interval_has_dashes() -> None:
     nothing = {"value": None, "ci95": None, "ci95_total": None}
     told = shown([estimate(1, False, bulk_modulus_pa=nothing, outcome="not_observable", bound_percent=float("inf"))])

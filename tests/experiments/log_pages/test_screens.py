@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from experiments.log_pages.screens import messages_shown, quantities_shown
+from experiments.log_pages.screens import MOST_REASONS, messages_shown, quantities_shown, told_in_lines
 
 
 def shown(said: dict[str, Any] | None = None, **entry: Any) -> str:
@@ -74,3 +74,21 @@ def test_a_share_is_told_in_percent_and_a_pressure_as_gauges_show_it() -> None:
 def test_a_name_with_an_end_of_line_stays_on_one_line() -> None:
     (line,) = messages_shown([{"file": "a\nb: no fault.csv", "message": "said", "advice": []}])
     assert line == "a\\x0ab: no fault.csv: said"
+
+
+def test_each_reason_against_a_result_has_its_line_once_and_of_many_the_rest_are_counted() -> None:
+    many = [f"reason {number}" for number in range(MOST_REASONS + 2)]
+    told = {"message": "; ".join(["no value", *many, "nothing else"]), "gate": {"reasons": many}, "reasons": many[:1]}
+    first, *lines = told_in_lines(told, "run.csv").splitlines()
+    assert first == "run.csv: no value; nothing else"
+    assert [line.removeprefix("  reasons ").strip() for line in lines] == [
+        *many[:MOST_REASONS],
+        "and 2 more, see --json",
+    ]
+
+
+def test_a_message_that_is_a_reason_alone_is_one_line() -> None:
+    alone = {"message": "the sign is wrong", "gate": {"reasons": ["the sign is wrong."]}}
+    assert told_in_lines(alone, "run.csv") == "run.csv: the sign is wrong"
+    both = {"message": "the sign is wrong; it lags", "gate": {"reasons": ["the sign is wrong", "it lags"]}}
+    assert told_in_lines(both, "run.csv").splitlines()[0] == "run.csv: no result"
