@@ -65,6 +65,10 @@ HOPEFUL, MOST_FITTED = 10.0, 4
 [dimensionless], and how many slips are fitted at most [count]; judged. Of right slips the rough misfit is 1.0 to 1.2,
 of wrong ones 2 to 3,000."""
 
+AS_RIGHT = 1.2
+"""Rough misfit up to which, and down to whose inverse, slips are alike: of right ones it is that much [dimensionless].
+Of alike ones those are fitted first whose pressure is nearest to what the rig's friction takes."""
+
 HOPELESS = 300.0
 """The same of the likeliest guess, from which on no search is made [dimensionless]: of right slips it is 2 to 120."""
 
@@ -171,7 +175,7 @@ def _hopeful(tried: Sequence[Slips], logged: Logged, rig: EhaParameters) -> Sequ
 
     Noise tells no unit of position, and a piston that then stands still tells none at all.
     """
-    left: list[tuple[float, Slips]] = []
+    left: list[tuple[tuple[float, float], Slips]] = []
     changes, as_read = _changes(logged, POSITION), _off_sliding(logged, rig)
     for slips in tried:
         if any(slip.channel == POSITION and not _changes(logged, slip.other or POSITION) for slip in slips):
@@ -180,8 +184,8 @@ def _hopeful(tried: Sequence[Slips], logged: Logged, rig: EhaParameters) -> Sequ
         if right is not None and any(slip.factor > 0.0 for slip in slips) and (not changes or _still(right, rig)):
             continue
         misfit = np.inf if right is None else _rough_misfit(right, rig)
-        if misfit < HOPEFUL:
-            left.append((max(misfit, 1.0 / misfit) if misfit > 0.0 else np.inf, slips))
+        if right is not None and 0.0 < misfit < HOPEFUL:
+            left.append(((max(misfit, 1.0 / misfit, AS_RIGHT), _off_sliding(right, rig)[1]), slips))
     return [slips for _, slips in sorted(left, key=itemgetter(0))[:MOST_FITTED]]
 
 

@@ -215,3 +215,17 @@ def test_a_rig_file_without_friction_at_rest_is_fitted_and_names_slips(times: fl
     found = estimate_bulk_modulus(read, replace(RIG, friction_coulomb=0.0))
     assert found.gate.passed == passed
     assert [note.code for note in found.gate.reasons] == ([] if passed else [ChannelCode.CHANNEL_MISREAD])
+
+
+def test_of_units_that_explain_a_log_alike_those_are_fitted_first_whose_pressure_the_rigs_friction_takes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A pressure in psi, read as bar, was called kPa or MPa: of five that explained it, four were fitted."""
+    pressures = [one for one in SLIPS if one.channel == PRESSURE]
+    monkeypatch.setattr(misread_module, "_rough_misfit", lambda *_: 0.9)
+    right = log()
+    wrong = right.replace(**{PRESSURE: right[PRESSURE] * 1e5 / PSI})
+    read = Logged(wrong, {PRESSURE: 1e6, POSITION: 1e-12, SPEED: 1e-2})
+    hopeful = misread_module._hopeful([(one,) for one in pressures], read, RIG)
+    assert len(hopeful) == MOST_FITTED
+    assert hopeful[0][0].said == "psi read as bar"
