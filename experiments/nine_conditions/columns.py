@@ -95,7 +95,8 @@ def _estimate(rows: pd.DataFrame, key: Experiment) -> Cell:
     if values.empty:
         bound = float(rows["bound_percent"].min())
         outcome = spaced(str(rows["outcome"].iloc[0]))
-        return Cell(f"{outcome} (bound {number(bound, 2)} %)" if math.isfinite(bound) else outcome, "none")
+        least = f"{number(bound, 2)} %" if bound < 100.0 else "over 100 %"
+        return Cell(f"{outcome} (bound {least})" if math.isfinite(bound) else outcome, "none")
     digits = 4 if key.form in {"pressure", "flow"} or key.plant == "reduced" else 2
     low, high = (number(MEGAPASCAL * value, digits) for value in (values.min(), values.max()))
     error = float(rows["error_percent"].astype(float).abs().max())

@@ -118,7 +118,7 @@ def draw_forms(estimates: pd.DataFrame, truth_pa: float) -> Figure:
     sine = estimates[(estimates["plant"] == "lumped") & (estimates["drive"] == "sine")]
     shown: Sequence[tuple[pd.DataFrame, str, str]] = (
         (sine[sine["form"] == "acceleration"], VERMILION, "published acceleration form"),
-        (sine[(sine["form"] == "pressure") & sine["pressure_logged"]], BLUE, "pressure form, dp logged"),
+        (sine[(sine["form"] == "pressure") & sine["pressure_logged"]], BLUE, "pressure form, with pressure"),
     )
     title = "Where two filters settle on a plant that sticks, driven by the 10 Hz sine"
     figure, (axis,) = panels(title, 1, 1, 3.9, BESIDE_CONDITIONS)

@@ -136,11 +136,11 @@ def experiment_in_words(key: Experiment) -> str:
     Examples
     --------
     >>> experiment_in_words(PRESSURE_STEPS)
-    'pressure form, plant sticks, nine steps, dp logged'
+    'pressure form, plant sticks, nine steps, with pressure'
     """
     plants = {"reduced": "never sticks", "lumped": "sticks"}
     drives = {"sine": "10 Hz sine", "steps": "nine steps"}
-    sensors = "dp logged" if key.pressure_logged else "dp not logged"
+    sensors = "with pressure" if key.pressure_logged else "without pressure"
     return f"{key.form} form, plant {plants.get(key.plant, key.plant)}, {drives.get(key.drive, key.drive)}, {sensors}"
 
 

@@ -19,7 +19,7 @@ class Verdict(StrEnum):
 
     REPRODUCED = "reproduced"
     PREDICTED = "predicted"
-    CALIBRATED = "calibrated to"
+    CALIBRATED = "calibrated"
     NOT_REPRODUCED = "not reproduced"
     ERRATUM = "erratum"
 
@@ -46,7 +46,7 @@ MISSED = frozenset({Verdict.NOT_REPRODUCED, Verdict.ERRATUM})
 TONES: Mapping[str, str] = {
     "reproduced": "good",
     "predicted": "good",
-    "calibrated to": "none",
+    "calibrated": "none",
     "not reproduced": "bad",
     "erratum": "bad",
     "drawn": "good",
@@ -203,7 +203,7 @@ def agrees(row: Row) -> bool:
 def verdict_of(row: Row) -> Verdict:
     """Return the verdict on a row.
 
-    What agrees is *calibrated to* if a model was given it, *predicted* if a model was not told it, *reproduced* if it
+    What agrees is *calibrated* if a model was given it, *predicted* if a model was not told it, *reproduced* if it
     was computed or estimated. What does not agree is an *erratum* if an erratum says that the printed value is wrong or
     contradicted, and *not reproduced* otherwise.
 

@@ -104,14 +104,14 @@ def page_of_the_papers(folder: Path) -> None:
     tables = read_tables(folder / "papers")
     rows, figures = tables["rows"], tables["figures"]
     assert len(rows) > 500
-    assert set(rows["verdict"]) == {"reproduced", "predicted", "calibrated to", "not reproduced", "erratum"}
+    assert set(rows["verdict"]) == {"reproduced", "predicted", "calibrated", "not reproduced", "erratum"}
     assert rows[["printed", "accept", "shown_by"]].notna().all().all()
     assert not rows.duplicated(["paper", "where", "claim"]).any(), rows[rows.duplicated(["paper", "where", "claim"])]
     assert figures["drawn"].notna().all()
     assert len(figures) == 11 + 14 + 50
     assert all(f">{verdict}<" in words for verdict in set(rows["verdict"]) | set(figures["drawn"]))
     verdicts = rows.set_index(["where", "claim"])["verdict"]
-    assert verdicts["section 7.1, Figure 47", "peak flow"] == "calibrated to"
+    assert verdicts["section 7.1, Figure 47", "peak flow"] == "calibrated"
     assert verdicts["Table 2", "(11) velocity, by equation 18 and one piston, row 3"] == "erratum"
     assert (
         verdicts["section 4, Figure 5", "curves share their shape: break frequency at a mean of 7 V"]

@@ -34,7 +34,7 @@ def row(
 
 
 @pytest.mark.parametrize(
-    ("basis", "verdict"), [("computed", "reproduced"), ("model", "predicted"), ("target", "calibrated to")]
+    ("basis", "verdict"), [("computed", "reproduced"), ("model", "predicted"), ("target", "calibrated")]
 )
 def test_what_agrees_is_called_by_where_ours_is_from(basis: Basis, verdict: str) -> None:
     assert verdict_of(row(basis=basis)) == verdict
