@@ -85,7 +85,7 @@ def test_what_it_costs_not_to_use_the_pressure_is_noted(form: str) -> None:
 
 
 def test_a_fit_is_refused_for_what_speaks_against_its_model_and_not_for_a_wide_bound() -> None:
-    frozen = with_fault(log(duration=2.0), SensorFault(channel="position_m", kind="freeze", start=1.0))
+    frozen = with_fault(log(duration=1.0), SensorFault(channel="position_m", kind="freeze", start=0.5))
     found = estimate_log(frozen, Rig())
     assert SensorCode.SENSOR_FROZE in [note.code for note in refused(found.evidence)]
     stuck = log("major_friction", "sine", duration=1.0).replace(**{PRESSURE: None})

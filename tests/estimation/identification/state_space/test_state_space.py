@@ -110,8 +110,7 @@ def test_outputs_share_one_model_that_is_saved_with_its_covariance(tmp_path_fact
 
 
 def test_dead_time_is_a_state_of_its_own_or_a_late_input() -> None:
-    system = identified(logged(4, 400), 3)
-    late = replace(system, delays=(2, 0))
+    late = replace(plant(), delays=(2, 0))
     a, b, c, d = late.with_delays_as_states()
     z = complex(np.exp(0.3j))
     response = c @ np.linalg.inv(z * np.eye(len(a)) - a) @ b + d
