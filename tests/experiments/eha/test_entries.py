@@ -252,7 +252,7 @@ def test_a_piston_that_stands_still_is_the_reason_why_there_is_no_number() -> No
     rng, p = np.random.default_rng(8), replace(EhaParameters(), friction_coulomb=1e6)
     seized = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     resting = {name: np.zeros(len(seized)) for name in ("motor_speed_rad_s", "position_m")}
-    logs = seized.replace(**{PRESSURE: 10.0 * seized[PRESSURE]}), seized.replace(**resting)
+    logs = seized.replace(motor_speed_rad_s=seized["motor_speed_rad_s"] / 6.28), seized.replace(**resting)
     for one, reason in zip(logs, (EstimateCode.STILL_AND_FOREIGN, EstimateCode.PUMP_AND_PISTON_REST), strict=True):
         entries = estimate_entries(estimate_log(one, Rig()))
         assert entries["outcome"] == Outcome.NOT_OBSERVABLE

@@ -13,7 +13,6 @@ from estimation.finding import OUTCOMES
 from estimation.identification.model.linear_model import LinearModel
 from estimation.notes import EstimateCode, RigCode
 from experiments.cli import app
-from experiments.eha import screens
 from faults.conditions import CONDITIONS
 from faults.notes import AdviceCode, AgainstCode, ClassCode
 from plant.eha.model import EhaParameters
@@ -223,14 +222,10 @@ def test_diagnose_names_the_condition_in_every_format(steps: dict[str, Path], fo
         assert one["gate"] == {"passed": True, "reasons": []}
 
 
-def test_diagnose_marks_the_best_on_the_screen(steps: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_diagnose_marks_the_best_on_the_screen(steps: dict[str, Path]) -> None:
     shown = invoke("diagnose", steps[".csv"], "--scores").stdout
     (marked,) = [line for line in shown.splitlines() if "<- best" in line]
     assert marked.split()[0] == "minor_friction"
-    monkeypatch.setattr(screens, "MOST_TABLES", 1)
-    many = invoke("diagnose", *[steps[".csv"]] * 2).stdout
-    assert "<- best" not in many
-    assert many.count(", wide") == 2
 
 
 def test_no_class_is_given_where_nothing_moves(folder: Path) -> None:

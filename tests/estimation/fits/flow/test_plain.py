@@ -55,7 +55,7 @@ SPEED = 175.0
 
 def test_steps_that_chatter_are_shortened_and_the_log_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
     """With usual steps such logs were refused: what the model left was its own error."""
-    speed = chirp(2.5, 5e-4, SPEED, 0.5, 4.0)
+    speed = chirp(1.5, 5e-4, SPEED, 0.5, 4.0)
     sensors, rng = replace(BENCH, pressure_noise=1500.0), np.random.default_rng(1)
     rod = EhaParameters(**{name: getattr(PILOTED, name) for name in PARAMETER_NAMES})
     logged = Logged(*without_strays(simulate(CIRCUIT, speed, 5e-4, PILOTED, sensors=sensors, rng=rng)))

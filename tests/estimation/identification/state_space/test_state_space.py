@@ -56,6 +56,16 @@ def test_the_subspace_start_is_near_the_poles() -> None:
     assert min(distance) < 0.05
 
 
+def test_deviations_of_a_log_are_those_of_the_bound_and_its_errors_are_within_them() -> None:
+    data = logged(0, 500)
+    (values, deviations), limit = told(identified(data, 3)), told(bound(data))[1]
+    free = limit > 1e-9
+    assert deviations[free] == pytest.approx(limit[free], rel=0.5)
+    assert np.mean(deviations[free] / limit[free]) == pytest.approx(1.0, abs=0.1)
+    assert np.sqrt(np.mean(((values - told(plant())[0])[free] / limit[free]) ** 2)) < 2.0
+
+
+@pytest.mark.slow
 def test_errors_are_at_the_bound_and_deviations_say_so() -> None:
     truth, errors, own = told(plant())[0], [], []
     for seed in range(8):
@@ -117,6 +127,7 @@ def test_dead_time_is_a_state_of_its_own_or_a_late_input() -> None:
     assert response == pytest.approx(late.response(z)[0])
 
 
+@pytest.mark.slow  # kept numbers ask it of smaller logs
 def test_missing_samples_and_several_logs_are_one_fit() -> None:
     first, second = logged(5, 300), logged(6, 300)
     both = [
