@@ -304,7 +304,7 @@ def test_where_volume_and_mass_explain_alike_what_they_disagree_on_is_in_the_dev
 
 def test_wear_of_the_pump_is_not_excluded_by_a_log_at_one_speed() -> None:
     leaky = parameters_for(CONDITIONS["major_leakage"])
-    one_speed = 100.0 * np.where(np.arange(2000) // 50 % 2, -1.0, 1.0)
+    one_speed = 100.0 * np.where(np.arange(1200) // 50 % 2, -1.0, 1.0)
     record = simulate(CIRCUIT, one_speed, 1e-3, leaky, sensors=BENCH, rng=np.random.default_rng(3))
     found = estimate_log(record, Rig(HEALTHY))
     assert RigCode.WEAR_NOT_EXCLUDED in [note.code for note in found.notes]

@@ -138,6 +138,7 @@ def test_missing_samples_and_several_logs_are_one_fit() -> None:
     assert min(one.quality.fit_percent for one in found) > 90.0
 
 
+@pytest.mark.slow  # kept numbers ask it of a smaller log
 def test_auto_takes_the_state_space_where_outputs_share_their_dynamics() -> None:
     shared = identify_outputs(logged(7, 300), structure="auto", order=3, delay=1)
     assert {one.model.structure for one in shared} == {"state-space"}
