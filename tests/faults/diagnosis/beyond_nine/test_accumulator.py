@@ -28,7 +28,7 @@ LITTLE = replace(circuit_of(PILOTED), accumulator_gas=1.5e-4, accumulator_oil=1.
 def of_rod() -> tuple[Blocks, Actuator, ClassFits]:
     """Return a log of the rod with little gas, and circuits that have a litre of it."""
     actuator = actuator_of(replace(LITTLE, accumulator_gas=1e-3, accumulator_oil=1e-3))
-    speed = chirp(4.0, 5e-4, SPEED, 0.3, 1.0)
+    speed = chirp(2.5, 5e-4, SPEED, 0.3, 1.0)
     record = simulate(CIRCUIT, speed, 5e-4, LITTLE, sensors=BENCH, rng=np.random.default_rng(1))
     log = blocks_of(record)
     return log, actuator, fit_classes(log, actuator)
