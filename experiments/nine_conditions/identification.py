@@ -79,9 +79,7 @@ def draw_order(order: pd.DataFrame) -> Figure:
     Figure
         Two panels: of the impulse response, and of the projected data.
     """
-    suggested = int(order["suggested_order"].iloc[0])
-    title = f"Singular values of the normal condition: order {suggested} stands above the noise"
-    figure, axes = panels(title, 1, 2, 3.4, Margins(left=0.8, top=0.6, across=0.85))
+    figure, axes = panels("Singular values of the normal condition", 1, 2, 3.4, Margins(left=0.8, top=0.6, across=0.85))
     shown = (("hankel", "Hankel matrix of the impulse response"), ("projected", "projected data matrix"))
     for axis, (name, words) in zip(axes, shown, strict=True):
         floor = float(order[f"{name}_floor"].iloc[0])
@@ -94,7 +92,7 @@ def draw_order(order: pd.DataFrame) -> Figure:
         say(axis, "noise floor", (last + 0.6, floor), (0, -4), color=VERMILION, ha="right", va="top")
         axis.set(yscale="log", ylim=(0.5 * min(floor, float(order[name].min())), None), xlim=(0.4, last + 0.6))
         axis.xaxis.set_major_locator(MaxNLocator(integer=True))
-        axis.set(title=words, xlabel="index [count]")
+        axis.set(title=f"{words}: {int(above.sum())} above the noise", xlabel="index [count]")
     axes[0].set(ylabel="singular value [m/s per rad/s]")
     axes[1].set(ylabel="singular value [normalised]")
     return figure

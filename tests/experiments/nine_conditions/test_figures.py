@@ -140,10 +140,16 @@ def test_scores_frame_the_smallest_of_each_row(study: Found, drawn: Mapping[str,
     assert framed == list(enumerate(study.tables["score_example"].to_numpy().argmin(axis=1)))
 
 
-def test_order_is_named_in_the_title(study: Found) -> None:
-    order = study.series["order"].assign(suggested_order=7)
+def test_each_panel_of_singular_values_says_how_many_stand_above_its_noise(study: Found) -> None:
+    order = study.series["order"]
+    edges = {"hankel_floor": order["hankel"].nlargest(3).iloc[-1], "projected_floor": order["projected"].max() / 2.0}
     with styled():
-        assert "order 7" in draw_order(order).get_suptitle()
+        hankel, projected = draw_order(order.assign(**edges)).axes
+    above = int((order["projected"] > edges["projected_floor"]).sum())
+    assert [axis.get_title(loc="left").split(": ")[1] for axis in (hankel, projected)] == [
+        "2 above the noise",
+        f"{above} above the noise",
+    ]
 
 
 def test_figures_leave_the_tables_as_they_were(study: Found) -> None:
