@@ -191,6 +191,7 @@ class EstimateCode(Code):
     PUMP_AND_PISTON_REST = (
         "neither the pump nor the piston moves noticeably in this log: bulk modulus is not observable"
     )
+    POSITION_CONSTANT = "{channel} never changes: a dead sensor and a piston that stands still look alike"
     PISTON_STANDS_STILL = (
         "the piston moves by only {moved_m:.2g|mm} mm, while the pump turns enough for {pumped_m:.3g|mm} mm: it is "
         "stuck, or leakage takes all that is pumped; no motion confirms the units of motor speed and pressure"

@@ -9,7 +9,7 @@ import numpy as np
 
 from estimation.eha.another_rig import unless_another_rig
 from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
-from estimation.eha.foreign_oil import at_rest_throughout, unless_foreign
+from estimation.eha.foreign_oil import shows_no_motion, unless_foreign
 from estimation.eha.named_methods import NAMED
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide, without_number
 from estimation.eha.rig_share import fitted_responses, scaled_responses, with_wear
@@ -197,10 +197,12 @@ def estimate_clean(
     form = _form(options, log.record)
     if log.mistakes:
         return _misread(log, form)
+    if automatic and not filtering and (wrong := _wrong_sensors(log, form)):
+        return without_number(Outcome.MISMATCH, wrong, form, FITTED[form][1])
     if automatic and form == "motion" and (bound := rigid_bound(log, parameters)) > LARGEST_BOUND:
         unseen = without_number(Outcome.NOT_OBSERVABLE, (too_wide(bound),), form, MOTION_CHANNELS, bound)
         return _doubting_sensors(unseen, log)
-    if automatic and form == "flow" and not filtering and (still := at_rest_throughout(log.record, parameters)):
+    if automatic and form == "flow" and not filtering and (still := shows_no_motion(log.record, parameters)):
         return _doubting_sensors(without_number(Outcome.NOT_OBSERVABLE, still, form, FLOW_CHANNELS), log)
     fit = None if filtering else _fit(log, parameters, form, guess, spreads, chosen=options.method == LEAST_SQUARES)
     if fit is not None and (slips := _channel_slips(fit, parameters)):
@@ -241,6 +243,11 @@ def _fit(
     ended = any(note.code == EstimateCode.SEARCH_ENDED for note in fit.reasons)
     plain = not fit.reasons  # to the noise: a load that leaks off at once leaves nothing strange
     return None if loaded and fit.explanation is None and not (ended or plain) else fit  # a filter needs no rest
+
+
+def _wrong_sensors(log: CleanLog, form: str) -> tuple[Note, ...]:
+    """Return the objections to the sensors that a fit would use: it would explain them by faults that are not there."""
+    return log.objections_to((*FITTED[form][1], SPEED)) if form in FITTED else ()
 
 
 def _doubting_sensors(found: BulkModulusEstimate, log: CleanLog) -> BulkModulusEstimate:

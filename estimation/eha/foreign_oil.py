@@ -7,10 +7,12 @@ on that friction takes. Oil that is compressed behind a piston that stands still
 from dataclasses import replace
 from math import log as ln
 
+import numpy as np
+
 from estimation.eha.result import BulkModulusEstimate, without_number
 from estimation.finding import Outcome
 from estimation.fits.flow.misread import KIN
-from estimation.log_checks.channel_names import PRESSURE
+from estimation.log_checks.channel_names import POSITION, PRESSURE, VELOCITY
 from estimation.log_checks.channel_physics import PRESSURE_OFF
 from estimation.log_checks.standstill import travels
 from estimation.notes import ChannelCode, EstimateCode
@@ -19,13 +21,16 @@ from plant.log.record import Record
 from plant.notes import Note
 
 
-def at_rest_throughout(record: Record, p: EhaParameters) -> tuple[Note, ...]:
-    """Return the objection to a log in which neither pump nor piston moves.
+def shows_no_motion(record: Record, p: EhaParameters) -> tuple[Note, ...]:
+    """Return the objection to a log in which neither pump nor piston moves, or no sensor of the piston ever changes.
+
+    A piston that stands still yields on its seals, which makes 2 % of bulk modulus; a sensor that shows no such thing
+    is dead or too coarse.
 
     Parameters
     ----------
     record : Record
-        The log.
+        The log, with position.
     p : EhaParameters
         The healthy actuator.
 
@@ -35,7 +40,12 @@ def at_rest_throughout(record: Record, p: EhaParameters) -> tuple[Note, ...]:
         Empty where one of them moves.
     """
     gone = travels(record, p)
-    return (EstimateCode.PUMP_AND_PISTON_REST.note(),) if gone is not None and gone.at_rest else ()
+    if gone is not None and gone.at_rest:
+        return (EstimateCode.PUMP_AND_PISTON_REST.note(),)
+    seen = [record[name][np.isfinite(record[name])] for name in (POSITION, VELOCITY) if name in record]
+    if any(len(one) and np.ptp(one) > 0.0 for one in seen):
+        return ()
+    return (EstimateCode.POSITION_CONSTANT.note(channel=POSITION),)
 
 
 def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters) -> BulkModulusEstimate:

@@ -1,4 +1,4 @@
-"""Does a still encoder miss a motion? Judged by the leakage of the log itself, not by a healthy actuator's."""
+"""Does a still encoder miss a motion, or that seals yield? Leakage is the log's own, not a healthy actuator's."""
 
 import numpy as np
 
@@ -23,6 +23,13 @@ SHORTEST_TRAVEL = 5e-4
 
 AT_RELIEF = 0.9
 """Share of the relief setting from which the valve may take all that is pumped [fraction]."""
+
+SEALS_YIELD, RESOLVED = 2e-5, 10.0
+"""How far seals yield before they slide [m] (judged), and quanta of an encoder by which it must show that [count]."""
+
+FAR_LONGER, SWINGS = 10.0, 0.5
+"""Times the longest other hold, and share of the range of pressure elsewhere, from which a hold is looked at
+[dimensionless]."""
 
 JUMP, BEYOND_PUMP = 10.0, 5.0
 """A step after a hold is a jump if it is so many times any other, and so many times what the pump can move."""
@@ -53,6 +60,41 @@ def jumped(record: Record, hold: slice, p: EhaParameters) -> bool:
     others = np.delete(rate, after)
     fastest = float(np.nanmax(np.abs(record[SPEED]))) * p.pump_displacement / p.piston_area
     return bool(rate[after] > max(JUMP * float(np.max(others, initial=0.0)), BEYOND_PUMP * fastest))
+
+
+def misses_seals(record: Record, hold: slice, p: EhaParameters) -> bool:
+    """Return whether a fine encoder of a piston that only yields on its seals repeats one value for long.
+
+    Pressure swings on meanwhile, and the encoder repeats itself for far longer than anywhere else.
+
+    Parameters
+    ----------
+    record : Record
+        The log, with position.
+    hold : slice
+        Samples over which it is still.
+    p : EhaParameters
+        The actuator, for its friction.
+    """
+    length = hold.stop - hold.start
+    if PRESSURE not in record or min(length, len(record) - length) * record.sample_time < WINDOW:
+        return False
+    position = record[POSITION].copy()
+    position[hold.start + 1 : hold.stop] = np.nan
+    position = position[np.isfinite(position)]
+    steps = np.diff(position)
+    moved = np.flatnonzero(steps)
+    if np.ptp(position) > SHORTEST_TRAVEL or len(moved) < FEWEST or length < FAR_LONGER * np.max(np.diff(moved)):
+        return False
+    within, usual = (_range(one) for one in (record[PRESSURE][hold], np.delete(record[PRESSURE], hold)))
+    yields = SEALS_YIELD * within * p.piston_area / p.friction_coulomb if p.friction_coulomb > 0.0 else 0.0
+    return within > SWINGS * usual and yields > RESOLVED * float(np.min(np.abs(steps[moved])))
+
+
+def _range(values: Array) -> float:
+    """Return the range of a channel without its highest and lowest hundredth; NaN where hardly anything is there."""
+    there = values[np.isfinite(values)]
+    return float(np.subtract(*np.percentile(there, (99.0, 1.0)))) if len(there) > FEWEST else np.nan
 
 
 def missed_motion(record: Record, hold: slice, p: EhaParameters) -> bool:

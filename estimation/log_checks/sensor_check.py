@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.channel_names import CHAMBERS, POSITION, PRESSURE, PRESSURES, SPEED, VELOCITY
 from estimation.log_checks.filtered import independent_rows
-from estimation.log_checks.frozen_encoder import jumped, missed_motion
+from estimation.log_checks.frozen_encoder import jumped, missed_motion, misses_seals
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.log_checks.order import median
 from estimation.log_checks.velocity_strays import strays_unusually
@@ -191,9 +191,8 @@ def _frozen_position(record: Record, p: EhaParameters) -> Note | None:
     if stretch is None:
         return None
     slid, rests = shows_motion(record, stretch)
-    if slid or jumped(record, stretch, p) or (not rests and missed_motion(record, stretch, p)):
-        return _says_frozen(POSITION, stretch, record)
-    return None
+    missed = not rests and (missed_motion(record, stretch, p) or misses_seals(record, stretch, p))
+    return _says_frozen(POSITION, stretch, record) if slid or missed or jumped(record, stretch, p) else None
 
 
 def shows_motion(record: Record, stretch: slice) -> tuple[bool, bool]:

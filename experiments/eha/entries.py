@@ -187,7 +187,12 @@ def estimate_message(found: "Finding") -> str:
             return clauses(
                 [f"no value of bulk modulus: {volume}; correct chamber_volume, then estimate this log again"]
             )
-        at_rest = {EstimateCode.PUMP_AND_PISTON_REST, EstimateCode.PISTON_STANDS_STILL, EstimateCode.STILL_AND_FOREIGN}
+        at_rest = {
+            EstimateCode.PUMP_AND_PISTON_REST,
+            EstimateCode.POSITION_CONSTANT,
+            EstimateCode.PISTON_STANDS_STILL,
+            EstimateCode.STILL_AND_FOREIGN,
+        }
         still = [str(note) for note in found.gate.reasons if note.code in at_rest]
         if seen and still and not mistakes:
             return clauses([f"no value of bulk modulus: {still[0]}", *still[1:]])

@@ -6,13 +6,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.log_checks.frozen_encoder import missed_motion
 from estimation.log_checks.sensor_check import sensor_objections
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import DRIVES, make_drive
 from plant.eha.model import EhaParameters
-from plant.eha.simulate import LUMPED, simulate
+from plant.eha.simulate import CIRCUIT, LUMPED, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 from tests.thinned import thinned
@@ -66,6 +67,18 @@ def test_an_encoder_that_freezes_for_good_is_named(absent: tuple[str, ...], leak
     assert [note.data["channel"] for note in sensor_objections(log.replace(**dict.fromkeys(absent)), HEALTHY)] == [
         POSITION
     ]
+
+
+def test_an_encoder_that_freezes_while_the_piston_yields_on_its_seals_is_named() -> None:
+    """Half of such a log passed as air that enters, or as a speed in another unit: no motion of 0.5 mm is missed."""
+    p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(18811)
+    log = simulate(CIRCUIT, make_drive("sine", 4.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    unseen = log.replace(**{VELOCITY: None})
+    assert sensor_objections(unseen, HEALTHY) == ()
+    (said,) = sensor_objections(frozen(unseen, 4000)[0], HEALTHY)
+    assert (said.code, said.data["channel"]) == (SensorCode.SENSOR_FROZE, POSITION)
+    found = estimate_bulk_modulus(frozen(unseen, 4000)[0], HEALTHY)
+    assert (found.value, found.explanation, found.gate.reasons) == (None, None, (said,))
 
 
 def test_a_flow_bias_is_known_though_the_motor_rests_most_of_the_log() -> None:
