@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimation.eha.rig_share import DELIVERY_ENTRY
+from estimation.fits.hypotheses import PRESUMED
 from faults.conditions import CONDITIONS
 from faults.notes import ClassCode
 from plant.arrays import Array
@@ -20,6 +22,18 @@ WORTH_SAYING = 0.01
 
 LOWEST = 0.1
 """Setting of a relief valve over the rig file's, to which it may be low [fraction]: no piston slides below."""
+
+DELIVERIES = (0.7, 0.75, 0.8, 0.85, 0.9)
+"""Shares of its displacement that a worn pump delivers [dimensionless]. A log of 10 s holds one of 0.85 by 50 of
+log-likelihood more than its neighbours at 0.8 and 0.9, which it holds no better than a sound one."""
+
+SO_WORN = math.log(0.5)
+"""Log-likelihood of one of them before a log is seen, beside what is presumed of wear [dimensionless]: it stands for a
+twentieth, a sound pump for a tenth."""
+
+WELL_WORN = 0.8
+"""Share up to which a pump is a worn one whatever the rig file's displacement is worth [dimensionless]: an entry may be
+off by 5 %, and what is presumed of wear has a deviation of 15 %."""
 
 STAYS = 0.5
 """Probability of a condition, beside a fault, from which it is the same as without [probability]."""
@@ -67,6 +81,50 @@ def odds_of_hidden_relief(pressure: float, setting: float) -> float:
     if not 0.0 < pressure < setting:
         return -math.inf
     return math.log(min(math.log(setting / pressure) / -math.log(LOWEST), 1.0))
+
+
+def odds_of_wear(scores: Sequence[float], sound: float) -> float:
+    """Return the odds of a well worn pump against a sound one, with the prior of wear.
+
+    What is presumed of wear before a log is seen is that of `faults.diagnosis.beyond_nine.wear.summed_over_wear`.
+
+    Parameters
+    ----------
+    scores : sequence of float
+        How well pumps that deliver each of `DELIVERIES` explain a log [dimensionless].
+    sound : float
+        The same of a sound pump [dimensionless].
+
+    Returns
+    -------
+    float
+        Logarithm of the ratio of pumps that deliver `WELL_WORN` at most to sound ones [dimensionless].
+
+    Examples
+    --------
+    >>> odds_of_wear([-9.0, -9.0, 0.0, 9.0, 9.0], 0.0) < 0.0 < odds_of_wear([-9.0, 0.0, 2.0, 0.0, 0.0], 0.0)
+    True
+    """
+    well = np.array(DELIVERIES) <= WELL_WORN
+    return float(np.logaddexp.reduce((np.array(scores) - sound + presumed_of_wear(DELIVERIES))[well]))
+
+
+def presumed_of_wear(shares: Sequence[float]) -> Array:
+    """Return the log-likelihoods of what pumps deliver before a log is seen.
+
+    Parameters
+    ----------
+    shares : sequence of float
+        What they deliver over their displacement [dimensionless].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Half a normal distribution of the logarithm of deviation `PRESUMED`, with `SO_WORN`; 0 for a sound pump
+        [dimensionless].
+    """
+    delivered = np.asarray(shares, dtype=np.float64)
+    return -0.5 * (np.log(delivered) / PRESUMED[DELIVERY_ENTRY]) ** 2 + np.where(delivered < 1.0, SO_WORN, 0.0)
 
 
 def probabilities_of(odds: Mapping[str, float]) -> dict[str, float]:

@@ -8,20 +8,20 @@ the best of several sound circuits is taken.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from estimation.eha.rig_share import DELIVERY_ENTRY
-from estimation.fits.hypotheses import PRESUMED
 from faults.conditions import CONDITIONS
 from faults.diagnosis.beyond_nine.left_open import (
+    DELIVERIES,
     WORTH_SAYING,
     OpenFault,
     not_excluded,
     odds_of_hidden_relief,
+    odds_of_wear,
     probabilities_of,
 )
 from faults.diagnosis.beyond_nine.sound_circuit import Tried, sound_circuit
@@ -59,17 +59,10 @@ STUCK = "a make-up valve that is stuck shut"
 SOUND = "a sound circuit"
 """What one is called that differs from the rig file's in what no rig file knows."""
 
-DELIVERIES = (0.7, 0.8, 0.9)
-"""Shares of its displacement that a worn pump delivers [dimensionless]."""
-
 LIKELIER = 10.0
 """How many times likelier than a sound pump a well worn one must be to be believed [dimensionless]: evidence is called
 strong from there on (Jeffreys, Theory of Probability, 1961, appendix B). Of 16 sound training logs under major leakage
 and friction none comes to more than 1.4."""
-
-WELL_WORN = 0.8
-"""Share up to which a pump is a worn one whatever the rig file's displacement is worth [dimensionless]: an entry may be
-off by 5 %, and what is presumed of wear has a deviation of 15 %."""
 
 SHUT = (0.9, 0.97, 0.99, 1.0)
 """Shares of a make-up valve that are stuck shut [dimensionless]: one that lets a little oil through passes for friction
@@ -242,48 +235,6 @@ def _with_each(blocks: Blocks, sound: Tried, runs: Array, behind: float = HOPELE
     """Yield each fault, and the circuit with it that explains a log best."""
     for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best, sound.actuator)):
         yield fault, _with(fault, blocks, sound, runs, behind)
-
-
-def odds_of_wear(scores: Sequence[float], sound: float) -> float:
-    """Return the odds of a well worn pump against a sound one, with the prior of wear.
-
-    What is presumed of wear before a log is seen is that of `faults.diagnosis.beyond_nine.wear.summed_over_wear`.
-
-    Parameters
-    ----------
-    scores : sequence of float
-        How well pumps that deliver each of `DELIVERIES` explain a log [dimensionless].
-    sound : float
-        The same of a sound pump [dimensionless].
-
-    Returns
-    -------
-    float
-        Logarithm of the ratio of pumps that deliver `WELL_WORN` at most to sound ones [dimensionless].
-
-    Examples
-    --------
-    >>> odds_of_wear([-9.0, 0.0, 9.0], 0.0) < 0.0 < odds_of_wear([-9.0, 2.0, 0.0], 0.0)
-    True
-    """
-    well = np.array(DELIVERIES) <= WELL_WORN
-    return float(np.logaddexp.reduce((np.array(scores) - sound + presumed_of_wear(DELIVERIES))[well]))
-
-
-def presumed_of_wear(shares: Sequence[float]) -> Array:
-    """Return the log-likelihoods of what pumps deliver before a log is seen.
-
-    Parameters
-    ----------
-    shares : sequence of float
-        What they deliver over their displacement [dimensionless].
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Half a normal distribution of the logarithm of deviation `PRESUMED`, 0 for a sound pump [dimensionless].
-    """
-    return np.asarray(-0.5 * (np.log(shares) / PRESUMED[DELIVERY_ENTRY]) ** 2, dtype=np.float64)
 
 
 def largest_pressure(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float:

@@ -19,9 +19,9 @@ from estimation.eha.rig_share import delivery_left_open, wear_left_open
 from estimation.finding import NORMAL_95
 from estimation.fits.hypotheses import OFFSET
 from estimation.notes import RigCode
-from faults.diagnosis.beyond_nine.left_open import WORTH_SAYING
+from faults.diagnosis.beyond_nine.left_open import DELIVERIES, WORTH_SAYING, presumed_of_wear
 from faults.diagnosis.beyond_nine.near_enough import lies_beside, only_beside
-from faults.diagnosis.beyond_nine.other_faults import DELIVERIES, faults_outside, presumed_of_wear
+from faults.diagnosis.beyond_nine.other_faults import faults_outside
 from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator
@@ -43,6 +43,9 @@ the nine conditions keep their order below it."""
 FLOW_SCALE = np.array([{"leakage": 1.0, "bias": 1.0, "bulk_modulus": -1.0}.get(name, 0.0) for name in COORDINATES])
 """Direction in which all flows of a piston that hardly moves scale with what the pump delivers [dimensionless]: where
 wear is left open, this is why, and pumps that differ explain the log alike along it."""
+
+TRIED = DELIVERIES[::2]
+"""Shares that pumps deliver for which circuits are fitted where pressure is logged [dimensionless]."""
 
 UNLIKELY = math.log(1e-3)
 """Log-likelihood of a delivery below the likeliest one's from which no circuit is fitted with it [dimensionless]."""
@@ -184,7 +187,7 @@ def probabilities_over_wear(
 ) -> Mapping[str, float] | None:
     """Return the probability of each condition, whatever the pump delivers, where a log does not tell.
 
-    The conditions are scored again for pumps that deliver `DELIVERIES` of their displacement, as far as the balance
+    The conditions are scored again for pumps that deliver `TRIED` of their displacement, as far as the balance
     of flows leaves them likely; see `summed_over_wear`.
 
     Parameters
@@ -206,13 +209,13 @@ def probabilities_over_wear(
     left = delivery_left_open(remarks)
     if board.blocks.pressure is None or left is None:
         return None
-    deliveries = np.log([1.0, *DELIVERIES])
+    deliveries = np.log([1.0, *TRIED])
     likely = -0.5 * ((deliveries - left.size) / left.deviation) ** 2
     likely[deliveries < left.least] = -math.inf
     likely -= np.max(likely)
     healthy, scores, kept = actuator.circuit, [board.fits.scores], [likely[0]]
     runs = nominal_runs(board.blocks, actuator)
-    for share, one in zip(DELIVERIES, likely[1:], strict=True):
+    for share, one in zip(TRIED, likely[1:], strict=True):
         if one < UNLIKELY:
             continue
         kept.append(one)

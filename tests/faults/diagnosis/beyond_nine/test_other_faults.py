@@ -9,13 +9,7 @@ import pytest
 from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine import other_faults
-from faults.diagnosis.beyond_nine.other_faults import (
-    DELIVERIES,
-    Outside,
-    faults_outside,
-    largest_pressure,
-    odds_of_wear,
-)
+from faults.diagnosis.beyond_nine.other_faults import Outside, faults_outside, largest_pressure
 from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuits.actuator import Actuator, actuator_of
 from faults.diagnosis.circuits.blocks import Blocks
@@ -76,6 +70,15 @@ def test_a_fault_that_no_condition_has_is_named(name: str) -> None:
     )
 
 
+@pytest.mark.parametrize("share", [0.75, 0.85])
+def test_a_pump_that_delivers_something_between_tenths_is_named(share: float) -> None:
+    """10 s of steps of one that delivers 85 % were minor leakage at 98 %: neither 80 nor 90 % explained them better."""
+    circuit = replace(SOUND, pump_displacement=share * SOUND.pump_displacement)
+    ((found, data),), _ = said(log_of(circuit, "normal"))
+    assert found == AgainstCode.PUMP_DELIVERS_LESS
+    assert data["percent"] == pytest.approx(100.0 * share)
+
+
 @pytest.mark.parametrize("condition", ["normal", "minor_leakage", "major_friction", "major_leakage_major_friction"])
 def test_no_fault_is_named_in_a_sound_circuit(condition: str) -> None:
     assert not said(log_of(condition=condition))[0]
@@ -99,12 +102,6 @@ def test_a_valve_that_never_had_to_open_is_not_excluded_and_a_worn_pump_is_where
     assert not against
     assert "stuck shut" in open_
     assert "worn pump" not in open_
-
-
-@pytest.mark.parametrize("shares", [(-9.0, -4.0, 3.9), (0.0, 0.0, 3.9), (3.0, 1.0, 0.0), (-9.0, 1.2, 1.0)], ids=str)
-def test_a_pump_that_is_well_worn_need_only_be_likelier_than_a_sound_one(shares: tuple[float, ...]) -> None:
-    less, well = np.exp(np.array(shares) - 0.5 * (np.log(DELIVERIES) / 0.15) ** 2), np.array([1.0, 1.0, 0.0])
-    assert odds_of_wear([one - 5.0 for one in shares], -5.0) == pytest.approx(np.log(less @ well))
 
 
 def test_what_a_worn_pump_gains_may_be_less_than_what_a_rare_fault_must(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,6 @@ from estimation.notes import RigCode
 from experiments.open_benchmark.kinds import make
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine import wear
-from faults.diagnosis.beyond_nine.other_faults import DELIVERIES
 from faults.diagnosis.beyond_nine.wear import chance_of_wear, probabilities_over_wear, whatever_the_pump_delivers
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
@@ -72,7 +71,7 @@ def test_conditions_are_summed_over_pumps_by_what_is_presumed_of_them(monkeypatc
     one = blocks()
     told = {"models": np.linspace(0.0, -6.0, 9), "parameters": np.linspace(-3.0, 0.0, 9)}
     board = Scoreboard(told, one, made_classes(OFF, one), log(), None)
-    scores = {share: np.random.default_rng(round(10.0 * share)).normal(size=9) for share in DELIVERIES}
+    scores = {share: np.random.default_rng(round(10.0 * share)).normal(size=9) for share in wear.TRIED}
     sound = RIG.circuit.pump_displacement
 
     def fitted(_: Any, actuator: Any, runs: Any, start: Any) -> Any:

@@ -1,0 +1,23 @@
+"""How likely a fault is that a log does not exclude."""
+
+import numpy as np
+import pytest
+
+from faults.diagnosis.beyond_nine.left_open import DELIVERIES, odds_of_wear, presumed_of_wear
+
+
+@pytest.mark.parametrize(
+    "shares",
+    [(-9.0, -9.0, -4.0, 3.9, 3.9), (0.0, 0.0, 0.0, 3.9, 3.9), (3.0, 3.0, 1.0, 0.0, 0.0), (-9.0, 0.0, 1.2, 1.0, 1.0)],
+    ids=str,
+)
+def test_a_pump_that_is_well_worn_need_only_be_likelier_than_a_sound_one(shares: tuple[float, ...]) -> None:
+    presumed = 0.5 * np.exp(-0.5 * (np.log(DELIVERIES) / 0.15) ** 2)
+    less, well = np.exp(shares) * presumed, np.array([1.0, 1.0, 1.0, 0.0, 0.0])
+    assert odds_of_wear([one - 5.0 for one in shares], -5.0) == pytest.approx(np.log(less @ well))
+
+
+def test_what_is_presumed_of_wear_does_not_hang_on_how_many_pumps_are_tried() -> None:
+    tenths = np.exp(-0.5 * (np.log([0.7, 0.8, 0.9]) / 0.15) ** 2)
+    assert np.sum(np.exp(presumed_of_wear(DELIVERIES))) == pytest.approx(np.sum(tenths), rel=0.2)
+    assert presumed_of_wear([1.0]) == 0.0
