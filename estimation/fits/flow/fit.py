@@ -132,20 +132,22 @@ def fit_flow(
         read = replace(answer.plain.start, turns_read=True)
         answer = agreed(answer, _answered(corrected, read, sensed, traits, work))
     plain, asked, open_ends, strange, ended = answer
-    if (slip := corrected.misread(plain, plain.best if strange is None else strange.fit)) is not None:
-        return replace(_plain_fit(plain, sensed, (), begun=False), reasons=(slip,))
-    if strange is not None:
-        return _explained_fit(plain, strange, sensed, traits)
-    loss = None
-    if len(asked) >= len(HYPOTHESES) and not ended:
-        try:
-            with work.counted():
+    slip = loss = None
+    try:
+        with work.counted():
+            slip = corrected.misread(plain, plain.best if strange is None else strange.fit)
+            if slip is None and strange is None and len(asked) >= len(HYPOTHESES) and not ended:
                 loss = _uneven(plain, traits)
-        except WorkSpentError:
-            ended = True
+    except WorkSpentError:
+        ended = True
+    if slip is not None:
+        return replace(_plain_fit(plain, sensed, (), begun=False), reasons=(slip,))
     if loss is not None:
         return _losing_fit(plain, loss, sensed)
-    fit = _plain_fit(plain, sensed, open_ends, begun=BEGUN in asked)
+    if strange is not None:
+        fit = _explained_fit(plain, strange, sensed, traits)
+    else:
+        fit = _plain_fit(plain, sensed, open_ends, begun=BEGUN in asked)
     return replace(fit, reasons=(*fit.reasons, EstimateCode.SEARCH_ENDED.note())) if ended else fit
 
 

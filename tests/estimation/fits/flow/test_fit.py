@@ -10,7 +10,9 @@ import pytest
 from estimation.eha.bulk_modulus import LEAST_SQUARES, estimate_bulk_modulus
 from estimation.fits.flow.fit import _told_by, fit_flow  # pyright: ignore[reportPrivateUsage]
 from estimation.fits.flow.log import speed_gaps
-from estimation.fits.greybox.work_limit import Work
+from estimation.fits.flow.misread import CorrectedLogs
+from estimation.fits.flow.plain import PlainFits
+from estimation.fits.greybox.work_limit import Work, spend
 from estimation.notes import EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import circuit_of
@@ -87,6 +89,18 @@ def test_a_log_whose_search_was_ended_is_refused_and_handed_to_no_filter(
     assert found.form == "flow"
     assert found.method == LEAST_SQUARES
     assert EstimateCode.SEARCH_ENDED in [note.code for note in found.gate.reasons]
+
+
+def test_slips_that_are_asked_last_may_do_no_more_than_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pairs of slips were searched however much that took."""
+
+    def searched(_: object, plain: PlainFits, *__: object, paired: bool = True) -> None:
+        if paired:
+            spend(plain.log, 10**9)
+
+    monkeypatch.setattr(CorrectedLogs, "misread", searched)
+    found = fit_flow(log("normal", 12, duration=1.0), HEALTHY, HEALTHY.bulk_modulus)
+    assert [note.code for note in found.reasons] == [EstimateCode.SEARCH_ENDED]
 
 
 @pytest.mark.slow
