@@ -49,6 +49,8 @@ class Travels(NamedTuple):
 def travels(record: Record, p: EhaParameters) -> Travels | None:
     """Return how far piston and pump went, noise averaged out over blocks; None where one is not logged.
 
+    Without position, velocity tells.
+
     Parameters
     ----------
     record : Record
@@ -57,8 +59,11 @@ def travels(record: Record, p: EhaParameters) -> Travels | None:
         The actuator.
     """
     blocks = channel_blocks(record, p, MIDDLE)
-    if blocks.position is None or blocks.pumped is None or not len(blocks.pumped):
+    position = blocks.position
+    if position is None and blocks.velocity is not None:
+        position = np.cumsum(blocks.velocity) * blocks.length
+    if position is None or blocks.pumped is None or not len(blocks.pumped):
         return None
     offset = p.pump_displacement * LIMITS["motor_speed_rad_s"].least
     pumped = np.cumsum(blocks.pumped - np.clip(np.mean(blocks.pumped), -offset, offset)) * blocks.length
-    return Travels(float(np.ptp(blocks.position)), float(np.ptp(pumped)) / p.piston_area)
+    return Travels(float(np.ptp(position)), float(np.ptp(pumped)) / p.piston_area)

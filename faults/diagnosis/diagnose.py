@@ -28,6 +28,7 @@ from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
 from faults.diagnosis.beyond_nine.balance_refused import class_without_balance
 from faults.diagnosis.beyond_nine.drift import over_drift
 from faults.diagnosis.beyond_nine.load import Loaded, under_load
+from faults.diagnosis.beyond_nine.near_enough import BESIDE
 from faults.diagnosis.beyond_nine.wear import whatever_the_pump_delivers
 from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuit_verdict import Diagnosis
@@ -133,7 +134,9 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     if stands is not None:
         left, found = (), replace(found, notes=(*found.notes, stands))
     still = stands_still(log.record, case.healthy, diagnosis.not_told)
-    against = distinct((*still, *left, *diagnosis.against))
+    # a piston that stands still shows no friction that could lie beside the nine
+    follow = tuple(note for note in diagnosis.against if not (still and note.code in BESIDE))
+    against = distinct((*still, *left, *follow))
     if against and not still:  # nominal models are no judges of another oil, but say what is off if a piston moves
         against = distinct((*against, *verdict.against))
     return _with_class(found, case, diagnosis, against)

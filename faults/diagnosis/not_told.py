@@ -7,6 +7,7 @@ import numpy as np
 
 from estimation.finding import Quantity
 from estimation.log_checks.channel_blocks import channel_blocks
+from estimation.log_checks.channel_names import POSITION
 from estimation.log_checks.channel_physics import MIDDLE
 from estimation.log_checks.standstill import travels
 from faults.conditions import CONDITIONS, parameters_for
@@ -62,7 +63,7 @@ def stands_still(record: Record, p: EhaParameters, not_told: Collection[Note]) -
     """Return the reason against all nine conditions of a piston that none of them keeps still, or that may be blocked.
 
     In the nine, friction yields to the relief pressure, so only leakage keeps the piston still. A blocked rod does so
-    as well. Pressure tells them apart, or friction that shows where the piston moves a little.
+    as well. Pressure tells them apart, or friction that shows where a position moves a little.
 
     Parameters
     ----------
@@ -76,14 +77,15 @@ def stands_still(record: Record, p: EhaParameters, not_told: Collection[Note]) -
     Returns
     -------
     tuple of Note
-        None where friction shows, the piston moves, or pressure stays where friction may hold it.
+        None where the piston moves, pressure stays where friction may hold it, or friction shows without pressure.
     """
-    said = {note.code for note in not_told}
-    gone = travels(record, p) if ClassCode.FRICTION_NOT_VISIBLE in said else None
+    gone = travels(record, p)
     if gone is None or not gone.stuck:
         return ()
+    said = {note.code for note in not_told}
     if ClassCode.ONE_SCALE in said:
-        return (AgainstCode.STUCK_OR_LEAKS.note(moved_m=gone.piston, pumped_m=gone.pump),)
+        shows = ClassCode.FRICTION_NOT_VISIBLE not in said and POSITION in record
+        return () if shows else (AgainstCode.STUCK_OR_LEAKS.note(moved_m=gone.piston, pumped_m=gone.pump),)
     pressure = channel_blocks(record, p, MIDDLE).pressure
     if pressure is None or not len(pressure) or p.area_difference != 0.0:
         return ()

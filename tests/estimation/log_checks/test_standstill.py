@@ -34,5 +34,5 @@ def test_a_piston_that_stands_still_is_stuck_only_where_its_pump_turns(
     assert gone.piston == pytest.approx(2.0 * travel, abs=2e-5 + 0.01 * travel)
 
 
-def test_nothing_is_said_without_position() -> None:
+def test_nothing_is_said_without_position_and_velocity() -> None:
     assert travels(Record(1e-3, {SPEED: np.ones(2000)}), RIG) is None

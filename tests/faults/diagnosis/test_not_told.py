@@ -73,6 +73,22 @@ def test_a_piston_that_stands_still_for_an_unknown_reason_has_no_condition(
     assert [note.code for note in found] == ([AgainstCode.STUCK_OR_LEAKS] if doubted else [])
 
 
+@pytest.mark.parametrize(("pressure", "reason"), [(None, AgainstCode.STUCK_OR_LEAKS), (3e6, AgainstCode.ROD_BLOCKED)])
+def test_without_position_velocity_tells_that_a_piston_stands_still(
+    pressure: float | None, reason: AgainstCode
+) -> None:
+    """Its noise hides what friction does; a circuit had 50 times the friction, or leakage and friction in one."""
+    time = 1e-3 * np.arange(2000)
+    sign, noise = np.sign(np.sin(3.0 * time)), 1e-3 * np.random.default_rng(2).standard_normal(2000)
+    record = Record(1e-3, {"motor_speed_rad_s": 100.0 * sign, "velocity_m_s": noise})
+    if pressure is not None:
+        record = record.replace(differential_pressure_pa=pressure * sign)
+    said = [ClassCode.ONE_SCALE.note()] if pressure is None else []
+    assert [note.code for note in stands_still(record, RIG, said)] == [reason]
+    moving = record.replace(velocity_m_s=noise + 0.01 * np.sin(3.0 * time))
+    assert stands_still(moving, RIG, said) == ()
+
+
 @pytest.mark.parametrize(("pressure", "travel", "blocked"), [(3e6, 1e-5, True), (3e5, 1e-5, False), (3e6, 5e-3, False)])
 def test_a_piston_that_stands_still_at_a_pressure_that_no_friction_of_the_nine_holds_is_blocked(
     pressure: float, travel: float, blocked: bool
