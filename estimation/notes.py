@@ -194,7 +194,7 @@ class EstimateCode(Code):
     POSITION_CONSTANT = "{channel} never changes: a dead sensor and a piston that stands still look alike"
     PISTON_STANDS_STILL = (
         "the piston moves by only {moved_m:.2g|mm} mm, while the pump turns enough for {pumped_m:.3g|mm} mm: it is "
-        "stuck, or leakage takes all that is pumped; no motion confirms the units of motor speed and pressure"
+        "stuck, or all that is pumped leaks or is compressed; no motion confirms the units of motor speed and pressure"
     )
     STILL_AND_FOREIGN = (
         "bulk modulus seems {ratio:.2g} times that in the rig file, but while the piston stands still, such oil cannot "
