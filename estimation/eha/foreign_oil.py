@@ -20,7 +20,6 @@ from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
 
-
 UNLIKE = 0.2
 """Logarithm of bulk modulus over the rig file's from which the units are doubted that no motion confirms
 [dimensionless]; judged."""
@@ -72,8 +71,8 @@ def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters)
     Returns
     -------
     BulkModulusEstimate
-        Without a number where no oil is like that, or, of a piston that stands still, where it is no kin of the rig's or
-        a vague one. That no motion confirms the units is said where the pump turns, and of oil unlike the rig's.
+        Without a number where no oil is like that, or, of a piston that stands still, where it is vague or no kin of
+        the rig's. That no motion confirms the units is said where the pump turns, and of oil unlike the rig's.
     """
     if found.value is None:
         return found
