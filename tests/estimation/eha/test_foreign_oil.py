@@ -62,7 +62,7 @@ def test_a_vague_bulk_modulus_behind_a_still_piston_is_none() -> None:
 
 @pytest.mark.parametrize(("times", "said"), [(1.1, False), (0.7, True)])
 def test_of_oil_unlike_the_rigs_behind_a_still_piston_the_units_are_doubted(times: float, said: bool) -> None:
-    """The pump need not turn far: rad/s read as rpm and psi read as bar passed with 29 % less, without a word."""
+    """The pump need not turn far: rad/s read as rpm and bar read as psi passed with 29 % less, without a word."""
     rng = np.random.default_rng(18813)
     log = simulate(CIRCUIT, make_drive("sine", 2.0, 1e-3, RIG, rng), 1e-3, RIG, sensors=BENCH, rng=rng)
     whole = replace(estimate_bulk_modulus(seized(), RIG), remarks=())
