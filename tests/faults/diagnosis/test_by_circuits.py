@@ -12,6 +12,7 @@ from estimation.log_checks.clean import clean_log
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine import wear
+from faults.diagnosis.beyond_nine.left_open import DELIVERIES
 from faults.diagnosis.beyond_nine.other_faults import Outside
 from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.calibration import Calibration, shipped_calibration
@@ -172,8 +173,11 @@ def test_without_pressure_classes_are_summed_over_what_a_pump_may_deliver(monkey
     record = simulate(CIRCUIT, speed, 1e-3, HEALTHY, sensors=BENCH, rng=np.random.default_rng(1))
     sound = diagnosed(record, pressure=False)
     place, other = (list(CONDITIONS).index(name) for name in (sound.condition, "major_leakage"))
-    worn = np.full((4, 9), -30.0)
-    worn[0, place], worn[2, other] = 0.0, 3.0  # a pump at 80 % explains the log better, in another condition
+    worn = np.full((1 + len(DELIVERIES), 9), -30.0)
+    worn[0, place], worn[1 + DELIVERIES.index(0.8), other] = (
+        0.0,
+        3.0,
+    )  # a pump at 80 % explains the log better, in another condition
     monkeypatch.setattr(wear, "faults_outside", lambda *_: Outside(worn=worn))
     found = diagnosed(record, pressure=False)
     assert sound.probabilities[sound.condition] > 0.99 * sum(sound.probabilities.values())
