@@ -11,6 +11,7 @@ from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS
 from faults.diagnosis import by_circuits
 from faults.diagnosis.beyond_nine import other_faults, sound_circuit, wear
+from faults.diagnosis.beyond_nine.left_open import WORTH_SAYING
 from faults.diagnosis.beyond_nine.other_faults import Outside, faults_outside
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
@@ -95,12 +96,12 @@ def test_a_fault_is_excluded_below_a_gain_of_minus_three(
 def test_what_worn_pumps_leave_of_the_conditions_is_told_where_they_are_not_excluded(
     best: float, open_: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scores = {1.0: 0.0, 0.7: -8.0, 0.8: best, 0.9: -5.0}
+    scores = {1.0: 0.0, 0.7: -8.0, 0.75: -7.0, 0.8: best, 0.85: -6.0, 0.9: -5.0}
     found, _ = looked(monkeypatch, lambda one: scores[worn(one)] if type(one) is type(SOUND) else 1.0)
     assert "a make-up valve that leaks" in found.open[0].data["faults"]
     if open_:
         assert found.worn is not None
-        assert found.worn.tolist() == [[score - 9.0, score] for score in (0.0, -8.0, best, -5.0)]
+        assert found.worn.tolist() == [[score - 9.0, score] for score in (0.0, -8.0, -7.0, best, -6.0, -5.0)]
     else:
         assert found.worn is None
 
@@ -109,12 +110,14 @@ def test_what_worn_pumps_leave_of_the_conditions_is_told_where_they_are_not_excl
 def test_a_well_worn_pump_that_is_not_excluded_takes_its_probability_from_the_conditions(
     gain: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scores = {1.0: 0.0, 0.7: -9.0, 0.8: gain, 0.9: -9.0}
+    scores = {1.0: 0.0, 0.7: -9.0, 0.75: -9.0, 0.8: gain, 0.85: -9.0, 0.9: -9.0}
     found, _ = looked(monkeypatch, lambda one: scores[worn(one)] if type(one) is type(SOUND) else -9.0, np.nan)
-    odds = np.exp(gain - 0.5 * (np.log(0.8) / 0.15) ** 2) + np.exp(-9.0 - 0.5 * (np.log(0.7) / 0.15) ** 2)
+    gains = np.array([-9.0, -9.0, gain])
+    odds = 0.5 * float(np.sum(np.exp(gains - 0.5 * (np.log([0.7, 0.75, 0.8]) / 0.15) ** 2)))
     share = odds / (1.0 + odds)
     assert found.faulty == pytest.approx(share)
-    assert found.open[0].data["faults"] == f"a worn pump ({100.0 * share:.0f} %)"
+    percent = f" ({100.0 * share:.0f} %)" if share > WORTH_SAYING else ""
+    assert found.open[0].data["faults"] == f"a worn pump{percent}"
     monkeypatch.setattr(wear, "faults_outside", lambda *_: found)
     nothing = {name: np.zeros(9) for name in ("models", "innovations", "parameters")}
     board = Scoreboard(nothing, LOG, SimpleNamespace(), None, None)  # type: ignore[arg-type]
@@ -164,13 +167,13 @@ def test_a_search_for_a_fault_need_not_come_nearer_than_twenty_to_the_sound_circ
     for module in (other_faults, sound_circuit):
         monkeypatch.setattr(module, "fit_classes", fitted)
     faults_outside(LOG, fits(0.0), ACTUATOR)
-    # three pumps twice, two settings, and of each valve four shares that stick and two seats
-    assert len(wanted) == 6 + 2 + 2 * (len(other_faults.SHUT) + 2)
+    # five pumps twice, two settings, and of each valve four shares that stick and two seats
+    assert len(wanted) == 10 + 2 + 2 * (len(other_faults.SHUT) + 2)
     assert set(wanted) == {30.0 * (20.0 - 3.0)}
 
 
 def test_a_worn_pump_is_weighed_against_the_sound_one_as_it_is_found_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    scores, asked = {1.0: 0.0, 0.7: -9.0, 0.8: 5.0, 0.9: -9.0}, list[float]()
+    scores, asked = {1.0: 0.0, 0.7: -9.0, 0.75: -9.0, 0.8: 5.0, 0.85: -9.0, 0.9: -9.0}, list[float]()
 
     def score(one: CircuitParameters) -> float:
         if type(one) is not type(SOUND):
@@ -180,8 +183,8 @@ def test_a_worn_pump_is_weighed_against_the_sound_one_as_it_is_found_anew(monkey
 
     found, _ = looked(monkeypatch, score, np.nan)
     assert found.worn is not None
-    assert found.worn[:, 1].tolist() == [3.0, -9.0, 5.0, -9.0]
-    odds = np.exp(2.0 - 0.5 * (np.log(0.8) / 0.15) ** 2)
+    assert found.worn[:, 1].tolist() == [3.0, -9.0, -9.0, 5.0, -9.0, -9.0]
+    odds = 0.5 * np.exp(2.0 - 0.5 * (np.log(0.8) / 0.15) ** 2)
     assert found.faulty == pytest.approx(odds / (1.0 + odds), rel=1e-3)
 
 
