@@ -196,7 +196,8 @@ def estimate_message(found: "Finding") -> str:
         still = [str(note) for note in found.gate.reasons if note.code in at_rest]
         if seen and still and not mistakes:
             return clauses([f"no value of bulk modulus: {still[0]}", *still[1:]])
-        if found.outcome is Outcome.MISMATCH and found.gate.reasons and not mistakes:
+        unexplained = seen and any(note.code != EstimateCode.BOUND_TOO_WIDE for note in found.gate.reasons)
+        if (unexplained or (found.outcome is Outcome.MISMATCH and found.gate.reasons)) and not mistakes:
             return clauses(
                 ["no value of bulk modulus: the model does not describe the log", *map(str, found.gate.reasons)]
             )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation.eha.estimate import estimate_log
-from estimation.finding import Finding, Outcome, Quantity
+from estimation.finding import Finding, Gate, Outcome, Quantity
 from estimation.notes import EstimateCode, RigCode, SensorCode
 from experiments.command.json_output import plain
 from experiments.eha.entries import (
@@ -231,6 +231,23 @@ def test_pressure_is_asked_for_where_it_was_not_used(pressure: bool) -> None:
     message = estimate_entries(unseen)["message"]
     assert ("Log differential pressure" in message) is not pressure
     assert "larger, slower steps" in message
+
+
+def test_another_drive_is_not_asked_for_where_the_fit_does_not_explain_the_log() -> None:
+    """The bound of a fit that leaves 6.6 times the noise says little; a pressure whose zero had moved was to blame."""
+    found = estimate_log(log(), Rig("rig", EhaParameters()))
+    large = EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=6.6)
+    wide = EstimateCode.BOUND_TOO_WIDE.note(percent=8.0)
+    unseen = replace(
+        found,
+        outcome=Outcome.NOT_OBSERVABLE,
+        quantities={**found.quantities, "bulk_modulus": Quantity(None, "Pa")},
+        gate=Gate(passed=False, reasons=(wide, large)),
+    )
+    message = estimate_entries(unseen)["message"]
+    assert "the model does not describe the log" in message
+    assert str(large) in message
+    assert "slower steps" not in message
 
 
 def test_a_wrong_volume_in_the_rig_file_is_mended_before_another_drive_is_tried() -> None:
