@@ -47,6 +47,13 @@ GAIN_MEANS_NOTHING = frozenset(
 )
 """Notes by which a steady gain must not be used."""
 
+REASONS = {
+    IdentificationCode.SIGN_NOT_MEASURED: "the output seems to be measured without its sign",
+    IdentificationCode.WALK_FOLLOWED: "it follows what the output does by itself",
+    IdentificationCode.ANSWERS_LATE: "the output seems to answer later than this model does",
+}
+"""What notes say against a model, whatever its fit."""
+
 
 def is_usable(view: IdentifiedView) -> bool:
     """Return whether the model may be used at all: it runs free, and does better than the mean on held-back data.
@@ -84,6 +91,10 @@ def _why_not(view: IdentifiedView) -> str:
     held, own = view.result["held_back_percent"], view.result["fit_percent"]
     if not np.isfinite(view.simulated).all():
         return "its free run grows beyond bounds"
+    told = {one["code"] for one in view.result.get("notes", ())}
+    reason = next((words for code, words in REASONS.items() if code in told), None)
+    if reason is not None:
+        return reason
     if held is not None and held <= 0.0:
         return "on held-back data it is no better than the mean"
     if own is not None and own <= 0.0:

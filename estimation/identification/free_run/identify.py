@@ -178,7 +178,9 @@ def _identified(
             return _absolute(signless, linear)
         if signless is not None:
             left = signless.held_back / linear.best.held_back
-            linear.notes.append(IdentificationCode.SIGN_NOT_MEASURED.note(output=data.output, left=left))
+            linear.notes.insert(0, IdentificationCode.SIGN_NOT_MEASURED.note(output=data.output, left=left))
+            # where inputs of the log keep one sign, blocks show nothing of what others bring
+            return replace(linear.identified(), sound=False)
     return linear.identified() if structure == "output-error" else _nonlinear_or_linear(structure, linear)
 
 

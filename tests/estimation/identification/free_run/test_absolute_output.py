@@ -55,6 +55,8 @@ def test_the_default_stays_linear_and_says_that_the_sign_is_missing(shift: float
     found = identify_channels(channels_from([u[:, None]], [y + shift], 0.02, ["u"], "y"), order=2, delay=1)
     assert found.model.structure == "output-error"
     assert (IdentificationCode.SIGN_NOT_MEASURED in [note.code for note in found.notes]) is told
+    if told:  # a log whose speed keeps one sign has a good fit, and nothing of it holds when the drive reverses
+        assert not found.sound
 
 
 def test_a_model_is_the_same_after_it_was_saved(found: Identified) -> None:
