@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +34,8 @@ class PublicSet:
         Inputs and output of each test, by name.
     skipped : int
         Samples at the start of a test that do not count.
+    again : mapping
+        Other records of the same plant, each like the test, by name.
     """
 
     name: str
@@ -42,6 +44,12 @@ class PublicSet:
     train: Part
     tests: dict[str, Part]
     skipped: int = 0
+    again: dict[str, Part] = field(default_factory=dict[str, Part])
+
+    @property
+    def parts(self) -> dict[str, Part]:
+        """Tests and other records."""
+        return {**self.tests, **self.again}
 
 
 def public_sets(wanted: Sequence[str] = ()) -> list[PublicSet]:

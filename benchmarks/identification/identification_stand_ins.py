@@ -1,14 +1,17 @@
 """Stand-ins of sets that are kept back: machines simulated after their equations, their last two fifths the test.
 
-Outputs of one machine share a run. Values, sizes and noise are drawn from a seed.
+Outputs of one machine share a run. Values, sizes and noise are drawn from a seed. One test says little of a machine
+that bends. So other records of it are made on demand: other inputs of the same kind from rest, of which the same last
+two fifths are tests.
 """
 
 from collections.abc import Callable, Mapping
+from copy import deepcopy
 from math import copysign, cos, exp, sin, sqrt, tanh
 
 import numpy as np
 
-from benchmarks.identification.identification_sets_data import PublicSet
+from benchmarks.identification.identification_sets_data import Part, PublicSet
 from estimation.arrays import Array
 from estimation.identification.model.recursion import filtered
 
@@ -36,49 +39,74 @@ CELLS = 8
 Outputs = dict[str, Array]
 """What is measured, by name, shape (n,)."""
 
+Drive = Callable[[np.random.Generator], Array]
+"""Draws one input of a kind, shape (n,)."""
 
-def stand_in_sets(seed: int = 0) -> list[PublicSet]:
+OTHERS = 78
+"""Tells what is drawn of other records from all else."""
+
+
+def stand_in_sets(seed: int = 0, again: int = 0) -> list[PublicSet]:
     """Return one set an output of every stand-in.
 
     Parameters
     ----------
     seed : int
         Of all that is random.
+    again : int
+        Other records of each machine; the circuit, whose test is of another kind, has none.
     """
-    return [one for name in MACHINES for one in _sets(name, seed)] + [_duffing(seed)]
+    return [one for name in MACHINES for one in _sets(name, seed, again)] + [_duffing(seed)]
 
 
-def _sets(name: str, seed: int) -> list[PublicSet]:
+def _sets(name: str, seed: int, again: int) -> list[PublicSet]:
     sample_time, make = MACHINES[name]
-    rng = np.random.default_rng([seed, 2000 + list(MACHINES).index(name)])
+    index = list(MACHINES).index(name)
+    rng = np.random.default_rng([seed, 2000 + index])
     n = int(rng.integers(*SIZES))
-    u = _steps(n, rng) if rng.integers(2) else _noise(n, rng)
+    drive = _steps(n, rng) if rng.integers(2) else _noise(n, rng)
+    u, machine = drive(rng), deepcopy(rng)
     cut = int(TRAINED * n)
-    found: list[PublicSet] = []
-    for output, clean in make(u, rng).items():
-        y = _noisy(clean, rng)
-        tests = {"": (u[cut:, None], y[cut:])}
-        title = f"{name} {output}".strip()
-        found.append(PublicSet(title, True, sample_time, (u[:cut, None], y[:cut]), tests, SKIPPED))
-    return found
+    logged = {output: _noisy(clean, rng) for output, clean in make(u, rng).items()}
+    others: dict[str, dict[str, Part]] = {output: {} for output in logged}
+    rng = np.random.default_rng([seed, OTHERS, index])
+    for number in range(again):
+        v = drive(rng)
+        for output, clean in make(v, deepcopy(machine)).items():
+            others[output][f"record {number}"] = v[cut:, None], _noisy(clean, rng)[cut:]
+    return [
+        PublicSet(
+            f"{name} {output}".strip(),
+            True,
+            sample_time,
+            (u[:cut, None], y[:cut]),
+            {"": (u[cut:, None], y[cut:])},
+            SKIPPED,
+            others[output],
+        )
+        for output, y in logged.items()
+    ]
 
 
 def _noisy(y: Array, rng: np.random.Generator) -> Array:
     return y + rng.uniform(*NOISE) * y.std() * rng.normal(size=y.size)
 
 
-def _steps(n: int, rng: np.random.Generator) -> Array:
-    """Return levels from -1 to 1, each held for a random time."""
+def _steps(n: int, rng: np.random.Generator) -> Drive:
+    """Return what draws levels from -1 to 1, each held for a random time."""
     longest = int(rng.integers(15, 60))
-    out = np.repeat(rng.uniform(-1.0, 1.0, n), rng.integers(5, longest, n))
-    return out[:n]
+    return lambda rng: np.repeat(rng.uniform(-1.0, 1.0, n), rng.integers(5, longest, n))[:n]
 
 
-def _noise(n: int, rng: np.random.Generator) -> Array:
-    """Return low-passed noise that reaches 1."""
+def _noise(n: int, rng: np.random.Generator) -> Drive:
+    """Return what draws low-passed noise that reaches 1."""
     pole = float(rng.uniform(0.8, 0.97))
-    out = filtered([1.0 - pole], [1.0, -pole], rng.normal(size=n))
-    return out / np.abs(out).max()
+
+    def drawn(rng: np.random.Generator) -> Array:
+        out = filtered([1.0 - pole], [1.0, -pole], rng.normal(size=n))
+        return out / np.abs(out).max()
+
+    return drawn
 
 
 def _flow(opening: float, above: float, below: float) -> float:

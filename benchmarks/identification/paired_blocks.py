@@ -1,4 +1,6 @@
-"""How sure one test is that a model is better than another: blocks of it drawn anew, the same ones for both."""
+"""How sure tests are that a model is better than another: blocks or records drawn anew, the same ones for both."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -36,3 +38,29 @@ def error_ratio(one: Array, other: Array, *, blocks: int = BLOCKS, seed: int = 0
         drawn.append((total[begins + length] - total[begins]).sum(axis=1))
     low, high = np.quantile(np.sqrt(drawn[0] / drawn[1]), (0.025, 0.975))
     return float(np.sqrt(np.sum(one**2) / np.sum(other**2))), float(low), float(high)
+
+
+def records_ratio(one: Sequence[Array], other: Sequence[Array], *, seed: int = 0) -> tuple[float, float, float]:
+    """Return the same over several records, which are drawn anew as wholes.
+
+    A model that is better on one record of a plant that bends may be worse on the next; blocks of one say nothing of
+    that.
+
+    Parameters
+    ----------
+    one, other : sequence of ndarray, shape (n,)
+        Errors of each on the same records, NaN nowhere.
+    seed : int
+        Of what is drawn.
+
+    Returns
+    -------
+    tuple of float
+        Ratio, lower and upper end [dimensionless].
+    """
+    squares = np.array([[float(np.sum(errors**2)) for errors in errors_of] for errors_of in (one, other)])
+    drawn = squares[:, np.random.default_rng(seed).integers(0, len(one), (DRAWS, len(one)))].sum(axis=2)
+    # between an endless error and another there is no value
+    low, high = np.quantile(np.sqrt(drawn[0] / drawn[1]), (0.025, 0.975), method="inverted_cdf")
+    ratio = np.sqrt(squares[0].sum() / squares[1].sum())
+    return float(ratio), float(low), float(high)

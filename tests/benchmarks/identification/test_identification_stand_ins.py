@@ -6,6 +6,7 @@ import pytest
 from benchmarks.identification import identification_stand_ins as module
 from benchmarks.identification.identification_sets_data import PublicSet
 from benchmarks.identification.identification_stand_ins import MACHINES, stand_in_sets
+from estimation.arrays import Array
 
 
 @pytest.fixture(scope="module")
@@ -47,3 +48,20 @@ def test_a_seed_tells_a_log(monkeypatch: pytest.MonkeyPatch) -> None:
     first, again, other = (stand_in_sets(seed)[0].train[1] for seed in (1, 1, 2))
     assert np.array_equal(first, again)
     assert first.size != other.size or not np.array_equal(first, other)
+
+
+def test_other_records_are_of_the_same_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MACHINES", {"damper": MACHINES["damper"]})
+    alone, one = stand_in_sets(1)[0], stand_in_sets(1, again=2)[0]
+    assert np.array_equal(alone.train[1], one.train[1]), "they change nothing of the log"
+    (u, y), (v, z) = one.again.values()
+    assert u.shape == v.shape == one.tests[""][0].shape
+    assert not np.array_equal(u, v)
+    assert not alone.again
+
+    def gain(part: tuple[Array, Array]) -> float:
+        return float(np.polyfit(part[0][:, 0], part[1], 1)[0])
+
+    own = gain(one.tests[""])
+    assert gain((u, y)) == pytest.approx(own, rel=0.3)
+    assert gain((v, z)) == pytest.approx(own, rel=0.3)

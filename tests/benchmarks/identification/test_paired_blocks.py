@@ -1,9 +1,9 @@
-"""The interval of a ratio of errors: it holds the truth where errors stay alike, and shrinks with the test."""
+"""The interval of a ratio of errors: it holds the truth where errors stay alike, and shrinks with what is tested."""
 
 import numpy as np
 from scipy.signal import lfilter
 
-from benchmarks.identification.paired_blocks import error_ratio
+from benchmarks.identification.paired_blocks import error_ratio, records_ratio
 from estimation.arrays import Array
 
 
@@ -42,3 +42,14 @@ def test_what_one_stretch_alone_tells_is_not_sure() -> None:
 def test_the_same_errors_are_equal_for_sure() -> None:
     one = errors(1000, 2)[0]
     assert error_ratio(2.0 * one, one) == (2.0, 2.0, 2.0)
+
+
+def test_records_of_unlike_levels_are_drawn_as_wholes() -> None:
+    held = 0
+    for seed in range(200):
+        levels = np.exp(0.3 * np.random.default_rng(seed).normal(size=(2, 16)))
+        parts = [errors(400, 1000 * seed + number) for number in range(16)]
+        one, other = ([level * part[k] for level, part in zip(levels[k], parts, strict=True)] for k in (0, 1))
+        _, low, high = records_ratio(one, other)
+        held += low < 1.0 < high
+    assert 0.85 * 200 <= held <= 0.99 * 200
