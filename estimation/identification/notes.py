@@ -99,6 +99,10 @@ class IdentificationCode(Code):
         "the offset of {output!r} differs from log to log ({above} beside their mean): each log has its own, and the "
         "model their mean, so its level does not hold for other logs"
     )
+    TREND = (
+        "{output!r} drifts by {slope:.3g} a second, which the inputs do not explain: the model was fitted beside this "
+        "trend, and does not have it"
+    )
     OUTLIERS = (
         "{count} of {total} samples of {output!r} stand out from their neighbours and decide what is fitted: if the "
         "sensor is at fault there, leave their cells empty and identify again"
@@ -119,6 +123,15 @@ class IdentificationCode(Code):
     NO_FIT = "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): do not rely on it"
 
 
+GAIN_MEANS_NOTHING = frozenset(
+    {
+        IdentificationCode.INTEGRATES,
+        IdentificationCode.TIME_CONSTANT_BEYOND_RECORD,
+        IdentificationCode.SLOWER_THAN_PERIOD,
+    }
+)
+"""Notes by which a steady gain must not be used."""
+
 WARNED = (
     IdentificationCode.TIME_CONSTANT_BEYOND_RECORD,
     IdentificationCode.NO_FIT,
@@ -132,6 +145,7 @@ WARNED = (
     IdentificationCode.RANDOM_WALK,
     IdentificationCode.WALK_FOLLOWED,
     IdentificationCode.OFFSETS_DIFFER,
+    IdentificationCode.TREND,
     IdentificationCode.ANSWERS_LATE,
 )
 """Notes that are raised as warnings too; the others say only what was passed over."""

@@ -187,7 +187,7 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
             f"{result['held_back_percent']:.2f}",
             "-" if test is None or isnan(test["fit_percent"]) else f"{test['fit_percent']:.2f}",
             f"{result['rmse']:.4g}",
-            _gains(result["dc_gain"]),
+            _gains(result),
         )
     yield shown
     for result in results:
@@ -206,14 +206,18 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     )
 
 
-def _gains(gain: Mapping[str, Any] | None) -> str:
+def _gains(result: Result) -> str:
     """Return the steady gain from each input; one that is less than its standard deviation is not determined."""
+    from estimation.identification.notes import GAIN_MEANS_NOTHING
+
+    gain = result["dc_gain"]
     if gain is None:
         return "-"
     values, spreads = gain["value"], gain.get("std") or 0.0
     values = [values] if isinstance(values, float) else values
     each = zip(values, spreads if isinstance(spreads, list) else [spreads] * len(values), strict=True)
-    return " ".join("undetermined" if spread > abs(one) else f"{one:.4g}" for one, spread in each)
+    nothing = not GAIN_MEANS_NOTHING.isdisjoint(note["code"] for note in result["notes"])
+    return " ".join("undetermined" if nothing or spread > abs(one) else f"{one:.4g}" for one, spread in each)
 
 
 def _with_interval(one: Mapping[str, Any]) -> str:

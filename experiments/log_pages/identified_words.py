@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from estimation.identification.notes import IdentificationCode
+from estimation.identification.notes import GAIN_MEANS_NOTHING, IdentificationCode
 from experiments.identification.of_channels import INPUT, OUTPUT
 from experiments.log_pages.identified_charts import MeasuredCurve
 from experiments.log_pages.identified_view import AS_LOGGED, IdentifiedView, Signal
@@ -37,15 +37,6 @@ NO_BREAK = "\N{NO-BREAK SPACE}"
 
 LEVEL = 0.05
 """Level of the tests of the residual [probability]."""
-
-GAIN_MEANS_NOTHING = frozenset(
-    {
-        IdentificationCode.INTEGRATES,
-        IdentificationCode.TIME_CONSTANT_BEYOND_RECORD,
-        IdentificationCode.SLOWER_THAN_PERIOD,
-    }
-)
-"""Notes by which a steady gain must not be used."""
 
 REASONS = {
     IdentificationCode.SIGN_NOT_MEASURED: "the output seems to be measured without its sign",

@@ -70,7 +70,9 @@ def _believed(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> t
     integrating = [one for one in candidates if one.fit.integrates and one.doubt != "no_fit"]
     integrating += [one for one in beyond if one.form in alone]
     tempting = chosen(integrating) if integrating else None
-    if tempting is not None and tempting.held_back < bar and not wanders(tempting.fit, data):
+    settled = [one for one in free if not one.doubt]
+    believed = tempting is not None and tempting.held_back < bar and not _needless(tempting, settled)
+    if tempting is not None and believed and not wanders(tempting.fit, data):
         # a pole that is estimated beyond the record is believed beside one at 1 alone, and where it is surely better
         leaky = chosen(beyond) if beyond else tempting
         surely = surely_better(leaky.block_errors, tempting.block_errors) and not wanders(leaky.fit, data)
@@ -104,6 +106,15 @@ def _believed(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> t
         if not (surely_better(best.block_errors, taken.block_errors) and _carries_on(best, taken, data)):
             return taken, [*beyond, *said]
     return best, notes
+
+
+def _needless(integrating: Candidate, settled: Sequence[Candidate]) -> bool:
+    """Return whether a model that settles, of no more values, explains the whole record better than one that does not.
+
+    A block that holds the only step of the inputs takes from its fit all that tells how the output settles.
+    """
+    smaller = [one for one in settled if one.form.n_values <= integrating.form.n_values]
+    return any(one.bic < integrating.bic for one in smaller)
 
 
 def _time_constant(one: Candidate, data: Channels) -> float:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
+from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
 from plant.notes import Note
@@ -24,8 +25,8 @@ class Identified:
         What was passed over, or is doubtful.
     sound : bool
         Whether the model may be believed.
-    above : tuple of float
-        How much each log's offset is above the model's; empty where they have one [output unit].
+    above : tuple of float, or of ndarray, shape (n,)
+        How much each log's offset is above the model's, or its trend; empty where they have none [output unit].
     """
 
     model: FreeRunModel
@@ -34,10 +35,10 @@ class Identified:
     candidates: tuple[dict[str, Any], ...]
     notes: tuple[Note, ...]
     sound: bool
-    above: tuple[float, ...] = ()
+    above: tuple[float | Array, ...] = ()
 
     def at_one_offset(self, data: Channels) -> Channels:
-        """Return the fitted logs with the model's offset, where each has its own.
+        """Return the fitted logs with the model's offset, where each has its own or drifts.
 
         Parameters
         ----------

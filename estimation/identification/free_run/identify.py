@@ -55,6 +55,7 @@ from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.random_walk import followed_walk, from_changes, wandering
+from estimation.identification.free_run.trend import detrended
 from estimation.identification.free_run.unrelated import bend_explains, polynomial_explains
 from estimation.identification.notes import WARNED, IdentificationCode
 from plant.errors import HydrostateError, LogWarning, require_known
@@ -168,6 +169,9 @@ def _identified(
         if believed(own, linear):
             own.notes.append(apart.note)
             return replace(own.identified(), above=tuple(apart.above.tolist()))
+    drift = detrended(linear, orders) if structure in ("output-error", "auto") else None
+    if drift is not None:
+        return replace(drift.linear.identified(), above=drift.trends)
     if structure in ADOPTED:
         return _adopted(structure, linear)
     if structure == "auto" and linear.best.held_back < ROUNDING:
@@ -289,7 +293,9 @@ def _without_sign(linear: LinearComparison, *, surely: bool) -> AbsoluteCandidat
     if not found:
         return None
     taken = chosen_absolute(found)
-    return None if surely and not taken.held_back < SIGNLESS * linear.best.held_back else taken
+    # a block that holds the only step of the inputs says little, so the fit of all of them has to agree
+    explains = taken.bic / data.n_samples < linear.best.bic / linear.task.part.n_samples
+    return None if surely and not (explains and taken.held_back < SIGNLESS * linear.best.held_back) else taken
 
 
 def _absolute(taken: AbsoluteCandidate, linear: LinearComparison) -> Identified:

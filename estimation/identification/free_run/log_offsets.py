@@ -93,7 +93,7 @@ def believed(own: LinearComparison, one: LinearComparison) -> bool:
     own, one : LinearComparison
         Models with an offset of each log, and with one.
     """
-    lasting = [_lasts(each.best, each) for each in (own, one)]
+    lasting = [lasts(each.best, each) for each in (own, one)]
     spread = own.task.by.y_std / one.task.by.y_std
     errors, least = [spread * error for error in own.best.block_errors], spread * own.best.held_back
     if lasting == [False, True]:
@@ -101,6 +101,14 @@ def believed(own: LinearComparison, one: LinearComparison) -> bool:
     return least < CLEARLY * one.best.held_back and told_apart(errors, one.best.block_errors)
 
 
-def _lasts(best: Candidate, of: LinearComparison) -> bool:
-    """Return whether a pole is slower than a held-back block."""
+def lasts(best: Candidate, of: LinearComparison) -> bool:
+    """Return whether a pole is slower than a held-back block.
+
+    Parameters
+    ----------
+    best : Candidate
+        A model.
+    of : LinearComparison
+        That it was compared in.
+    """
     return bool(best.doubt) or best.fit.integrates or best.outlasts_block(of.task.part)

@@ -1,0 +1,93 @@
+"""A linear trend that the inputs do not explain: a sensor that drifts, or a bench that warms up.
+
+Inputs whose mean is not zero make an integrator go up like a trend, so that a pole at 1 or a slow one follows it, and
+the steady gain means nothing. A trend behind a settled plant is a trend again, so time is one more input here. If the
+slow pole then explains no more than chance, it was the trend.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.identification.free_run.choose_linear import criteria, slowest_pole
+from estimation.identification.free_run.data import Channels, scaled, section
+from estimation.identification.free_run.dead_times import ORDER
+from estimation.identification.free_run.held_back import BLOCKS
+from estimation.identification.free_run.linear_comparison import LinearComparison, linear_comparison
+from estimation.identification.free_run.linear_fit import COARSE, fit_linear
+from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
+from estimation.identification.free_run.log_offsets import NEARLY, lasts
+from estimation.identification.notes import IdentificationCode
+
+
+@dataclass(frozen=True, eq=False)
+class Detrended:
+    """Logs without their trend.
+
+    Parameters
+    ----------
+    linear : LinearComparison
+        Models of what is left.
+    trends : tuple of ndarray, shape (n,)
+        Of each log, zero in its middle [output unit].
+    """
+
+    linear: LinearComparison
+    trends: tuple[Array, ...]
+
+
+def detrended(one: LinearComparison, orders: Sequence[int]) -> Detrended | None:
+    """Return models beside a trend; None where the model without one settles, or explains more than a trend does.
+
+    Parameters
+    ----------
+    one : LinearComparison
+        Models without a trend.
+    orders : sequence of int
+        Of models that are compared; the first few tell the trend.
+    """
+    task = one.task
+    if not lasts(one.best, one):
+        return None
+    part, slow = _beside_time(task.part), one.best.fit
+    quickest = float(np.exp(-(BLOCKS + 1.0) / task.part.told))
+    delays = slow.form.delays
+    forms = [_beside(Form(order, (order + 1,) * len(delays), delays)) for order in orders[:ORDER]]
+    settled = [fit for form in forms if slowest_pole((fit := fit_linear(form, part, least_gain=COARSE)).f) <= quickest]
+    if not settled:
+        return None
+    beside = fit_linear(_beside(slow.form), part, [slow.f], least_gain=COARSE)
+    best = min(settled, key=lambda fit: _bic(fit, part))
+    if _bic(beside, part) < _bic(best, part):
+        return None
+    whole = _beside_time(task.whole)
+    values = Problem(best.form, whole).profiled(best.f)[1]
+    rate = float(values[best.form.n_b - 1] / best.f.sum()) * task.by.y_std
+    trends = tuple(rate * u[:, -1] for u in whole.u)
+    data = replace(task.data, y=tuple(y - trend for y, trend in zip(task.data.y, trends, strict=True)))
+    flat, by = scaled(data)
+    cut = section(flat, sum(y.size for y in task.part.y))
+    own = linear_comparison(replace(task, data=data, whole=flat, by=by, part=cut))
+    left = own.best.held_back * by.y_std / task.by.y_std
+    if lasts(own.best, own) or left > NEARLY * one.best.held_back:
+        return None
+    slope = rate / (task.whole.longest * task.data.sample_time)
+    own.notes.append(IdentificationCode.TREND.note(output=task.data.output, slope=slope))
+    return Detrended(own, trends)
+
+
+def _beside_time(data: Channels) -> Channels:
+    """Return channels with time as one more input: zero in the middle of each log, 1 over the longest."""
+    times = [(np.arange(y.size) - 0.5 * (y.size - 1)) / data.longest for y in data.y]
+    u = tuple(np.column_stack([own, time]) for own, time in zip(data.u, times, strict=True))
+    return replace(data, inputs=(*data.inputs, "time"), u=u)
+
+
+def _beside(form: Form) -> Form:
+    return Form(form.order, (*form.sizes, 1), (*form.delays, 0))
+
+
+def _bic(fit: LinearFit, data: Channels) -> float:
+    return criteria(fit.cost, fit.theta.size, data.n_samples)[0]
