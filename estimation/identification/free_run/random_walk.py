@@ -112,7 +112,7 @@ def wandering(
         return None
     late = estimate_delays(changed) if delays is None else delays
     first = fit_linear(Form(ORDER, (ORDER + 1,) * len(late), late), changed, least_gain=COARSE)
-    rest = _longest_rest(first, changed)
+    rest = longest_rest(first, changed)
     if rest.size < FEWEST or returns(rest) <= COMES_BACK or _explained(rest) > SMOOTH:
         return None
     candidates = linear_candidates(changed, orders, delays, sizes)
@@ -194,7 +194,7 @@ def walks(fit: LinearFit, changes: Channels) -> bool:
     changes : Channels
         Scaled.
     """
-    left = _longest_rest(fit, changes)
+    left = longest_rest(fit, changes)
     return left.size >= FEWEST and returns(left) > COMES_BACK and not remembers(left)
 
 
@@ -291,8 +291,21 @@ def _explained(changes: Array) -> float:
     return float(np.sum(found[1:] ** 2 - _by_chance(found, changes)))
 
 
-def _longest_rest(fit: LinearFit, changes: Channels) -> Array:
-    """Return what a model leaves of the longest row of changes without gaps."""
+def longest_rest(fit: LinearFit, changes: Channels) -> Array:
+    """Return what a model leaves of the longest row of outputs without gaps.
+
+    Parameters
+    ----------
+    fit : LinearFit
+        The model.
+    changes : Channels
+        Changes, or levels; scaled as the model's.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Measured less simulated [dimensionless].
+    """
     problem = Problem(fit.form, changes)
     left = np.where(problem.used, problem.y - problem.jacobian(fit.theta)[0], np.nan)
     rows = [

@@ -2,7 +2,7 @@
 
 Inputs whose mean is not zero make an integrator go up like a trend, so that a pole at 1 or a slow one follows it, and
 the steady gain means nothing. A trend behind a settled plant is a trend again, so time is one more input here. If the
-slow pole then explains no more than chance, it was the trend.
+slow pole then explains no more than chance, and white noise is left, it was the trend.
 """
 
 from collections.abc import Sequence
@@ -19,6 +19,7 @@ from estimation.identification.free_run.linear_comparison import LinearCompariso
 from estimation.identification.free_run.linear_fit import COARSE, fit_linear
 from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
 from estimation.identification.free_run.log_offsets import NEARLY, lasts
+from estimation.identification.free_run.random_walk import FEWEST, longest_rest, remembers
 from estimation.identification.notes import IdentificationCode
 
 
@@ -54,13 +55,21 @@ def detrended(one: LinearComparison, orders: Sequence[int]) -> Detrended | None:
     part, slow = _beside_time(task.part), one.best.fit
     quickest = float(np.exp(-(BLOCKS + 1.0) / task.part.told))
     delays = slow.form.delays
-    forms = [_beside(Form(order, (order + 1,) * len(delays), delays)) for order in orders[:ORDER]]
+    # a trend takes the place of the slow pole: of an order that is asked for, one less is left
+    fewer = sorted({max(orders[0] - 1, 1), *orders[:ORDER]})
+    forms = [_beside(Form(order, (order + 1,) * len(delays), delays)) for order in fewer]
     settled = [fit for form in forms if slowest_pole((fit := fit_linear(form, part, least_gain=COARSE)).f) <= quickest]
     if not settled:
         return None
     beside = fit_linear(_beside(slow.form), part, [slow.f], least_gain=COARSE)
     best = min(settled, key=lambda fit: _bic(fit, part))
-    if _bic(beside, part) < _bic(best, part):
+    sizes, late = best.form.sizes[:-1], best.form.delays[:-1]
+    alone = fit_linear(Form(best.form.order, sizes, late), task.part, [best.f], least_gain=COARSE)
+    if not _bic(best, part) < min(_bic(beside, part), _bic(alone, task.part)):
+        return None
+    # what a bend leaves is slow too, and no trend
+    rest = longest_rest(best, part)
+    if rest.size < FEWEST or remembers(rest):
         return None
     whole = _beside_time(task.whole)
     values = Problem(best.form, whole).profiled(best.f)[1]
