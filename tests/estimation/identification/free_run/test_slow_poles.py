@@ -195,3 +195,17 @@ def test_what_is_slower_than_its_inputs_repeat_themselves_does_not_integrate(
     assert note.data["time_constant_s"] == pytest.approx(0.9 * N)
     integrates = replace(within, fit=replace(within.fit, integrates=True))
     assert [module._slow_note(one, data).code for one in (beyond, integrates)] == [IdentificationCode.INTEGRATES] * 2
+
+
+@pytest.mark.parametrize(("gained", "taken"), [(10.0, "settled"), (-10.0, "integrates")])
+def test_a_pole_at_one_is_needless_where_a_settled_model_explains_the_record_better(
+    plain: tuple[Channels, Candidate], gained: float, taken: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data, one = plain
+    monkeypatch.setattr(module, "wanders", lambda *_: False)
+    # one block holds the only step of the inputs, and the fit without it knows nothing of the pole
+    settled = replace(one, held_back=0.1, block_errors=(0.02, 0.02, 0.02, 0.2))
+    other = with_pole(one, 1.0, (0.02, 0.02, 0.02, 0.02), "time_constant")
+    integrating = replace(other, fit=replace(other.fit, integrates=True), bic=one.bic + gained)
+    best, _ = believable([settled, integrating], data, scaled(data)[1])
+    assert best.fit is {"settled": settled, "integrates": integrating}[taken].fit
