@@ -7,7 +7,13 @@ from functools import partial
 import numpy as np
 
 from estimation.fits.flow.agreement import Answered, agreed, wanted_of
-from estimation.fits.flow.asked_hypotheses import ALWAYS_ASKED, MOST_ASKED, hypotheses_asked, near_starts
+from estimation.fits.flow.asked_hypotheses import (
+    ALWAYS_ASKED,
+    MOST_ASKED,
+    at_widest,
+    hypotheses_asked,
+    near_starts,
+)
 from estimation.fits.flow.belief import hopeless_cost, play_explained, wanted_cost
 from estimation.fits.flow.log import homed_at_stop, require_flow_channels, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
@@ -202,7 +208,8 @@ def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequ
 def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> Explanation | None:
     """Return the explanation of a log by hypotheses, if it is believed rather than the plain form."""
     explains = _told_by(plain, begun=BEGUN in asked)
-    near = near_starts(plain.swinging, plain.starts, explains, in_motion=traits.loaded or traits.moving)
+    in_motion, widest = traits.loaded or traits.moving, at_widest(plain.log, plain.swinging)
+    near = near_starts(plain.swinging, plain.starts, explains, in_motion=in_motion, widest=widest)
     if plain.best is not plain.swinging and explains(plain.best):
         near = [plain.best.values, *near]
     alone = len(asked) == 1 and asked[0] in ALWAYS_ASKED  # it has no rival
