@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from math import isfinite
 
 from estimation.models.completed_flow import CRACKS, USUAL_CRACK
+from estimation.models.filtered_flow import FILTER_TIME
 from estimation.models.flow import STIFFNESS
 from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import CROSSED, QUICKEST, QUICKNESS
@@ -158,6 +159,14 @@ more, and the search for a delay would have no end."""
 
 PRESSURE_LATE = Hypothesis("pressure_late", ("pressure_lag",), ({"pressure_lag": 1e-3},), LATE_TRIED)
 
+PRESSURE_FILTERED = replace(
+    PRESSURE_LATE,
+    free=("pressure_lag", FILTER_TIME),
+    starts=({"pressure_lag": 5e-3, FILTER_TIME: 3e-3},),
+    delays=(0.0,),
+)
+"""The same behind a filter of second order: to slow signals it is a delay, of no whole samples."""
+
 SPEED_LATE = Hypothesis(
     "speed_late", ("speed_lag",), ({"speed_lag": 1e-3},), LATE_TRIED, "motor_speed_rad_s", instead=("speed_lead",)
 )
@@ -285,6 +294,7 @@ HYPOTHESES = (
 LIMITS: Mapping[str, tuple[float, float]] = {
     "makeup_opening": (1e2, 1e6),
     "pressure_lag": (0.0, 0.05),
+    FILTER_TIME: (5e-4, 0.05),
     "speed_lag": (0.0, 0.05),
     "position_lag": (0.0, 0.05),
     "pressure_offset": (-1e7, 1e7),

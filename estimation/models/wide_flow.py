@@ -53,6 +53,7 @@ class WideFlowParameters(FlowParameters):
     """The flow form's parameters, and those of what a strange rig, oil or logger may add; absent by default."""
 
     pressure_lag: float = si(0.0, "s", "first-order lag of the pressure sensor", "fitted")
+    filter_time: float = si(1e-3, "s", "inverse natural frequency of a second-order pressure filter", "fitted")
     speed_lag: float = si(0.0, "s", "first-order lag of the motor's speed sensor", "fitted")
     position_lag: float = si(0.0, "s", "first-order lag of the encoder or of its filter", "fitted")
     position_play: float = si(0.0, "m", "play between the piston and the encoder", "fitted")
@@ -130,7 +131,7 @@ def _stiffness(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool
     return _room(pressure, air, p, quick=quick) / maximum(1.0 + short * short + softer * p.bulk_modulus, STIFFEST)
 
 
-def _rates(
+def wide_rates(
     state: tuple[Scalar, ...],
     drives: Any,
     p: SimpleNamespace,
@@ -139,6 +140,7 @@ def _rates(
     turbulent: bool = False,
     quick: bool = False,
 ) -> tuple[Scalar, ...]:
+    """Return the rates of both chambers, of how far the sensor is behind, and of the inner circuit [Pa/s]."""
     speeds, (read, next_read), (begun, next_begun), (rate, next_rate), *courses, step = drives
     p1, p2, behind, supply = state
     side, next_side = _sides(courses, p)
@@ -172,9 +174,13 @@ def _rates(
     rise = _stiffness(p1, air, p, quick=quick) * (at_1 - area_1 * velocity + into_1) / volume_1
     fall = _stiffness(p2, air, p, quick=quick) * (area_2 * velocity - at_2 + into_2) / volume_2
     # how far the sensor is behind stays small where its lag is short, which a stiff step resolves
-    offset = p.pressure_offset + p.pressure_drift * elapsed
-    lagging = rise - fall - (behind + offset) / (p.pressure_lag + SHORTEST_LAG)
+    lagging = rise - fall - (behind + offset_at(elapsed, p)) / (p.pressure_lag + SHORTEST_LAG)
     return rise, fall, lagging, -p.accumulator_stiffness * (into_1 + into_2)
+
+
+def offset_at(elapsed: Scalar, p: SimpleNamespace) -> Scalar:
+    """Return what the pressure sensor reads of nothing [Pa]."""
+    return p.pressure_offset + p.pressure_drift * elapsed
 
 
 def _sides(courses: Any, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
@@ -299,7 +305,7 @@ WIDE_FLOW_FORM = GreyBoxModel(
     outputs=("differential_pressure_pa",),
     unknowns=(),
     initial=_at_rest,
-    rates=_rates,
+    rates=wide_rates,
     observe=_shown,
     parameters=WideFlowParameters,
     jump=(0.5, -0.5, 0.0, 0.0),
@@ -308,15 +314,15 @@ WIDE_FLOW_FORM = GreyBoxModel(
 
 
 def _turbulent(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
-    return _rates(state, drives, p, share, turbulent=True)
+    return wide_rates(state, drives, p, share, turbulent=True)
 
 
 def _quick(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
-    return _rates(state, drives, p, share, quick=True)
+    return wide_rates(state, drives, p, share, quick=True)
 
 
 def _turbulent_quick(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
-    return _rates(state, drives, p, share, turbulent=True, quick=True)
+    return wide_rates(state, drives, p, share, turbulent=True, quick=True)
 
 
 TURBULENT_FLOW_FORM = replace(WIDE_FLOW_FORM, name="wide_flow_turbulent", rates=_turbulent)

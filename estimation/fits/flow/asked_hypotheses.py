@@ -2,8 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-import numpy as np
-
 from estimation.fits.flow.log import homed_at_stop, outruns_pump
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.greybox.fit import GreyBoxFit
@@ -34,7 +32,7 @@ from estimation.fits.hypothesis_search.explain import WORTH
 from estimation.fits.hypothesis_search.fit_objections import doubted, fit_explains, is_too_close
 from estimation.fits.hypothesis_search.not_excluded import open_wear_note, share_lost
 from estimation.fits.hypothesis_search.predicted_gains import PredictedGain, predicted_gain, predicted_gains, slopes_of
-from estimation.fits.hypothesis_search.wide_problem import flow_bounds
+from estimation.fits.hypothesis_search.wide_problem import widest_makeup
 from estimation.models.completed_flow import CRACKS, balances_mass
 from estimation.models.flow import STIFFNESS
 from estimation.models.inner_circuit import BEND
@@ -109,7 +107,11 @@ def hypotheses_asked(
         return (BEGUN, OFFSET_AT_REST), ()
     if is_too_close(swinging, log.passes_on):
         return (), ()
-    if not fit_explains(swinging, log.passes_on) or most_late(swinging.late)[2] > WORTH or at_widest(log, swinging):
+    if (
+        not fit_explains(swinging, log.passes_on)
+        or most_late(swinging.late)[2] > WORTH
+        or at_widest(swinging, parameters)
+    ):
         pulled = (MAKEUP_BENDS,) if outruns_pump(log, parameters) else ()
         return (BEGUN,) if moving else (*HYPOTHESES, *pulled), ()
     by_mass = balances_mass(swinging.model)
@@ -143,19 +145,18 @@ def hypotheses_asked(
     return (BEGUN, *asked) if lost or _possible([begun], swinging)[0].gain > WORTH else asked, remarks
 
 
-def at_widest(log: GreyBoxLog, fit: GreyBoxFit) -> bool:
+def at_widest(fit: GreyBoxFit, parameters: EhaParameters) -> bool:
     """Return whether the make-up valves of a plain fit are as wide as may be: no valve is, so they took something up.
 
     Parameters
     ----------
-    log : GreyBoxLog
-        The log, as the plain flow form sees it.
     fit : GreyBoxFit
-        Its fit.
+        The plain form's.
+    parameters : EhaParameters
+        The actuator.
     """
-    _, most = flow_bounds(fit.model, [fit.theta], log)
-    place = fit.model.unknowns.index("makeup_conductance")  # fitted as a logarithm
-    return bool(fit.theta[place] - most[place] > np.log(WIDEST))
+    stiff = max(parameters.bulk_modulus, fit.values["bulk_modulus"])
+    return fit.values.get("makeup_conductance", 0.0) > WIDEST * widest_makeup(parameters.chamber_volume, stiff)
 
 
 def _late_valves(fit: GreyBoxFit) -> tuple[Hypothesis, ...]:

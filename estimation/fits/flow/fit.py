@@ -208,7 +208,7 @@ def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequ
 def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> Explanation | None:
     """Return the explanation of a log by hypotheses, if it is believed rather than the plain form."""
     explains = _told_by(plain, begun=BEGUN in asked)
-    in_motion, widest = traits.loaded or traits.moving, at_widest(plain.log, plain.swinging)
+    in_motion, widest = traits.loaded or traits.moving, at_widest(plain.swinging, plain.start.parameters)
     near = near_starts(plain.swinging, plain.starts, explains, in_motion=in_motion, widest=widest)
     if plain.best is not plain.swinging and explains(plain.best):
         near = [plain.best.values, *near]

@@ -18,7 +18,7 @@ from estimation.fits.hypothesis_search.conclusion import Accepted, conclude, is_
 from estimation.fits.hypothesis_search.decimation import FEW, Decimation, cost_over_noise, decimation_for
 from estimation.fits.hypothesis_search.decimation_limit import decimation_limit
 from estimation.fits.hypothesis_search.explanation import Explanation, Trial
-from estimation.fits.hypothesis_search.final_fits import ALIKE, REACHED, with_less_lag
+from estimation.fits.hypothesis_search.final_fits import ALIKE, REACHED, behind_filter, with_less_lag
 from estimation.fits.hypothesis_search.predicted_gains import (
     by_predicted_gain,
     predicted_gain_beside,
@@ -109,6 +109,7 @@ def explain(
     finished = _alone(wide, plain.cost, (likely, others, gains), spared, accepted, useful)
     if finished[0].fits and not is_explained(finished[0], accepted):
         finished = ranked([*finished, *filter(None, [with_less_lag(wide, finished[0])])])
+    finished = _distinct([behind_filter(wide, finished[0]), *finished])
     if paired and finished[0].cost < hopeless and not _by_itself(wide, finished[0], accepted):
         first, second = finished[0], finished[1] if len(finished) > 1 else None
         pairs = _paired(wide, first, starts[0], accepted)
@@ -120,6 +121,7 @@ def explain(
         finished = _distinct([first, *pairs])
         if begun := [one for one in asked if one.from_first_sample and one.free == START_LOAD.free]:
             finished = _distinct([*finished, *_rig_and_load(wide, begun[0], finished[0], spared, accepted)])
+        finished = _distinct([behind_filter(wide, finished[0]), *finished])
     if is_explained(finished[0], accepted):
         stuck = [one for one in stuck_instead(wide, finished[0], spared, WORTH) if is_explained(one, accepted)]
         finished = [*stuck, *finished[len(stuck) :]]

@@ -9,7 +9,7 @@ from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.spared_steps import LAST, spared
-from estimation.fits.hypotheses import CHECKS_CRACK
+from estimation.fits.hypotheses import CHECKS_CRACK, PRESSURE_FILTERED, PRESSURE_LATE
 from estimation.fits.hypothesis_search.coarse_search import FINEST_DELAY, NEAR, coarsened, descended
 from estimation.fits.hypothesis_search.decimation import FEW, cost_over_noise
 from estimation.fits.hypothesis_search.explanation import Trial
@@ -155,6 +155,36 @@ def with_less_lag(log: GreyBoxLog, tried: Trial) -> Trial | None:
         return None
     later = {**tried.delays, last.late: tried.delays.get(last.late, 0.0) + FINEST_DELAY}
     return final_fit(log, replace(tried, delays=later, values={**tried.values, lag: max(left, 0.0)}), tried.cost)
+
+
+def behind_filter(log: GreyBoxLog, tried: Trial) -> Trial:
+    """Return the final fit of a set with a pressure filter of second order in place of a delay and a lag, if likelier.
+
+    A filter's delay is of no whole samples: a delay of 8 ms put bulk modulus 4 deviations off behind one of 7.5 ms.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    tried : Trial
+        The set, fitted to the end.
+
+    Returns
+    -------
+    Trial
+        The set as it was where its pressure is not late or only lags, and where no filter explains the log better.
+    """
+    delay = tried.delays.get(PRESSURE_LATE.late, 0.0)
+    if not tried.fits or PRESSURE_LATE not in tried.together or delay <= 0.0:
+        return tried
+    name, time = PRESSURE_FILTERED.free
+    lag = tried.values[name]
+    late = delay + lag  # the same first and second moments of the response to an impulse
+    values = {**tried.values, name: late, time: (0.5 * (late**2 - lag**2)) ** 0.5}
+    together = tuple(PRESSURE_FILTERED if one == PRESSURE_LATE else one for one in tried.together)
+    delays = {channel: one for channel, one in tried.delays.items() if channel != PRESSURE_LATE.late}
+    filtered = final_fit(log, replace(tried, together=together, values=values, delays=delays), tried.cost)
+    return filtered if filtered.cost < tried.cost else tried
 
 
 def _concluded(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxFit:

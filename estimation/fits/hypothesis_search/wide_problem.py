@@ -15,6 +15,13 @@ from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
 from estimation.fits.hypothesis_search.leakage_step import likeliest_step
 from estimation.fits.hypothesis_search.wide_log import LEAST_PEAK, START_LEVEL, shut_in, usual_values
 from estimation.log_checks.channel_names import POSITION, SPEED
+from estimation.models.filtered_flow import (
+    FILTER_TIME,
+    FILTERED_FLOW_FORM,
+    FILTERED_QUICK_FLOW_FORM,
+    FILTERED_TURBULENT_FLOW_FORM,
+    FILTERED_TURBULENT_QUICK_FLOW_FORM,
+)
 from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.wide_flow import (
@@ -61,6 +68,18 @@ BEYOND = 1.001
 MOST_WORN = 0.2
 """Most that a worn pump loses of its displacement where the search for it begins [fraction]; judged."""
 
+FORMS = {
+    (False, False, False): WIDE_FLOW_FORM,
+    (False, False, True): QUICK_FLOW_FORM,
+    (False, True, False): TURBULENT_FLOW_FORM,
+    (False, True, True): TURBULENT_QUICK_FLOW_FORM,
+    (True, False, False): FILTERED_FLOW_FORM,
+    (True, False, True): FILTERED_QUICK_FLOW_FORM,
+    (True, True, False): FILTERED_TURBULENT_FLOW_FORM,
+    (True, True, True): FILTERED_TURBULENT_QUICK_FLOW_FORM,
+}
+"""By whether pressure passes a filter of second order, a leak is turbulent, and bubbles have an exponent."""
+
 FLOW_BIAS = "flow_bias"
 
 POSITION_ZERO = "position_zero"
@@ -101,12 +120,7 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedP
     known = [name for name in plain.unknowns if name not in held]
     late = {one.late for one in together}
     log = replace(log, timed=tuple(channel for channel in log.timed if channel not in late))
-    slow, quick = (
-        (TURBULENT_FLOW_FORM, TURBULENT_QUICK_FLOW_FORM)
-        if set(LEAKAGE_TURBULENT.free) <= set(extra)
-        else (WIDE_FLOW_FORM, QUICK_FLOW_FORM)
-    )
-    form = quick if QUICKNESS in extra else slow
+    form = FORMS[FILTER_TIME in extra, LEAKAGE_TURBULENT.free[0] in extra, QUICKNESS in extra]
     free = tuple(dict.fromkeys((*known, *extra)))
     ridge = Ridge(DELIVERY.free[0], FLOW_BIAS, flow_speed(log)) if DELIVERY.free[0] in free else None
     return FreedProblem(form, log, free, LINEAR, ridge)
@@ -214,6 +228,24 @@ def stiffest_accumulator(rig: Mapping[str, float], *, small: bool = False) -> fl
     return ADIABATIC * rig["accumulator_pressure"] / (gas * rig["chamber_volume"])
 
 
+def widest_makeup(chamber_volume: float, bulk_modulus: float) -> float:
+    """Return the largest conductance of a make-up valve that model steps resolve.
+
+    Parameters
+    ----------
+    chamber_volume : float
+        Dead volume, half of a chamber's [m^3].
+    bulk_modulus : float
+        Of the oil [Pa].
+
+    Returns
+    -------
+    float
+        Conductance [m^3/(s Pa)].
+    """
+    return 2.0 * chamber_volume / (FASTEST_MAKEUP * bulk_modulus)
+
+
 def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) -> tuple[Array, Array]:
     """Return the bounds of a search for the flow form's unknowns, plain or wide.
 
@@ -245,7 +277,7 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     stiff = max(rig["bulk_modulus"], stiffest_guess)
     volume = rig["chamber_volume"]
     limits["chamber_volume"] = (volume / MOST_VOLUME, MOST_VOLUME * volume)
-    limits["makeup_conductance"] = (0.0, 2.0 * rig["chamber_volume"] / (FASTEST_MAKEUP * stiff))
+    limits["makeup_conductance"] = (0.0, widest_makeup(rig["chamber_volume"], stiff))
     if log.passes_on:
         limits["bulk_modulus"] = (softest / MOST_BIASED, MOST_BIASED * stiffest_guess)
     return search_bounds(model, guesses, {**LIMITS, **limits})

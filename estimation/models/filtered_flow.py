@@ -1,0 +1,65 @@
+"""The wide flow form behind a pressure filter of second order, as an amplifier's or a logger's mostly is."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+from estimation.models.wide_flow import WIDE_FLOW_FORM, offset_at, wide_rates
+from plant.compiled.functions import Scalar
+
+FILTER_TIME = "filter_time"
+"""Inverse of the natural frequency of that filter."""
+
+
+def _rates(
+    state: tuple[Scalar, ...],
+    drives: Any,
+    p: SimpleNamespace,
+    share: Scalar,
+    *,
+    turbulent: bool = False,
+    quick: bool = False,
+) -> tuple[Scalar, ...]:
+    """Return the rates of the circuit and of ``T^2 y'' + lag y' + y = dp + offset``, y being what is read."""
+    p1, p2, behind, supply, climbs = state
+    circuit = p1, p2, behind, supply
+    rise, fall, _, fed = wide_rates(circuit, drives, p, share, turbulent=turbulent, quick=quick)
+    begun, next_begun = drives[2]
+    left = behind + offset_at(begun + share * (next_begun - begun), p) - p.pressure_lag * climbs
+    return rise, fall, rise - fall - climbs, fed, left / (p.filter_time * p.filter_time)
+
+
+def _turbulent(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
+    return _rates(state, drives, p, share, turbulent=True)
+
+
+def _quick(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
+    return _rates(state, drives, p, share, quick=True)
+
+
+def _turbulent_quick(state: tuple[Scalar, ...], drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, ...]:
+    return _rates(state, drives, p, share, turbulent=True, quick=True)
+
+
+def _at_rest(p: SimpleNamespace) -> tuple[Scalar, ...]:
+    return *WIDE_FLOW_FORM.initial(p), 0.0
+
+
+def _shown(state: tuple[Scalar, ...]) -> tuple[Scalar]:
+    p1, p2, behind, _, _ = state
+    return (p1 - p2 - behind,)
+
+
+FILTERED_FLOW_FORM = replace(
+    WIDE_FLOW_FORM,
+    name="filtered_flow",
+    initial=_at_rest,
+    rates=_rates,
+    observe=_shown,
+    jump=(*WIDE_FLOW_FORM.jump, 0.0),
+)
+FILTERED_TURBULENT_FLOW_FORM = replace(FILTERED_FLOW_FORM, name="filtered_flow_turbulent", rates=_turbulent)
+FILTERED_QUICK_FLOW_FORM = replace(FILTERED_FLOW_FORM, name="filtered_flow_quick", rates=_quick)
+FILTERED_TURBULENT_QUICK_FLOW_FORM = replace(
+    FILTERED_FLOW_FORM, name="filtered_flow_turbulent_quick", rates=_turbulent_quick
+)
