@@ -167,7 +167,7 @@ def behind_filter(log: GreyBoxLog, tried: Trial) -> Trial:
     log : GreyBoxLog
         The log, widened.
     tried : Trial
-        The set, fitted to the end.
+        The set, fitted to the end unless that is far from the log.
 
     Returns
     -------
@@ -175,7 +175,7 @@ def behind_filter(log: GreyBoxLog, tried: Trial) -> Trial:
         The set as it was where its pressure is not late or only lags, and where no filter explains the log better.
     """
     delay = tried.delays.get(PRESSURE_LATE.late, 0.0)
-    if not tried.fits or PRESSURE_LATE not in tried.together or delay <= 0.0:
+    if PRESSURE_LATE not in tried.together or delay <= 0.0:
         return tried
     name, time = PRESSURE_FILTERED.free
     lag = tried.values[name]

@@ -22,6 +22,7 @@ from estimation.fits.hypotheses import (
 from estimation.fits.hypothesis_search.fit_objections import DOUBTED, QUIET
 from estimation.fits.hypothesis_search.not_excluded import OPEN_DELIVERY
 from estimation.fits.hypothesis_search.predicted_gains import PredictedGain
+from estimation.fits.hypothesis_search.wide_problem import widest_makeup
 from estimation.models.completed_flow import CRACKS
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
@@ -50,6 +51,17 @@ def test_a_fit_that_leaves_far_less_than_the_noise_of_position_is_asked_for_noth
     for left, wanted in ((0.99 * QUIET, ()), (1.01 * QUIET, HYPOTHESES)):
         fit = replace(sound, chi_square=(left,), autocorrelation=(0.9,))  # alike as well, which alone asks for all
         assert hypotheses_asked(noisy, PAPER, fit, fit, loaded=False, moving=False)[0] == wanted
+
+
+def test_valves_as_wide_as_a_model_resolves_are_asked_what_they_took_up() -> None:
+    """A pressure that lags by 2 ms was told as plain, bulk modulus six deviations too low."""
+    plain, sound = seen(log(0.2)), made_fit(400.0, 2e8, 1e5)
+    widest = widest_makeup(PAPER.chamber_volume, PAPER.bulk_modulus)
+    for share, wanted in ((0.42, ()), (1.0, HYPOTHESES)):  # of sound logs 0.42 at most
+        wide = replace(sound, values={**sound.values, "makeup_conductance": share * widest})
+        with all_promise(PredictedGain(0.0, 0.0, 0.0)):
+            asked, _ = hypotheses_asked(plain, PAPER, wide, wide, loaded=False, moving=False)
+        assert asked == wanted
 
 
 def test_a_minute_at_1_khz_is_asked_and_two_are_not() -> None:
