@@ -205,6 +205,16 @@ def test_a_plain_log_whose_plain_form_has_two_valleys_is_explained_by_the_lower_
     assert answer.parameters["case_leakage"][0] == pytest.approx(made.setup.machine.drain, rel=0.3)
 
 
+def test_the_drain_of_a_side_that_a_load_shuts_in_is_sought_from_below_too() -> None:
+    """The minimum with fourteen times the drain put leakage twelve deviations off."""
+    made = make("constant_load", "validation", 17804)
+    channels = {name: made.log[name].to_numpy() for name in made.log if name != "time_s"}
+    answer = flow_fit.fit_flow(Record(1e-3, channels), PAPER, PAPER.bulk_modulus)
+    value, std = answer.parameters["leakage_coefficient"]
+    assert value == pytest.approx(made.setup.machine.leakage, abs=2.0 * std)
+    assert value == pytest.approx(made.setup.machine.leakage, rel=1.5e-3)
+
+
 @pytest.mark.slow
 def test_a_plain_log_whose_search_ended_far_off_is_told_no_air() -> None:
     """Air that enters after the end of the log, `0 ± inf %`, was found, and its bleeding advised."""
