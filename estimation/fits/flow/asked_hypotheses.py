@@ -205,7 +205,7 @@ def near_starts(
     explains: Callable[[GreyBoxFit], bool],
     *,
     in_motion: bool,
-    widest: bool,
+    widest: bool = False,
 ) -> Sequence[Mapping[str, float]]:
     """Return the starts of the search for hypotheses: a fit that explains the log is at no wrong minimum.
 
@@ -222,7 +222,7 @@ def near_starts(
         ``explains(fit)``: whether a fit explains the log.
     in_motion : bool
         Whether the log begins under load, or while the motor turns.
-    widest : bool
+    widest : bool, optional
         Whether it is at a wrong minimum all the same, see `at_widest`.
 
     Returns
