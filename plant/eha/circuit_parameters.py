@@ -196,11 +196,11 @@ def circuit_of(p: EhaParameters) -> CircuitParameters:
     compliance = p.chamber_volume / p.bulk_modulus * paper.bulk_modulus / paper.chamber_volume
     size = max(1.0, compliance * max(1.0, p.relief_pressure / paper.relief_pressure))
     known = {name: value for name, value in asdict(p).items() if value is not None}
+    judged = {"stroke": min(paper.stroke, float(longest_stroke(p))), "accumulator_gas": size * paper.accumulator_gas}
     return CircuitParameters(
-        **{"stroke": min(paper.stroke, float(longest_stroke(p))), **known},
+        **{**judged, **known},
         pump_crossport_leakage=share * paper.pump_crossport_leakage,
         pump_case_leakage=share * paper.pump_case_leakage,
-        accumulator_gas=size * paper.accumulator_gas,
         accumulator_oil=size * paper.accumulator_oil,
     )
 

@@ -84,6 +84,18 @@ DOUBTS: Mapping[str, Doubt] = {
         "judged: a catalogue's piston and rod leave out the load, and oil in a line counts by the square of piston "
         "area over line area (0.3 m of 12 mm line add 5 kg on 15 cm^2); measured by weighing with the load",
     ),
+    "accumulator_pressure": Doubt(
+        Spread.of(0.2),
+        Spread.of(0.05),
+        "judged: gas is charged at another temperature (20 K are 7 %) and seeps away over years; measured with a "
+        "gauge on the inner circuit",
+    ),
+    "accumulator_gas": Doubt(
+        Spread.of(0.3),
+        Spread.of(0.1),
+        "judged, where it is given: a catalogue gives the shell, and the gas is what charge and filling leave of it; "
+        "measured by filling and pressure",
+    ),
     PRESSURE_GAIN: Doubt(
         Spread.of(0.015),
         Spread.of(0.003),

@@ -60,6 +60,9 @@ class EhaParameters:
         zero=True,
     )
     accumulator_pressure: float = si(2.758e5, "Pa", "inner circuit, absolute", "section 2: 40 psi")
+    accumulator_gas: float | None = si(
+        None, "m^3", "gas of the inner circuit's accumulator at its pressure, if known", "the paper gives none"
+    )
     makeup_conductance: float = si(
         1e-9, "m^3/(s Pa)", "make-up flow per pascal below the inner circuit", JUDGED, zero=True
     )

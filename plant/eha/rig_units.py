@@ -38,6 +38,7 @@ LIMITS: Mapping[str, Limits] = MappingProxyType(
         "flow_bias": Limits(0.0, 1e-2, "m^3/s", "0.1 L/min"),
         "relief_pressure": Limits(1e4, 1e9, "Pa", "160 bar"),
         "accumulator_pressure": Limits(1e3, 1e9, "Pa", "3 bar"),
+        "accumulator_gas": Limits(1e-9, 10.0, "m^3", "0.3 L"),
         "stroke": Limits(1e-4, 30.0, "m", "200 mm"),
     }
 )

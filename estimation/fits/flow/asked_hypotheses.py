@@ -32,10 +32,9 @@ from estimation.fits.hypothesis_search.explain import WORTH
 from estimation.fits.hypothesis_search.fit_objections import doubted, fit_explains, is_too_close
 from estimation.fits.hypothesis_search.not_excluded import open_wear_note, share_lost
 from estimation.fits.hypothesis_search.predicted_gains import PredictedGain, predicted_gain, predicted_gains, slopes_of
+from estimation.fits.hypothesis_search.wide_log import HELD
 from estimation.fits.hypothesis_search.wide_problem import widest_makeup
 from estimation.models.completed_flow import CRACKS, balances_mass
-from estimation.models.flow import STIFFNESS
-from estimation.models.inner_circuit import BEND
 from plant.eha.model import EhaParameters
 from plant.notes import Note
 
@@ -236,5 +235,4 @@ def near_starts(
     usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
     lost = fit.values["makeup_conductance"] > TOO_WIDE * MAKEUP_TRIED[0]
     near = [fit.values, fed] if lost else [fit.values]
-    held = (STIFFNESS, *CRACKS, BEND)
-    return [*({name: value for name, value in one.items() if name not in held} for one in near), *usual]
+    return [*({name: value for name, value in one.items() if name not in HELD} for one in near), *usual]

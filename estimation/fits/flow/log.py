@@ -8,6 +8,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.fits.flow.pumped import pumped_evenly
+from estimation.fits.flow.stated_gas import GAS, presumed_stiffness
 from estimation.fits.greybox.block_averages import averaged, odd_block
 from estimation.fits.greybox.intersample_doubt import OWN_NOISE, SLOW
 from estimation.fits.greybox.intersample_speed import straightened
@@ -170,7 +171,7 @@ def flow_log(
         flow_parameters(parameters),
         longest_step=LONGEST_STEP,
         variances={**variances, **quiet},
-        uncertainties=uncertainties,
+        uncertainties={name: one for name, one in uncertainties.items() if name != GAS},  # its stiffness is fitted
     )
     speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
     swept = _swept_share(log.drives[:, position], parameters)
@@ -192,6 +193,7 @@ def flow_log(
             "makeup_opening": (OPENING_START, PRESUMED_STD),
             "speed_lead": (0.0, MOST_LEAD * record.sample_time / dict(FLOW_FORM.linear)["speed_lead"]),
             **dict.fromkeys((*CRACKS, BEND), (0.0, 1.0)),
+            **presumed_stiffness(parameters, uncertainties),
         },
         within=WITHIN,
     )

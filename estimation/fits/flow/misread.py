@@ -29,7 +29,7 @@ from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
 from estimation.log_checks.flow_balance import MOST_LOST
 from estimation.log_checks.sliding_pressure import beyond_sliding, sliding_pressure
 from estimation.log_checks.standstill import travels
-from estimation.models.flow import FLOW_FORM, STIFFNESS, reaches_relief, relieving
+from estimation.models.flow import FLOW_FORM, reaches_relief, relieving
 from estimation.notes import ChannelCode
 from plant.eha.model import EhaParameters
 from plant.notes import Note
@@ -197,7 +197,7 @@ def _rough_misfit(logged: Logged, rig: EhaParameters) -> float:
     log = logged.seen_at(rig).taken_at(rig.bulk_modulus)
     form = relieving(FLOW_FORM) if reaches_relief(log.measured, rig.relief_pressure) else FLOW_FORM
     problem = FreedProblem.of(form, log.coarsened())
-    guesses = guesses_about({STIFFNESS: 0.0, **flow_starts(rig, rig.bulk_modulus)[0]}, form, rig)
+    guesses = guesses_about(flow_starts(rig, rig.bulk_modulus)[0], form, rig)
     costs = problem.costs(guesses, LANES)
     if 2.0 * np.min(costs) > HOPELESS * problem.blocks:
         return np.inf

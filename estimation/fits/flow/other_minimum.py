@@ -6,6 +6,7 @@ from typing import TypeAlias
 import numpy as np
 
 from estimation.fits.flow.log import outruns_pump
+from estimation.fits.flow.stated_gas import by_belief, first_stiffness
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
@@ -51,7 +52,7 @@ def nearest(one: Found, other: Found, guesses: Mapping[str, float]) -> Point:
         First guesses [SI].
     """
     problem, point, bounds = one
-    led = {STIFFNESS: 0.0, **other[0].model.values(other[1].theta), **{name: guesses[name] for name in VANISHING}}
+    led = {STIFFNESS: first_stiffness(problem.log), **other[0].model.values(other[1].theta), **{name: guesses[name] for name in VANISHING}}
     there = problem.at(np.clip(problem.model.theta(led), *bounds))
     return there if there.cost < problem.at(point.theta).cost else point
 
@@ -91,10 +92,10 @@ def lower_minimum(
     if log.gaps.size:
         return None
     bent = outruns_pump(log, parameters)
-    values = {STIFFNESS: 0.0, BEND: 0.0, **fit.values, **dict.fromkeys(CRACKS, 0.0)}
+    values = {STIFFNESS: first_stiffness(log), BEND: 0.0, **fit.values, **dict.fromkeys(CRACKS, 0.0)}
     values |= {name: value for name, (value, _) in found.items()}
     if CRACKS[0] not in fit.values:
-        form = completed_form(fit.model, bent=bent)
+        form = completed_form(fit.model, log, bent=bent)
         if BEND in found or FreedProblem.of(form, log).at(form.theta(values)).cost >= fit.cost:
             return None
     _, point, _ = from_minimum(fit.model, log, values, wanted, bent=bent)
@@ -124,8 +125,10 @@ def smaller_accumulator(
     -------
     Mapping[str, float] or None
         Values of the unknowns of the plain form [SI]; None where no fit has the smallest usual accumulator, or none
-        falls so low.
+        falls so low, or the rig file states the gas.
     """
+    if STIFFNESS in log.presumed:
+        return None
     usual = stiffest_accumulator(vars(parameters))
     for fit in sorted(fits, key=lambda one: one.cost):
         if fit.values.get(STIFFNESS, 0.0) > usual / BEYOND:
@@ -160,23 +163,25 @@ def from_minimum(
     Found
         The form's problem, where it led, and how far it might have gone.
     """
-    form = completed_form(form, bent=bent)
+    form = completed_form(form, log, bent=bent)
     problem = FreedProblem.of(form, log)
-    theta = form.theta({STIFFNESS: 0.0, **valley})
+    theta = form.theta({STIFFNESS: first_stiffness(log), **valley})
     bounds = flow_bounds(form, [theta], log)
     quick = spared(problem, theta)
     return quick, descend(quick.at, theta, FINISHING, bounds, radius=WITHIN, wanted=wanted), bounds
 
 
-def completed_form(form: GreyBoxModel, *, bent: bool) -> GreyBoxModel:
+def completed_form(form: GreyBoxModel, log: GreyBoxLog, *, bent: bool) -> GreyBoxModel:
     """Return a form with what matters to the last digits alone; held chambers have no such valves.
 
     Parameters
     ----------
     form : GreyBoxModel
         The form, completed or not.
+    log : GreyBoxLog
+        The log, with what is presumed.
     bent : bool
         Whether make-up valves must let in more than the pump delivers, so that they are orifices.
     """
     known = CRACKS[0] in form.unknowns or form.rates is HELD_FLOW_FORM.rates
-    return form if known else completed(form, bent=bent)
+    return form if known else by_belief(completed(form, bent=bent), log)

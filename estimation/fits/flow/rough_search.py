@@ -11,6 +11,7 @@ from math import ceil
 import numpy as np
 
 from estimation.fits.flow.guesses import guesses_about
+from estimation.fits.flow.stated_gas import by_belief, first_stiffness
 from estimation.fits.greybox.descent import Point, descend, remembered
 from estimation.fits.greybox.driven import driven_samples
 from estimation.fits.greybox.fit import NEAR_ENOUGH, Search, explained, roughly
@@ -63,7 +64,7 @@ class RoughOptimum:
     @property
     def values(self) -> Mapping[str, float]:
         """The unknowns, with an accumulator's stiffness where the balance has none [SI]."""
-        return {STIFFNESS: 0.0, **self.problem.model.values(self.point.theta)}
+        return {STIFFNESS: first_stiffness(self.problem.log), **self.problem.model.values(self.point.theta)}
 
 
 def rough_optima(
@@ -89,7 +90,8 @@ def rough_optima(
         By volume, by mass, and by volume in held chambers.
     """
     relieved = reaches_relief(log.measured, parameters.relief_pressure)
-    volume, mass, held = (relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM))
+    forms = (by_belief(form, log) for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM))
+    volume, mass, held = (relieving(form) if relieved else form for form in forms)
     rough = _led([volume, mass, held], log, parameters, starts)
     if not parameters.area_difference or any(map(_explains, rough)):
         return rough
@@ -138,7 +140,7 @@ def _guess(
     Of the log its beginning is looked at, which the problem holds.
     """
     search = _search(log)
-    around = {STIFFNESS: 0.0, **starts[0]}
+    around = {STIFFNESS: first_stiffness(log), **starts[0]}
     guesses = guesses_about(around, problem.model, parameters)
     likeliest = guesses[int(np.argmin(problem.costs(guesses, LANES)))]
     bounds = flow_bounds(problem.model, guesses, log)
@@ -166,9 +168,9 @@ def _searched(
     screen: Callable[[Array], Point] | None = None,
 ) -> RoughOptimum:
     """Return the best that is found from starts, at first with noise of position as it is at the rig's bulk modulus."""
-    search = _search(log)
+    search, fed = _search(log), {STIFFNESS: first_stiffness(log)}
     problem = FreedProblem.of(form, afar)
-    guesses = [form.theta({STIFFNESS: 0.0, **start}) for start in starts]
+    guesses = [form.theta({**fed, **start}) for start in starts]
     bounds = flow_bounds(form, guesses, afar)
     if not log.passes_on:
         point = roughly(problem, guesses, search, bounds, wanted, hopeful=hopeful, screen=screen)
@@ -177,7 +179,7 @@ def _searched(
     if np.isinf(point.cost):
         return RoughOptimum(problem, point, bounds)
     problem, modulus = problem.on(log), form.values(point.theta)["bulk_modulus"]
-    guesses = [form.theta({STIFFNESS: 0.0, **start, "bulk_modulus": modulus}) for start in starts]
+    guesses = [form.theta({**fed, **start, "bulk_modulus": modulus}) for start in starts]
     bounds = flow_bounds(form, guesses, log)
     again = [point.theta] if alone else [*guesses, point.theta]
     return RoughOptimum(problem, roughly(problem, again, search, bounds, wanted), bounds)

@@ -9,6 +9,7 @@ from estimation.arrays import IntArray
 from estimation.fits.flow.log import DRAIN_START, OPENING_START, carried, outruns_pump
 from estimation.fits.flow.other_minimum import FINISHING, Found, completed_form, from_minimum, nearest
 from estimation.fits.flow.rough_search import RIVAL, UNLIKELY, RoughOptimum, rough_optima
+from estimation.fits.flow.stated_gas import first_stiffness
 from estimation.fits.flow.swept import swept_evenly
 from estimation.fits.greybox.descent import descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded, explained
@@ -24,7 +25,8 @@ from estimation.fits.hypothesis_search.fault_guesses import (
 )
 from estimation.fits.hypothesis_search.wide_problem import flow_bounds
 from estimation.models.completed_flow import CRACKS
-from estimation.models.flow import HELD_FLOW_FORM
+from estimation.models.flow import HELD_FLOW_FORM, STIFFNESS
+from estimation.models.inner_circuit import BEND
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.spare_processors import each
@@ -213,9 +215,10 @@ def _plain(one: RoughOptimum) -> bool:
 
 def _completed(one: RoughOptimum, log: GreyBoxLog, *, bent: bool) -> tuple[Problem, Array, tuple[Array, Array]]:
     """Return the problem with what matters to the last digits alone, where its search begins, and its bounds."""
-    problem = FreedProblem.of(completed_form(one.problem.model, bent=bent), one.problem.log)
-    theta = np.append(one.point.theta, np.zeros(len(problem.model.unknowns) - len(one.point.theta)))
+    problem = FreedProblem.of(completed_form(one.problem.model, log, bent=bent), one.problem.log)
+    known, fresh = len(one.point.theta), {STIFFNESS: first_stiffness(log), BEND: 0.0, **dict.fromkeys(CRACKS, 0.0)}
+    begun = problem.model.theta({**fresh, **one.values})
+    theta = np.append(one.point.theta, begun[known:])
     lowest, highest = flow_bounds(problem.model, [theta], log)
-    known = len(one.point.theta)
     lowest[:known], highest[:known] = one.bounds
     return problem, theta, (lowest, highest)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.finding import NORMAL_95
+from estimation.fits.flow.stated_gas import by_belief, first_stiffness
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
@@ -295,7 +296,7 @@ class _Search:
 
     def _problem(self, course: LossRegressor | None, *, coarse: bool) -> FreedProblem:
         log = self._with(np.zeros(len(self._log.drives)) if course is None else self._measured.of(course))
-        return FreedProblem.of(self._form, log.coarsened() if coarse else log)
+        return FreedProblem.of(by_belief(self._form, log), log.coarsened() if coarse else log)
 
     def _with(self, loss: Array) -> GreyBoxLog:
         """Return the log with a loss beside its drives."""
@@ -305,7 +306,7 @@ class _Search:
         return replace(self._log, drives=drives, drive_std=(*self._log.drive_std, 0.0), parameters=parameters)
 
     def _theta(self, problem: FreedProblem, values: Mapping[str, float]) -> Array:
-        return problem.model.theta({STIFFNESS: 0.0, **dict.fromkeys(CRACKS, 0.0), **values})
+        return problem.model.theta({STIFFNESS: first_stiffness(self._log), **dict.fromkeys(CRACKS, 0.0), **values})
 
     def _bounds(self, problem: FreedProblem, theta: Array) -> tuple[Array, Array]:
         lowest, highest = flow_bounds(problem.model, [theta], problem.log)

@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from estimation.fits.flow.stated_gas import first_stiffness
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play_courses import crossings
 from estimation.fits.hypotheses import PRESUMED
@@ -26,6 +27,9 @@ from plant.eha.model import EhaParameters
 from plant.solvers.steps import parameter_names, parameter_row
 
 START_LEVEL = "start_level"
+
+HELD = (STIFFNESS, *CRACKS, BEND)
+"""What the plain form found and a search for what is strange holds: it would take that up."""
 
 LEVEL_OPEN = 3.0**-0.5
 """Root mean square of the level at which the lower side begins, over the most that it may be, before a log is seen: it
@@ -50,8 +54,7 @@ def widened(
     parameters : EhaParameters
         The actuator.
     found : Mapping[str, float], optional
-        What the plain form found; of it `STIFFNESS`, `CRACKS` and `BEND` are held, as they would take up what is
-        strange [SI].
+        What the plain form found; of it `HELD` is kept [SI].
 
     Returns
     -------
@@ -69,7 +72,7 @@ def widened(
         parameters=parameter_row(
             WideFlowParameters(
                 **known,
-                **{name: found.get(name, 0.0) for name in (STIFFNESS, *CRACKS, BEND)},
+                **{STIFFNESS: first_stiffness(log), **{name: found[name] for name in HELD if name in found}},
                 stated_pressure=usual_pressure(log, parameters),
             )
         ),

@@ -62,6 +62,9 @@ SMALLEST_GAS = 1.0
 """Least gas that there may be, over the oil that both chambers take up from rest to relief pressure [dimensionless]:
 with as much it loses half its pressure then, and a designer gives it more."""
 
+MOST_DEVIATIONS = 5.0
+"""Deviations of what a rig file states by which an accumulator is stiffer at most [dimensionless]."""
+
 BEYOND = 1.001
 """How many times as stiff as usual an accumulator is that is smaller than usual [dimensionless]: but for rounding."""
 
@@ -123,7 +126,8 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedP
     form = FORMS[FILTER_TIME in extra, LEAKAGE_TURBULENT.free[0] in extra, QUICKNESS in extra]
     free = tuple(dict.fromkeys((*known, *extra)))
     ridge = Ridge(DELIVERY.free[0], FLOW_BIAS, flow_speed(log)) if DELIVERY.free[0] in free else None
-    return FreedProblem(form, log, free, LINEAR, ridge)
+    linear = {name: size for name, size in LINEAR.items() if name != STIFFNESS or STIFFNESS not in log.presumed}
+    return FreedProblem(form, log, free, linear, ridge)
 
 
 def freed_at_end(together: Iterable[Hypothesis]) -> list[str]:
@@ -267,7 +271,10 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     most = rig["pump_displacement"] * float(np.max(np.abs(log.drives[:, 0])))
     relief = (0.0, max(most / (SHARPEST_RELIEF * rig["relief_pressure"]), rig["relief_conductance"]))
     stiffest = stiffest_accumulator(rig)
-    if STIFFNESS in model.unknowns and max(model.values(guess)[STIFFNESS] for guess in guesses) > BEYOND * stiffest:
+    if STIFFNESS in log.presumed:
+        value, spread = log.presumed[STIFFNESS]
+        stiffest = value * np.exp(MOST_DEVIATIONS * spread)
+    elif STIFFNESS in model.unknowns and max(model.values(guess)[STIFFNESS] for guess in guesses) > BEYOND * stiffest:
         stiffest = stiffest_accumulator(rig, small=True)
     latest = 0.0 if log.course is None else -log.sample_time
     limits = {"speed_lead": (latest, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
