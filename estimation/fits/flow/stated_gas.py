@@ -20,6 +20,30 @@ SLOWEST, QUICKEST = 1.0, 1.4
 """Exponents of nitrogen that is compressed slowly, at its wall's temperature, and quickly [dimensionless]."""
 
 
+LEAST_GAS, MOST_GAS = 1.0, 100.0
+"""Gas of an accumulator, over the oil that it gives and takes [dimensionless]; judged. With as much as that it loses half
+of its pressure, and a designer gives it more; with the most its pressure stays as it is."""
+
+
+def oil_taken(p: EhaParameters) -> float:
+    """Return the oil that the inner circuit gives and takes.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    float
+        What both chambers take up from rest to relief pressure, as much as a chamber at most, and what a single rod
+        displaces [m^3].
+    """
+    compressed = p.chamber_volume * min(4.0 * p.relief_pressure / p.bulk_modulus, 1.0)
+    swept = p.piston_area * p.stroke if p.stroke else 2.0 * p.chamber_volume
+    return compressed + 2.0 * abs(p.area_difference) * swept
+
+
 def presumed_stiffness(p: EhaParameters, uncertainties: Mapping[str, float]) -> dict[str, tuple[float, float]]:
     """Return what is known of the accumulator's stiffness before a log is seen.
 
@@ -46,9 +70,10 @@ def presumed_stiffness(p: EhaParameters, uncertainties: Mapping[str, float]) -> 
     >>> round(value)
     3263309670
     """
-    if p.accumulator_gas is None:
-        return {}
     exponent = math.sqrt(SLOWEST * QUICKEST)
+    if p.accumulator_gas is None:
+        usual = math.sqrt(LEAST_GAS * MOST_GAS) * oil_taken(p)
+        return {STIFFNESS: (exponent * p.accumulator_pressure / usual, math.log(MOST_GAS / LEAST_GAS) / math.sqrt(12.0))}
     of_exponent = math.log(QUICKEST / SLOWEST) / math.sqrt(12.0)
     spread = math.hypot(of_exponent, uncertainties.get(GAS, 0.0), uncertainties.get(CHARGE, 0.0))
     return {STIFFNESS: (exponent * p.accumulator_pressure / p.accumulator_gas, spread)}

@@ -261,7 +261,8 @@ def test_a_relief_valve_with_a_sharp_corner_does_not_feign_certainty(seed: int) 
     coarse = record.replace(differential_pressure_pa=bit * np.round(record["differential_pressure_pa"] / bit))
     fit = fit_flow(coarse, rig, 2.07e8)
     assert 1e-3 < fit.bound < 5e-3
-    assert fit.parameters["bulk_modulus"][0] == pytest.approx(p.bulk_modulus, rel=0.01)
+    value, std = fit.parameters["bulk_modulus"]
+    assert abs(value - p.bulk_modulus) < 4.0 * std
 
 
 @pytest.mark.parametrize("seed", thinned([100, 101], [100]))
