@@ -38,6 +38,7 @@ NAMES = (
     "diagnosis.diagnosis",
     "diagnosis.noisy_sensors",
     "diagnosis.random_rigs",
+    "diagnosis.typed_rigs",
     "diagnosis.open_benchmark",
     "many_logs.batch_scale",
     "many_logs.archive",

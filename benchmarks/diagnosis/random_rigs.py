@@ -65,15 +65,35 @@ def scored(seed: int, *, wrong: bool, pressure: bool) -> dict[str, Any]:
     bench = draw_bench(seed)
     rig = Rig("drawn", wrong_file(bench.healthy, seed) if wrong else bench.healthy)
     log, began = Log(bench.record, rig), time.process_time()
+    row = row_of(log, {"bulk_modulus": bench.true.bulk_modulus, "condition": bench.condition}, pressure=pressure)
+    return {"seed": seed, "about": bench.about, **row, "seconds": time.process_time() - began}
+
+
+def row_of(log: Log, truth: dict[str, Any], *, pressure: bool) -> dict[str, Any]:
+    """Return what both verbs say of a log, against its truth.
+
+    Parameters
+    ----------
+    log : Log
+        The log with its rig.
+    truth : dict
+        True ``bulk_modulus`` [Pa] and ``condition``.
+    pressure : bool
+        Whether it may be used.
+
+    Returns
+    -------
+    dict[str, Any]
+        As of `scored`, without what it says of the rig.
+    """
     estimate, diagnosis = (_asked(log, verb, pressure) for verb in ("estimate", "diagnose"))
-    seconds = time.process_time() - began
-    truth = {"beta_lo": bench.true.bulk_modulus, "beta_hi": bench.true.bulk_modulus, "accept": bench.condition}
-    row: dict[str, Any] = {"seed": seed, "about": bench.about, "z": None, "seconds": seconds}
-    row |= judge_bulk_modulus(estimate, truth) | judge_class(diagnosis, truth)
+    modulus = truth["bulk_modulus"]
+    judged = {"beta_lo": modulus, "beta_hi": modulus, "accept": truth["condition"]}
+    row: dict[str, Any] = {"z": None, **judge_bulk_modulus(estimate, judged), **judge_class(diagnosis, judged)}
     said = estimate.get("bulk_modulus_pa") or {}
     if said.get("value") is not None:
         low, high = said["ci95"]
-        row["z"] = 2.0 * NORMAL_95 * (said["value"] - bench.true.bulk_modulus) / (high - low)
+        row["z"] = 2.0 * NORMAL_95 * (said["value"] - modulus) / (high - low)
     condition = diagnosis.get("condition")
     row["said"] = condition, (diagnosis.get("probabilities") or {}).get(condition, 0.0)
     told = (*estimate.get("notes", ()), *diagnosis.get("notes", ()))

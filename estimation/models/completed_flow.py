@@ -37,7 +37,7 @@ def completed(form: GreyBoxModel, *, bent: bool = False) -> GreyBoxModel:
         sizes, names = (*sizes, (BEND, USUAL_BEND)), (*names, BEND)
     if form.rates is FLOW_FORM.rates:
         form = replace(form, name="flow_volume", initial=all_at_rest, rates=_by_volume, jump=MASS_FLOW_FORM.jump)
-        sizes, names = (*sizes, *MASS_FLOW_FORM.linear[-1:]), (*names, STIFFNESS)
+        names = (*names, STIFFNESS)
         form = replace(form, rates=_bent_by_volume) if bent else form
     elif bent:
         form = replace(form, rates=_bent_by_mass)

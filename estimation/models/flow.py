@@ -303,7 +303,6 @@ MASS_FLOW_FORM = replace(
     unknowns=(*FLOW_FORM.unknowns, STIFFNESS),
     initial=all_at_rest,
     rates=_by_mass,
-    linear=(*FLOW_FORM.linear, (STIFFNESS, 1e8)),
     jump=(0.5, -0.5, 0.0),
 )
 """Balanced by mass, with an inner circuit whose pressure rises with the oil that it takes."""

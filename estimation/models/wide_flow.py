@@ -9,7 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from estimation.models.completed_flow import CRACKS, USUAL_CRACK
-from estimation.models.flow import STIFFNESS, delivered_flow, leaked_flow, port_flows
+from estimation.models.flow import delivered_flow, leaked_flow, port_flows
 from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.inner_circuit import BEND, USUAL_BEND, narrowed
@@ -344,6 +344,5 @@ LINEAR = {
     **dict.fromkeys(("area_difference", "volume_difference"), 0.1),
     **dict.fromkeys(CRACKS, USUAL_CRACK),
     BEND: USUAL_BEND,
-    STIFFNESS: 1e8,
 }
 """Parameters that may be zero or negative, each with a typical size [SI]."""

@@ -19,7 +19,7 @@ from estimation.fits.flow.log import homed_at_stop, require_flow_channels, witho
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
 from estimation.fits.flow.misread import UNLIKE_SLIPS, CorrectedLogs
-from estimation.fits.flow.other_minimum import lower_minimum, smaller_accumulator
+from estimation.fits.flow.other_minimum import lower_minimum
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer, with_shorter_steps
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.greybox.fit import GreyBoxFit
@@ -286,9 +286,7 @@ def _elsewhere(plain: PlainFits, strange: Explanation) -> FitStart | None:
         return replace(start, speed_offset=turned, valley=None)
     if start.valley is not None:
         return None
-    lower = smaller_accumulator(plain.log, start.parameters, plain.fits, cost + WORTH)
-    if lower is None:
-        lower = lower_minimum(plain.log, start.parameters, plain.swinging, strange.values, cost + WORTH)
+    lower = lower_minimum(plain.log, start.parameters, plain.swinging, strange.values, cost + WORTH)
     return None if lower is None else replace(start, valley=lower)
 
 

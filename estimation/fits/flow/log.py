@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.arrays import Array
+from estimation.fits.flow.accumulator import GAS, presumed_stiffness
 from estimation.fits.flow.pumped import pumped_evenly
-from estimation.fits.flow.stated_gas import GAS, presumed_stiffness
 from estimation.fits.greybox.block_averages import averaged, odd_block
 from estimation.fits.greybox.intersample_doubt import OWN_NOISE, SLOW
 from estimation.fits.greybox.intersample_speed import straightened

@@ -1,19 +1,19 @@
 """`lower_minimum(log, ...)`: a lower minimum of the plain flow form, found from the values of another explanation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TypeAlias
 
 import numpy as np
 
+from estimation.fits.flow.accumulator import first_stiffness
 from estimation.fits.flow.log import outruns_pump
-from estimation.fits.flow.stated_gas import by_belief, first_stiffness
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.greybox.spared_steps import spared
-from estimation.fits.hypothesis_search.wide_problem import BEYOND, flow_bounds, stiffest_accumulator
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds
 from estimation.models.completed_flow import CRACKS, completed
 from estimation.models.flow import HELD_FLOW_FORM, STIFFNESS
 from estimation.models.greybox import GreyBoxModel
@@ -27,9 +27,6 @@ large, long model steps lead so far astray that 15 left 74 of log-likelihood, an
 
 WITHIN = 0.3
 """First radius of a search from a place in another valley [dimensionless]."""
-
-SMALLER = 2.0
-"""How many times as stiff as usual an accumulator is where the search for a small one begins [dimensionless]."""
 
 VANISHING = ("leakage_coefficient", "case_leakage", "makeup_opening")
 """What another balance may have lost on its way."""
@@ -52,7 +49,11 @@ def nearest(one: Found, other: Found, guesses: Mapping[str, float]) -> Point:
         First guesses [SI].
     """
     problem, point, bounds = one
-    led = {STIFFNESS: first_stiffness(problem.log), **other[0].model.values(other[1].theta), **{name: guesses[name] for name in VANISHING}}
+    led = {
+        STIFFNESS: first_stiffness(problem.log),
+        **other[0].model.values(other[1].theta),
+        **{name: guesses[name] for name in VANISHING},
+    }
     there = problem.at(np.clip(problem.model.theta(led), *bounds))
     return there if there.cost < problem.at(point.theta).cost else point
 
@@ -95,49 +96,11 @@ def lower_minimum(
     values = {STIFFNESS: first_stiffness(log), BEND: 0.0, **fit.values, **dict.fromkeys(CRACKS, 0.0)}
     values |= {name: value for name, (value, _) in found.items()}
     if CRACKS[0] not in fit.values:
-        form = completed_form(fit.model, log, bent=bent)
+        form = completed_form(fit.model, bent=bent)
         if BEND in found or FreedProblem.of(form, log).at(form.theta(values)).cost >= fit.cost:
             return None
     _, point, _ = from_minimum(fit.model, log, values, wanted, bent=bent)
     return values if point.cost < wanted else None
-
-
-def smaller_accumulator(
-    log: GreyBoxLog, parameters: EhaParameters, fits: Sequence[GreyBoxFit], wanted: float
-) -> Mapping[str, float] | None:
-    """Return a start from which the plain form falls below a cost with a smaller accumulator than is usual.
-
-    A compact actuator's accumulator may hold little more gas than its chambers take up oil. What its pressure then does
-    at every stroke passes for an encoder that was homed elsewhere.
-
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log, as the flow form sees it.
-    parameters : EhaParameters
-        The actuator.
-    fits : sequence of GreyBoxFit
-        The plain form's.
-    wanted : float
-        The cost [dimensionless].
-
-    Returns
-    -------
-    Mapping[str, float] or None
-        Values of the unknowns of the plain form [SI]; None where no fit has the smallest usual accumulator, or none
-        falls so low, or the rig file states the gas.
-    """
-    if STIFFNESS in log.presumed:
-        return None
-    usual = stiffest_accumulator(vars(parameters))
-    for fit in sorted(fits, key=lambda one: one.cost):
-        if fit.values.get(STIFFNESS, 0.0) > usual / BEYOND:
-            bent = BEND in fit.values
-            values = {BEND: 0.0, **dict.fromkeys(CRACKS, 0.0), **fit.values, STIFFNESS: SMALLER * usual}
-            problem, point, _ = from_minimum(fit.model, log, values, bent=bent)
-            if point.cost < wanted:
-                return {**values, **problem.model.values(point.theta)}
-    return None
 
 
 def from_minimum(
@@ -163,7 +126,7 @@ def from_minimum(
     Found
         The form's problem, where it led, and how far it might have gone.
     """
-    form = completed_form(form, log, bent=bent)
+    form = completed_form(form, bent=bent)
     problem = FreedProblem.of(form, log)
     theta = form.theta({STIFFNESS: first_stiffness(log), **valley})
     bounds = flow_bounds(form, [theta], log)
@@ -171,17 +134,15 @@ def from_minimum(
     return quick, descend(quick.at, theta, FINISHING, bounds, radius=WITHIN, wanted=wanted), bounds
 
 
-def completed_form(form: GreyBoxModel, log: GreyBoxLog, *, bent: bool) -> GreyBoxModel:
+def completed_form(form: GreyBoxModel, *, bent: bool) -> GreyBoxModel:
     """Return a form with what matters to the last digits alone; held chambers have no such valves.
 
     Parameters
     ----------
     form : GreyBoxModel
         The form, completed or not.
-    log : GreyBoxLog
-        The log, with what is presumed.
     bent : bool
         Whether make-up valves must let in more than the pump delivers, so that they are orifices.
     """
     known = CRACKS[0] in form.unknowns or form.rates is HELD_FLOW_FORM.rates
-    return form if known else by_belief(completed(form, bent=bent), log)
+    return form if known else completed(form, bent=bent)

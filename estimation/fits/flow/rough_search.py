@@ -10,8 +10,8 @@ from math import ceil
 
 import numpy as np
 
+from estimation.fits.flow.accumulator import first_stiffness
 from estimation.fits.flow.guesses import guesses_about
-from estimation.fits.flow.stated_gas import by_belief, first_stiffness
 from estimation.fits.greybox.descent import Point, descend, remembered
 from estimation.fits.greybox.driven import driven_samples
 from estimation.fits.greybox.fit import NEAR_ENOUGH, Search, explained, roughly
@@ -90,8 +90,7 @@ def rough_optima(
         By volume, by mass, and by volume in held chambers.
     """
     relieved = reaches_relief(log.measured, parameters.relief_pressure)
-    forms = (by_belief(form, log) for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM))
-    volume, mass, held = (relieving(form) if relieved else form for form in forms)
+    volume, mass, held = (relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM))
     rough = _led([volume, mass, held], log, parameters, starts)
     if not parameters.area_difference or any(map(_explains, rough)):
         return rough

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.arrays import IntArray
+from estimation.fits.flow.accumulator import first_stiffness
 from estimation.fits.flow.log import DRAIN_START, OPENING_START, carried, outruns_pump
 from estimation.fits.flow.other_minimum import FINISHING, Found, completed_form, from_minimum, nearest
 from estimation.fits.flow.rough_search import RIVAL, UNLIKELY, RoughOptimum, rough_optima
-from estimation.fits.flow.stated_gas import first_stiffness
 from estimation.fits.flow.swept import swept_evenly
 from estimation.fits.greybox.descent import descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded, explained
@@ -215,7 +215,7 @@ def _plain(one: RoughOptimum) -> bool:
 
 def _completed(one: RoughOptimum, log: GreyBoxLog, *, bent: bool) -> tuple[Problem, Array, tuple[Array, Array]]:
     """Return the problem with what matters to the last digits alone, where its search begins, and its bounds."""
-    problem = FreedProblem.of(completed_form(one.problem.model, log, bent=bent), one.problem.log)
+    problem = FreedProblem.of(completed_form(one.problem.model, bent=bent), one.problem.log)
     known, fresh = len(one.point.theta), {STIFFNESS: first_stiffness(log), BEND: 0.0, **dict.fromkeys(CRACKS, 0.0)}
     begun = problem.model.theta({**fresh, **one.values})
     theta = np.append(one.point.theta, begun[known:])

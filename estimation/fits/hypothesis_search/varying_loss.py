@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.finding import NORMAL_95
-from estimation.fits.flow.stated_gas import by_belief, first_stiffness
+from estimation.fits.flow.accumulator import first_stiffness
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
@@ -296,7 +296,7 @@ class _Search:
 
     def _problem(self, course: LossRegressor | None, *, coarse: bool) -> FreedProblem:
         log = self._with(np.zeros(len(self._log.drives)) if course is None else self._measured.of(course))
-        return FreedProblem.of(by_belief(self._form, log), log.coarsened() if coarse else log)
+        return FreedProblem.of(self._form, log.coarsened() if coarse else log)
 
     def _with(self, loss: Array) -> GreyBoxLog:
         """Return the log with a loss beside its drives."""

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from estimation.fits.flow.stated_gas import first_stiffness
+from estimation.fits.flow.accumulator import first_stiffness
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play_courses import crossings
 from estimation.fits.hypotheses import PRESUMED

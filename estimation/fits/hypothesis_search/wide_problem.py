@@ -51,22 +51,8 @@ MOST_VOLUME = 2.0
 """Factor by which a chamber's volume is sought above or below the rig file's [dimensionless]: 4.6 deviations of what is
 presumed. Volumes 4 and 80 times as large took the place of an encoder's zero."""
 
-ADIABATIC = 1.4
-"""Exponent of nitrogen that is compressed quickly [dimensionless]."""
-
-LEAST_GAS = 1.0
-"""Usual least gas of the inner circuit's accumulator, in chamber volumes; judged. With less its pressure would follow
-every stroke, as chambers do whose encoder was homed elsewhere, and hide that."""
-
-SMALLEST_GAS = 1.0
-"""Least gas that there may be, over the oil that both chambers take up from rest to relief pressure [dimensionless]:
-with as much it loses half its pressure then, and a designer gives it more."""
-
 MOST_DEVIATIONS = 5.0
-"""Deviations of what a rig file states by which an accumulator is stiffer at most [dimensionless]."""
-
-BEYOND = 1.001
-"""How many times as stiff as usual an accumulator is that is smaller than usual [dimensionless]: but for rounding."""
+"""Deviations of what is presumed of an accumulator by which it is stiffer at most [dimensionless]."""
 
 MOST_WORN = 0.2
 """Most that a worn pump loses of its displacement where the search for it begins [fraction]; judged."""
@@ -126,8 +112,7 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedP
     form = FORMS[FILTER_TIME in extra, LEAKAGE_TURBULENT.free[0] in extra, QUICKNESS in extra]
     free = tuple(dict.fromkeys((*known, *extra)))
     ridge = Ridge(DELIVERY.free[0], FLOW_BIAS, flow_speed(log)) if DELIVERY.free[0] in free else None
-    linear = {name: size for name, size in LINEAR.items() if name != STIFFNESS or STIFFNESS not in log.presumed}
-    return FreedProblem(form, log, free, linear, ridge)
+    return FreedProblem(form, log, free, LINEAR, ridge)
 
 
 def freed_at_end(together: Iterable[Hypothesis]) -> list[str]:
@@ -212,26 +197,6 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
     return [{"relief_pressure": share * peak, "relief_conductance": RELIEF_START} for share in one.shares_of_peak]
 
 
-def stiffest_accumulator(rig: Mapping[str, float], *, small: bool = False) -> float:
-    """Return how stiff the inner circuit's accumulator may be.
-
-    Parameters
-    ----------
-    rig : Mapping[str, float]
-        The actuator's parameters [SI].
-    small : bool
-        Whether it may be as small as the oil that it takes, or as a chamber if that is less.
-
-    Returns
-    -------
-    float
-        Rise of its pressure per volume of oil that it takes in [Pa/m^3].
-    """
-    taken = min(4.0 * rig["relief_pressure"] / rig["bulk_modulus"], 1.0)
-    gas = SMALLEST_GAS * taken if small else LEAST_GAS
-    return ADIABATIC * rig["accumulator_pressure"] / (gas * rig["chamber_volume"])
-
-
 def widest_makeup(chamber_volume: float, bulk_modulus: float) -> float:
     """Return the largest conductance of a make-up valve that model steps resolve.
 
@@ -258,7 +223,7 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     model : GreyBoxModel
         The flow form with its unknowns.
     guesses : sequence of ndarray, shape (unknowns,)
-        Where it begins [dimensionless]. An accumulator that is smaller than usual there may be as small as any.
+        Where it begins [dimensionless].
     log : GreyBoxLog
         The log, as the model sees it.
 
@@ -270,12 +235,8 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     rig = dict(zip(parameter_names(model.parameters), map(float, log.parameters), strict=True))
     most = rig["pump_displacement"] * float(np.max(np.abs(log.drives[:, 0])))
     relief = (0.0, max(most / (SHARPEST_RELIEF * rig["relief_pressure"]), rig["relief_conductance"]))
-    stiffest = stiffest_accumulator(rig)
-    if STIFFNESS in log.presumed:
-        value, spread = log.presumed[STIFFNESS]
-        stiffest = value * np.exp(MOST_DEVIATIONS * spread)
-    elif STIFFNESS in model.unknowns and max(model.values(guess)[STIFFNESS] for guess in guesses) > BEYOND * stiffest:
-        stiffest = stiffest_accumulator(rig, small=True)
+    stiffness, doubt = log.presumed[STIFFNESS]
+    stiffest = stiffness * np.exp(MOST_DEVIATIONS * doubt)
     latest = 0.0 if log.course is None else -log.sample_time
     limits = {"speed_lead": (latest, log.sample_time), "relief_conductance": relief, STIFFNESS: (0.0, stiffest)}
     limits[START_LEVEL] = (-rig["accumulator_pressure"], shut_in(log))

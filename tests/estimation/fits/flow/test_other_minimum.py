@@ -12,10 +12,10 @@ import hydrostate
 from benchmarks.diagnosis.rig_draws import draw_bench
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.fits.flow import fit as flow_fit
-from estimation.fits.flow import other_minimum
 from estimation.fits.flow import plain as plain_flow
+from estimation.fits.flow.accumulator import first_stiffness
 from estimation.fits.flow.log import flow_log, without_strays
-from estimation.fits.flow.other_minimum import lower_minimum, nearest, smaller_accumulator
+from estimation.fits.flow.other_minimum import lower_minimum, nearest
 from estimation.fits.flow.search import balanced, flow_starts
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
@@ -104,39 +104,11 @@ def unmoved(one: Any, log: GreyBoxLog, wanted: float = np.inf, *, bent: bool) ->
     return problem, problem.at(theta), one.bounds
 
 
-@pytest.mark.parametrize(("cost", "found_it"), [(1.0, True), (-1.0, False)])
-@pytest.mark.parametrize("at_bound", [True, False])
-def test_a_smaller_accumulator_than_usual_is_sought_where_a_fit_has_the_smallest(
-    cost: float, monkeypatch: pytest.MonkeyPatch, *, found_it: bool, at_bound: bool
-) -> None:
-    """A rig whose accumulator holds a twentieth of a chamber was told an encoder's zero that it did not have."""
-    usual = 1.4 * PAPER.accumulator_pressure / PAPER.chamber_volume
-    stiffness = usual if at_bound else 0.5 * usual
-    fit = replace(best(), values={**best().values, STIFFNESS: stiffness})
-    begun: list[float] = []
-
-    def led(form: Any, log: GreyBoxLog, valley: Mapping[str, float], *, bent: bool) -> Any:
-        assert not bent
-        begun.append(valley[STIFFNESS])
-        problem = FreedProblem.of(form, log)
-        return problem, replace(problem.at(form.theta(valley)), cost=best().cost), ()
-
-    monkeypatch.setattr(other_minimum, "from_minimum", led)
-    valley = smaller_accumulator(seen(), PAPER, [fit], best().cost + cost)
-    assert (valley is not None) == (found_it and at_bound)
-    assert begun == ([pytest.approx(2.0 * usual)] if at_bound else [])
-    if valley is not None:
-        form = fit.model
-        most = flow_bounds(form, [form.theta(valley)], seen())[1][form.unknowns.index(STIFFNESS)]
-        taken = 4.0 * PAPER.relief_pressure / PAPER.bulk_modulus
-        assert most * dict(form.linear)[STIFFNESS] == pytest.approx(usual / taken)
-
-
 @pytest.mark.parametrize("lost", [True, False])
 def test_a_form_that_fails_is_led_by_one_that_has_lost_its_leakage(*, lost: bool) -> None:
     """A search by mass ended at 24 times the noise, without leakage, from where none comes back."""
     problem = FreedProblem.of(MASS_FLOW_FORM, seen())
-    known = {STIFFNESS: 0.0, **best().values}
+    known = {STIFFNESS: first_stiffness(seen()), **best().values}
     ended = problem.at(MASS_FLOW_FORM.theta({**known, "leakage_coefficient": 1e-26}))
     far = (
         problem.at(MASS_FLOW_FORM.theta({**known, "bulk_modulus": 5e8}))

@@ -1,0 +1,231 @@
+"""Both verbs on rigs of other makers: ten rig files as an engineer types them, logs by the open benchmark's physics.
+
+The files in `typed_rigs/` were put together by hand, with sizes as catalogues of such units have them: a flight-control
+actuator, a drone's, an excavator's boom, a press, a robot's knee, a compact unit, a blade's pitch, a steering gear, a
+laboratory's bench, and an active strut. They are right, and some do not say how much gas the accumulator holds. Each rig
+is driven as such a rig is: by a position loop, by a sine, by steps, or by its duty cycle. A line a log, and what is
+right of all.
+"""
+
+import argparse
+import time
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import ceil, pi, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.diagnosis.random_rigs import line_of, row_of, summarised
+from benchmarks.targets import printed
+from experiments.open_benchmark.draws import course_of
+from experiments.open_benchmark.drives import CLOSED
+from experiments.open_benchmark.logger import DIFFERENCE, POSITION, SPEED, VELOCITY, Logger, Sensor
+from experiments.open_benchmark.machine import PRELOAD, Machine, machine_of
+from experiments.open_benchmark.run import RECORD, at_rest, run, substeps_for
+from experiments.open_benchmark.setup import Setup
+from experiments.python_user.log import Log
+from experiments.running.random_streams import stream
+from faults.conditions import CONDITIONS, parameters_for
+from plant.arrays import Array
+from plant.eha.model import EhaParameters, piston_areas
+from plant.eha.rig import Rig, read_rig
+from plant.errors import LogWarning
+from plant.log.record import Record
+
+FILES = Path(__file__).parent / "typed_rigs"
+
+
+@dataclass(frozen=True)
+class Use:
+    """How a rig is used, and what its file need not say.
+
+    Parameters
+    ----------
+    drives : tuple of str
+        Names of `experiments.open_benchmark.drives.DRIVES`.
+    sample_time : float
+        Of its logger [s].
+    gas : float
+        Of its accumulator [m^3].
+    travel : float
+        Share of half the stroke that its drives use [fraction].
+    """
+
+    drives: tuple[str, ...]
+    sample_time: float
+    gas: float
+    travel: float = 0.7
+
+
+USES: Mapping[str, Use] = {
+    "blade_pitch": Use(("posn", "track"), 2e-3, 8e-3),
+    "excavator_boom": Use(("track", "posn"), 2e-3, 6e-3),
+    "flight_control": Use(("track", "posn"), 1e-3, 6e-5),
+    "laboratory": Use(("steps", "prbs", "multisine"), 1e-3, 1e-3),
+    "light_aircraft": Use(("track", "sines"), 5e-4, 1.2e-5),
+    "mini_pack": Use(("steps", "posn"), 1e-3, 2.5e-4),
+    "press": Use(("posn", "steps"), 1e-3, 1e-2),
+    "robot_leg": Use(("track", "posn"), 5e-4, 1.5e-5),
+    "steering_gear": Use(("posn", "sines"), 2e-3, 5e-3),
+    "suspension": Use(("sines", "multisine"), 1e-3, 5e-5),
+}
+"""By name of the file; gas where a file gives it is the same."""
+
+SPREAD = 0.05
+"""Half width of leakage, friction and bulk modulus about the file's [fraction]."""
+
+SINGLE_PILOT = 3.0
+"""How many pascals a pascal in the other chamber opens a single rod's make-up valves by, as the open benchmark's."""
+
+DURATION = 10.0
+"""Of a log [s]."""
+
+UNSTABLE = 0.3
+"""Most that a step of Heun's method may be of the shortest time constant of a chamber [dimensionless]."""
+
+
+def main(arguments: list[str]) -> int:
+    """Print a line a log, and every figure beside its target; return how many fall short."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", default="0:2", metavar="A:B", help="first and last seed of each rig")
+    parser.add_argument("--rigs", default=",".join(USES), metavar="NAME,NAME")
+    options = parser.parse_args(arguments)
+    first, _, last = options.seeds.partition(":")
+    warnings.simplefilter("ignore", LogWarning)
+    rows: list[dict[str, Any]] = []
+    for name in options.rigs.split(","):
+        for seed in range(int(first), int(last or first) + 1):
+            rows.append(scored(name, seed))
+            print(f"{name} {line_of(rows[-1])}", flush=True)
+    checks = printed(summarised(rows, wrong=False))
+    return sum(not check.met for check in checks)
+
+
+def scored(name: str, seed: int) -> dict[str, Any]:
+    """Return what both verbs say of one log of a rig, against its truth.
+
+    Parameters
+    ----------
+    name : str
+        Of its file.
+    seed : int
+        Of the log.
+
+    Returns
+    -------
+    dict[str, Any]
+        As of `benchmarks.diagnosis.random_rigs.scored`.
+    """
+    rig = read_rig(FILES / f"{name}.toml")
+    setup, record = logged(name, rig, seed)
+    log, began = Log(record, rig), time.process_time()
+    truth = {"bulk_modulus": setup.machine.bulk_modulus, "condition": setup.condition}
+    row = row_of(log, truth, pressure=True)
+    about = f"{setup.condition}; {setup.drive}, {1e3 * record.sample_time:g} ms"
+    return {"seed": seed, "about": about, **row, "seconds": time.process_time() - began}
+
+
+def logged(name: str, rig: Rig[EhaParameters], seed: int) -> tuple[Setup, Record]:
+    """Return what was true of a log of a rig, and the log.
+
+    Parameters
+    ----------
+    name : str
+        Of its file.
+    rig : Rig
+        The file.
+    seed : int
+        Of the log.
+
+    Returns
+    -------
+    tuple of (Setup, Record)
+        The setup, and channels in SI.
+    """
+    use, healthy, rng = USES[name], rig.parameters, stream(seed, "typed rigs", name)
+    condition = "normal" if seed % 3 == 0 else str(rng.choice(list(CONDITIONS)))
+    drive = use.drives[seed % len(use.drives)]
+    machine = _machine(healthy, condition, use, rng)
+    travel = 0.5 * use.travel * (healthy.stroke or 0.0)
+    if drive in CLOSED:
+        glide = healthy.pump_displacement / healthy.piston_area
+        machine = machine._replace(loop_gain=10.0 / glide, speed_limit=healthy.rated_speed)
+    setup = Setup(condition, machine, drive, travel, DURATION, rated_speed=healthy.rated_speed)
+    setup = setup.with_logger(sensors=_sensors(healthy), sample_time=use.sample_time)
+    course = course_of(setup, rng)
+    states = run(machine, course, _held(machine), refine=_refined(machine))
+    states[:, 4:6] = np.maximum(states[:, 4:6], machine.vapour)
+    table = setup.logger.log(states, rng)
+    return setup, Record(use.sample_time, {one: table[one].to_numpy() for one in setup.logger.channels})
+
+
+def _machine(healthy: EhaParameters, condition: str, use: Use, rng: np.random.Generator) -> Machine:
+    """Return the actuator of a rig file in a condition, with what no file says sized as its flow asks."""
+    p = parameters_for(CONDITIONS[condition], healthy)
+    (area_a, area_b), made = piston_areas(p), machine_of(p)
+    flow, uneven = p.rated_flow, p.area_difference != 0.0
+
+    def about(value: float) -> float:
+        return value * float(rng.uniform(1.0 - SPREAD, 1.0 + SPREAD))
+
+    opening = flow / sqrt(float(rng.uniform(0.3e5, 1e5)))  # the pump's flow at a drop of 0.3 to 1 bar
+    return made._replace(
+        **{name: about(getattr(made, name)) for name in ("leakage", "quadratic", "linear", "coulomb", "bulk_modulus")},
+        flow_bias=about(made.flow_bias),
+        area_a=area_a,
+        area_b=area_b,
+        volume_a=2.0 * p.chamber_volume * (1.0 + p.volume_difference),
+        volume_b=2.0 * p.chamber_volume * (1.0 - p.volume_difference),
+        stroke=p.stroke,
+        spring=p.load_stiffness,
+        load=p.load_force,
+        drain=float(rng.uniform(0.0, 0.05)) * healthy.leakage_coefficient,
+        teeth=float(rng.integers(7, 15)),
+        motor_lag=float(rng.uniform(3e-3, 1e-2)),
+        acceleration=p.rated_speed / float(rng.uniform(0.02, 0.06)),
+        rotor_inertia=8e-4 * p.pump_displacement / EhaParameters().pump_displacement,
+        speed_limit=p.motor_speed_limit,
+        relief_slope=flow / (0.03 * p.relief_pressure),
+        supply_gas=use.gas,
+        check_a=opening,
+        check_b=opening,
+        crack_a=float(rng.uniform(0.0, 5e3)),
+        crack_b=float(rng.uniform(0.0, 5e3)),
+        pilot=SINGLE_PILOT if uneven else 0.0,
+    )
+
+
+def _sensors(p: EhaParameters) -> Mapping[str, Sensor]:
+    """Return sensors of the ranges that a rig needs: of the pressure of its relief valve, and of its speeds."""
+    sensors, velocity = dict(Logger().sensors), p.rated_flow / p.piston_area
+    return sensors | {
+        SPEED: Sensor(noise=4e-4 * p.rated_speed),
+        POSITION: Sensor(quantum=1e-6),
+        VELOCITY: Sensor(noise=5e-3 * velocity),
+        DIFFERENCE: Sensor(noise=7e-4 * p.relief_pressure, quantum=2.0**-14 * p.relief_pressure),
+    }
+
+
+def _held(m: Machine) -> Array:
+    """Return the states at rest in mid-stroke, the load held by the chamber that it pushes on."""
+    states = at_rest(m)
+    states[4] += max(m.load, 0.0) / m.area_a
+    states[5] += max(-m.load, 0.0) / m.area_b
+    return states
+
+
+def _refined(m: Machine) -> int:
+    """Return by how many times steps must be finer than usual: small chambers settle through their valves in little."""
+    filled = max(m.check_a / sqrt(PRELOAD), m.relief_slope) * m.bulk_modulus / (0.5 * min(m.volume_a, m.volume_b))
+    ringing = sqrt(4.0 * m.bulk_modulus * max(m.area_a, m.area_b) ** 2 / (min(m.volume_a, m.volume_b) * m.mass))
+    usual = RECORD / substeps_for(m, m.speed_limit)
+    return max(1, ceil(usual * max(filled, ringing / (2.0 * pi)) / UNSTABLE))
+
+
+if __name__ == "__main__":
+    import sys
+
+    sys.exit(main(sys.argv[1:]))
