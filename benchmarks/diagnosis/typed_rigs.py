@@ -1,10 +1,9 @@
 """Both verbs on rigs of other makers: ten rig files as an engineer types them, logs by the open benchmark's physics.
 
-The files in `typed_rigs/` were put together by hand, with sizes as catalogues of such units have them: a flight-control
-actuator, a drone's, an excavator's boom, a press, a robot's knee, a compact unit, a blade's pitch, a steering gear, a
-laboratory's bench, and an active strut. They are right, and some do not say how much gas the accumulator holds. Each rig
-is driven as such a rig is: by a position loop, by a sine, by steps, or by its duty cycle. A line a log, and what is
-right of all.
+The files in `typed_rigs/` were put together by hand, with sizes as catalogues of such units have them: actuators of a
+flight control, a drone, an excavator's boom, a press, a robot's knee, a compact unit, a blade's pitch, a steering gear,
+a laboratory's bench and a strut. They are right, and some do not say how much gas the accumulator holds. Each rig is
+driven as such a rig is: by a position loop, by sines, or by steps. A line a log, and what is right of all.
 """
 
 import argparse
@@ -66,8 +65,8 @@ USES: Mapping[str, Use] = {
     "flight_control": Use(("track", "posn"), 1e-3, 6e-5),
     "laboratory": Use(("steps", "prbs", "multisine"), 1e-3, 1e-3),
     "light_aircraft": Use(("track", "sines"), 5e-4, 1.2e-5),
-    "mini_pack": Use(("steps", "posn"), 1e-3, 2.5e-4),
-    "press": Use(("posn", "steps"), 1e-3, 1e-2),
+    "mini_pack": Use(("track", "posn"), 1e-3, 2.5e-4),
+    "press": Use(("posn", "track"), 1e-3, 1e-2),
     "robot_leg": Use(("track", "posn"), 5e-4, 1.5e-5),
     "steering_gear": Use(("posn", "sines"), 2e-3, 5e-3),
     "suspension": Use(("sines", "multisine"), 1e-3, 5e-5),

@@ -1,10 +1,10 @@
 """`presumed_stiffness(p, ...)`: what is known of the inner circuit's accumulator before a log is seen.
 
-The pressure that feeds the lower side of a piston rises and falls with the oil that the chambers take and give back. How
+The pressure that feeds the lower side of a piston rises and falls with the oil that chambers take and give back. How
 stiff it is depends on the accumulator's gas, which a rig file may state, with an uncertainty. A file that says nothing
-leaves what designers choose: some times the oil that comes and goes. Either is a belief, and the log may say better: the
-logarithm of the stiffness is normal before the log is seen. So what it leaves open is in the interval given the rig, and
-in the total one. A bound at the paper's size left compact actuators half a per cent too stiff, and hid a single rod's.
+leaves what designers choose: some times the oil that comes and goes. Either is a belief, and the log may say better:
+the logarithm of the stiffness is normal before the log is seen. So what it leaves open is in the interval given the
+rig, and in the total one. See decision 389.
 """
 
 import math
@@ -19,10 +19,10 @@ GAS, CHARGE = "accumulator_gas", "accumulator_pressure"
 SLOWEST, QUICKEST = 1.0, 1.4
 """Exponents of nitrogen that is compressed slowly, at its wall's temperature, and quickly [dimensionless]."""
 
-
 LEAST_GAS, MOST_GAS = 1.0, 100.0
-"""Gas of an accumulator, over the oil that it gives and takes [dimensionless]; judged. With as much as that it loses half
-of its pressure, and a designer gives it more; with the most its pressure stays as it is."""
+"""Gas of an accumulator, over the oil that it gives and takes [dimensionless]; judged. With as much as that it loses
+half of its pressure, and a designer gives it more; with the most its pressure stays as it is. Evenly likely between, in
+ratios."""
 
 
 def oil_taken(p: EhaParameters) -> float:
@@ -68,15 +68,16 @@ def presumed_stiffness(p: EhaParameters, uncertainties: Mapping[str, float]) -> 
     >>> [(name, f"{value:.3g}", round(doubt, 2)) for name, (value, doubt) in stated.items()]
     [('accumulator_stiffness', '3.26e+08', 0.32)]
     """
-    exponent = math.sqrt(SLOWEST * QUICKEST)
-    if p.accumulator_gas is None:
-        usual = math.sqrt(LEAST_GAS * MOST_GAS) * oil_taken(p)
-        return {
-            STIFFNESS: (exponent * p.accumulator_pressure / usual, math.log(MOST_GAS / LEAST_GAS) / math.sqrt(12.0))
-        }
-    of_exponent = math.log(QUICKEST / SLOWEST) / math.sqrt(12.0)
-    spread = math.hypot(of_exponent, uncertainties.get(GAS, 0.0), uncertainties.get(CHARGE, 0.0))
-    return {STIFFNESS: (exponent * p.accumulator_pressure / p.accumulator_gas, spread)}
+    gas, doubt = p.accumulator_gas, uncertainties.get(GAS, 0.0)
+    if gas is None:
+        gas, doubt = math.sqrt(LEAST_GAS * MOST_GAS) * oil_taken(p), _even(LEAST_GAS, MOST_GAS)
+    spread = math.hypot(_even(SLOWEST, QUICKEST), doubt, uncertainties.get(CHARGE, 0.0))
+    return {STIFFNESS: (math.sqrt(SLOWEST * QUICKEST) * p.accumulator_pressure / gas, spread)}
+
+
+def _even(least: float, most: float) -> float:
+    """Return the standard deviation of a logarithm that is evenly likely between two ends [dimensionless]."""
+    return math.log(most / least) / math.sqrt(12.0)
 
 
 def first_stiffness(log: GreyBoxLog) -> float:

@@ -28,7 +28,9 @@ large, long model steps lead so far astray that 15 left 74 of log-likelihood, an
 WITHIN = 0.3
 """First radius of a search from a place in another valley [dimensionless]."""
 
-VANISHING = ("leakage_coefficient", "case_leakage", "makeup_opening")
+DRAIN = "case_leakage"
+
+VANISHING = ("leakage_coefficient", DRAIN, "makeup_opening")
 """What another balance may have lost on its way."""
 
 Found: TypeAlias = tuple[Problem, Point, tuple[Array, Array]]
@@ -68,7 +70,8 @@ def lower_minimum(
     """Return a start from which the plain form falls below a cost, given a better explanation of the log.
 
     A form has several valleys where make-up valves open and shut. The way out of one may lead through a hypothesis of
-    which nothing is left at the end: a drain of one port that ends as the other one's.
+    which nothing is left at the end: a drain of one port that ends as the other one's. Or it is a drain's first guess:
+    with a drain that is too large, make-up valves that let in as much, and a stiffer accumulator.
 
     Parameters
     ----------
@@ -99,8 +102,11 @@ def lower_minimum(
         form = completed_form(fit.model, bent=bent)
         if BEND in found or FreedProblem.of(form, log).at(form.theta(values)).cost >= fit.cost:
             return None
-    _, point, _ = from_minimum(fit.model, log, values, wanted, bent=bent)
-    return values if point.cost < wanted else None
+    for start in (values, {**values, DRAIN: log.presumed[DRAIN][0]}):
+        _, point, _ = from_minimum(fit.model, log, start, wanted, bent=bent)
+        if point.cost < wanted:
+            return start
+    return None
 
 
 def from_minimum(
