@@ -24,8 +24,10 @@ PAPER = CircuitParameters()
 def test_the_circuit_keeps_the_actuator_it_is_made_around() -> None:
     actuator = EhaParameters(bulk_modulus=1.5e8, piston_area=1.2e-3, leakage_coefficient=1e-12)
     circuit = circuit_of(actuator)
-    assert {name: asdict(circuit)[name] for name in asdict(actuator)} == {**asdict(actuator), "stroke": JUDGED_STROKE}
-    assert circuit_of(replace(actuator, stroke=0.3)).stroke == 0.3
+    judged = {"stroke": JUDGED_STROKE, "accumulator_gas": pytest.approx(1.38e-3)}
+    assert {name: asdict(circuit)[name] for name in asdict(actuator)} == {**asdict(actuator), **judged}
+    stated = circuit_of(replace(actuator, stroke=0.3, accumulator_gas=2e-4))
+    assert (stated.stroke, stated.accumulator_gas) == (0.3, 2e-4)
 
 
 def test_a_stroke_that_is_not_known_has_room_in_small_chambers() -> None:
