@@ -1,6 +1,6 @@
 """`whatever_accumulator(found, again)`: a single rod whose inner circuit holds less gas, or more, than is assumed.
 
-No rig file tells the gas of the inner circuit's accumulator. A single rod takes oil from it at every stroke and gives
+Few rig files tell the gas of the inner circuit's accumulator. A single rod takes oil from it at every stroke and gives
 it back, and its pressure, which the low side of the piston has, swings by bars where there is little gas. The balance
 of flows hardly feels that, the force on the piston does: circuits with another accumulator left a fifth to a third of
 the velocity of such logs.

@@ -1,4 +1,5 @@
 from dataclasses import astuple, fields, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +42,9 @@ def test_linear_growth_passes_through_the_given_parameters_and_holds_beyond() ->
 def test_every_sample_of_a_path_is_a_valid_actuator_between_its_ends(time: float, growth: Growth) -> None:
     worn = replace(HEALTHY, friction_linear=-7.44e3, leakage_coefficient=6e-11)
     (row,) = ParameterPath((0.0, 5.0), (HEALTHY, worn), growth).sample([time])
-    sampled = EhaParameters(**{**dict(zip(NAMES, row.tolist(), strict=True)), "stroke": None, "accumulator_gas": None})
+    unknown = {"stroke": None, "accumulator_gas": None}
+    values: dict[str, Any] = {**dict(zip(NAMES, row.tolist(), strict=True)), **unknown}
+    sampled = EhaParameters(**values)
     assert worn.friction_linear <= sampled.friction_linear <= HEALTHY.friction_linear
     assert sampled.piston_area == HEALTHY.piston_area
 
