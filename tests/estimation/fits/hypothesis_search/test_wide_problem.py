@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.diagnosis.rig_draws import draw_bench
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
+from estimation.fits.flow.accumulator import presumed_stiffness
 from estimation.fits.greybox import freed_problem
 from estimation.fits.greybox.deviations import believed
 from estimation.fits.greybox.log import greybox_log
@@ -35,9 +36,8 @@ VARIANCES = {"differential_pressure_pa": 1e6}
 @pytest.mark.parametrize("one", HYPOTHESES, ids=[one.name for one in HYPOTHESES])
 def test_every_search_of_a_log_with_a_dead_pressure_sensor_begins_at_a_number(one: Hypothesis) -> None:
     still = dict.fromkeys((*FLOW_FORM.drives, *FLOW_FORM.outputs), np.zeros(20))
-    log = widened(
-        greybox_log(FLOW_FORM, Record(1e-3, still), flow_parameters(RIG), longest_step=1e-3, variances=VARIANCES), RIG
-    )
+    seen_log = greybox_log(FLOW_FORM, Record(1e-3, still), flow_parameters(RIG), longest_step=1e-3, variances=VARIANCES)
+    log = widened(replace(seen_log, presumed=presumed_stiffness(RIG, {})), RIG)
     model = freed(log, (one,)).model
     known = dict.fromkeys(model.unknowns, 1.0)
     for start in own_starts(log, one):

@@ -1,0 +1,34 @@
+"""Ten rigs of other makers, as an engineer types them."""
+
+import numpy as np
+import pytest
+
+from benchmarks.diagnosis import typed_rigs
+from benchmarks.diagnosis.typed_rigs import FILES, USES, logged
+from experiments.open_benchmark.drives import DRIVES
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.rig import read_rig
+
+
+def test_every_file_has_a_use_and_every_use_a_file() -> None:
+    assert {file.stem for file in FILES.glob("*.toml")} == set(USES)
+    assert {drive for use in USES.values() for drive in use.drives} <= set(DRIVES)
+
+
+@pytest.mark.parametrize("name", USES)
+def test_a_file_is_right_about_the_gas_that_it_states_and_a_circuit_fits_around_it(name: str) -> None:
+    p = read_rig(FILES / f"{name}.toml").parameters
+    assert p.accumulator_gas in (None, pytest.approx(USES[name].gas))
+    assert circuit_of(p).stroke == p.stroke
+
+
+@pytest.mark.parametrize("name", ["robot_leg", "mini_pack"])
+def test_a_log_of_a_rig_stays_within_its_stroke_and_is_the_same_again(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(typed_rigs, "DURATION", 1.0)
+    rig = read_rig(FILES / f"{name}.toml")
+    setup, record = logged(name, rig, 1)
+    assert np.max(np.abs(record["position_m"])) < 0.5 * setup.machine.stroke
+    assert np.array_equal(logged(name, rig, 1)[1]["position_m"], record["position_m"])
+    assert setup.machine.supply_gas == USES[name].gas
