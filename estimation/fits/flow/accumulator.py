@@ -14,7 +14,7 @@ from estimation.fits.greybox.log import GreyBoxLog
 from estimation.models.flow import STIFFNESS
 from plant.eha.model import EhaParameters
 
-GAS, CHARGE = "accumulator_gas", "accumulator_pressure"
+GAS = "accumulator_gas"
 
 SLOWEST, QUICKEST = 1.0, 1.4
 """Exponents of nitrogen that is compressed slowly, at its wall's temperature, and quickly [dimensionless]."""
@@ -71,7 +71,7 @@ def presumed_stiffness(p: EhaParameters, uncertainties: Mapping[str, float]) -> 
     gas, doubt = p.accumulator_gas, uncertainties.get(GAS, 0.0)
     if gas is None:
         gas, doubt = math.sqrt(LEAST_GAS * MOST_GAS) * oil_taken(p), _even(LEAST_GAS, MOST_GAS)
-    spread = math.hypot(_even(SLOWEST, QUICKEST), doubt, uncertainties.get(CHARGE, 0.0))
+    spread = math.hypot(_even(SLOWEST, QUICKEST), doubt)
     return {STIFFNESS: (math.sqrt(SLOWEST * QUICKEST) * p.accumulator_pressure / gas, spread)}
 
 
