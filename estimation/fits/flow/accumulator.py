@@ -24,6 +24,9 @@ LEAST_GAS, MOST_GAS = 1.0, 100.0
 half of its pressure, and a designer gives it more; with the most its pressure stays as it is. Evenly likely between, in
 ratios."""
 
+SOFT = 2.0
+"""Deviations below what is presumed at which searches begin [dimensionless]."""
+
 
 def oil_taken(p: EhaParameters) -> float:
     """Return the oil that the inner circuit gives and takes.
@@ -81,5 +84,10 @@ def _even(least: float, most: float) -> float:
 
 
 def first_stiffness(log: GreyBoxLog) -> float:
-    """Return the accumulator's stiffness from which searches begin: as presumed [Pa/m^3]."""
-    return log.presumed[STIFFNESS][0]
+    """Return the accumulator's stiffness from which searches begin: as soft as it may well be [Pa/m^3].
+
+    What is strange is sought with it held where no plain form has found it, and a rod that the file does not know
+    displaces oil to which an accumulator of the usual size would be too stiff.
+    """
+    value, spread = log.presumed[STIFFNESS]
+    return value * math.exp(-SOFT * spread)
