@@ -140,7 +140,28 @@ def wide_rates(
     turbulent: bool = False,
     quick: bool = False,
 ) -> tuple[Scalar, ...]:
-    """Return the rates of both chambers, of how far the sensor is behind, and of the inner circuit [Pa/s]."""
+    """Return the rates of both chambers, of how far the sensor is behind, and of the inner circuit [Pa/s].
+
+    Parameters
+    ----------
+    state : tuple of float
+        Pressures of the chambers, how far the sensor is behind, and the inner circuit's pressure [Pa].
+    drives : tuple
+        Motor speeds, positions, time and slopes at both ends of a step, courses of play, and the step.
+    p : SimpleNamespace
+        The form's parameters [SI].
+    share : float
+        Share of the step that has gone [fraction].
+    turbulent : bool
+        Whether part of the leakage is turbulent.
+    quick : bool
+        Whether bubbles are compressed faster than heat leaves them.
+
+    Returns
+    -------
+    tuple of float
+        Rates of the state [Pa/s].
+    """
     speeds, (read, next_read), (begun, next_begun), (rate, next_rate), *courses, step = drives
     p1, p2, behind, supply = state
     side, next_side = _sides(courses, p)
@@ -179,7 +200,20 @@ def wide_rates(
 
 
 def offset_at(elapsed: Scalar, p: SimpleNamespace) -> Scalar:
-    """Return what the pressure sensor reads of nothing [Pa]."""
+    """Return what the pressure sensor reads of nothing [Pa].
+
+    Parameters
+    ----------
+    elapsed : float
+        Share of the log that has gone [fraction].
+    p : SimpleNamespace
+        The form's parameters [SI].
+
+    Returns
+    -------
+    float
+        Pressure [Pa].
+    """
     return p.pressure_offset + p.pressure_drift * elapsed
 
 

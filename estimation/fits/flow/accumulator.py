@@ -84,10 +84,20 @@ def _even(least: float, most: float) -> float:
 
 
 def first_stiffness(log: GreyBoxLog) -> float:
-    """Return the accumulator's stiffness from which searches begin: as soft as it may well be [Pa/m^3].
+    """Return the accumulator's stiffness from which searches begin: as soft as it may well be.
 
     What is strange is sought with it held where no plain form has found it, and a rod that the file does not know
     displaces oil to which an accumulator of the usual size would be too stiff.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, with what is presumed of the accumulator.
+
+    Returns
+    -------
+    float
+        Rise of its pressure per volume of oil that it takes in [Pa/m^3].
     """
     value, spread = log.presumed[STIFFNESS]
     return value * math.exp(-SOFT * spread)

@@ -10,7 +10,7 @@ from faults.eha.inject import abrupt, growing, spread
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
 
-RIG = EhaParameters(stroke=0.25)
+RIG = EhaParameters(stroke=0.25, accumulator_gas=1e-3)
 FAULTY = parameters_for(CONDITIONS["major_leakage_minor_friction"], RIG)
 NAMES = [field.name for field in fields(EhaParameters)]
 HALF_WIDTHS = {

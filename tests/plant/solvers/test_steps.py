@@ -157,7 +157,7 @@ def test_each_row_of_parameters_holds_until_the_next_sample(lumped: Trajectory) 
 
 
 def test_parameters_stand_in_the_row_as_in_the_dataclass() -> None:
-    p = EhaParameters(stroke=0.25)
+    p = EhaParameters(stroke=0.25, accumulator_gas=1e-3)
     assert dict(zip(PARAMETER_NAMES, parameter_row(p).tolist(), strict=True)) == asdict(p)
     assert {name: found.value for name, found in vars(parameter_symbols(EhaParameters)).items()} == {
         n: n for n in PARAMETER_NAMES

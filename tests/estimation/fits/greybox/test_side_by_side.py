@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from estimation.fits.flow.accumulator import presumed_stiffness
 from estimation.fits.greybox import freed_problem, side_by_side
 from estimation.fits.greybox.freed_problem import NUDGE, FreedProblem
 from estimation.fits.greybox.gap_loops import residuals_across_gaps
@@ -40,7 +41,7 @@ def problem() -> FreedProblem:
     pressure[[20, 21, 22, 23, 300]] = np.nan
     record = record.replace(differential_pressure_pa=pressure)
     log = greybox_log(FLOW_FORM, record, flow_parameters(HEALTHY), longest_step=2.5e-4, variances=VARIANCES)
-    return freed(widened(log, HEALTHY), HYPOTHESES)
+    return freed(widened(replace(log, presumed=presumed_stiffness(HEALTHY, {})), HEALTHY), HYPOTHESES)
 
 
 def points(problem: FreedProblem, count: int) -> np.ndarray:
