@@ -165,7 +165,8 @@ def _alone(
         finished = refined(log, first, spared=spared)
         return ranked([*finished, *refined(log, second, finished[0].cost, spared)])
     finished = refined(log, ended, spared=spared._replace(starts=promising_starts(starts, begun)), useful=useful)
-    if is_explained(finished[0], accepted):  # a stuck valve was told as a small step of leakage, at 1.1 times the noise
+    if is_explained(finished[0], accepted) and finished[0].cost < plain - WORTH:
+        # a stuck valve was told as a small step of leakage, at 1.1 times the noise
         others = [one for one in others if one.far] if cost_over_noise(log, finished[0].cost) > NOISE else []
     if not others:
         return finished
