@@ -48,6 +48,10 @@ LENGTHS = (1e-3, 1e2)
 """Chamber volume over piston area [m]; judged: half a chamber, with port and hose, is as long as some pistons' travel.
 Litres are told by it in any size of actuator."""
 
+MOST_GAS = 100.0
+"""Gas of the accumulator over a chamber's dead volume [dimensionless]; judged: cubic metres that are litres have a
+thousand times what they should."""
+
 
 def _quoted(example: str) -> str:
     return f'write another unit in quotes, as in "{example}"'
@@ -83,4 +87,9 @@ def require_si(p: EhaParameters) -> None:
             f"parameters.chamber_volume must be {LENGTHS[0]:g} to {LENGTHS[1]:g} m of the piston's area, got "
             f"{p.chamber_volume:g} m^3, which is {length:.3g} m of {p.piston_area:g} m^2; "
             f'{_quoted("0.6 L")}, and piston_area as in "31.2 cm^2"'
+        )
+    if p.accumulator_gas is not None and p.accumulator_gas > MOST_GAS * p.chamber_volume:
+        raise RigError(
+            f"parameters.accumulator_gas must be at most {MOST_GAS:g} times chamber_volume ({p.chamber_volume:g} m^3), "
+            f"got {p.accumulator_gas:g} m^3; {_quoted('0.3 L')}"
         )
