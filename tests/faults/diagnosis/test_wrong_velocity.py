@@ -50,7 +50,11 @@ def stuck_when_slow(velocity: Array) -> Array:
     return np.where(np.abs(velocity) < 0.5 * velocity.std(), 0.0, velocity)
 
 
-@pytest.mark.parametrize("wrong", [lambda v: 0.8 * v, stuck_when_slow], ids=["its gain is 20 % low", "it sticks"])
+@pytest.mark.parametrize(
+    "wrong",
+    [lambda v: 0.8 * v, stuck_when_slow, lambda v: 0.0 * v],
+    ids=["its gain is 20 % low", "it sticks", "it reads 0"],
+)
 def test_a_wrong_velocity_costs_no_class_and_is_named(wrong: Callable[[Array], Array]) -> None:
     found = diagnosed(wrong(log()[VELOCITY]))
     assert (found.condition, found.unknown, found.against) == ("minor_leakage", False, ())
