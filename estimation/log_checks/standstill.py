@@ -7,6 +7,7 @@ import numpy as np
 from estimation.log_checks.channel_blocks import channel_blocks
 from estimation.log_checks.channel_physics import MIDDLE
 from estimation.log_checks.frozen_encoder import SHORTEST_TRAVEL
+from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.log.plausibility import LIMITS
 from plant.log.record import Record
@@ -49,7 +50,7 @@ class Travels(NamedTuple):
 def travels(record: Record, p: EhaParameters) -> Travels | None:
     """Return how far piston and pump went, noise averaged out over blocks; None where one is not logged.
 
-    Without position, velocity tells.
+    Without position, velocity tells, less an offset that is worth no more flow than one of motor speed may be.
 
     Parameters
     ----------
@@ -59,11 +60,16 @@ def travels(record: Record, p: EhaParameters) -> Travels | None:
         The actuator.
     """
     blocks = channel_blocks(record, p, MIDDLE)
+    offset = p.pump_displacement * LIMITS["motor_speed_rad_s"].least
     position = blocks.position
-    if position is None and blocks.velocity is not None:
-        position = np.cumsum(blocks.velocity) * blocks.length
+    if position is None and blocks.velocity is not None and len(blocks.velocity):
+        position = _swept(blocks.velocity, offset / p.piston_area) * blocks.length
     if position is None or blocks.pumped is None or not len(blocks.pumped):
         return None
-    offset = p.pump_displacement * LIMITS["motor_speed_rad_s"].least
-    pumped = np.cumsum(blocks.pumped - np.clip(np.mean(blocks.pumped), -offset, offset)) * blocks.length
+    pumped = _swept(blocks.pumped, offset) * blocks.length
     return Travels(float(np.ptp(position)), float(np.ptp(pumped)) / p.piston_area)
+
+
+def _swept(rate: Array, offset: float) -> Array:
+    """Return the sums of a rate, whose mean is taken off as far as it may be an offset."""
+    return np.cumsum(rate - np.clip(np.mean(rate), -offset, offset))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.log_checks.channel_names import POSITION, SPEED
+from estimation.log_checks.channel_names import POSITION, SPEED, VELOCITY
 from estimation.log_checks.standstill import travels
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -32,6 +32,15 @@ def test_a_piston_that_stands_still_is_stuck_only_where_its_pump_turns(
     assert gone is not None
     assert (gone.still, gone.at_rest, gone.stuck) == (still, at_rest, stuck)
     assert gone.piston == pytest.approx(2.0 * travel, abs=2e-5 + 0.01 * travel)
+
+
+@pytest.mark.parametrize(("velocity", "stuck"), [(1e-4, True), (1e-3, False)])
+def test_without_position_a_small_offset_of_velocity_is_no_motion(velocity: float, stuck: bool) -> None:
+    """It hid a blocked rod, which was told as major leakage and major friction without pressure."""
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(10_000)
+    gone = travels(Record(1e-3, {SPEED: np.full(10_000, 100.0), VELOCITY: velocity + noise}), RIG)
+    assert gone is not None
+    assert gone.stuck == stuck
 
 
 def test_nothing_is_said_without_position_and_velocity() -> None:
