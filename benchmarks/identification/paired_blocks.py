@@ -41,7 +41,7 @@ def error_ratio(one: Array, other: Array, *, blocks: int = BLOCKS, seed: int = 0
 
 
 def records_ratio(one: Sequence[Array], other: Sequence[Array], *, seed: int = 0) -> tuple[float, float, float]:
-    """Return the same over several records, which are drawn anew as wholes.
+    """Return the ratio of two models' errors over several records, with its 95 % interval; records are drawn anew.
 
     A model that is better on one record of a plant that bends may be worse on the next; blocks of one say nothing of
     that.

@@ -24,12 +24,12 @@ LOWEST = 0.1
 """Setting of a relief valve over the rig file's, to which it may be low [fraction]: no piston slides below."""
 
 DELIVERIES = (0.7, 0.75, 0.8, 0.85, 0.9)
-"""Shares of its displacement that a worn pump delivers [dimensionless]. A log of 10 s holds one of 0.85 by 50 of
-log-likelihood more than its neighbours at 0.8 and 0.9, which it holds no better than a sound one."""
+"""Shares of its displacement that a worn pump delivers [dimensionless]. In a log of 10 s, a pump of 0.85 is likelier
+than a sound one by 50 of log-likelihood; its neighbours at 0.8 and 0.9 are no likelier than a sound one."""
 
 SO_WORN = math.log(0.5)
-"""Log-likelihood of one of them before a log is seen, beside what is presumed of wear [dimensionless]: it stands for a
-twentieth, a sound pump for a tenth."""
+"""Log-likelihood of one of them before a log is seen, beside what is presumed of wear [dimensionless]: each stands for
+5 % of the displacement, a sound pump for 10 %."""
 
 WELL_WORN = 0.8
 """Share up to which a pump is a worn one whatever the rig file's displacement is worth [dimensionless]: an entry may be

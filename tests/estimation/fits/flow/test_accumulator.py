@@ -58,4 +58,4 @@ def test_a_compact_actuator_has_its_bulk_modulus_and_its_gas_whatever_its_file_s
     assert fit.explanation is None
     assert abs(value - rig.bulk_modulus) < 3.0 * std
     stiffness, doubt = fit.parameters[STIFFNESS]
-    assert abs(stiffness - rig.accumulator_pressure / SMALL) < 3.0 * doubt
+    assert abs(stiffness - rig.accumulator_pressure / SMALL) < 3.0 * doubt < stiffness
