@@ -2,7 +2,8 @@
 
 A historian or a bus that reports by exception repeats the last value until the quantity has moved by a threshold. What
 it repeats is wrong by up to that, and always late: bulk modulus was up to 5 % off behind an open gate. The smallest
-steps of such a channel are alike, as those of a coarse converter are, but its values lie on no grid.
+steps of such a channel are alike, as those of a coarse converter are, but its values lie on no grid. Steps of a ramp
+are alike too, but follow each other in every row.
 """
 
 import numpy as np
@@ -22,6 +23,10 @@ FEWEST_STEPS = 50
 ALIKE, EDGE = 0.25, 2.0
 """Share of steps that lie between the smallest and so many times that [fraction, dimensionless]. Of a channel that is
 logged in every row a few in a hundred do."""
+
+AFTER_REPEAT = 0.1
+"""Share of those steps that follow a row which repeats the last value [fraction]; judged. Of logs on change it is 0.2
+to 1; of ramps between levels, a pump that starts and stops, or a clipped pressure, 0.02 at most."""
 
 OFF_GRID = 0.15
 """Distance of values from a grid of the smallest step, root mean square, above which no converter made them [steps];
@@ -83,10 +88,12 @@ def dead_band(values: Array) -> float:
     changes = there[1:] != there[:-1]
     if not FEWEST_STEPS <= np.count_nonzero(changes) <= (1.0 - REPEATED) * len(changes):
         return 0.0
-    made = np.sort(np.abs(np.diff(there)[changes]))
+    steps = np.abs(np.diff(there))
+    made = np.sort(steps[changes])
     least = float(made[len(made) // 100])
-    alike = made[(made >= least) & (made < EDGE * least)]
-    if len(alike) < ALIKE * len(made):
+    alike = (steps >= least) & (steps < EDGE * least)
+    count, after_repeat = np.count_nonzero(alike), np.count_nonzero(alike[1:] & ~changes[:-1])
+    if count < ALIKE * len(made) or after_repeat < AFTER_REPEAT * count:
         return 0.0
     return 0.0 if _on_grid(there, float(np.mean(made[(made >= least) & (made < 1.001 * least)]))) else least
 

@@ -182,6 +182,7 @@ def _diagnosed(
     from estimation.log_checks.sample_time import require_fast_enough
     from faults.diagnosis.diagnose import diagnose_log
     from faults.diagnosis.rmse import score_transfer_functions
+    from faults.notes import ClassCode
     from plant.spare_processors import begun
 
     require_fast_enough(record.sample_time)  # before the transfer functions take the log to their own sample time
@@ -189,16 +190,17 @@ def _diagnosed(
     if no_pressure:
         record = record.replace(**{PRESSURE: None})
 
-    def scored() -> "Scores | None":
-        return None if linear is None else score_transfer_functions(record, linear())
+    def scored(used: "Record" = record) -> "Scores | None":
+        return None if linear is None else score_transfer_functions(used, linear())
 
     waiting = scored if linear is None else begun(scored) or scored
     seen = None if kept is None else _seen(record, rig, kept)
     found = diagnose_log(record, rig, seen)
     if kept is not None and seen is None:  # circuits ran beside the estimate, which has checked the log for itself
         kept[tuple(record)] = rig, (None, found.evidence.estimate)
+    wrong = any(one.code is ClassCode.VELOCITY_CONTRADICTED for one in found.notes)
     try:
-        scores = waiting()
+        scores = scored(record.replace(**{SENSORS["velocity"]: None})) if wrong else waiting()
     except LogError as error:
         note(f"the transfer functions are left out: {error}")
         return found

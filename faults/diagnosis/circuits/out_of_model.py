@@ -113,7 +113,8 @@ def unexplained(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Not
     list[Note]
         None where a circuit follows the log.
     """
-    shares = fits.best.scales / np.maximum(blocks.sizes, np.finfo(float).tiny)
+    scales, sizes = fits.best.scales, blocks.sizes
+    shares = np.divide(scales, sizes, out=np.full(len(scales), np.inf), where=sizes > 0.0)  # a dead sensor reads 0
     least = np.array([yielding_velocity(blocks, actuator), 0.0])[: len(shares)]
     heard = fits.best.scales > np.maximum(2.0 * blocks.noise, least)
     if blocks.pressure is not None:

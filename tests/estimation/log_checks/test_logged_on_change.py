@@ -57,6 +57,17 @@ def test_a_channel_that_is_held_or_rests_is_not_accused() -> None:
     assert dead_band(np.concatenate([np.full(4000, values[0]), values])) == 0.0
 
 
+def test_even_steps_that_follow_each_other_are_a_ramp_and_no_threshold() -> None:
+    """Motor speed as a drive plans it, a pump that starts and stops, and a pressure that its sensor clips."""
+    levels = np.repeat([0.0, 157.08, -104.72, 52.36] * 6, 400)
+    speed = np.zeros(len(levels))
+    for k in range(1, len(levels)):
+        speed[k] = speed[k - 1] + np.clip(levels[k] - speed[k - 1], -2.5, 2.5)
+    turned = np.cumsum(np.repeat([97.3, 0.0, -120.2, 0.0, 140.0, 0.0] * 8, 150)) * 1e-6
+    clipped = np.clip(3e6 * np.sin(0.01 * np.arange(8000.0)), -2e6, 2e6)
+    assert [dead_band(one) for one in (speed, turned, clipped)] == [0.0, 0.0, 0.0]
+
+
 @pytest.mark.parametrize("channel", [SPEED, POSITION, PRESSURE])
 def test_the_threshold_is_read_off_the_steps_and_named_where_it_matters(channel: str) -> None:
     values = log()[channel]

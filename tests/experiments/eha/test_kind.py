@@ -12,10 +12,10 @@ from estimation.eha.estimate import estimate_log
 from experiments.cli import app
 from experiments.eha.kind import EHA
 from experiments.published.library import read_library
-from plant.eha.drives import sine
+from plant.eha.drives import make_drive, sine
 from plant.eha.model import EhaParameters
 from plant.eha.rig import Rig
-from plant.eha.simulate import LUMPED, simulate
+from plant.eha.simulate import CIRCUIT, LUMPED, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
 
@@ -67,6 +67,18 @@ def test_another_rig_s_transfer_functions_are_identified_only_if_asked_for_and_o
 def log() -> Record:
     p, rng = EhaParameters(), np.random.default_rng(1)
     return simulate(LUMPED, sine(2.0, 1e-3, p.rated_speed, 5.0), 1e-3, p, sensors=BENCH, rng=rng)
+
+
+def test_the_library_is_not_compared_with_a_velocity_that_is_found_wrong() -> None:
+    p, rng = EhaParameters(), np.random.default_rng(8)
+    record = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    velocity, verb = record["velocity_m_s"], EHA.diagnose
+    assert verb is not None
+    wrong, absent = (
+        verb.run(record.replace(velocity_m_s=one), Rig(), (False, read_library)).evidence.transfer_functions
+        for one in (0.5 * velocity, None)
+    )
+    assert wrong.by_condition == absent.by_condition
 
 
 def test_a_log_that_was_fitted_has_no_figure_and_the_reader_is_told_how_to_get_one(

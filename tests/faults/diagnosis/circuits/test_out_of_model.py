@@ -1,5 +1,6 @@
 """A log that no condition explains is "unknown", and each reason has its own limit: above it, not below."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -19,6 +20,7 @@ from faults.diagnosis.circuits.out_of_model import (
     LEAST_BIAS,
     STICKS,
     reasons_against,
+    unexplained,
 )
 from faults.diagnosis.circuits.region_scores import region_scores
 from faults.diagnosis.circuits.yielding import UNEXPLAINED, YIELDING
@@ -93,6 +95,14 @@ def healthy() -> Blocks:
 def test_nothing_speaks_against_the_log_of_a_nominal_circuit(place: int) -> None:
     point = ACTUATOR.conditions[place]
     assert not reasons(run_of(tuple(point.tolist())), point)
+
+
+def test_of_a_pressure_that_is_0_throughout_all_is_unexplained_without_a_warning_of_numpy() -> None:
+    log = healthy()
+    dead = replace(log, pressure=np.zeros(len(log.velocity)))
+    with warnings.catch_warnings(action="error"):
+        (said,) = unexplained(dead, fitted(dead, ACTUATOR.conditions[0]), ACTUATOR)
+    assert (said.data["channel"], said.data["percent"]) == ("differential pressure", np.inf)
 
 
 @pytest.mark.parametrize(("channel", "name"), [(0, "velocity"), (1, "differential pressure")])
