@@ -129,10 +129,9 @@ def balanced(
     done += each(lambda one: _finished(one, log, steps, best[1].cost, bent=bent), behind)
     if valley is not None:
         done = each(lambda one: min(one, from_minimum(one[0].model, log, valley, bent=bent), key=_cost), done)
-    while sparing := [one for one in _told_of(done) if one[0].log.steps is not log.steps]:
-        done = each(lambda one, ending=sparing: _ended(one, log) if one in ending else one, done)
+    done = _told_ended(done, log)
     if _one_sided(log):
-        done = [found for each_one in each(_with_less_drain, done) for found in each_one]
+        done = _told_ended([found for each_one in each(_with_less_drain, done) for found in each_one], log)
     best, swinging = _told_of(done)
     least = best[1].cost
 
@@ -159,6 +158,14 @@ def _finished(one: RoughOptimum, log: GreyBoxLog, steps: IntArray, wanted: float
             return one.problem, one.point, one.bounds
     problem, theta, bounds = _completed(one, log, bent=bent)
     return problem, descend(problem.at, theta, FINISHING, bounds, wanted=wanted), bounds
+
+
+def _told_ended(done: Sequence[Found], log: GreyBoxLog) -> list[Found]:
+    """Return minima of which those that are told have short model steps throughout."""
+    done = list(done)
+    while sparing := [one for one in _told_of(done) if one[0].log.steps is not log.steps]:
+        done = each(lambda one, ending=sparing: _ended(one, log) if one in ending else one, done)
+    return done
 
 
 def _ended(one: Found, log: GreyBoxLog) -> Found:

@@ -1,4 +1,6 @@
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -7,9 +9,12 @@ from estimation.fits.flow import rough_search
 from estimation.fits.flow import search as flow_search
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log, outruns_pump
+from estimation.fits.flow.other_minimum import Found
 from estimation.fits.flow.search import balanced, flow_starts
-from estimation.fits.greybox.fit import GreyBoxFit, roughly
+from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.fit import GreyBoxFit, concluded, roughly
 from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.problem import Problem
 from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO
 from estimation.fits.hypothesis_search.predicted_gains import predicted_gain, predicted_gains
 from estimation.log_checks.measurement_noise import measurement_variances
@@ -115,6 +120,30 @@ def test_a_log_that_rests_for_long_before_it_moves_is_explained_by_the_plain_for
     likeliest = min(fits, key=lambda fit: fit.cost)
     assert likeliest.chi_square[0] < 1.1
     assert likeliest.values["bulk_modulus"] == pytest.approx(p.bulk_modulus, rel=0.01)
+
+
+def test_what_is_told_has_short_steps_throughout_though_less_drain_was_found_with_long_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    log, told = seen(recorded("normal")), list[int]()
+
+    def drained_less(one: Found) -> list[Found]:
+        problem, point, bounds = one
+        long = problem.on(problem.log.stepped(np.minimum(log.steps, log.long_steps)))
+        return [one, (long, replace(point, cost=point.cost - 1.0), bounds)]
+
+    def recording(problem: Problem, point: Point, *, asked: bool, **given: Any) -> GreyBoxFit:
+        told.extend([int(problem.log.steps.sum())] * asked)
+        return concluded(problem, point, asked=asked, **given)
+
+    for name, stand_in in (
+        ("_one_sided", lambda _: True),
+        ("_with_less_drain", drained_less),
+        ("concluded", recording),
+    ):
+        monkeypatch.setattr(flow_search, name, stand_in)
+    balanced(log, HEALTHY, STARTS)
+    assert set(told) == {int(log.steps.sum())}
 
 
 def by_mass(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:
