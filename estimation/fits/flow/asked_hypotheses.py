@@ -106,13 +106,9 @@ def hypotheses_asked(
         return (BEGUN, OFFSET_AT_REST), ()
     if is_too_close(swinging, log.passes_on):
         return (), ()
-    if (
-        not fit_explains(swinging, log.passes_on)
-        or most_late(swinging.late)[2] > WORTH
-        or at_widest(swinging, parameters)
-    ):
-        pulled = (MAKEUP_BENDS,) if outruns_pump(log, parameters) else ()
-        return (BEGUN,) if moving else (*HYPOTHESES, *pulled), ()
+    all_strange = (*HYPOTHESES, MAKEUP_BENDS) if outruns_pump(log, parameters) else HYPOTHESES
+    if not fit_explains(swinging, log.passes_on) or most_late(swinging.late)[2] > WORTH:
+        return (BEGUN,) if moving else all_strange, ()
     by_mass = balances_mass(swinging.model)
     promises = predicted_gains(
         log.stepped(swinging.steps),
@@ -135,6 +131,8 @@ def hypotheses_asked(
     asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > worth)
     asked += tuple(one for one in _late_valves(swinging) if one not in asked)
     remarks = open_wear_note(delivery, share_lost(log, swinging.values, parameters.pump_displacement))
+    if at_widest(swinging, parameters):
+        return (BEGUN,) if moving else all_strange, remarks
     if not moving:
         return HYPOTHESES if not log.passes_on and doubted(swinging) else asked, remarks
     # chambers shut in far above the accumulator take no make-up for seconds, and a search from rest ends without any
