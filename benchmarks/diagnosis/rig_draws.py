@@ -192,7 +192,7 @@ def draw_rig(rng: np.random.Generator) -> CircuitParameters:
 
 
 def file_of(rig: EhaParameters) -> EhaParameters:
-    """Return what a rig file says of an actuator: nothing of its circuit."""
+    """Return what a rig file says of an actuator: of its circuit nothing but the accumulator's gas."""
     return EhaParameters(**{name: getattr(rig, name) for name in PARAMETER_NAMES})
 
 

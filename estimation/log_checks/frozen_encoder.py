@@ -29,7 +29,7 @@ SEALS_YIELD, RESOLVED = 2e-5, 10.0
 
 FAR_LONGER, SWINGS = 10.0, 0.5
 """Times the longest other hold, and share of the range of pressure elsewhere, from which a hold is looked at
-[dimensionless]."""
+[dimensionless]; judged."""
 
 JUMP, BEYOND_PUMP = 10.0, 5.0
 """A step after a hold is a jump if it is so many times any other, and so many times what the pump can move."""

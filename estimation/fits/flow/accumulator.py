@@ -25,7 +25,7 @@ half of its pressure, and a designer gives it more; with the most its pressure s
 ratios."""
 
 SOFT = 2.0
-"""Deviations below what is presumed at which searches begin [dimensionless]."""
+"""Deviations below what is presumed at which searches begin [dimensionless]; judged, see decision 389."""
 
 
 def oil_taken(p: EhaParameters) -> float:
@@ -39,8 +39,8 @@ def oil_taken(p: EhaParameters) -> float:
     Returns
     -------
     float
-        What both chambers take up from rest to relief pressure, as much as a chamber at most, and what a single rod
-        displaces [m^3].
+        What both chambers take up from rest to relief pressure, half of what one holds at most, and what a single
+        rod displaces [m^3].
     """
     compressed = p.chamber_volume * min(4.0 * p.relief_pressure / p.bulk_modulus, 1.0)
     swept = p.piston_area * p.stroke if p.stroke else 2.0 * p.chamber_volume

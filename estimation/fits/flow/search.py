@@ -43,7 +43,8 @@ ONE_SIDED = 0.5
 
 LESS_DRAINED, APART = 0.05, 0.5
 """Drain from which the search for a second one begins, over the first, and how far apart logarithms of two drains are
-[fraction, dimensionless]."""
+[fraction, dimensionless]; judged. From a minimum with 14 times the drain the
+right one was found so."""
 
 SETTLING = 15
 """Evaluations with short model steps of a form that does not explain its log: it is asked what is strange [count]."""

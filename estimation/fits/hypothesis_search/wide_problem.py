@@ -52,7 +52,7 @@ MOST_VOLUME = 2.0
 presumed. Volumes 4 and 80 times as large took the place of an encoder's zero."""
 
 MOST_DEVIATIONS = 5.0
-"""Deviations of what is presumed of an accumulator by which it is stiffer at most [dimensionless]."""
+"""Deviations of what is presumed of an accumulator by which it is stiffer at most [dimensionless]; judged."""
 
 MOST_WORN = 0.2
 """Most that a worn pump loses of its displacement where the search for it begins [fraction]; judged."""
