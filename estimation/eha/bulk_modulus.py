@@ -11,7 +11,7 @@ from estimation.eha.another_rig import unless_another_rig
 from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
 from estimation.eha.foreign_oil import shows_no_motion, unless_foreign
 from estimation.eha.named_methods import NAMED
-from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide, without_number
+from estimation.eha.result import LARGEST_BOUND, VAGUE, BulkModulusEstimate, too_wide, without_number
 from estimation.eha.rig_share import fitted_responses, scaled_responses, with_wear
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
@@ -330,8 +330,8 @@ def _fitted(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEs
     outcome = Outcome.OK
     if fit.chi_square >= MISMATCH_NIS:
         outcome = Outcome.MISMATCH
-    elif fit.bound > LARGEST_BOUND:
-        outcome, gate = Outcome.NOT_OBSERVABLE, Gate(False, (too_wide(fit.bound), *fit.reasons))
+    elif (vague := max(fit.bound, std / value if std > VAGUE * value else 0.0)) > LARGEST_BOUND:
+        outcome, gate = Outcome.NOT_OBSERVABLE, Gate(False, (too_wide(vague), *fit.reasons))
     known = outcome is Outcome.OK
     return BulkModulusEstimate(
         outcome=outcome,

@@ -121,7 +121,7 @@ def test_a_loop_of_the_stack_is_fitted_within_its_interval_and_what_the_procedur
 def test_quoted_numbers_have_a_role_and_a_verdict(stack_tables: Tables) -> None:
     table = stack_tables["quoted numbers"]
     assert set(table["role"]) <= {"calibration target", "prediction", "computed"}
-    assert (table.loc[table["verdict"] == "calibrated to", "role"] == "calibration target").all()
+    assert (table.loc[table["verdict"] == "calibrated", "role"] == "calibration target").all()
     assert (table.loc[table["verdict"] == "predicted", "role"] == "prediction").all()
     missed = table[table["verdict"] == "not reproduced"]["claim"]
     assert missed.tolist() == ["frequency of the maximum at 1.0 MPa", "frequency of the maximum at 0.6 MPa"]

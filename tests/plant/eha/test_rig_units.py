@@ -32,7 +32,7 @@ from plant.errors import RigError
         ("flow_bias = 0.14", '"0.1 L/min"'),
         ("relief_pressure = 160", '"160 bar"'),
         ("accumulator_pressure = 3", '"3 bar"'),
-        ("accumulator_gas = 0.3", 'at most 100 times chamber_volume (0.00108 m^3), got 0.3 m^3; write another unit'),
+        ("accumulator_gas = 0.3", "at most 100 times chamber_volume (0.00108 m^3), got 0.3 m^3; write another unit"),
         ("stroke = 200", '"200 mm"'),
     ],
 )
