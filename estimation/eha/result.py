@@ -18,8 +18,8 @@ LARGEST_BOUND = 0.03
 """Relative Cramér-Rao bound above which bulk modulus is called not observable (errata E13) [fraction]."""
 
 VAGUE = 0.5
-"""Relative standard deviation above which a number is none, whatever its bound [fraction]; judged. Where a model chatters
-the bound may vanish: a log of chambers that leak empty within a sample had 147 % beside one of 1e-9."""
+"""Relative standard deviation above which a number is none, whatever its bound [fraction]; judged. Where a model
+chatters the bound may vanish: a log of chambers that leak empty within a sample had 147 % beside one of 1e-9."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,23 +8,17 @@ from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
+from estimation.models.aerated_oil import present_air, swellings, tangent_stiffness
 from estimation.models.completed_flow import CRACKS, USUAL_CRACK
 from estimation.models.flow import delivered_flow, leaked_flow, port_flows
 from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.inner_circuit import BEND, USUAL_BEND, narrowed
-from plant.compiled.functions import Scalar, exp, log, maximum, minimum, sqrt, where
+from plant.compiled.functions import Scalar, maximum, minimum, sqrt, where
 from plant.components.check_valve import make_up_flow
-from plant.components.oil import ATMOSPHERE
 from plant.eha.circuit import chamber_volumes
 from plant.eha.model import piston_areas
 from plant.units import si
-
-VAPOUR = 2e4
-"""Absolute pressure about which a chamber that is short of oil becomes soft [Pa]; pressures stay positive."""
-
-STIFFEST = 0.01
-"""Least compliance of a chamber over that at the stated pressure: a search may try more air than there can be there."""
 
 TURBULENT_AT = 5e5
 """Differential pressure at which a turbulent share of the leakage is stated, and leakage with it [Pa]."""
@@ -88,49 +82,6 @@ class WideFlowParameters(FlowParameters):
     by_mass: float = si(0.0, "1", "1: balanced by mass, 0: by volume", "chosen")
 
 
-def _air(elapsed: Scalar, p: SimpleNamespace) -> Scalar:
-    """Return the present softness of the oil due to entrained air: ``a`` of ``a/p^2`` [Pa]."""
-    return p.air_softness * minimum(maximum((elapsed - p.air_onset) / p.air_width, 0.0), 1.0)
-
-
-def _bubbles(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
-    """Return the volume of entrained air over that of its oil [dimensionless]."""
-    above = maximum(pressure, 0.05 * VAPOUR)
-    return air / above * exp(p.air_quickness * log(above / ATMOSPHERE)) if quick else air / above
-
-
-def _before(air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
-    """Return the volume of the air that the stated bulk modulus holds, over that of its oil [dimensionless]."""
-    return where(p.air_onset < 0.0, _bubbles(p.stated_pressure, air, p, quick=quick), 0.0)
-
-
-def _liquid(air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
-    """Return the share of the stated oil's compliance that is the liquid's, and not its air's [fraction]."""
-    slope = 1.0 - p.air_quickness if quick else 1.0
-    return 1.0 - p.bulk_modulus * slope * _before(air, p, quick=quick) / p.stated_pressure
-
-
-def _room(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
-    """Return bulk modulus times the volume of oil and bubbles over that when stated, which is 1 by volume [Pa]."""
-    grown = p.by_mass * (_bubbles(pressure, air, p, quick=quick) - _before(air, p, quick=quick))
-    squeezed = pressure - (p.stated_pressure if quick else ATMOSPHERE)
-    return p.bulk_modulus * (1.0 + grown) - p.by_mass * squeezed * _liquid(air, p, quick=quick)
-
-
-def _stiffness(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool = False) -> Scalar:
-    """Return the tangent bulk modulus of a chamber [Pa]: liquid, air that softens as 1/p^2 or so, and vapour.
-
-    `bulk_modulus` is that at `stated_pressure`, air included; the liquid's where air gets in midway. By mass it is of
-    the room that the oil fills, bubbles included.
-    """
-    above = maximum(pressure, 0.05 * VAPOUR)
-    ratio, bubbles = VAPOUR / above, _bubbles(pressure, air, p, quick=quick)
-    short = ratio * ratio
-    slope = 1.0 - p.air_quickness if quick else 1.0
-    softer = slope * (bubbles / above - _before(air, p, quick=quick) / p.stated_pressure)
-    return _room(pressure, air, p, quick=quick) / maximum(1.0 + short * short + softer * p.bulk_modulus, STIFFEST)
-
-
 def wide_rates(
     state: tuple[Scalar, ...],
     drives: Any,
@@ -187,13 +138,10 @@ def wide_rates(
     drain = p.case_leakage * grown
     into_1 = fed_1 - p.drain_share_a * drain * (p1 - supply)
     into_2 = fed_2 - p.drain_share_b * drain * (p2 - supply)
-    air = _air(elapsed, p)
-    freed = _bubbles(p2, air, p, quick=quick) - _bubbles(p1, air, p, quick=quick)
-    swells = dp * _liquid(air, p, quick=quick) + p.bulk_modulus * freed
-    swelling_1, swelling_2 = (p.by_mass * swells / _room(one, air, p, quick=quick) for one in (p1, p2))
-    at_1, at_2 = port_flows(pumped, leaked, dp, (swelling_1, swelling_2))
-    rise = _stiffness(p1, air, p, quick=quick) * (at_1 - area_1 * velocity + into_1) / volume_1
-    fall = _stiffness(p2, air, p, quick=quick) * (area_2 * velocity - at_2 + into_2) / volume_2
+    air = present_air(elapsed, p)
+    at_1, at_2 = port_flows(pumped, leaked, dp, swellings(p1, p2, air, p, quick=quick))
+    rise = tangent_stiffness(p1, air, p, quick=quick) * (at_1 - area_1 * velocity + into_1) / volume_1
+    fall = tangent_stiffness(p2, air, p, quick=quick) * (area_2 * velocity - at_2 + into_2) / volume_2
     # how far the sensor is behind stays small where its lag is short, which a stiff step resolves
     lagging = rise - fall - (behind + offset_at(elapsed, p)) / (p.pressure_lag + SHORTEST_LAG)
     return rise, fall, lagging, -p.accumulator_stiffness * (into_1 + into_2)

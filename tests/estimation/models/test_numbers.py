@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from estimation.models import chambers, completed_flow, eha_forms, flow, inner_circuit, motion, wide_flow
+from estimation.models.aerated_oil import present_air, tangent_stiffness
 from estimation.models.augment import AUGMENTABLE, augmented, augmented_prior
 from estimation.models.flow_parameters import FlowParameters, flow_parameters
 from estimation.models.gaussian import Gaussian
@@ -135,9 +136,7 @@ def wide_flow_form() -> dict[str, Any]:
             where: list(wide_flow.WIDE_FLOW_FORM.rates((*pressures, 1e4, 4.4e5), drives, p, 0.25))
             for where, pressures in {**PRESSURES, "short": (5e3, 1e6), "void": (5e2, 1e6)}.items()
         }
-        told[name]["stiffness [Pa]"] = [
-            wide_flow._stiffness(one, wide_flow._air(0.4, p), p) for one in (2e2, 1e3, 2e4, 1e6)
-        ]
+        told[name]["stiffness [Pa]"] = [tangent_stiffness(one, present_air(0.4, p), p) for one in (2e2, 1e3, 2e4, 1e6)]
     for name in ("air", "air that is in"):
         p = SimpleNamespace(**{**base, **WIDE[name], "air_quickness": 0.2, "by_mass": 1.0})
         told[f"{name}, squeezed quickly"] = {

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from estimation.models.wide_flow import QUICK_FLOW_FORM, VAPOUR, WIDE_FLOW_FORM, WideFlowParameters, _stiffness
+from estimation.models.wide_flow import QUICK_FLOW_FORM, WIDE_FLOW_FORM, WideFlowParameters
 from plant.components.oil import ATMOSPHERE
 
 
@@ -23,28 +23,6 @@ def test_a_jump_moves_what_is_shown_by_as_much_and_the_mean_of_the_chambers_not_
     assert after - before == pytest.approx(1e5)
     assert sum(jumped[:2]) == pytest.approx(sum(state[:2]))
     assert jumped[2:] == state[2:]
-
-
-@pytest.mark.parametrize("pressure", [2e5, 7e5, 3e6])
-def test_bubbles_are_squeezed_as_their_exponent_says_and_bulk_modulus_is_that_at_the_stated_pressure(
-    pressure: float,
-) -> None:
-    share, exponent, stated = 0.02, 1.3, 7e5
-    p = SimpleNamespace(
-        bulk_modulus=1e8, by_mass=0.0, air_onset=-1.0, air_quickness=1.0 - 1.0 / exponent, stated_pressure=stated
-    )
-    air = share * ATMOSPHERE
-
-    def bubbles(at: float) -> float:
-        return share * (ATMOSPHERE / at) ** (1.0 / exponent)
-
-    softer = (bubbles(pressure) / pressure - bubbles(stated) / stated) / exponent
-    short = (VAPOUR / pressure) ** 2
-    told = _stiffness(pressure, air, p, quick=True)
-    assert told == pytest.approx(1.0 / ((1.0 + short**2) / p.bulk_modulus + softer))
-    by_mass = SimpleNamespace(**vars(p) | {"by_mass": 1.0})
-    at_stated = _stiffness(stated, air, by_mass, quick=True)
-    assert at_stated == pytest.approx(p.bulk_modulus, rel=1e-5)
 
 
 @pytest.mark.parametrize("quick", [False, True])

@@ -1,0 +1,109 @@
+"""Oil that holds air: its tangent bulk modulus, and by what share it swells from one pressure to another."""
+
+from types import SimpleNamespace
+
+from plant.compiled.functions import Scalar, exp, log, maximum, minimum, where
+from plant.components.oil import ATMOSPHERE
+
+VAPOUR = 2e4
+"""Absolute pressure about which a chamber that is short of oil becomes soft [Pa]; pressures stay positive."""
+
+STIFFEST = 0.01
+"""Least compliance of a chamber over that at the stated pressure: a search may try more air than there can be there."""
+
+
+def present_air(elapsed: Scalar, p: SimpleNamespace) -> Scalar:
+    """Return the present softness of the oil due to entrained air: ``a`` of ``a/p^2``.
+
+    Parameters
+    ----------
+    elapsed : float
+        Share of the log that has gone [fraction].
+    p : SimpleNamespace
+        Parameters of the wide flow form [SI].
+
+    Returns
+    -------
+    float
+        Softness [Pa].
+    """
+    return p.air_softness * minimum(maximum((elapsed - p.air_onset) / p.air_width, 0.0), 1.0)
+
+
+def _bubbles(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
+    """Return the volume of entrained air over that of its oil [dimensionless]."""
+    above = maximum(pressure, 0.05 * VAPOUR)
+    return air / above * exp(p.air_quickness * log(above / ATMOSPHERE)) if quick else air / above
+
+
+def _before(air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
+    """Return the volume of the air that the stated bulk modulus holds, over that of its oil [dimensionless]."""
+    return where(p.air_onset < 0.0, _bubbles(p.stated_pressure, air, p, quick=quick), 0.0)
+
+
+def _liquid(air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
+    """Return the share of the stated oil's compliance that is the liquid's, and not its air's [fraction]."""
+    slope = 1.0 - p.air_quickness if quick else 1.0
+    return 1.0 - p.bulk_modulus * slope * _before(air, p, quick=quick) / p.stated_pressure
+
+
+def _room(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool) -> Scalar:
+    """Return bulk modulus times the volume of oil and bubbles over that when stated, which is 1 by volume [Pa]."""
+    grown = p.by_mass * (_bubbles(pressure, air, p, quick=quick) - _before(air, p, quick=quick))
+    squeezed = pressure - (p.stated_pressure if quick else ATMOSPHERE)
+    return p.bulk_modulus * (1.0 + grown) - p.by_mass * squeezed * _liquid(air, p, quick=quick)
+
+
+def tangent_stiffness(pressure: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool = False) -> Scalar:
+    """Return the tangent bulk modulus of a chamber: liquid, air that softens as 1/p^2 or so, and vapour.
+
+    `bulk_modulus` is that at `stated_pressure`, air included; the liquid's where air gets in midway. By mass it is of
+    the room that the oil fills, bubbles included.
+
+    Parameters
+    ----------
+    pressure : float
+        Absolute pressure of the chamber [Pa].
+    air : float
+        Present softness due to entrained air, see `present_air` [Pa].
+    p : SimpleNamespace
+        Parameters of the wide flow form [SI].
+    quick : bool
+        Whether bubbles are compressed faster than heat leaves them.
+
+    Returns
+    -------
+    float
+        Rise of pressure over the share by which the volume falls [Pa].
+    """
+    above = maximum(pressure, 0.05 * VAPOUR)
+    ratio, bubbles = VAPOUR / above, _bubbles(pressure, air, p, quick=quick)
+    short = ratio * ratio
+    slope = 1.0 - p.air_quickness if quick else 1.0
+    softer = slope * (bubbles / above - _before(air, p, quick=quick) / p.stated_pressure)
+    return _room(pressure, air, p, quick=quick) / maximum(1.0 + short * short + softer * p.bulk_modulus, STIFFEST)
+
+
+def swellings(p1: Scalar, p2: Scalar, air: Scalar, p: SimpleNamespace, *, quick: bool = False) -> tuple[Scalar, Scalar]:
+    """Return by what share oil swells that flows from the first pressure to the second, of the room in either.
+
+    Parameters
+    ----------
+    p1, p2 : float
+        Absolute pressures of the chambers [Pa].
+    air : float
+        Present softness due to entrained air, see `present_air` [Pa].
+    p : SimpleNamespace
+        Parameters of the wide flow form [SI].
+    quick : bool
+        Whether bubbles are compressed faster than heat leaves them.
+
+    Returns
+    -------
+    tuple of float
+        Shares, both zero where volumes are balanced [fraction].
+    """
+    freed = _bubbles(p2, air, p, quick=quick) - _bubbles(p1, air, p, quick=quick)
+    swells = (p1 - p2) * _liquid(air, p, quick=quick) + p.bulk_modulus * freed
+    first, second = (p.by_mass * swells / _room(one, air, p, quick=quick) for one in (p1, p2))
+    return first, second
