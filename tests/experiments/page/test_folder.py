@@ -236,6 +236,7 @@ def test_a_study_that_is_ended_as_it_replaces_another_leaves_a_whole_result(
         raise AssertionError("for a moment nothing has the name")
 
     if not (child := os.fork()):
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
         monkeypatch.setattr(Path, "rename", never)
         monkeypatch.setattr(shutil, "rmtree", end_first)
         try:
