@@ -20,6 +20,9 @@ MAJOR = 2.0
 TOLD = 0.5
 """Probability of all else from which a level of leakage, or of friction, is not told [probability]."""
 
+FLATLY = 0.9
+"""Probability of a level below which it is called probable [probability]; judged."""
+
 LEAKS: Mapping[str, str] = {
     "minor": "leaks inside more than it should (minor leakage)",
     "major": "leaks badly inside (major leakage)",
@@ -90,9 +93,10 @@ def verdict(result: Mapping[str, Any]) -> str:
         return " ".join(_named(result)) or f"No verdict: {_hindered(result)}."
     levels = _levels(result)
     faults = {"leakage": LEAKS.get(levels["leakage"] or ""), "friction": RUBS.get(levels["friction"] or "")}
-    wrong = " and ".join(one for one in faults.values() if one)
+    doubt = {name: "" if _share(result, name, level) >= FLATLY else "probably " for name, level in levels.items()}
+    wrong = " and ".join(f"{doubt[name]}{one}" for name, one in faults.items() if one)
     others = [
-        f"{name} is normal" if levels[name] else f"{name} cannot be told from this log"
+        f"{name} is {doubt[name]}normal" if levels[name] else f"{name} cannot be told from this log"
         for name, one in faults.items()
         if not one
     ]
@@ -103,6 +107,8 @@ def verdict(result: Mapping[str, Any]) -> str:
         return sentence("; ".join(others) + soft.replace("its", "the", 1))
     if soft:
         return "The oil is softer than its limit; leakage and friction are normal."
+    if any(doubt.values()):
+        return f"The actuator is probably healthy: {' and '.join(others)}."
     return "The actuator is healthy: leakage and friction are normal."
 
 
@@ -127,13 +133,17 @@ def _levels(result: Mapping[str, Any]) -> dict[str, str | None]:
 
     What the nine conditions leave to a fault that is none of them, as a worn pump, is something else too.
     """
-    best, shares = CONDITIONS[result["condition"]], result.get("probabilities")
-    found: dict[str, str | None] = {}
-    for name in ("leakage", "friction"):
-        level = getattr(best, name)
-        own = sum(share for one, share in (shares or {}).items() if getattr(CONDITIONS[one], name) == level)
-        found[name] = level if not shares or own > 1.0 - TOLD else None
-    return found
+    best = CONDITIONS[result["condition"]]
+    levels = {name: getattr(best, name) for name in ("leakage", "friction")}
+    return {name: level if _share(result, name, level) > 1.0 - TOLD else None for name, level in levels.items()}
+
+
+def _share(result: Mapping[str, Any], name: str, level: str | None) -> float:
+    """Return the probability of a level of leakage or of friction; 1 where a log has no probabilities."""
+    shares = result.get("probabilities")
+    if not shares:
+        return 1.0
+    return float(sum(share for one, share in shares.items() if getattr(CONDITIONS[one], name) == level))
 
 
 def _soft_oil(result: Mapping[str, Any]) -> bool:

@@ -171,6 +171,19 @@ def test_friction_that_a_log_does_not_show_is_not_called_normal() -> None:
     assert not any("guides" in one for one in what_to_do(result))
 
 
+@pytest.mark.parametrize(("share", "word"), [(0.54, "probably "), (0.89, "probably "), (0.91, "")])
+def test_a_level_below_nine_in_ten_is_called_probable(share: float, word: str) -> None:
+    """Friction was called normal at 54 %; it was minor."""
+    leaks = {"major_leakage": share, "major_leakage_minor_friction": 1.0 - share}
+    told = f"The actuator leaks badly inside (major leakage); friction is {word}normal."
+    assert verdict(said_of("major_leakage", probabilities=leaks)) == told
+    sound = {"normal": share, "minor_leakage": 1.0 - share}
+    healthy = "leakage is probably normal and friction is normal." if word else "leakage and friction are normal."
+    assert verdict(said_of("normal", probabilities=sound)) == f"The actuator is {word}healthy: {healthy}"
+    rubs = {"minor_friction": share, "normal": 1.0 - share}
+    assert verdict(said_of("minor_friction", probabilities=rubs)).startswith(f"The actuator {word}has more friction")
+
+
 def test_an_actuator_of_which_nothing_is_told_is_not_called_healthy() -> None:
     even = dict.fromkeys(("normal", "minor_friction", "major_friction"), 1 / 3)
     result = said_of("normal", probabilities=even)
