@@ -203,7 +203,7 @@ def estimate_clean(
         unseen = without_number(Outcome.NOT_OBSERVABLE, (too_wide(bound),), form, MOTION_CHANNELS, bound)
         return _doubting_sensors(unseen, log)
     if automatic and form == "flow" and not filtering and (still := shows_no_motion(log.record, parameters)):
-        return _doubting_sensors(without_number(Outcome.NOT_OBSERVABLE, still, form, FLOW_CHANNELS), log)
+        return without_number(Outcome.NOT_OBSERVABLE, still, form, FLOW_CHANNELS)
     fit = None if filtering else _fit(log, parameters, form, guess, spreads, chosen=options.method == LEAST_SQUARES)
     if fit is not None and (slips := _channel_slips(fit, parameters)):
         return without_number(Outcome.MISMATCH, slips, form, FITTED[form][1])

@@ -24,7 +24,7 @@ UNLIKE = 0.2
 """Logarithm of bulk modulus over the rig file's from which the units are doubted that no motion confirms
 [dimensionless]; judged."""
 
-VAGUE = 0.1
+VAGUE_STILL = 0.1
 """Relative deviation of bulk modulus from which one behind a still piston is none [fraction]; judged. Two slips of
 scale that cancel had 13 to 30 %, logs without a slip 1 to 3 %."""
 
@@ -85,7 +85,7 @@ def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters)
     unlike = abs(ln(ratio))
     doubted = gone.stuck or unlike > UNLIKE
     said = (EstimateCode.PISTON_STANDS_STILL.note(moved_m=gone.piston, pumped_m=gone.pump),) if doubted else ()
-    vague = found.std is None or found.std > VAGUE * found.value
+    vague = found.std is None or found.std > VAGUE_STILL * found.value
     if unlike < ln(KIN) and not vague:
         return replace(found, remarks=(*found.remarks, *said))
     return _without(found, Outcome.NOT_OBSERVABLE, *said, EstimateCode.STILL_AND_FOREIGN.note(ratio=ratio))

@@ -43,8 +43,7 @@ ONE_SIDED = 0.5
 
 LESS_DRAINED, APART = 0.05, 0.5
 """Drain from which the search for a second one begins, over the first, and how far apart logarithms of two drains are
-[fraction, dimensionless]; judged. From a minimum with 14 times the drain the
-right one was found so."""
+[fraction, dimensionless]; judged. From a minimum with 14 times the drain the right one was found so."""
 
 SETTLING = 15
 """Evaluations with short model steps of a form that does not explain its log: it is asked what is strange [count]."""
@@ -132,7 +131,7 @@ def balanced(
         done = each(lambda one: min(one, from_minimum(one[0].model, log, valley, bent=bent), key=_cost), done)
     done = _told_ended(done, log)
     if _one_sided(log):
-        done = _told_ended([found for each_one in each(_with_less_drain, done) for found in each_one], log)
+        done = _told_ended([found for minima in each(_with_less_drain, done) for found in minima], log)
     best, swinging = _told_of(done)
     least = best[1].cost
 
