@@ -101,3 +101,25 @@ def first_stiffness(log: GreyBoxLog) -> float:
     """
     value, spread = log.presumed[STIFFNESS]
     return value * math.exp(-SOFT * spread)
+
+
+FAR_STIFFER = 2.0
+"""Deviations over what is presumed from which an accumulator has taken up something else [dimensionless]."""
+
+
+def is_far_stiffer(log: GreyBoxLog, values: Mapping[str, float]) -> bool:
+    """Return whether a fit's accumulator is so much stiffer than presumed that it has taken up something else.
+
+    The level that it holds follows the piston, as do the volumes of an encoder that was homed elsewhere.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, with what is presumed.
+    values : Mapping[str, float]
+        The fit's [SI].
+    """
+    if STIFFNESS not in values or values[STIFFNESS] <= 0.0 or STIFFNESS not in log.presumed:
+        return False
+    usual, std = log.presumed[STIFFNESS]
+    return math.log(values[STIFFNESS] / usual) > FAR_STIFFER * std

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
+from estimation.fits.flow.accumulator import is_far_stiffer
 from estimation.fits.flow.log import homed_at_stop, outruns_pump
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.greybox.fit import GreyBoxFit
@@ -122,6 +123,8 @@ def hypotheses_asked(
     shows_zero = best is swinging or homed_at_stop(log)
     if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
         zero = max(zero, predicted_gain(log, parameters, best.values, ENCODER_ZERO))
+    if is_far_stiffer(log, swinging.values):  # else slopes promise what the accumulator leaves of a zero: nothing
+        zero = max(zero, predicted_gain(log, parameters, unheld(swinging.values), ENCODER_ZERO, by_mass=by_mass))
     worn = delivery.gain > worth and abs(delivery.size) > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and abs(zero.size) > LEAST_ZERO
     plays = play_shows(swinging.play, sensed)
@@ -154,6 +157,21 @@ def at_widest(fit: GreyBoxFit, parameters: EhaParameters) -> bool:
     """
     stiff = max(parameters.bulk_modulus, fit.values["bulk_modulus"])
     return fit.values.get("makeup_conductance", 0.0) > WIDEST * widest_makeup(parameters.chamber_volume, stiff)
+
+
+def is_astray(log: GreyBoxLog, fit: GreyBoxFit, parameters: EhaParameters) -> bool:
+    """Return whether a plain fit took up what is strange, and so is at a wrong minimum though it explains its log.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log.
+    fit : GreyBoxFit
+        The plain form's.
+    parameters : EhaParameters
+        The actuator.
+    """
+    return at_widest(fit, parameters) or is_far_stiffer(log, fit.values)
 
 
 def _late_valves(fit: GreyBoxFit) -> tuple[Hypothesis, ...]:
@@ -202,12 +220,13 @@ def near_starts(
     explains: Callable[[GreyBoxFit], bool],
     *,
     in_motion: bool,
-    widest: bool = False,
+    astray: bool = False,
 ) -> Sequence[Mapping[str, float]]:
     """Return the starts of the search for hypotheses: a fit that explains the log is at no wrong minimum.
 
     One that begins at rest may be where the log does not (``in_motion``): without make-up, which is then tried too.
-    So it is where make-up valves ended far wider than any, since the model is too rough there to find a way back.
+    So it is where make-up valves ended far wider than any, since the model is too rough there to find a way back, and
+    where the accumulator took up what is strange.
 
     Parameters
     ----------
@@ -219,8 +238,8 @@ def near_starts(
         ``explains(fit)``: whether a fit explains the log.
     in_motion : bool
         Whether the log begins under load, or while the motor turns.
-    widest : bool, optional
-        Whether it is at a wrong minimum all the same, see `at_widest`.
+    astray : bool, optional
+        Whether it is at a wrong minimum all the same, see `is_astray`.
 
     Returns
     -------
@@ -228,9 +247,20 @@ def near_starts(
         First guesses [SI].
     """
     fed = {**fit.values, "makeup_conductance": MAKEUP_TRIED[0]}
-    if explains(fit) and not widest:
+    if explains(fit) and not astray:
         return [fit.values, fed] if in_motion else [fit.values]
     usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
     lost = fit.values["makeup_conductance"] > TOO_WIDE * MAKEUP_TRIED[0]
     near = [fit.values, fed] if lost else [fit.values]
-    return [*({name: value for name, value in one.items() if name not in HELD} for one in near), *usual]
+    return [*map(unheld, near), *usual]
+
+
+def unheld(values: Mapping[str, float]) -> dict[str, float]:
+    """Return values without those that a search for what is strange holds, see `HELD`.
+
+    Parameters
+    ----------
+    values : Mapping[str, float]
+        The plain form's [SI].
+    """
+    return {name: value for name, value in values.items() if name not in HELD}

@@ -39,7 +39,14 @@ def hopeless_cost(swinging: GreyBoxFit, asked: Sequence[Hypothesis]) -> float:
 
 
 def wanted_cost(
-    names: Sequence[str], best: GreyBoxFit, swinging: GreyBoxFit, *, homed: bool, late: bool, worth: float = WORTH
+    names: Sequence[str],
+    best: GreyBoxFit,
+    swinging: GreyBoxFit,
+    *,
+    homed: bool,
+    late: bool,
+    astray: bool = False,
+    worth: float = WORTH,
 ) -> float:
     """Return the cost below which hypotheses are believed rather than the plain form.
 
@@ -57,6 +64,8 @@ def wanted_cost(
         Whether the encoder may have been homed at a stop.
     late : bool
         Whether the pressure was filtered.
+    astray : bool
+        Whether the accumulator of the fit with volumes that swing is far too stiff.
     worth : float
         What they must gain in log-likelihood [dimensionless].
 
@@ -70,7 +79,7 @@ def wanted_cost(
     if tuple(names) == (PRESSURE_LATE.name,) and late:
         return best.cost + WORTH
     if tuple(names) == (ENCODER_ZERO.name,) and homed:
-        return min(best.cost + WORTH, swinging.cost - worth)
+        return min(best.cost + WORTH, swinging.cost - (0.0 if astray else worth))
     return best.cost - worth
 
 

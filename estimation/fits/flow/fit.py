@@ -6,12 +6,13 @@ from functools import partial
 
 import numpy as np
 
+from estimation.fits.flow.accumulator import is_far_stiffer
 from estimation.fits.flow.agreement import Answered, agreed, wanted_of
 from estimation.fits.flow.asked_hypotheses import (
     ALWAYS_ASKED,
     MOST_ASKED,
-    at_widest,
     hypotheses_asked,
+    is_astray,
     near_starts,
 )
 from estimation.fits.flow.belief import hopeless_cost, play_explained, wanted_cost
@@ -19,6 +20,7 @@ from estimation.fits.flow.log import homed_at_stop, require_flow_channels, witho
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
 from estimation.fits.flow.misread import UNLIKE_SLIPS, CorrectedLogs
+from estimation.fits.flow.offset_beside import offset_settled
 from estimation.fits.flow.other_minimum import lower_minimum
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer, with_shorter_steps
 from estimation.fits.flow.search import MAKEUP_TRIED
@@ -174,6 +176,7 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
                 if not start.turns_read and _misread(corrected, plain, asked, traits):
                     return Answered(plain, (), (), None)
                 strange = _strange(plain, asked, traits) if asked else None
+                plain, strange = offset_settled(plain, strange, partial(_strange, traits=traits))
         except WorkSpentError:
             return Answered(plain, asked, open_ends, None, ended=True)
         elsewhere = strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))
@@ -208,8 +211,9 @@ def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequ
 def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> Explanation | None:
     """Return the explanation of a log by hypotheses, if it is believed rather than the plain form."""
     explains = _told_by(plain, begun=BEGUN in asked)
-    in_motion, widest = traits.loaded or traits.moving, at_widest(plain.swinging, plain.start.parameters)
-    near = near_starts(plain.swinging, plain.starts, explains, in_motion=in_motion, widest=widest)
+    in_motion = traits.loaded or traits.moving
+    astray = is_astray(plain.log, plain.swinging, plain.start.parameters)
+    near = near_starts(plain.swinging, plain.starts, explains, in_motion=in_motion, astray=astray)
     if plain.best is not plain.swinging and explains(plain.best):
         near = [plain.best.values, *near]
     alone = len(asked) == 1 and asked[0] in ALWAYS_ASKED  # it has no rival
@@ -232,8 +236,9 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
 
 def _wanted(names: Sequence[str], plain: PlainFits, traits: LogTraits, left: float) -> float:
     """Return the cost below which hypotheses that leave ``left`` are believed rather than the plain form."""
-    homed, late = homed_at_stop(plain.log), traits.filtered
-    return wanted_cost(names, plain.best, plain.swinging, homed=homed, late=late, worth=wanted_of(plain, left))
+    best, swinging, worth = plain.best, plain.swinging, wanted_of(plain, left)
+    homed, astray = homed_at_stop(plain.log), is_far_stiffer(plain.log, swinging.values)
+    return wanted_cost(names, best, swinging, homed=homed, late=traits.filtered, astray=astray, worth=worth)
 
 
 def _uneven(plain: PlainFits, traits: LogTraits) -> VaryingLoss | None:

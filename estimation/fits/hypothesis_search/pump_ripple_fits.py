@@ -141,7 +141,7 @@ def with_pump_ripple(
     shifted = _shifted(log, plain, fitted, largest)
     if offset:
         plain, shifted = shifted or plain, None
-        plain = plain._replace(remarks=_told_offset(plain.log.speed_offset, plain.best.speed_offset.std))
+        plain = plain._replace(remarks=told_offset(plain.log.speed_offset, plain.best.speed_offset.std))
     worth = plain.best.cost - TEETH_WORTH
     found = None
     for begun in (plain,) if shifted is None else (shifted, plain):
@@ -151,7 +151,7 @@ def with_pump_ripple(
         sure = begun.best.chi_square[0] <= 1.0 + SURE * (largest - 1.0) + CHANCE * (2.0 / len(log.drives)) ** 0.5
         if begun is shifted and sure and explains(begun.best) and begun.best.cost < plain.best.cost - OFFSET_WORTH:
             offset = begun.log.speed_offset
-            told = _told_offset(offset, begun.best.speed_offset.std)
+            told = told_offset(offset, begun.best.speed_offset.std)
             return begun._replace(log=replace(begun.log, counts=()), remarks=told)
     return plain._replace(left=() if found is not None and _by_chance(plain.best, found.best) else _left(plain))
 
@@ -299,10 +299,17 @@ def _told(teeth: Ripple, offset: float, left: ShownRipple) -> tuple[Note, ...]:
     ripples = RigCode.PUMP_RIPPLES.note(
         percent=100.0 * teeth.amplitude, half_width=100.0 * NORMAL_95 * left.std, teeth=teeth.count
     )
-    return (ripples, *_told_offset(offset, left.offset_std))
+    return (ripples, *told_offset(offset, left.offset_std))
 
 
-def _told_offset(offset: float, std: float) -> tuple[Note, ...]:
+def told_offset(offset: float, std: float) -> tuple[Note, ...]:
+    """Return the note on an offset of motor speed; none where it is too small to matter.
+
+    Parameters
+    ----------
+    offset, std : float
+        By how much the logged speed exceeds the shaft's, and the standard deviation of that [rad/s].
+    """
     if abs(offset) < LEAST_OFFSET:
         return ()
     return (RigCode.SPEED_OFFSET.note(offset_rad_s=offset, half_width=NORMAL_95 * std),)

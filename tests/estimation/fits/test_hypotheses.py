@@ -246,8 +246,8 @@ def test_play_of_the_encoder_is_named_and_taken_up() -> None:
 def test_an_encoder_zero_need_be_no_likelier_than_held_volumes_and_anything_else_must() -> None:
     held, swinging = made_fit(100.0, 2e8, 1e6), made_fit(300.0, 2e8, 1e6)
     wanted = partial(wanted_cost, homed=True, late=False)
-    assert wanted(("encoder_zero",), held, swinging) == 100.0 + module.WORTH
-    assert wanted(("encoder_zero",), held, held) == 100.0 - module.WORTH
+    assert [wanted(("encoder_zero",), held, one) for one in (swinging, held)] == [110.0, 90.0]
+    assert [wanted((one,), held, held, astray=True) for one in ("encoder_zero", "volume")] == [100.0, 90.0]
     assert wanted_cost(("encoder_zero",), held, swinging, homed=False, late=False) == 100.0 - module.WORTH
     assert wanted(("position_play",), held, swinging) == 100.0 - module.WORTH
     assert wanted(("position_play", "position_late"), held, swinging) == -np.inf

@@ -7,7 +7,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from estimation.fits.flow.accumulator import LEAST_GAS, MOST_GAS, oil_taken, presumed_stiffness
+from estimation.fits.flow.accumulator import (
+    FAR_STIFFER,
+    LEAST_GAS,
+    MOST_GAS,
+    is_far_stiffer,
+    oil_taken,
+    presumed_stiffness,
+)
 from estimation.fits.flow.fit import fit_flow
 from estimation.models.flow import STIFFNESS
 from plant.eha.circuit_parameters import CircuitParameters
@@ -16,7 +23,7 @@ from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
-from tests.estimation.fits.short_logs import PAPER
+from tests.estimation.fits.short_logs import PAPER, log, seen
 
 SMALL = 1.2e-4
 """Gas of a compact actuator's accumulator: 1.7 times the oil that its chambers take up, an eighth of the paper's."""
@@ -46,6 +53,16 @@ def test_gas_that_is_not_stated_is_some_times_the_oil_that_comes_and_goes() -> N
 def test_a_single_rod_gives_and_takes_what_its_rod_displaces() -> None:
     single = replace(PAPER, area_difference=0.2, stroke=0.3)
     assert oil_taken(single) - oil_taken(PAPER) == pytest.approx(4.0 * 0.1 * single.piston_area * 0.3)
+
+
+def test_an_accumulator_far_stiffer_than_presumed_has_taken_up_something_else() -> None:
+    """That of 45 plain logs is 0.6 deviations above at most, those of two encoders homed at a stop were 2.4."""
+    plain = seen(log(0.2))
+    usual, std = plain.presumed[STIFFNESS]
+    for deviations, wanted in ((0.6, False), (FAR_STIFFER - 0.01, False), (FAR_STIFFER + 0.01, True), (-3.0, False)):
+        assert is_far_stiffer(plain, {STIFFNESS: usual * math.exp(deviations * std)}) is wanted
+    assert not is_far_stiffer(plain, {STIFFNESS: 0.0})
+    assert not is_far_stiffer(plain, {"bulk_modulus": 2e8})  # held volumes have none
 
 
 @pytest.mark.parametrize("stated", [None, SMALL, 2.0 * SMALL])

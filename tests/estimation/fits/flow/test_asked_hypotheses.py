@@ -1,13 +1,16 @@
 """What a log is asked beside the plain form."""
 
+import math
 from dataclasses import replace
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 import pytest
 
+from estimation.fits.flow import asked_hypotheses
 from estimation.fits.flow import fit as flow_fit
-from estimation.fits.flow.asked_hypotheses import ZERO_WORTH, hypotheses_asked
+from estimation.fits.flow.asked_hypotheses import ZERO_WORTH, hypotheses_asked, is_astray, near_starts
 from estimation.fits.greybox.chance import LARGEST_CHI_SQUARE
 from estimation.fits.hypotheses import (
     CHECKS_HIDDEN,
@@ -21,9 +24,10 @@ from estimation.fits.hypotheses import (
 )
 from estimation.fits.hypothesis_search.fit_objections import DOUBTED, QUIET
 from estimation.fits.hypothesis_search.not_excluded import OPEN_DELIVERY
-from estimation.fits.hypothesis_search.predicted_gains import PredictedGain
+from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, PredictedGain
 from estimation.fits.hypothesis_search.wide_problem import widest_makeup
 from estimation.models.completed_flow import CRACKS
+from estimation.models.flow import STIFFNESS
 from estimation.notes import RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
@@ -91,6 +95,28 @@ def test_an_encoder_s_zero_is_asked_for_where_no_held_volumes_fit_better_or_the_
         for seen_log, best, wanted in ((seen(record), swinging, True), (seen(record), held, False), (stop, held, True)):
             asked, _ = hypotheses_asked(seen_log, PAPER, swinging, best, loaded=False, moving=False)
             assert (ENCODER_ZERO in asked) == wanted
+
+
+@pytest.mark.parametrize(("deviations", "wanted"), [(0.5, False), (2.5, True)])
+def test_an_encoder_s_zero_is_asked_for_where_the_accumulator_took_it_up(deviations: float, *, wanted: bool) -> None:
+    """Slopes beside an accumulator that follows the piston promised nothing: bulk modulus was 1.8 and 2.1 % low."""
+    plain, sound = seen(log(0.2)), made_fit(400.0, 2e8, 1e5)
+    usual, std = plain.presumed[STIFFNESS]
+    values = {**sound.values, "makeup_conductance": 1e-9, STIFFNESS: usual * math.exp(deviations * std)}
+    fit = replace(sound, values=values)
+
+    def beside_none(*given: Any, **_: Any) -> PredictedGain:
+        assert STIFFNESS not in given[2]
+        return PredictedGain(2.0 * ZERO_WORTH, 2.0 * LEAST_ZERO, 0.03)
+
+    with all_promise(NO_GAIN), patch.object(asked_hypotheses, "predicted_gain", beside_none):
+        asked, _ = hypotheses_asked(plain, PAPER, fit, fit, loaded=False, moving=False)
+    assert (ENCODER_ZERO in asked) is wanted
+    (near,) = near_starts(fit, (), lambda _: True, in_motion=False)
+    assert STIFFNESS in near
+    assert is_astray(plain, fit, PAPER) is wanted
+    (away,) = near_starts(fit, (), lambda _: True, in_motion=False, astray=True)
+    assert STIFFNESS not in away
 
 
 def test_a_short_log_is_not_asked_for_all_where_noise_alone_leaves_as_much_by_chance() -> None:

@@ -1,0 +1,64 @@
+"""`offset_settled(plain, strange, explained)`: an offset of motor speed as what is strange about a log leaves it.
+
+An encoder with another zero, or a rod on one side, lets a plain fit ask for an offset of speed that is not there. What
+explains the log then stands beside that offset, and is several deviations off.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from estimation.finding import NORMAL_95
+from estimation.fits.flow.plain import PlainFits
+from estimation.fits.greybox.pump_ripple import MOST_OFFSET, Turning, with_ripple
+from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
+from estimation.fits.hypothesis_search.explanation import Explanation
+from estimation.fits.hypothesis_search.pump_ripple_fits import KEPT, OFFSET_SETTLED, OFFSET_WORTH, told_offset
+from estimation.notes import RigCode
+
+
+def offset_settled(
+    plain: PlainFits,
+    strange: Explanation | None,
+    explained: Callable[[PlainFits, Sequence[Hypothesis]], Explanation | None],
+) -> tuple[PlainFits, Explanation | None]:
+    """Return a log's fits and what explains it, at the offset of speed that the explanation leaves.
+
+    Parameters
+    ----------
+    plain : PlainFits
+        The log's plain fits, with the offset that they take up.
+    strange : Explanation or None
+        What explains the log beside them.
+    explained : callable
+        ``explained(plain, asked)``: the explanation of a log by hypotheses, None where it is not believed.
+
+    Returns
+    -------
+    tuple of (PlainFits, Explanation or None)
+        Both as they were where the explanation asks for no other offset, or does not keep what that promises.
+    """
+    if strange is None or plain.log.gaps.size:
+        return plain, strange
+    shown, taken = strange.fit.speed_offset, plain.turning.offset
+    if shown.gain < (OFFSET_SETTLED if taken else OFFSET_WORTH):
+        return plain, strange
+    offset = taken + shown.value
+    if taken and abs(offset) < NORMAL_95 * shown.std:
+        offset = 0.0
+    if abs(offset) > MOST_OFFSET:
+        return plain, strange
+    other = _turned(plain, offset, shown.std)
+    again = explained(other, [one for one in HYPOTHESES if one.name in strange.names])
+    if again is None or again.names != strange.names or again.fit.cost > strange.fit.cost - KEPT * shown.gain:
+        return plain, strange
+    return other, again
+
+
+def _turned(plain: PlainFits, offset: float, std: float) -> PlainFits:
+    """Return plain fits whose log has another offset of speed; the fits are those of the log as it was."""
+    turning = Turning(plain.turning.teeth, offset)
+    drives = plain.log.drives.copy()
+    drives[:, 0] = with_ripple(plain.unturned, turning.teeth, offset).drives[:, 0]
+    others = tuple(note for note in plain.teeth if note.code is not RigCode.SPEED_OFFSET)
+    log = replace(plain.log, drives=drives, speed_offset=offset)
+    return replace(plain, log=log, turning=turning, teeth=(*others, *told_offset(offset, std)))
