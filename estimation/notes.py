@@ -6,10 +6,7 @@ from plant.notes import Code
 class SensorCode(Code):
     """Notes on the sensors of a log."""
 
-    SENSOR_FROZE = (
-        "{channel} stays at {value:.6g} for {length_s:.3g} s, from {begin_s:.3g} s on, while other channels move: the "
-        "sensor froze"
-    )
+    SENSOR_FROZE = "{channel} froze for {length_s:.3g} s, from {begin_s:.3g} s on, while other channels moved"
     SENSOR_CONSTANT = "{channel} is {value:.4g|bar} bar throughout: the sensor is dead or not connected"
     SENSOR_NOISE_ONLY = "{channel} shows only noise ({noise:.3g|bar} bar) while the motor turns: the sensor is dead"
     SENSOR_CLIPPED = (
@@ -84,7 +81,8 @@ class ChannelCode(Code):
         "column's unit (NAME:UNIT under [columns] in the rig file, or --columns CHANNEL=NAME:UNIT)"
     )
     CHANNEL_MISREAD = (
-        "{channel} looks like {slip}: with that set right, the log fits the rig (--columns CHANNEL=NAME:UNIT)"
+        "{channel} looks like {slip}: with that set right, the log fits the rig; correct the column's unit (NAME:UNIT "
+        "under [columns] in the rig file, or --columns CHANNEL=NAME:UNIT)"
     )
     NO_SUCH_OIL = (
         "{channel}: bulk modulus seems {ratio:.2g} times that in the rig file, and oils differ by far less: a unit or "

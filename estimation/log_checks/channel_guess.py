@@ -41,8 +41,7 @@ CANDIDATES: Mapping[str, Sequence[str]] = {
     SPEED: ("rad/s", "rpm"),
     POSITION: ("m", "mm", "um"),
     VELOCITY: ("m/s", "mm/s"),
-    PRESSURE: ("Pa", "bar", "kPa"),
-    **dict.fromkeys(PORTS, ("Pa", "bar", "kPa")),
+    **dict.fromkeys((PRESSURE, *PORTS), ("Pa", "bar", "kPa", "psi", "MPa")),
     VOLTAGE: ("V", "mV"),
 }
 """Units that are tried where a file gives none, the usual ones first."""
@@ -283,8 +282,8 @@ def _with_units(
         if heading.stamped:
             notes = [GuessCode.DATES.note()]
         elif (one.unit is None and heading.name != one.channel) and one.channel in CANDIDATES:
-            unit = _unit_of(one.channel, columns[one.place], p)
-            notes.append(GuessCode.UNIT_GUESSED.note(unit=unit))
+            unit, *others = _usual_units(one.channel, columns[one.place], p)
+            notes.append(GuessCode.UNIT_GUESSED.note(unit=unit, usual=" or ".join([unit, *others])))
             one = Guess(one.channel, one.place, one.name, unit, one.points, UNIT_DOUBT * one.sure)
         elif one.unit is not None:
             notes.append(GuessCode.UNIT_FITS.note(unit=one.unit))
@@ -295,15 +294,15 @@ def _with_units(
     return tuple(made)
 
 
-def _unit_of(channel: str, values: Array, p: EhaParameters) -> str:
-    """Return the unit in which a channel has a usual size, the first of those that are tried where several have."""
+def _usual_units(channel: str, values: Array, p: EhaParameters) -> list[str]:
+    """Return the units in which a channel has a usual size, the likeliest first; the SI unit where none is usual."""
     present = values[np.isfinite(values)]
     if not len(present):
-        return UNITS[channel]
+        return [UNITS[channel]]
     if channel == TIME:
         facts = clock_facts(values)
         step = 0.0 if facts is None else facts.step
-        return next((one for one in CANDIDATES[TIME] if SAMPLE_TIME[0] <= step * _factor(one, "s") <= 0.1), "s")
+        return [one for one in CANDIDATES[TIME] if SAMPLE_TIME[0] <= step * _factor(one, "s") <= 0.1] or ["s"]
     size = float(np.ptp(present)) if channel == POSITION else float(np.abs(present).max())
     least, most = LIMITS[channel].least, LIMITS[channel].most
     if channel == SPEED:
@@ -311,7 +310,7 @@ def _unit_of(channel: str, values: Array, p: EhaParameters) -> str:
     if channel in (POSITION, VELOCITY):
         least, most = 1e-4, 2.0
     wanted = UNITS[channel]
-    return next((one for one in CANDIDATES[channel] if least <= size * _factor(one, wanted) <= most), wanted)
+    return [one for one in CANDIDATES[channel] if least <= size * _factor(one, wanted) <= most] or [wanted]
 
 
 def _factor(unit: str, wanted: str) -> float:

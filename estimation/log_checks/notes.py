@@ -9,7 +9,7 @@ class GuessCode(Code):
     CALLED_SO = "its name says so"
     DATES = "it holds dates or times of the day"
     UNIT_FITS = "{unit} is a unit of this channel"
-    UNIT_GUESSED = "no unit is given; in {unit} its size is usual: check the unit"
+    UNIT_GUESSED = "no unit is given; its size is usual in {usual}: {unit} was taken, so check it"
     INCREASES = "it increases by {step:.6g} from row to row"
     HAS_SLOPE = "column {column} is its slope (correlation {correlation:.3f})"
     IS_SLOPE = "it is the slope of column {column} (correlation {correlation:.3f})"

@@ -44,8 +44,8 @@ def without_position_beyond_range(record: Record) -> tuple[Record, tuple[Note, .
     beyond = np.isin(values, levels)
     note = SensorCode.SENSOR_CLIPPED.note(
         channel=POSITION,
-        levels=" and ".join(f"{level:.4g}" for level in levels),
-        unit="m",
+        levels=" and ".join(f"{1e3 * level:.4g}" for level in levels),
+        unit="mm",
         percent=100.0 * np.count_nonzero(beyond) / len(seen),
     )
     return record.replace(**{POSITION: np.where(beyond, np.nan, values)}), (note,)

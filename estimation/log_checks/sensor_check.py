@@ -284,8 +284,8 @@ def without_saturated(record: Record, parameters: EhaParameters) -> tuple[Record
         counts = np.cumsum(np.pad(clipped, (reach + 1, reach)))
         around = counts[2 * reach + 1 :] > counts[: -2 * reach - 1]
         share = 100.0 * np.count_nonzero(clipped) / np.count_nonzero(np.isfinite(values))
-        at = " and ".join(f"{level:.4g}" for level in levels)
-        said.append(SensorCode.SENSOR_CLIPPED.note(channel=channel, levels=at, unit="Pa", percent=share))
+        at = " and ".join(f"{1e-5 * level:.4g}" for level in levels)
+        said.append(SensorCode.SENSOR_CLIPPED.note(channel=channel, levels=at, unit="bar", percent=share))
         lost = (channel, PRESSURE) if _is_difference(record) else (channel,)
         left_out = clipped | (close & around)
         record = record.replace(**{name: np.where(left_out, np.nan, record[name]) for name in lost})

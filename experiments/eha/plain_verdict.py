@@ -6,7 +6,7 @@ from typing import Any
 
 from estimation.log_checks.notes import LoggerCode
 from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
-from experiments.page.condition_names import in_words
+from experiments.page.condition_names import in_words, level_in_words
 from experiments.page.sentences import left_unread, sentence
 from faults.conditions import CONDITIONS
 from faults.notes import AdviceCode, AgainstCode
@@ -46,6 +46,13 @@ WRONG_SENSORS = frozenset(
     {SensorCode.SENSOR_FROZE, SensorCode.SENSOR_CONSTANT, SensorCode.SENSOR_NOISE_ONLY, SensorCode.SENSORS_DISAGREE}
 )
 """Codes of sensors of which nothing can be used."""
+
+HINDRANCES: Mapping[frozenset[str], str] = {
+    frozenset(map(str, ChannelCode)): "the sign, unit or name of {} is wrong",
+    frozenset(map(str, WRONG_SENSORS)): "the sensor of {} reads wrong",
+    frozenset(map(str, LoggerCode)): "the logger left measurements of {} out",
+}
+"""What hinders a verdict, and which channel, by the codes of notes that say so; the first that is found is told."""
 
 WRONG_INPUT = WRONG_SENSORS.union(ChannelCode, LoggerCode)
 """Codes of sensors and columns that are wrong, from which other reasons against a verdict may follow."""
@@ -114,18 +121,22 @@ def verdict(result: Mapping[str, Any]) -> str:
 
 def _hindered(result: Mapping[str, Any]) -> str:
     """Return why there is no verdict, in one clause."""
+    for accused, words in HINDRANCES.items():
+        notes = [one for one in result["notes"] if one["code"] in accused and one["text"] in result["reasons"]]
+        if notes:
+            named = dict.fromkeys(one["data"].get("channel", "velocity_m_s or position_m") for one in notes)
+            return words.format(" and ".join(named))
     codes = {one["code"] for one in result["notes"]}
-    if codes & set(ChannelCode):
-        return "a column of the log has a wrong sign, unit or name"
-    if codes & WRONG_SENSORS:
-        return "a sensor reads wrong"
-    if codes & set(LoggerCode):
-        return "the logger left measurements out"
     if AgainstCode.STUCK_OR_LEAKS in codes:
         return "the piston stands still, and without pressure the log does not tell why"
     if EstimateCode.RIG_CONTRADICTED in codes:
         return "the log and the rig file contradict each other"
     return "the log does not fit any known condition of this actuator"
+
+
+def size_in_words(result: Mapping[str, Any]) -> str:
+    """Return the size of a fault that lies between the nine conditions: 'leakage between none and minor'."""
+    return "; ".join(level_in_words(name, size) for name, size in _raised(result).items())
 
 
 def _levels(result: Mapping[str, Any]) -> dict[str, str | None]:

@@ -8,13 +8,13 @@ import pandas as pd
 
 from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.rows import STATES, LogRow
+from experiments.page.condition_names import in_words, level_in_words
 from experiments.page.names_shown import SHOWN
 from experiments.page.numbers import MISSING, alike_in_digits, fixed, number, shop_unit
 from experiments.page.render import render_page
 from experiments.page.scripting import data_block
 from experiments.page.sentences import whole_dates
 from experiments.page.tables import Cell, Column, right
-from experiments.page.words import in_words
 
 MOST_STILL = 100
 """Rows of a table where scripts do not run [count]."""
@@ -26,9 +26,6 @@ the latter."""
 
 UNREAD = ("log", "actuator", "why")
 """Columns of the table of logs that could not be read."""
-
-LEVELS = ("none", "minor", "major")
-"""Levels of leakage and friction, by size."""
 
 IF_RIGHT = ", if the rig file is right"
 """Behind the levels of a circuit that lies beside the nine conditions."""
@@ -194,7 +191,7 @@ def rig_hint(rows: Sequence[ActuatorRow], *, served: bool = False) -> str:
     served : bool
         Whether a server has the logs, in no folder of the reader's.
     """
-    unknown = [row for row in rows if row.state == "unknown" and not row.last.told]
+    unknown = [row for row in rows if row.state == "unknown"]
     if len(unknown) < LEAST_OPEN or len(unknown) < SHARE_OPEN * len(rows):
         return ""
     remedy = (
@@ -249,25 +246,6 @@ def found_in(log: LogRow) -> str:
     if levels:
         return "; ".join(levels) + (IF_RIGHT if log.beside else "")
     return in_words(log.condition) if log.condition else log.reason.split(f"{log.file}: ", 1)[-1]
-
-
-def level_in_words(name: str, size: float) -> str:
-    """Return between which levels a fault lies.
-
-    Parameters
-    ----------
-    size : float
-        Where 1 is minor and 2 is major [dimensionless].
-
-    Examples
-    --------
-    >>> level_in_words("leakage", 0.5), level_in_words("friction", 1.0), level_in_words("friction", 2.25)
-    ('leakage none to minor', 'minor friction', 'friction above major')
-    """
-    below = int(size)
-    if below == size and below < len(LEVELS):
-        return f"{LEVELS[below]} {name}"
-    return f"{name} {LEVELS[below]} to {LEVELS[below + 1]}" if below + 1 < len(LEVELS) else f"{name} above major"
 
 
 def worst_in(log: LogRow) -> str:

@@ -101,7 +101,7 @@ class LogRow:
     @property
     def told(self) -> bool:
         """Whether the severities are the actuator's: a model explains the log, of one of the nine conditions or not."""
-        return self.state not in ("unknown", "failed") or (bool(self.between) and not self.beside)
+        return self.state not in ("unknown", "failed")
 
     @property
     def shown(self) -> bool:
@@ -148,8 +148,8 @@ def _row(row: Mapping[str, Any], named: Named, limits: Mapping[str, float]) -> L
     amounts = _amounts(row["quantities"], limits)
     code, between = _placed(row.get("against"))
     state = _state(row, amounts)
-    if state == "unknown" and code == BETWEEN and any(one.share > 1.0 for one in amounts.values()):
-        state = "likely"  # a sensor with a wrong gain would look alike
+    if state == "unknown" and code == BETWEEN:  # never surely: a sensor with a wrong gain would look alike
+        state = "likely" if any(one.share > 1.0 for one in amounts.values()) else "open"
     beside = code == BESIDE
     return LogRow(
         row["file"], named, state, row["found_condition"] or "", row["reason"] or "", amounts, between, beside

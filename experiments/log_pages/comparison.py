@@ -254,8 +254,16 @@ def _conditions_of(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
     """Return the conditions of two logs, in the order of the logs; empty where one of them was not diagnosed."""
     if not all(one.get("condition") and one.get("probabilities") for one in (first, second)):
         return ""
-    one, other = ("no verdict" if each.get("unknown") else in_words(each["condition"]) for each in (first, second))
+    one, other = (_found(each) for each in (first, second))
     return f"From {one} to {other}." if one != other else sentence(f"{one} in both logs")
+
+
+def _found(result: Mapping[str, Any]) -> str:
+    from experiments.eha.plain_verdict import of_another_size, size_in_words
+
+    if not result.get("unknown"):
+        return in_words(result["condition"])
+    return size_in_words(result) if of_another_size(result) else "no verdict"
 
 
 def title_of(rows: Sequence[Mapping[str, Any]]) -> str:

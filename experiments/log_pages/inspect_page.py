@@ -47,12 +47,14 @@ def inspect_page(result: Mapping[str, Any], tables: "Sequence[TableFacts]") -> s
     with styled():
         figure = _draw(drawn[:MOST_COLUMNS])
     units = ["unit"] if any(row["unit"] for row in rows) else []
+    guessed = without_unit(result["tables"])
+    unsure = "; check the units that were guessed" if guessed else ""
     facts = {
         "result": result,
-        "title": "This log can be diagnosed." if result["reads"] else "This log cannot be diagnosed yet.",
+        "title": f"This log can be diagnosed{unsure}." if result["reads"] else "This log cannot be diagnosed yet.",
         "message": f"{result['message'][:1].upper()}{result['message'][1:]}.",
-        "block": block_of(result["columns"]),
-        "guessed": without_unit(result["tables"]),
+        "block": block_of(result["columns"], guessed),
+        "guessed": list(guessed.values()),
         "clocks": [sentence(clock_sentence(one)) for one in result["tables"]],
         "most": MOST_COLUMNS,
         "columns": pd.DataFrame([_row(row) for row in rows]),
@@ -92,7 +94,8 @@ def _time_of(facts: "TableFacts", told: Sequence[Mapping[str, Any]]) -> _Time | 
             stamps: Any = one.values
             dated = stamps.dtype.kind == "M"
             values: Array = (stamps - stamps[:1]) / np.timedelta64(1, "s") if dated else stamps
-            label = "time since the first row [s]" if dated else f"{one.heading.name} {_bracketed(one.heading.unit)}"
+            unit = "" if one.heading.name.endswith(("]", ")")) else _bracketed(one.heading.unit)
+            label = "time since the first row [s]" if dated else f"{one.heading.name} {unit}"
             return _Time(one, values, label.rstrip()) if bool(np.all(np.diff(values) > 0.0)) else None
     return None
 

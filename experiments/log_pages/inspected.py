@@ -1,7 +1,7 @@
 """Contents of an unknown log, as entries of the JSON contract: tables, columns, likely channels, readability."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,9 @@ BLANK: Result = dict.fromkeys(("plant", "tables", "columns", "options", "reads")
 
 PLOTTED = 24
 """Characters of a plot on the terminal."""
+
+GUESSED = "  # the file gives no unit: check this one"
+"""What stands behind a unit that was guessed, in a rig file."""
 
 
 def looked_into(
@@ -151,26 +154,30 @@ def _options(columns: Mapping[str, str], plant: str, sample_time: float | None, 
     return " ".join(kind + told + ([] if sample_time is None else [f"--sample-time {sample_time:g}"]))
 
 
-def block_of(columns: Mapping[str, str]) -> str:
+def block_of(columns: Mapping[str, str], guessed: Collection[str] = ()) -> str:
     """Return the ``[columns]`` block of a rig file.
 
     Parameters
     ----------
     columns : Mapping[str, str]
         Column with its unit, by channel.
+    guessed : collection of str
+        Channels whose unit the file does not give.
 
     Returns
     -------
     str
         TOML.
     """
-    return "\n".join(
-        ["[columns]", *(f"{channel} = {json.dumps(spec, ensure_ascii=True)}" for channel, spec in columns.items())]
-    )
+    lines = [
+        f"{channel} = {json.dumps(spec, ensure_ascii=True)}{GUESSED if channel in guessed else ''}"
+        for channel, spec in columns.items()
+    ]
+    return "\n".join(["[columns]", *lines])
 
 
-def without_unit(tables: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the names of likely channels whose unit was guessed, since the file gives none.
+def without_unit(tables: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """Return the columns whose unit was guessed, since the file gives none, by channel.
 
     Parameters
     ----------
@@ -180,7 +187,9 @@ def without_unit(tables: Sequence[Mapping[str, Any]]) -> list[str]:
     from estimation.log_checks.notes import GuessCode
 
     rows = (row for one in tables for row in one["columns"])
-    return [row["name"] for row in rows if any(why["code"] == GuessCode.UNIT_GUESSED for why in row["why"])]
+    return {
+        row["channel"]: row["name"] for row in rows if GuessCode.UNIT_GUESSED in (why["code"] for why in row["why"])
+    }
 
 
 def clock_sentence(one: Mapping[str, Any]) -> str:

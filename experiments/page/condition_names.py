@@ -1,5 +1,8 @@
 """Names of conditions for a reader; imports nothing, so that a verb on a log starts fast."""
 
+LEVELS = ("none", "minor", "major")
+"""Levels of leakage and friction, by size."""
+
 
 def in_words(condition: str) -> str:
     """Return a condition's name for a reader.
@@ -15,3 +18,24 @@ def in_words(condition: str) -> str:
     'minor leakage + major friction'
     """
     return condition.replace("leakage_", "leakage + ").replace("_", " ")
+
+
+def level_in_words(name: str, size: float) -> str:
+    """Return between which levels a fault lies.
+
+    Parameters
+    ----------
+    size : float
+        Where 1 is minor and 2 is major [dimensionless].
+
+    Examples
+    --------
+    >>> level_in_words("leakage", 0.5), level_in_words("friction", 1.0), level_in_words("friction", 2.25)
+    ('leakage between none and minor', 'minor friction', 'friction above major')
+    """
+    below = int(size)
+    if below == size and below < len(LEVELS):
+        return f"{LEVELS[below]} {name}"
+    if below + 1 >= len(LEVELS):
+        return f"{name} above major"
+    return f"{name} between {LEVELS[below]} and {LEVELS[below + 1]}"

@@ -66,7 +66,7 @@ def inspect(
 
             pages.write(log, inspect_page({"file": str(log), **found}, tables))
         if write is not None:
-            _write_rig(write, found["columns"], actuator(found["plant"]))
+            _write_rig(write, found, actuator(found["plant"]))
             note(f"{write}: check units and parameters, then run: hydrostate diagnose {log} --rig {write}")
         return {"outcome": "ok", **found}
 
@@ -82,11 +82,15 @@ def inspect(
     finish(batch, _screen, as_json=as_json, out=out, lost=bool(pages.unwritten))
 
 
-def _write_rig(path: Path, columns: Mapping[str, str], kind: "ActuatorKind") -> None:
+def _write_rig(path: Path, found: Mapping[str, Any], kind: "ActuatorKind") -> None:
     from plant.eha.rig import rig_template, write_rig_template
 
     text = rig_template(kind.parameters, kind.name, {})
-    write_rig_template(path, text.replace("[columns]", block_of(columns)))
+    write_rig_template(path, text.replace("[columns]", _block(found)))
+
+
+def _block(found: Mapping[str, Any]) -> str:
+    return block_of(found["columns"], without_unit(found["tables"]))
 
 
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
@@ -96,13 +100,9 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
             yield _shown(one)
             yield clock_sentence(one)
         yield ""
-        yield (
-            visible(block_of(result["columns"]))
-            if result["columns"]
-            else "no column was recognised; name the columns yourself"
-        )
+        yield (visible(_block(result)) if result["columns"] else "no column was recognised; name the columns yourself")
         if named := without_unit(result["tables"]):
-            yield visible(f"check the unit of {', '.join(named)}: the file gives none")
+            yield visible(f"check the unit of {', '.join(named.values())}: the file gives none")
         yield ""
         if result["options"]:
             yield visible(f"or add to one command: {result['options']}")

@@ -147,7 +147,9 @@ def limits_of_guesses() -> dict[str, Any]:
 
 @NUMBERS.case()
 def units_that_are_guessed() -> dict[str, Any]:
-    of = channel_guess._unit_of  # pyright: ignore[reportPrivateUsage]
+    def of(*asked: Any) -> str:
+        return channel_guess._usual_units(*asked)[0]  # pyright: ignore[reportPrivateUsage]
+
     ramp = np.linspace(-1.0, 1.0, 50)
     ranges = {
         SPEED: (0.1, 1e4),

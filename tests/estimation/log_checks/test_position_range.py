@@ -24,7 +24,7 @@ def test_the_samples_at_the_end_of_the_range_are_missing(ends: tuple[float, floa
     mended, (note,) = without_position_beyond_range(clipped)
     beyond = (ends[0] >= COURSE) | (ends[1] <= COURSE)
     np.testing.assert_array_equal(np.isnan(mended["position_m"]), beyond)
-    assert (note.code, note.data["channel"], note.data["unit"]) == (SensorCode.SENSOR_CLIPPED, "position_m", "m")
+    assert (note.code, note.data["channel"], note.data["unit"]) == (SensorCode.SENSOR_CLIPPED, "position_m", "mm")
     assert note.data["percent"] == pytest.approx(100.0 * np.mean(beyond))
 
 

@@ -41,8 +41,15 @@ def test_every_condition_has_a_verdict_and_work_that_name_what_is_wrong(conditio
 @pytest.mark.parametrize(
     ("note", "said"),
     [
-        (ChannelCode.CHANNELS_SWAPPED.note(channel="a", other="b", correlation=0.9), "a wrong sign, unit or name."),
-        (SensorCode.SENSORS_DISAGREE.note(difference_m_s=0.01), "a sensor reads wrong."),
+        (
+            ChannelCode.CHANNELS_SWAPPED.note(channel="a", other="b", correlation=0.9),
+            "unit or name of a is wrong.",
+        ),
+        (
+            SensorCode.SENSORS_DISAGREE.note(difference_m_s=0.01),
+            "of velocity_m_s or position_m reads wrong.",
+        ),
+        (SensorCode.SENSOR_CONSTANT.note(channel="b", value=1e5), "the sensor of b reads wrong."),
         (AgainstCode.STUCK_OR_LEAKS.note(moved_m=1e-5, pumped_m=0.04), "the log does not tell why."),
         (EstimateCode.RIG_CONTRADICTED.note(percent=129.0), "the log and the rig file contradict each other."),
         (AgainstCode.OIL_STIFF.note(share=2.0), "the log does not fit any known condition of this actuator."),

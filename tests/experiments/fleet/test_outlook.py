@@ -124,8 +124,8 @@ def test_logs_between_two_conditions_are_part_of_the_trend_and_may_raise_the_ala
     row = actuator(GROWING, outcome="mismatch", found_condition=None, against=between(0.5, 0.0))
     assert row.outlook is not None
     assert len(row.outlook.logs) == 30
-    assert (row.last.state, row.state) == ("unknown", "alarm")
-    assert "<h1>P-1: nearing a limit (leakage none to minor).</h1>" in actuator_page(row, {})
+    assert (row.last.state, row.state) == ("open", "alarm")
+    assert "<h1>P-1: nearing a limit (leakage between none and minor).</h1>" in actuator_page(row, {})
 
 
 def test_a_page_tells_logs_that_have_no_place_in_the_trend() -> None:

@@ -153,8 +153,8 @@ def test_a_log_between_two_conditions_is_shown_by_its_levels_and_amounts() -> No
     (found,) = actuator_rows(log_rows([row], {}, {}))
     _, state, said, worst, share, *_ = row_cells(found)
     assert (state, said, worst, share) == (
-        "unknown",
-        "leakage none to minor; minor friction",
+        "open",
+        "leakage between none and minor; minor friction",
         "leakage 1.80 L/min",
         40.0,
     )

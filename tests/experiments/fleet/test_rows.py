@@ -51,7 +51,7 @@ def test_a_log_between_two_conditions_has_severities_and_is_never_surely_past_a_
         store_row("c.csv", 9.0, **doubt),
     ]
     found = log_rows(rows, {}, {})
-    assert [(one.state, one.told) for one in found] == [("unknown", True), ("likely", True), ("unknown", False)]
+    assert [(one.state, one.told) for one in found] == [("open", True), ("likely", True), ("unknown", False)]
 
 
 def test_a_circuit_beside_the_nine_has_no_verdict_but_is_shown_and_named_if_few_are() -> None:
@@ -65,7 +65,7 @@ def test_a_circuit_beside_the_nine_has_no_verdict_but_is_shown_and_named_if_few_
     (row,) = fleet(rows[-5:])
     assert (row.state, row.last.told, row.last.shown) == ("unknown", False, True)
     assert row_cells(row)[2:6] == [
-        "leakage minor to major, if the rig file is right",
+        "leakage between minor and major, if the rig file is right",
         "leakage 4.00 L/min",
         None,
         "no verdict since 2",
