@@ -176,14 +176,18 @@ def estimate_message(found: "Finding") -> str:
     """
     from estimation.finding import NOT_OBSERVABLE_WITH_PRESSURE, OUTCOMES, Outcome
     from estimation.log_checks.channel_names import PRESSURE
-    from estimation.notes import ChannelCode, EstimateCode, RigCode
+    from estimation.log_checks.notes import LoggerCode
+    from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
 
     modulus = found.quantities["bulk_modulus"]
     if modulus.value is None or modulus.ci95 is None:
-        mistakes = [str(note) for note in found.gate.reasons if isinstance(note.code, ChannelCode)]
+        reasons = found.gate.reasons
+        mistakes = [str(note) for note in reasons if isinstance(note.code, ChannelCode)]
+        if mistakes:
+            return clauses(mistakes)
         seen = found.outcome is Outcome.NOT_OBSERVABLE and PRESSURE in found.channels
         volume = next((str(note) for note in found.notes if note.code == RigCode.VOLUME_DIFFERS), None)
-        if seen and volume and not mistakes:
+        if seen and volume:
             return clauses(
                 [f"no value of bulk modulus: {volume}; correct chamber_volume, then estimate this log again"]
             )
@@ -193,15 +197,16 @@ def estimate_message(found: "Finding") -> str:
             EstimateCode.PISTON_STANDS_STILL,
             EstimateCode.STILL_AND_FOREIGN,
         }
-        still = [str(note) for note in found.gate.reasons if note.code in at_rest]
-        if seen and still and not mistakes:
+        still = [str(note) for note in reasons if note.code in at_rest]
+        if seen and still:
             return clauses([f"no value of bulk modulus: {still[0]}", *still[1:]])
-        unexplained = seen and any(note.code != EstimateCode.BOUND_TOO_WIDE for note in found.gate.reasons)
-        if (unexplained or (found.outcome is Outcome.MISMATCH and found.gate.reasons)) and not mistakes:
-            return clauses(
-                ["no value of bulk modulus: the model does not describe the log", *map(str, found.gate.reasons)]
-            )
-        return clauses(mistakes or [NOT_OBSERVABLE_WITH_PRESSURE if seen else OUTCOMES[found.outcome]])
+        unexplained = seen and any(note.code != EstimateCode.BOUND_TOO_WIDE for note in reasons)
+        if unexplained or (found.outcome is Outcome.MISMATCH and reasons):
+            told = list(map(str, reasons))
+            if all(isinstance(note.code, (SensorCode, LoggerCode)) for note in reasons):
+                return clauses([f"no value of bulk modulus: {told[0]}", *told[1:]])
+            return clauses(["no value of bulk modulus: the model does not describe the log", *told])
+        return clauses([NOT_OBSERVABLE_WITH_PRESSURE if seen else OUTCOMES[found.outcome]])
     low, high = (1e-6 * end for end in modulus.ci95)
     digits = decimals_of(low, high)
     said = [

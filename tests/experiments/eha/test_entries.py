@@ -251,6 +251,19 @@ def test_another_drive_is_not_asked_for_where_the_fit_does_not_explain_the_log()
     assert "slower steps" not in message
 
 
+def test_a_sensor_alone_is_no_fault_of_the_model() -> None:
+    """Estimate said "the model does not describe the log" where all that spoke against it was a dead sensor."""
+    found = estimate_log(log(), Rig("rig", EhaParameters()))
+    dead = SensorCode.SENSOR_NOISE_ONLY.note(channel=PRESSURE, noise=4e3)
+    refused = replace(
+        found,
+        outcome=Outcome.MISMATCH,
+        quantities={**found.quantities, "bulk_modulus": Quantity(None, "Pa")},
+        gate=Gate(passed=False, reasons=(dead,)),
+    )
+    assert estimate_entries(refused)["message"] == f"no value of bulk modulus: {dead}"
+
+
 def test_a_wrong_volume_in_the_rig_file_is_mended_before_another_drive_is_tried() -> None:
     found = estimate_log(log(), Rig("rig", EhaParameters()))
     differs = RigCode.VOLUME_DIFFERS.note(percent=53.0, half_width=5.0)

@@ -6,6 +6,7 @@ import pytest
 
 from experiments.log_pages.comparison import compare_view, compared, plain_words, quantities_of
 from experiments.serve.fleet_view import actuator_view, fleet_view
+from faults.notes import AgainstCode
 
 
 def result(value: float | None, half: float | None, **more: Any) -> dict[str, Any]:
@@ -79,11 +80,18 @@ def test_the_title_says_what_the_second_log_has_more_of_and_less() -> None:
     assert "<h1>In the second log, a is higher; b and c are lower.</h1>" in compare_view(first, second)
 
 
+HALF_MINOR = AgainstCode.BETWEEN_CONDITIONS.note(leakage=0.5, friction=0.0).to_dict()
+
+
 @pytest.mark.parametrize(
     ("second", "title"),
     [
         ({"condition": "normal"}, "From major leakage to normal."),
         ({"condition": "normal", "unknown": True}, "From major leakage to no verdict."),
+        (
+            {"condition": "normal", "unknown": True, "reasons": ["one"], "notes": [HALF_MINOR]},
+            "From major leakage to leakage between none and minor.",
+        ),
         ({}, "Major leakage in both logs."),
     ],
 )

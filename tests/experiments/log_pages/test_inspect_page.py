@@ -66,3 +66,10 @@ def test_units_are_to_be_checked_where_the_file_gives_none_and_the_columns_are_n
     asked = "The file gives no unit for Zeit, Drehzahl, Weg: check"
     assert asked in page_of(tmp_path, "Zeit,Drehzahl,Weg", TIME, SPEED, WAY)
     assert "gives no unit" not in page_of(tmp_path, "time_s,motor_speed_rad_s,position_m", TIME, SPEED, WAY)
+
+
+def test_a_unit_that_was_guessed_is_marked_in_the_heading_and_in_the_rig_file(tmp_path: Path) -> None:
+    page = page_of(tmp_path, "time_s,motor_speed_rad_s,Weg [mm],dP", TIME, SPEED, WAY, 50.0 * SPEED / SPEED.max())
+    assert "<h1>This log can be diagnosed; check the units that were guessed.</h1>" in page
+    assert "# the file gives no unit: check this one" in page
+    assert "# the file" not in page_of(tmp_path, "time_s,motor_speed_rad_s,position_m", TIME, SPEED, WAY)
