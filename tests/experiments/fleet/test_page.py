@@ -175,9 +175,11 @@ def test_logs_that_could_not_be_read_are_listed_with_the_reason() -> None:
 
 def test_paper_hides_the_rows_beyond_those_that_the_page_says_it_lists(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(subject, "MOST_LISTED", 3)
-    rows = [store_row("A_1.csv", 1.0, outcome="failed", found_condition=None, reason="A_1.csv: no time")]
+    bad: dict[str, Any] = {"outcome": "failed", "found_condition": None, "reason": "no time"}
+    rows = [store_row(f"A_{number}.csv", 1.0, **bad) for number in range(4)]
     page = fleet_page(actuator_rows(log_rows(rows, {}, {})), {}, "hall")
     assert "on paper, at most 3." in page
+    assert "on paper, at most" not in fleet_page(actuator_rows(log_rows(rows[:3], {}, {})), {}, "hall")
     assert re.findall(r"@media print { :is\(#unread, #undated\) tbody tr:nth-child\(n \+ (\d+)\)", page) == ["4"]
 
 
