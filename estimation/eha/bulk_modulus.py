@@ -200,8 +200,7 @@ def estimate_clean(
     if automatic and not filtering and (wrong := _wrong_sensors(log, form)):
         return without_number(Outcome.MISMATCH, wrong, form, FITTED[form][1])
     if automatic and form == "motion" and (bound := rigid_bound(log, parameters)) > LARGEST_BOUND:
-        unseen = without_number(Outcome.NOT_OBSERVABLE, (too_wide(bound),), form, MOTION_CHANNELS, bound)
-        return _doubting_sensors(unseen, log)
+        return without_number(Outcome.NOT_OBSERVABLE, (too_wide(bound),), form, MOTION_CHANNELS, bound)
     if automatic and form == "flow" and not filtering and (still := shows_no_motion(log.record, parameters)):
         return without_number(Outcome.NOT_OBSERVABLE, still, form, FLOW_CHANNELS)
     fit = None if filtering else _fit(log, parameters, form, guess, spreads, chosen=options.method == LEAST_SQUARES)

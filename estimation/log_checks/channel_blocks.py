@@ -34,8 +34,6 @@ class ChannelBlocks:
         Slope of velocity [m/s^2].
     pressure : ndarray, shape (n,), or None
         Mean differential pressure [Pa].
-    pressure_slope : ndarray, shape (n,), or None
-        Its slope [Pa/s].
     """
 
     length: float
@@ -45,7 +43,6 @@ class ChannelBlocks:
     velocity: Array | None
     velocity_slope: Array | None
     pressure: Array | None
-    pressure_slope: Array | None
 
     @property
     def piston(self) -> Array | None:
@@ -91,7 +88,6 @@ def channel_blocks(record: Record, p: EhaParameters, length: float) -> ChannelBl
         mean(VELOCITY),
         slope(VELOCITY),
         mean(PRESSURE),
-        slope(PRESSURE),
     )
 
 

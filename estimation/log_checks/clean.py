@@ -122,8 +122,8 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     sound, late = without_late_velocity(sound)
     known = [name for name in MEASURED if name in sound]
     objections = (*sensor_objections(sound, parameters), *logged_on_change(sampled))
-    dead = any(note.data["channel"] == PRESSURE for note in objections)
-    mistakes = changes or channel_mistakes(sound.replace(**{PRESSURE: None}) if dead else sound, parameters)
+    stale = any(note.data["channel"] == PRESSURE for note in objections)  # froze, or was logged on change
+    mistakes = changes or channel_mistakes(sound.replace(**{PRESSURE: None}) if stale else sound, parameters)
     if mistakes:  # a sensor cannot be judged by channels of another meaning
         objections = steps = ()
     every, (sound, filtered) = sound, without_correlated_noise(sound, natural_frequency(parameters))

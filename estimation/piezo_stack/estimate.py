@@ -21,7 +21,7 @@ from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS, UNKNOWNS, 
 from plant.errors import LogError
 from plant.log.record import Record
 from plant.piezo_stack.parameters import LONGEST_STEP, PiezoStackParameters
-from plant.piezo_stack.run import BENCH_SENSORS, StackSensors, checked_voltage
+from plant.piezo_stack.run import BENCH_SENSORS, checked_voltage
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,6 @@ def stack_bounds(
     *,
     unknowns: Collection[str] = DEFAULT_UNKNOWNS,
     channels: Collection[str] = STACK_CHANNELS,
-    sensors: StackSensors = BENCH_SENSORS,
 ) -> Mapping[str, float]:
     """Return Cramér-Rao bounds of an experiment on each quantity, all unknown together.
 
@@ -175,7 +174,7 @@ def stack_bounds(
     Mapping[str, float]
         Standard deviation by name [SI]; of factors, relative.
     """
-    noise = {name: value for name, value in asdict(sensors).items() if name in channels}
+    noise = {name: value for name, value in asdict(BENCH_SENSORS).items() if name in channels}
     runs = StackRuns(checked_voltage(voltage), sample_time, parameters, tuple(unknowns), noise, np.zeros(0))
     deviations = np.sqrt(np.diag(covariance(runs.around(np.zeros(len(runs.names)), LONGEST_STEP)[1])))
     return {

@@ -102,13 +102,11 @@ def require_place(option: str, path: Path | None, ending: str = "", logs: Iterab
     require_no_log(option, [path], logs)
 
 
-def require_folder(option: str, folder: Path | None) -> None:
-    """Refuse a folder that is a file, or has the name of one, before the work and not after it.
+def require_folder(folder: Path | None) -> None:
+    """Refuse a folder of ``--out`` that is a file, or has the name of one, before the work and not after it.
 
     Parameters
     ----------
-    option : str
-        As the command line has it.
     folder : Path or None
         Where files go; None, not given, passes.
 
@@ -120,9 +118,9 @@ def require_folder(option: str, folder: Path | None) -> None:
     if folder is None or folder.is_dir():
         return
     if folder.exists():
-        raise HydrostateError(f"{option} must be a folder, got the file {str(folder)!r}")
+        raise HydrostateError(f"--out must be a folder, got the file {str(folder)!r}")
     if folder.suffix.lower() in (*OF_FILES, ".json"):
-        raise HydrostateError(f"{option} must be a folder, got {str(folder)!r}, a name as a file has it")
+        raise HydrostateError(f"--out must be a folder, got {str(folder)!r}, a name as a file has it")
 
 
 def page_place(report: Path | None) -> Path | None:

@@ -19,7 +19,7 @@ Settings = TypeVar("Settings", bound="DataclassInstance")
 
 def _folder(out: Path) -> Path:
     """Refuse what is no folder before a study is imported, which takes seconds."""
-    require_folder("--out", out)
+    require_folder(out)
     return out
 
 

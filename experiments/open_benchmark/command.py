@@ -31,7 +31,7 @@ def make(
     The same options write the same files. The simulator shares no model of physics, sensors or loggers with the methods
     that estimate and diagnose here.
     """
-    require_folder("--out", out)
+    require_folder(out)
     from experiments.open_benchmark.folders import write_set
     from experiments.open_benchmark.kinds import KINDS, VERSION
 

@@ -21,8 +21,8 @@ def _pressure(**changes: float) -> Draw:
     return lambda setup, _: setup.with_sensor(PRESSURES, **changes)
 
 
-def _sensor(channel: str, **changes: float) -> Draw:
-    return lambda setup, _: setup.with_sensor((channel,), **changes)
+def _speed(**changes: float) -> Draw:
+    return lambda setup, _: setup.with_sensor((SPEED,), **changes)
 
 
 RPM = 30.0 / 3.141592653589793
@@ -133,14 +133,14 @@ LOGGERS = (
     Kind(
         "speed_sign_reversed",
         "motor speed counts the other way",
-        _sensor(SPEED, gain=-1.0),
+        _speed(gain=-1.0),
         (UNKNOWN,),
         REVERSED,
     ),
     Kind(
         "speed_in_rpm",
         "rpm under the heading of rad/s",
-        _sensor(SPEED, gain=RPM),
+        _speed(gain=RPM),
         (UNKNOWN,),
         r"\brpm\b|revolutions|r/min",
     ),

@@ -57,7 +57,7 @@ def batch(
     from experiments.batch.part_store import open_store
     from experiments.batch.study_file import SHIPPED, read_study, shipped_studies, study_path
 
-    require_folder("--out", None if out is None else Path(out))
+    require_folder(None if out is None else Path(out))
     chosen = _with_logs(read_study(study), logs)
     shipped = study in shipped_studies() and not Path(study).exists()
     folder = Path() if shipped or logs is not None else study_path(study).parent

@@ -87,7 +87,7 @@ def c(
     The C code does the same arithmetic as Python, line by line. It allocates nothing, every loop is bounded, and the
     header states the largest number of operations per step.
     """
-    require_folder("--out", out)
+    require_folder(out)
     prepare_output(out)
     require_positive("--sample-time", sample_time, "s")
     bench = load_rig(rig)
@@ -171,7 +171,7 @@ def model(
     In MATLAB, for a model of one input: load model.mat, then tf(numerator, denominator, sample_time_s, 'Variable',
     'z^-1').
     """
-    require_folder("--out", out)
+    require_folder(out)
     from estimation.export.c_model import model_in_c
     from estimation.export.mat_model import model_in_mat
     from estimation.identification.free_run.saved import load_models

@@ -74,7 +74,7 @@ def fleet(
     from experiments.fleet.page import fleet_page, rig_hint, sickest_of, title_of
     from experiments.fleet.rows import log_rows
 
-    require_folder("--out", out)
+    require_folder(out)
     limits, repairs = limits_of_options(limit or []), read_maintenance(maintenance)
     _names((), pattern, names)  # what is wrong there, and in names of files, is said before any log is diagnosed
     if Path(place).is_file():

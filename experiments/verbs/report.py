@@ -27,5 +27,5 @@ def report(
     from experiments.batch.part_store import open_store
     from experiments.batch.report import write_report
 
-    require_folder("--out", None if out is None else Path(out))
+    require_folder(None if out is None else Path(out))
     emit(write_report(open_store(store), open_folder(out or store)))

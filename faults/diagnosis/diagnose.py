@@ -104,6 +104,8 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     estimate = estimated(log, rig, EstimateOptions())[1] if seen is None else seen[1]
     found, case = finding_of(log, estimate, rig), _set_right(log, rig, estimate)
     again, cleaned = partial(diagnose_log, record, rig), log
+    if (sound := without_wrong_velocity(cleaned, (), estimate, case.strange)) is not None:  # it froze, or reads 0
+        return again((sound, estimate))
     log, rig = case.log, case.rig
     scores = plain.scores_of(log, case.as_a_whole)
     verdict = models_verdict(scores, log.record)
@@ -117,8 +119,6 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     if mistakes := log.mistakes or tuple(one for one in estimate.gate.reasons if isinstance(one.code, ChannelCode)):
         return replace(_without_class(found, log, scores, mistakes), outcome=Outcome.MISMATCH)
     if verdict.outcome is not Outcome.OK:
-        if (sound := without_wrong_velocity(cleaned, (), estimate, case.strange)) is not None:  # it reads 0 throughout
-            return again((sound, estimate))
         return replace(found, evidence=EhaEvidence(estimate, scores, None))
     try:
         judged = partial(_judged, parameters=rig.parameters, case=case, plain=plain)

@@ -96,42 +96,6 @@ def throttled(base: CircuitParameters, a_volts: float, b_volts: float) -> Circui
     )
 
 
-def worn_pump(base: CircuitParameters, factor: float) -> CircuitParameters:
-    """Return the circuit with a worn pump: its clearances leak a factor more, across and into the case.
-
-    Parameters
-    ----------
-    base : CircuitParameters
-        The healthy circuit.
-    factor : float
-        Leakage over healthy leakage [dimensionless], 1 or more.
-
-    Returns
-    -------
-    CircuitParameters
-        The circuit; L_t grows with its parts (errata E17).
-
-    Raises
-    ------
-    HydrostateError
-        If the factor is below 1 or not finite.
-
-    Examples
-    --------
-    >>> round(worn_pump(CircuitParameters(), 3.0).leakage_coefficient * 1e12, 4)
-    9.8072
-    """
-    _require("pump wear", factor, 1.0, float("inf"))
-    crossed = (factor - 1.0) * base.pump_crossport_leakage
-    drained = (factor - 1.0) * base.pump_case_leakage
-    return replace(
-        base,
-        pump_crossport_leakage=base.pump_crossport_leakage + crossed,
-        pump_case_leakage=base.pump_case_leakage + drained,
-        leakage_coefficient=base.leakage_coefficient + crossed + 0.5 * drained,
-    )
-
-
 def aerated(base: CircuitParameters, air_fraction: float) -> CircuitParameters:
     """Return the circuit with air in its oil.
 

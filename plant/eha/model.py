@@ -186,33 +186,6 @@ def reduced_derivative(
     return v, a, A * beta / (M * V0) * (pumped - swept - leaked) - damping
 
 
-def lumped_derivative(
-    state: tuple[Scalar, Scalar, Scalar], speed: Scalar, direction: Scalar, p: EhaValues
-) -> tuple[Scalar, Scalar, Scalar]:
-    """Return the rates of the lumped model while it slides, equations 5.8 to 5.10 with errata E2 and E8.
-
-    Parameters
-    ----------
-    state : tuple of float or Expression
-        Position [m], velocity [m/s], differential pressure [Pa].
-    speed : float or Expression
-        Motor speed [rad/s].
-    direction : float or Expression
-        Sense of sliding, -1 or 1 [dimensionless].
-    p : EhaParameters or namespace of Expression
-        The actuator.
-
-    Returns
-    -------
-    tuple of float or Expression
-        Velocity [m/s], acceleration [m/s^2], rate of pressure [Pa/s].
-    """
-    x, v, dp = state
-    A = p.piston_area
-    friction = quadratic_friction(v, direction, p.friction_quadratic, p.friction_linear, p.friction_coulomb)
-    return v, (A * dp - friction - load_on_rod(x, p)) / p.moving_mass, pressure_rate(v, dp, speed, p)
-
-
 def pressure_rate(velocity: Scalar, pressure: Scalar, speed: Scalar, p: EhaValues) -> Scalar:
     """Return the rate of differential pressure from the flow balance 5.8, with relief (errata E2, E8).
 

@@ -137,7 +137,6 @@ def fit_greybox(
     *,
     starts: Sequence[Mapping[str, float]],
     search: Search = DEFAULT_SEARCH,
-    limits: Mapping[str, tuple[float, float]] | None = None,
 ) -> GreyBoxFit:
     """Fit the unknowns of any model to a log, from several starts, and return the best.
 
@@ -151,11 +150,9 @@ def fit_greybox(
         First guesses of the unknowns in SI.
     search : Search
         How they are brought to the optimum.
-    limits : Mapping[str, tuple of float], optional
-        Least and largest value of an unknown, where physics gives them [SI].
     """
     problem, guesses = Problem(model, log), [model.theta(start) for start in starts]
-    bounds = search_bounds(model, guesses, limits or {})
+    bounds = search_bounds(model, guesses, {})
     near = roughly(problem, guesses, search, bounds)
     return concluded(problem, descend(problem.at, near.theta, search.evaluations, bounds))
 

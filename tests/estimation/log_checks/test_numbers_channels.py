@@ -44,7 +44,7 @@ def codes(notes: tuple[Note, ...]) -> list[str]:
 
 
 def blocks(**given: Array | None) -> ChannelBlocks:
-    names = ("pumped", "slope", "position", "velocity", "velocity_slope", "pressure", "pressure_slope")
+    names = ("pumped", "slope", "position", "velocity", "velocity_slope", "pressure")
     return ChannelBlocks(0.05, **{**dict.fromkeys(names), **given})  # type: ignore[arg-type]
 
 

@@ -74,10 +74,10 @@ def test_a_folder_is_no_file_and_has_no_name_of_one(tmp_path: Path) -> None:
     (file := tmp_path / "afile").write_text("")
     (folder := tmp_path / "pages.html").mkdir()
     for fine in (None, tmp_path / "new", folder, tmp_path / "v1.2"):
-        require_folder("--out", fine)
+        require_folder(fine)
     with pytest.raises(HydrostateError, match=r"--out must be a folder, got the file '.*afile'"):
-        require_folder("--out", file)
+        require_folder(file)
     with pytest.raises(HydrostateError, match=r"--out must be a folder, got '.*fleet\.html', a name as a file has it"):
-        require_folder("--out", tmp_path / "fleet.html")
+        require_folder(tmp_path / "fleet.html")
     with pytest.raises(HydrostateError, match="--out must be a file, got the folder"):
         with_page_ending("--out", folder)

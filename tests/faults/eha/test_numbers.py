@@ -11,7 +11,7 @@ from faults.eha import bank, isolability
 from faults.eha.bank import identification_run, mathematical_bank, predict_run, predict_runs
 from faults.eha.inject import abrupt, growing, spread
 from faults.eha.isolability import Distances, condition_distances, structural_isolability, wrong_verdicts
-from faults.eha.physical import THROTTLE_A, THROTTLE_B, aerated, drifted_relief, throttled, worn_pump
+from faults.eha.physical import THROTTLE_A, THROTTLE_B, aerated, drifted_relief, throttled
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -32,7 +32,6 @@ def differs(changed: Any, base: Any) -> dict[str, float]:
 def physical_faults() -> dict[str, Any]:
     volts = [(10.0, 0.0), (2.0, 2.5), (1.9, 1.0), (1.5, 2.4), (1.75, 5.0), (0.0, 10.0), (6.0, 2.3)]
     calls: dict[str, Any] = {
-        "pump wear": lambda one: worn_pump(CIRCUIT, one),
         "air": lambda one: aerated(CIRCUIT, one),
         "relief": lambda one: drifted_relief(CIRCUIT, one),
         "throttle A": lambda one: throttled(CIRCUIT, one, 0.0),
@@ -41,7 +40,6 @@ def physical_faults() -> dict[str, Any]:
     sizes = (-0.1, 0.0, 1e-9, 0.4, 0.5, 0.51, 0.999, 1.0, 2.0, 2.01, 10.0, 10.1, np.inf)
     return {
         **{f"throttles at {a:g} and {b:g} V": differs(throttled(CIRCUIT, a, b), CIRCUIT) for a, b in volts},
-        "a worn pump": differs(worn_pump(CIRCUIT, 3.0), CIRCUIT),
         "air": differs(aerated(CIRCUIT, 0.03), CIRCUIT),
         "relief": differs(drifted_relief(CIRCUIT, 0.7), CIRCUIT),
         "throttle B's areas [m^2]": [THROTTLE_B.at(one) for one in (0.0, 1.0, 2.3, 2.5, 8.0, 10.0)],

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from faults.conditions import CONDITIONS, LEVELS, Condition, parameters_for
 from faults.eha.inject import growing
-from faults.eha.physical import VOLTS_A, VOLTS_B, aerated, drifted_relief, throttled, worn_pump
+from faults.eha.physical import VOLTS_A, VOLTS_B, aerated, drifted_relief, throttled
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.errors import HydrostateError, RigError
@@ -54,13 +54,6 @@ def test_a_voltage_out_of_range_is_refused(volts: float) -> None:
         throttled(PAPER, 10.0, volts)
 
 
-def test_a_worn_pump_leaks_into_its_parts_and_not_into_the_cylinder() -> None:
-    worn = worn_pump(PAPER, 4.0)
-    assert worn.cylinder_leakage == pytest.approx(PAPER.cylinder_leakage, rel=1e-9, abs=0.0)
-    assert worn.pump_case_leakage == pytest.approx(4.0 * PAPER.pump_case_leakage, abs=0.0)
-    assert worn.leakage_coefficient > 2.0 * PAPER.leakage_coefficient
-
-
 def test_a_relief_valve_that_drifts_down_opens_early() -> None:
     p = drifted_relief(throttled(PAPER, 10.0, 3.0), 0.5)
     record = simulate(CIRCUIT, np.full(8_000, p.rated_speed), 1e-4, p)
@@ -75,8 +68,6 @@ def test_air_that_comes_in_slowly_slows_the_build_up_of_pressure() -> None:
 
 
 def test_faults_out_of_range_are_refused() -> None:
-    with pytest.raises(HydrostateError, match="pump wear must be between 1 and inf"):
-        worn_pump(PAPER, 0.5)
     with pytest.raises(HydrostateError, match="air fraction must be between 0 and"):
         aerated(PAPER, 0.7)
     with pytest.raises(HydrostateError, match="relief factor must be positive"):

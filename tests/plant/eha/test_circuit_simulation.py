@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from faults.conditions import CONDITIONS, parameters_for
 from faults.eha.inject import abrupt, growing
-from faults.eha.physical import throttled, worn_pump
+from faults.eha.physical import throttled
 from plant.eha.circuit import circuit_breaches
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.circuit_start import at_rest
@@ -78,8 +78,9 @@ def test_an_abrupt_leak_slows_the_piston() -> None:
     assert velocity[-1] < 0.6 * healthy[-1]
 
 
-def test_a_pump_that_wears_slows_the_piston_ever_more() -> None:
-    velocity = simulate(CIRCUIT, CONSTANT, 1e-3, growing(RIG, worn_pump(RIG, 20.0), 1.0, 3.0))["velocity_m_s"]
+def test_leakage_that_grows_slows_the_piston_ever_more() -> None:
+    leaking = parameters_for(CONDITIONS["major_leakage"], RIG)
+    velocity = simulate(CIRCUIT, CONSTANT, 1e-3, growing(RIG, leaking, 1.0, 3.0))["velocity_m_s"]
     assert np.all(np.diff(velocity[1_200:2_900:100]) < 0.0)
 
 

@@ -26,7 +26,6 @@ from plant.eha.doubts import DOUBTS, spreads_of
 from plant.eha.drives import chirp, make_drive, multisine, nine_steps, prbs, sine
 from plant.eha.model import (
     EhaParameters,
-    lumped_derivative,
     lumped_step,
     piston_areas,
     pressure_rate,
@@ -99,9 +98,6 @@ def rates_and_steps_of_reduced_and_lumped_plants() -> dict[str, Any]:
                 for (x, v, _), a, speed in zip(
                     STATES_TRIED.values(), (3.0, -2.0, 0.5, 0.1), (90.0, -70.0, 30.0, 2.0), strict=True
                 )
-            ],
-            "acceleration [m/s^2]": [
-                lumped_derivative(state, 90.0, 1.0 if state[1] > 0.0 else -1.0, p)[1] for state in STATES_TRIED.values()
             ],
             "rate of pressure [Pa/s]": [pressure_rate(state[1], state[2], 90.0, p) for state in STATES_TRIED.values()],
             "after 0.2 ms: position, velocity, pressure": {
