@@ -32,9 +32,13 @@ RUBS: Mapping[str, str] = {
     "major": "has far too much friction (major friction)",
 }
 
+WHICH_LEAKS = (
+    "The log shows how much leaks, not which of the two: shut the cylinder's ports under load; if the piston creeps, "
+    "its seal leaks, else the pump."
+)
 WORK_ON_LEAKAGE: Mapping[str, str] = {
-    "minor": "Plan a check of pump and piston seal. The log shows how much leaks, not which of the two.",
-    "major": "Check pump and piston seal now. The log shows how much leaks, not which of the two.",
+    "minor": f"Plan a check of pump and piston seal. {WHICH_LEAKS}",
+    "major": f"Check pump and piston seal now. {WHICH_LEAKS}",
 }
 WORK_ON_FRICTION: Mapping[str, str] = {
     "minor": "Plan a check of seals, guides and alignment of the rod.",
@@ -211,11 +215,6 @@ def sureness(result: Mapping[str, Any]) -> str:
     ----------
     result : Mapping
         Entries of a diagnosis with probabilities.
-
-    Returns
-    -------
-    str
-        Sentences.
     """
     if result["unknown"]:
         told = causes(result)
