@@ -114,6 +114,11 @@ class Quantity:
         Its standard deviation, likewise [in its unit].
     ci95_total : tuple of float, optional
         Ends of its 95 % interval with what is not known of the rig [in its unit]; None where that was not asked.
+
+    Examples
+    --------
+    >>> print(Quantity(2.068e8, "Pa", (2.061e8, 2.076e8)))
+    2.068e+08 (2.061e+08 to 2.076e+08) Pa
     """
 
     value: float | None
@@ -121,6 +126,13 @@ class Quantity:
     ci95: tuple[float, float] | None = None
     std: float | None = None
     ci95_total: tuple[float, float] | None = None
+
+    def __str__(self) -> str:
+        """Return the value with its 95 % interval and its unit, as a reader wants them."""
+        if self.value is None:
+            return "not determined"
+        within = "" if self.ci95 is None else f" ({self.ci95[0]:.4g} to {self.ci95[1]:.4g})"
+        return f"{self.value:.4g}{within} {self.unit}"
 
     @staticmethod
     def normal(value: float, std: float, unit: str) -> "Quantity":

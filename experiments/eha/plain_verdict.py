@@ -7,7 +7,7 @@ from typing import Any
 from estimation.log_checks.notes import LoggerCode
 from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
 from experiments.page.condition_names import in_words, level_in_words
-from experiments.page.sentences import left_unread, sentence
+from experiments.page.sentences import in_a_row, left_unread, sentence
 from faults.conditions import CONDITIONS
 from faults.notes import AdviceCode, AgainstCode
 
@@ -129,7 +129,7 @@ def _hindered(result: Mapping[str, Any]) -> str:
         notes = [one for one in result["notes"] if one["code"] in accused and one["text"] in result["reasons"]]
         if notes:
             named = dict.fromkeys(one["data"].get("channel", "velocity_m_s or position_m") for one in notes)
-            return words.format(" and ".join(named))
+            return words.format(in_a_row(list(named)))
     codes = {one["code"] for one in result["notes"]}
     if AgainstCode.STUCK_OR_LEAKS in codes:
         return "the piston stands still, and without pressure the log does not tell why"

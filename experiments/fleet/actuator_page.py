@@ -19,7 +19,7 @@ from experiments.page.names_shown import SHOWN
 from experiments.page.numbers import MISSING, decimals_of, fixed, number, shop_unit
 from experiments.page.panels import Curve, Mark, Panel
 from experiments.page.render import render_page
-from experiments.page.sentences import whole_dates
+from experiments.page.sentences import in_a_row, whole_dates
 from experiments.page.tables import Cell, Column
 from faults.trend.kalman import moments, predict, settings
 from faults.trend.trend import FEWEST, trends
@@ -125,7 +125,7 @@ def _restarts(outlooks: Sequence[Outlook], maintained: Sequence[float]) -> list[
         repaired = any((before.place or 0.0) < one <= (log.place or 0.0) for one in maintained)
         why = "after a repair" if repaired else "after a lasting change"
         names = [SHOWN[one.name] for one in which]
-        subject = "Every severity" if len(names) == len(outlooks) else _in_a_row(names).capitalize()
+        subject = "Every severity" if len(names) == len(outlooks) else in_a_row(names).capitalize()
         verb = "is" if len(names) in (1, len(outlooks)) else "are"
         said.append(f"{subject} {verb} followed from the log of {log.shown or begin + 1} on, {why}.")
     return said
@@ -201,14 +201,9 @@ def _charts(outlooks: Sequence[Outlook], name: str) -> list[tuple[str, Charts]]:
         x, label = _abscissa(which[0], ahead)
         panels = [_panel(one, x, ahead) for one in which]
         file = name if len(which) == len(outlooks) else "-".join([name, *(one.name for one in which)])
-        caption = _in_a_row([SHOWN[one.name] for one in which]).capitalize()
+        caption = in_a_row([SHOWN[one.name] for one in which]).capitalize()
         found.append((caption, Charts(x, label, panels, file, label, dates=label == DATE)))
     return found
-
-
-def _in_a_row(names: Sequence[str]) -> str:
-    *others, last = names
-    return f"{', '.join(others)} and {last}" if others else last
 
 
 def _panel(one: Outlook, x: Array, ahead: int) -> Panel:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from estimation.finding import NORMAL_95
 from experiments.page.names_shown import SHOWN
 from experiments.page.numbers import MISSING, alike_in_digits, percent_text, pretty_unit, shop_unit
-from experiments.page.sentences import sentence
+from experiments.page.sentences import in_a_row, sentence
 from experiments.page.words import in_words
 
 if TYPE_CHECKING:
@@ -287,7 +287,6 @@ def title_of(rows: Sequence[Mapping[str, Any]]) -> str:
             if sign * one["difference"] > 0.0
         ]
         if named:
-            before = f"{', '.join(named[:-1])} and " if len(named) > 1 else ""
-            found.append(f"{before}{named[-1]} {'are' if before else 'is'} {words}")
+            found.append(f"{in_a_row(named)} {'are' if len(named) > 1 else 'is'} {words}")
     more = "; more has changed" if len(changed) > MOST_NAMED else ""
     return f"In the second log, {'; '.join(found)}{more}."

@@ -1,7 +1,7 @@
 """Clauses of results as sentences, for a page and for a terminal."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from markupsafe import Markup, escape
@@ -35,6 +35,18 @@ def sentence(said: str) -> str:
     """
     begin = said[:1] if "_" in said.split(" ", 1)[0] else said[:1].upper()
     return f"{begin}{said[1:].rstrip('.')}."
+
+
+def in_a_row(names: Sequence[str]) -> str:
+    """Return names as a sentence lists them.
+
+    Examples
+    --------
+    >>> in_a_row(["leakage"]), in_a_row(["leakage", "friction", "bulk modulus"])
+    ('leakage', 'leakage, friction and bulk modulus')
+    """
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def whole_dates(said: str) -> Markup:
