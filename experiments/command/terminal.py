@@ -219,7 +219,7 @@ class _KernelNotice(logging.Handler):
             note(f"warning: {record.getMessage()}")
         elif not self.said:
             self.said = True
-            note("compiling kernels: this takes some seconds, only in the first run")
+            note("compiling kernels: this takes some seconds, once for each kind of work")
 
 
 @contextmanager
