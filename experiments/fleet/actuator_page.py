@@ -51,8 +51,8 @@ FORECASTS = (
     Column("level", "level of the trend, 95 % interval", words=whole_dates),
     "limit",
     Column("growth", "growth per log"),
-    Column("half", "limit reached, 50 %", words=whole_dates),
-    Column("most", "limit reached, 90 %", words=whole_dates),
+    Column("half", "limit reached, 50 % interval", words=whole_dates),
+    Column("most", "limit reached, 90 % interval", words=whole_dates),
     Column("outlook", words=whole_dates),
 )
 LOGS = (
