@@ -11,7 +11,9 @@ from estimation.fits.flow.log import DRAIN_START, OPENING_START, carried, outrun
 from estimation.fits.flow.other_minimum import FINISHING, Found, completed_form, from_minimum, nearest
 from estimation.fits.flow.rough_search import RIVAL, UNLIKELY, RoughOptimum, rough_optima
 from estimation.fits.flow.swept import swept_evenly
+from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import descend
+from estimation.fits.greybox.drive_noise import SAMPLES_KEPT, moved_by_drives
 from estimation.fits.greybox.fit import GreyBoxFit, concluded, explained
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
@@ -126,6 +128,8 @@ def balanced(
     if not explained(best[0], best[1]):
         led = (nearest((one.problem.on(here), one.point, one.bounds), best, starts[0]) for one in behind)
         behind = [replace(one, point=point) for one, point in zip(behind, led, strict=True)]
+    elif best[1].cost < 0.5 * largest_chi_square(best[0].blocks, 1.0) * best[0].blocks:
+        behind = []  # nothing but noise is left, and no form comes so far down
     done += each(lambda one: _finished(one, log, steps, best[1].cost, bent=bent), behind)
     if valley is not None:
         done = each(lambda one: min(one, from_minimum(one[0].model, log, valley, bent=bent), key=_cost), done)
@@ -135,12 +139,24 @@ def balanced(
     best, swinging = _told_of(done)
     least = best[1].cost
 
+    counting = [one for one in done if one[1].cost < least + UNLIKELY]
+    shaken = _shaken(best) if len(counting) > 1 else None
+
     def told(one: Found) -> GreyBoxFit:
         problem, point, bounds = one
-        counts, asked = point.cost < least + UNLIKELY, one is best or one is swinging
-        return concluded(problem, point, least=bounds[0], disturbed=counts, asked=asked, steps=steps)
+        counts, asked = one in counting, one is best or one is swinging
+        return concluded(
+            problem, point, least=bounds[0], disturbed=counts, asked=asked, steps=steps, moved_by_noise=shaken
+        )
 
     return each(told, done)
+
+
+def _shaken(one: Found) -> Array | None:
+    """Return what noise of the drives does to the residuals of the likeliest, for the other balances too."""
+    log = one[0].log
+    noisy = any(spread > 0.0 for spread in log.drive_std) and not log.passes_on
+    return moved_by_drives(one[0], one[1].theta) if noisy and len(log.drives) <= SAMPLES_KEPT else None
 
 
 def _finished(one: RoughOptimum, log: GreyBoxLog, steps: IntArray, wanted: float = np.inf, *, bent: bool) -> Found:
@@ -172,6 +188,8 @@ def _ended(one: Found, log: GreyBoxLog) -> Found:
     """Return the end of a search whose last steps use short model steps throughout."""
     problem, point, bounds = one
     ending = with_steps(problem, log.steps)
+    if isinstance(ending, FreedProblem) and isinstance(problem, FreedProblem):
+        ending = ending.begun_at(point.theta, problem)
     evaluations = FINISHING if explained(problem, point) else 1
     return ending, descend(ending.at, point.theta, evaluations, bounds), bounds
 

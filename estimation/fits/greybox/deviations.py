@@ -121,6 +121,7 @@ def covariance_of(
     least: Array | None,
     disturbed: bool,
     undisturbed: Array | None,
+    moved: Array | None = None,
 ) -> Array:
     """Return the covariance of the unknowns that have an effect: by noise of the outputs, and of the drives if wanted.
 
@@ -138,6 +139,8 @@ def covariance_of(
         Whether the drives' noise counts.
     undisturbed : ndarray, shape (outputs, blocks), or None
         Normalised residuals with one model step a sample, where they are known [dimensionless].
+    moved : ndarray, shape (outputs * blocks, draws), optional
+        What the drives' noise does to the residuals, see `drive_covariance` [dimensionless].
 
     Returns
     -------
@@ -150,7 +153,8 @@ def covariance_of(
         spread if least is None else sign_constrained_covariance(problem, point, least, felt, told.fitted_bread, spread)
     )
     covariance = kept + NOISE_DOUBT**2 * np.outer(tilt, tilt)
-    covariance = covariance + (drive_covariance(problem, theta, bread, slopes, undisturbed) if disturbed else 0.0)
+    if disturbed:
+        covariance = covariance + drive_covariance(problem, theta, bread, slopes, undisturbed, moved)
     if problem.log.course is not None and disturbed:  # a window's estimate of few turns is poor
         covariance = covariance + np.diag(np.maximum(np.diag(bread - spread), 0.0))
         covariance = covariance + opened(problem, theta, told.errors, bread, slopes)

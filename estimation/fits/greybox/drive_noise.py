@@ -19,7 +19,12 @@ SAMPLES_KEPT = 50_000
 
 
 def drive_covariance(
-    problem: Problem, theta: Array, bread: Array, slopes: Array, undisturbed: Array | None = None
+    problem: Problem,
+    theta: Array,
+    bread: Array,
+    slopes: Array,
+    undisturbed: Array | None = None,
+    moved: Array | None = None,
 ) -> Array | float:
     """Return the covariance that noise of the driving channels adds to that of the fitted coordinates.
 
@@ -35,6 +40,8 @@ def drive_covariance(
         ``J``, the derivatives of the normalised residuals [dimensionless].
     undisturbed : ndarray, shape (outputs, blocks), optional
         The normalised residuals there with one model step a sample; run here if not given [dimensionless].
+    moved : ndarray, shape (outputs * blocks, draws), optional
+        What noise of the drives does to the residuals, see `moved_by_drives`; run here if not given [dimensionless].
 
     Returns
     -------
@@ -44,18 +51,48 @@ def drive_covariance(
     log = problem.log
     if not any(spread > 0.0 for spread in log.drive_std):
         return 0.0
-    rough, samples, spread = problem.coarse, len(log.drives), np.array(log.drive_std)
-    if undisturbed is None:  # by the kernel of the draws: by one of its own it would be compiled for this run alone
-        undisturbed = next(iter(rough.disturbed(theta, [log.drives])))
-    if samples <= SAMPLES_KEPT:
-        moved = rough.disturbed_together(theta, _noisy_drives(log)) - undisturbed[..., None]
-        answers = bread @ (slopes.T @ moved.reshape(-1, DRAWS))
+    if len(log.drives) <= SAMPLES_KEPT:
+        moved = moved_by_drives(problem, theta, undisturbed) if moved is None else moved
+        answers = bread @ (slopes.T @ moved)
         return np.asarray(answers @ answers.T / DRAWS, dtype=np.float64)
+    rough, spread = problem.coarse, np.array(log.drive_std)
+    if undisturbed is None:
+        undisturbed = _undisturbed(problem, theta)
     rng = np.random.default_rng(0)
     draws = (log.drives + spread * rng.standard_normal(log.drives.shape) for _ in range(DRAWS))
     each = ((errors - undisturbed).ravel() for errors in rough.disturbed(theta, draws))
     answers = np.column_stack([bread @ (slopes.T @ moved) for moved in each])
     return np.asarray(answers @ answers.T / DRAWS, dtype=np.float64)
+
+
+def moved_by_drives(problem: Problem, theta: Array, undisturbed: Array | None = None) -> Array:
+    """Return what draws of the driving channels' noise do to the residuals of a log of `SAMPLES_KEPT` at most.
+
+    All balances of a log add up what is pumped, so that the draws of one serve the others.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    theta : ndarray, shape (unknowns,)
+        Its solution [dimensionless].
+    undisturbed : ndarray, shape (outputs, blocks), optional
+        See `drive_covariance` [dimensionless].
+
+    Returns
+    -------
+    ndarray, shape (outputs * blocks, draws)
+        Changes of the normalised residuals [dimensionless].
+    """
+    if undisturbed is None:
+        undisturbed = _undisturbed(problem, theta)
+    moved = problem.coarse.disturbed_together(theta, _noisy_drives(problem.log)) - undisturbed[..., None]
+    return moved.reshape(-1, DRAWS)
+
+
+def _undisturbed(problem: Problem, theta: Array) -> Array:
+    """Return the residuals under the log's drives, by the kernel of the draws: no other is compiled for this run."""
+    return next(iter(problem.coarse.disturbed(theta, [problem.log.drives])))
 
 
 @lru_cache(maxsize=1)

@@ -248,6 +248,7 @@ def concluded(
     asked: bool = True,
     warned: bool = True,
     steps: IntArray | None = None,
+    moved_by_noise: Array | None = None,
 ) -> GreyBoxFit:
     """Return the result at a solution, with its standard deviations.
 
@@ -267,6 +268,8 @@ def concluded(
         Whether the caller is warned where unknowns are not separately determined; else their deviations are infinite.
     steps : ndarray of int, shape (n,), optional
         See `GreyBoxFit`; answers to the rig's doubts are as exact with them.
+    moved_by_noise : ndarray, shape (outputs * blocks, draws), optional
+        What the drives' noise does to the residuals, where another balance has asked for it [dimensionless].
     """
     model, theta = problem.model, point.theta
     errors, all_slopes = problem.linearised(theta)
@@ -280,7 +283,9 @@ def concluded(
         left_over, slopes, bread = known_of.left_over, known_of.fitted_slopes, known_of.fitted_bread
         told = disturbed and asked
         here, moved = changes_beside(problem, theta) if told else (None, [])
-        covariance = covariance_of(problem, point, known_of, least=least, disturbed=disturbed, undisturbed=here)
+        covariance = covariance_of(
+            problem, point, known_of, least=least, disturbed=disturbed, undisturbed=here, moved=moved_by_noise
+        )
         held, shifted = [one.count for one in problem.log.teeth], problem.log.speed_offset != 0.0
         counts = problem.log.counts if asked else held
         if (disturbed and counts) or shifted:
