@@ -47,6 +47,10 @@ LESS_DRAINED, APART = 0.05, 0.5
 """Drain from which the search for a second one begins, over the first, and how far apart logarithms of two drains are
 [fraction, dimensionless]; judged. From a minimum with 14 times the drain the right one was found so."""
 
+NEAR = 0.2
+"""How far the residuals of a balance move at the end of a search before it is told, up to which they are taken along
+their slopes and not run [dimensionless], see `FreedProblem`: 0.02 in log-likelihood."""
+
 SETTLING = 15
 """Evaluations with short model steps of a form that does not explain its log: it is asked what is strange [count]."""
 
@@ -173,6 +177,7 @@ def _finished(one: RoughOptimum, log: GreyBoxLog, steps: IntArray, wanted: float
         if not _plain(one):
             return one.problem, one.point, one.bounds
     problem, theta, bounds = _completed(one, log, bent=bent)
+    problem.near = NEAR if steps is not log.steps else 0.0
     return problem, descend(problem.at, theta, FINISHING, bounds, wanted=wanted), bounds
 
 
@@ -188,8 +193,6 @@ def _ended(one: Found, log: GreyBoxLog) -> Found:
     """Return the end of a search whose last steps use short model steps throughout."""
     problem, point, bounds = one
     ending = with_steps(problem, log.steps)
-    if isinstance(ending, FreedProblem) and isinstance(problem, FreedProblem):
-        ending = ending.begun_at(point.theta, problem)
     evaluations = FINISHING if explained(problem, point) else 1
     return ending, descend(ending.at, point.theta, evaluations, bounds), bounds
 
@@ -238,7 +241,7 @@ def _plain(one: RoughOptimum) -> bool:
     return not _held(one.problem) and explained(one.problem, one.point)
 
 
-def _completed(one: RoughOptimum, log: GreyBoxLog, *, bent: bool) -> tuple[Problem, Array, tuple[Array, Array]]:
+def _completed(one: RoughOptimum, log: GreyBoxLog, *, bent: bool) -> tuple[FreedProblem, Array, tuple[Array, Array]]:
     """Return the problem with what matters to the last digits alone, where its search begins, and its bounds."""
     problem = FreedProblem.of(completed_form(one.problem.model, bent=bent), one.problem.log)
     known, fresh = len(one.point.theta), {STIFFNESS: first_stiffness(log), BEND: 0.0, **dict.fromkeys(CRACKS, 0.0)}

@@ -32,10 +32,6 @@ have many small corners: a step of 1e-7 sees the slope between two of them, and 
 MOST_SIDE_BY_SIDE = 200_000
 """Longest log whose drives are copied once for each run side by side [samples]: some 30 MB."""
 
-NEAR = 0.2
-"""How far a run moves the residuals from a known one, in deviations of their noise and all together, up to which they
-are taken along its slopes instead [dimensionless]: it promises 0.02 in log-likelihood at most."""
-
 MOST_REMEMBERED = 100_000
 """Blocks of the longest log whose last slopes are kept [count]: some 15 MB."""
 
@@ -55,7 +51,15 @@ class FreedProblem(Problem):
         Typical sizes of parameters that are not fitted as logarithms [SI].
     ridge : Ridge, optional
         Two parameters that nearly cancel.
+
+    Attributes
+    ----------
+    near : float
+        How far a run moves the residuals from a known one, in deviations of their noise and all together, up to which
+        they are taken along its slopes instead [dimensionless]; 0 where what is told rests on the slopes.
     """
+
+    near = 0.0
 
     def __init__(
         self,
@@ -100,25 +104,6 @@ class FreedProblem(Problem):
     def on(self, log: GreyBoxLog) -> "FreedProblem":
         """Return the same problem of another log; see `Problem.on`."""
         return FreedProblem(self._bare, log, self.model.unknowns, self._sizes, self._ridge)
-
-    def begun_at(self, theta: Array, other: "FreedProblem") -> "FreedProblem":
-        """Return this problem with the slopes at a point that the same problem with other model steps has found there.
-
-        Residuals are its own. Where those steps are nearly as exact, a search that ends there need not run it again.
-
-        Parameters
-        ----------
-        theta : ndarray, shape (unknowns,)
-            The point [dimensionless].
-        other : FreedProblem
-            The other problem.
-        """
-        variance = self._variances(theta)
-        _, columns = other._remembered(theta, variance)
-        if columns is not None:  # two rows: a search has no kernel for one
-            here = self.residuals_of(theta, [self.log.parameters] * 2)[0]
-            self._last = [(theta.copy(), variance, here, columns)]
-        return self
 
     def at_each(self, thetas: Sequence[Array]) -> list[Point]:
         """Return the misfit at several points, which is quicker than one after another.
@@ -291,8 +276,10 @@ class FreedProblem(Problem):
             away = theta - point
             if not np.any(away):
                 return here, columns
+            if self.near == 0.0:
+                continue
             moved = columns @ away
-            if float(np.vdot(moved, moved)) < NEAR**2:
+            if float(np.vdot(moved, moved)) < self.near**2:
                 return here + moved, columns
         return None, None
 
