@@ -26,8 +26,10 @@ from faults.diagnosis.calibration import Calibration, shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
-from faults.diagnosis.circuits.class_fit import nominal_runs
-from faults.diagnosis.circuits.class_regions import fit_classes, is_stuck
+from faults.diagnosis.circuits.class_fit import LASTING, misfit
+from faults.diagnosis.circuits.class_regions import is_stuck
+from faults.diagnosis.circuits.friction_shape import told_of_bent
+from faults.diagnosis.circuits.region_scores import region_scores, scores_in_forces
 from faults.diagnosis.evidence import Scoreboard, bounded
 from faults.notes import AgainstCode, ClassCode
 from plant.arrays import Array
@@ -45,10 +47,10 @@ FLOW_SCALE = np.array([{"leakage": 1.0, "bias": 1.0, "bulk_modulus": -1.0}.get(n
 wear is left open, this is why, and pumps that differ explain the log alike along it."""
 
 TRIED = DELIVERIES[::2]
-"""Shares that pumps deliver for which circuits are fitted where pressure is logged [dimensionless]."""
+"""Shares that pumps deliver for which conditions are scored where pressure is logged [dimensionless]."""
 
 UNLIKELY = math.log(1e-3)
-"""Log-likelihood of a delivery below the likeliest one's from which no circuit is fitted with it [dimensionless]."""
+"""Log-likelihood of a delivery below the likeliest one's that counts for nothing [dimensionless]."""
 
 
 def whatever_the_pump_delivers(
@@ -187,8 +189,9 @@ def probabilities_over_wear(
 ) -> Mapping[str, float] | None:
     """Return the probability of each condition, whatever the pump delivers, where a log does not tell.
 
-    The conditions are scored again for pumps that deliver `TRIED` of their displacement, as far as the balance
-    of flows leaves them likely; see `summed_over_wear`.
+    The conditions are scored again for pumps that deliver `TRIED` of their displacement, as far as the balance of
+    flows leaves them likely; see `summed_over_wear`. Along `FLOW_SCALE` they explain the log alike, for which wear
+    is open, so that no circuit is fitted with them.
 
     Parameters
     ----------
@@ -213,17 +216,20 @@ def probabilities_over_wear(
     likely = -0.5 * ((deliveries - left.size) / left.deviation) ** 2
     likely[deliveries < left.least] = -math.inf
     likely -= np.max(likely)
-    healthy, scores, kept = actuator.circuit, [board.fits.scores], [likely[0]]
-    runs = nominal_runs(board.blocks, actuator)
-    for share, one in zip(TRIED, likely[1:], strict=True):
-        if one < UNLIKELY:
-            continue
-        kept.append(one)
-        worn = replace(healthy, pump_displacement=share * healthy.pump_displacement)
-        start = board.fits.best.coordinates + math.log(share) * FLOW_SCALE
-        fits = fit_classes(board.blocks, replace(actuator, circuit=worn), runs=runs, start=start)
-        scores.append(fits.scores)
-    return summed_over_wear(board, np.array(scores), calibration, np.array(kept))
+    kept = [0, *(place for place in range(1, len(likely)) if likely[place] >= UNLIKELY)]
+    worn = [_scores_at(board, deliveries[place] * FLOW_SCALE, actuator) for place in kept[1:]]
+    return summed_over_wear(board, np.array([board.fits.scores, *worn]), calibration, likely[kept])
+
+
+def _scores_at(board: Scoreboard, along: Array, actuator: Actuator) -> Array:
+    """Return the scores of a circuit that explains a log as well as the best one and lies elsewhere, shape (9,)."""
+    fits = board.fits
+    there = replace(fits.best, coordinates=fits.best.coordinates + along)
+    if np.any(fits.moved):
+        scores = scores_in_forces(there, told_of_bent(fits.information, fits.moved), actuator)
+    else:
+        scores = region_scores(there, fits.information, actuator)
+    return scores - misfit(board.blocks, there.fitted, there.scales) / LASTING
 
 
 def summed_over_wear(

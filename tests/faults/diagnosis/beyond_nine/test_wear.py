@@ -19,7 +19,7 @@ from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
-from faults.diagnosis.circuits.class_fit import nominal_runs
+from faults.diagnosis.circuits.class_fit import LASTING, misfit
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.evidence import Scoreboard, bounded, weigh
 from faults.notes import AgainstCode, ClassCode
@@ -72,21 +72,21 @@ def test_conditions_are_summed_over_pumps_by_what_is_presumed_of_them(monkeypatc
     told = {"models": np.linspace(0.0, -6.0, 9), "parameters": np.linspace(-3.0, 0.0, 9)}
     board = Scoreboard(told, one, made_classes(OFF, one), log(), None)
     scores = {share: np.random.default_rng(round(10.0 * share)).normal(size=9) for share in wear.TRIED}
-    sound = RIG.circuit.pump_displacement
+    best = board.fits.best
 
-    def fitted(_: Any, actuator: Any, runs: Any, start: Any) -> Any:
-        assert runs is nominal_runs(one, RIG)  # another pump has the same nearest condition: nine runs less
-        share = round(actuator.circuit.pump_displacement / sound, 6)
-        led = dict(zip(COORDINATES, np.exp(start - board.fits.best.coordinates), strict=True))
+    def held(there: Any, information: Any, _: Any) -> Any:
+        assert information is board.fits.information  # no circuit is fitted with another pump
+        led = dict(zip(COORDINATES, np.exp(there.coordinates - best.coordinates), strict=True))
+        share = round(led["leakage"], 6)
         scaled = {"leakage": share, "bias": share, "bulk_modulus": 1.0 / share}  # all flows, as what is pumped
         assert led == pytest.approx({name: scaled.get(name, 1.0) for name in COORDINATES})
-        return SimpleNamespace(scores=scores[share])
+        return scores[share]
 
-    monkeypatch.setattr(wear, "fit_classes", fitted)
+    monkeypatch.setattr(wear, "region_scores", held)
     found = probabilities_over_wear(board, RIG, OPEN, shipped_calibration())
-    likely = np.exp(board.fits.scores)
+    likely, left = np.exp(board.fits.scores), misfit(one, best.fitted, best.scales) / LASTING
     for share, score in scores.items():
-        likely = likely + np.exp(score) * np.exp(-(np.log(share) ** 2) / (2.0 * PRESUMED[DELIVERY_ENTRY] ** 2))
+        likely = likely + np.exp(score - left) * np.exp(-(np.log(share) ** 2) / (2.0 * PRESUMED[DELIVERY_ENTRY] ** 2))
     exact = replace(board, log_odds={**told, "parameters": bounded(np.log(likely))}).probabilities(
         shipped_calibration()
     )
