@@ -1,7 +1,7 @@
 """Measurement noise read off the log itself, not taken as published (errata E11)."""
 
 from collections.abc import Callable, Mapping, Sequence
-from hashlib import blake2b
+from hashlib import sha1
 from math import comb
 
 import numpy as np
@@ -64,7 +64,7 @@ def measurement_variances(record: Record, channels: Sequence[str]) -> Mapping[st
 def _once(variance: Callable[..., float], values: Array, *more: str) -> float:
     """Return a variance of a channel, which checks and fits ask one after another: once for all of them."""
     content = np.ascontiguousarray(values, dtype=np.float64)
-    key = (variance.__name__, blake2b(content.data, digest_size=16).digest(), len(content), *more)
+    key = (variance.__name__, sha1(content.data, usedforsecurity=False).digest(), len(content), *more)
     found = _remembered.get(key)
     if found is None:
         if len(_remembered) >= MOST_REMEMBERED:

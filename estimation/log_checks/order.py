@@ -1,5 +1,6 @@
 """Order statistics of complete samples: NumPy's values, faster."""
 
+from collections.abc import Sequence
 from math import floor
 
 import numpy as np
@@ -74,13 +75,38 @@ def percentile(values: Array, percent: float) -> float:
     >>> percentile(np.array([3.0, 1.0, 2.0, 10.0]), 50.0)
     2.5
     """
-    place = (len(values) - 1) * (percent / 100.0)
-    low = floor(place)
-    high, share = min(low + 1, len(values) - 1), place - low
-    ordered = np.partition(values, (low, high))
-    below, above = ordered[low], ordered[high]
-    between = below + share * (above - below) if share < 0.5 else above - (1.0 - share) * (above - below)
-    return float(between)
+    return percentiles(values, (percent,))[0]
+
+
+def percentiles(values: Array, percents: Sequence[float]) -> list[float]:
+    """Return several percentiles of the same samples, which are ordered once; see `percentile`.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Any unit; one sample at least, none missing.
+    percents : sequence of float
+        Shares of the samples that lie below [percent].
+
+    Returns
+    -------
+    list of float
+        In the same unit.
+
+    Examples
+    --------
+    >>> percentiles(np.array([3.0, 1.0, 2.0, 10.0]), (0.0, 50.0))
+    [1.0, 2.5]
+    """
+    places = [(len(values) - 1) * (percent / 100.0) for percent in percents]
+    ends = [(floor(place), min(floor(place) + 1, len(values) - 1)) for place in places]
+    ordered = np.partition(values, sorted({end for each in ends for end in each}))
+    found: list[float] = []
+    for place, (low, high) in zip(places, ends, strict=True):
+        below, above, share = ordered[low], ordered[high], place - low
+        between = below + share * (above - below) if share < 0.5 else above - (1.0 - share) * (above - below)
+        found.append(float(between))
+    return found
 
 
 def stacked(values: Array, count: int) -> tuple[Array, Array]:

@@ -1,6 +1,6 @@
 """Severities of a fitted circuit in workshop units, each with a 95 % interval."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, lru_cache
 from types import SimpleNamespace
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from estimation.finding import Quantity
-from estimation.log_checks.order import percentile
+from estimation.log_checks.order import percentiles
 from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.circuit_runs import fitted_parameters, friction_parts
@@ -170,7 +170,7 @@ def severities(
     found = _under(_with_losses(fits.spread, known), among, actuator, widths or {}, straight)
     if not np.any(fits.moved):
         return found
-    bent = _under(_with_losses(fits.bent_spread, known), among, actuator, widths or {}, curved)
+    bent = _under(_with_losses(fits.bent_spread, known), among, actuator, widths or {}, curved, OF_FRICTION)
     return found | {name: replace(found[name], ci95_total=bent[name].ci95) for name in OF_FRICTION}
 
 
@@ -190,10 +190,11 @@ def _under(
     actuator: Actuator,
     widths: Mapping[str, float],
     rubbing: tuple[Array, Array] | None,
+    asked: Collection[str] = UNITS,
 ) -> dict[str, Quantity]:
     """Return the severities of the likeliest circuit, with intervals of all under a covariance of their coordinates.
 
-    ``rubbing`` are forces of friction and their covariance, in place of the circuits'.
+    ``rubbing`` are forces of friction and their covariance, in place of the circuits'. Only some may be asked for.
     """
     centre = max(among, key=lambda one: one.probability).coordinates
     draws = _normal_draws(len(centre))
@@ -207,11 +208,13 @@ def _under(
     found: dict[str, Quantity] = {}
     unresolved = _unresolved(actuator)
     for name, value in best.items():
+        if name not in asked:
+            continue
         if not np.isfinite(value):
             found[name] = Quantity(None, UNITS[name])
             continue
         finite = table[name][~np.isnan(table[name])]
-        low, high = (percentile(finite, percent) if len(finite) else np.nan for percent in (2.5, 97.5))
+        low, high = percentiles(finite, (2.5, 97.5)) if len(finite) else (np.nan, np.nan)
         of_forces = rubbing is not None and name in OF_FRICTION  # factors were fitted to errors of circuits
         stretch = 1.0 if of_forces else widths.get(name, 1.0)
         least = unresolved.get(name, 0.0)
@@ -219,6 +222,8 @@ def _under(
         if name == "bulk_modulus" and stretch != 1.0:  # never negative, however wide
             ends = value * (low / value) ** stretch, value * (high / value) ** stretch
         found[name] = Quantity(value, UNITS[name], ends)
+    if "entrained_air" not in asked:
+        return found
     return found | {"entrained_air": _with_air(found["entrained_air"], found["bulk_modulus"], actuator)}
 
 

@@ -6,6 +6,7 @@ that explains the log, nothing else is searched; else searches begin at leakages
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import ceil
 
 import numpy as np
@@ -150,9 +151,14 @@ def _guess(
 def _search(log: GreyBoxLog) -> Search:
     # where the noise moves with bulk modulus, steps promise less than they give
     near_enough = NEAR_ENOUGH if log.passes_on else ROUGH_ENOUGH
+    return Search(screened=_screened(log), near_enough=near_enough)
+
+
+@lru_cache(maxsize=2)
+def _screened(log: GreyBoxLog) -> int:
+    """Return how long the beginning is on which starts are compared; kept for all searches of a log [samples]."""
     speed = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
-    screened = driven_samples(speed, ceil(SCREENED_SECONDS / log.sample_time))
-    return Search(screened=screened, near_enough=near_enough)
+    return driven_samples(speed, ceil(SCREENED_SECONDS / log.sample_time))
 
 
 def _searched(

@@ -11,7 +11,7 @@ from estimation.fits.greybox.problem import Problem
 from estimation.fits.hypotheses import LEAST_PLAY
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.channel_names import POSITION, PRESSURE, VELOCITY
-from estimation.log_checks.order import percentile
+from estimation.log_checks.order import percentiles
 from estimation.notes import EstimateCode, RigCode
 from plant.log.record import Record
 from plant.notes import Note
@@ -248,4 +248,5 @@ def _lasting(left: Array, there: BoolArray, samples: int) -> float:
 
 
 def _spread(values: Array) -> float:
-    return percentile(values, 95.0) - percentile(values, 5.0)
+    high, low = percentiles(values, (95.0, 5.0))
+    return high - low

@@ -278,8 +278,7 @@ def _ways(log: GreyBoxLog, one: _Sought) -> list[tuple[Array, float]]:
     """
     speed, step = log.drives[:, 0], log.sample_time
     turned = _turned(speed - one.offset, step)
-    waves = [_delivered(Ripple(one.count, *parts), turned, step) for parts in ((1.0, 0.0), (0.0, 1.0))]
-    ways = [(wave, NUDGE) for wave in waves]
+    ways = [(wave, NUDGE) for wave in _waves(one.count, turned, step)]
     if log.speed_offset == 0.0 or all(each.count != one.count for each in log.teeth):
         return ways
     now, then = (delivering(speed, log.teeth, off, step) for off in (0.0, OFFSET_NUDGE))
@@ -300,11 +299,17 @@ def _delivered(teeth: Ripple, turned: tuple[Array, Array], sample_time: float) -
     Straight lines between samples then deliver what teeth do that pass at an even speed. Teeth of which too few samples
     are taken deliver their mean, which is none.
     """
+    cosine, sine = _waves(teeth.count, turned, sample_time)
+    return teeth.cosine * cosine + teeth.sine * sine
+
+
+def _waves(count: int, turned: tuple[Array, Array], sample_time: float) -> tuple[Array, Array]:
+    """Return what teeth of unit size deliver as a cosine and as a sine of the shaft's angle [rad/s]."""
     between, steps = turned
-    phase, half = teeth.count * between, 0.5 * teeth.count * steps
+    phase, half = count * between, 0.5 * count * steps
     seen = half < MOST_BETWEEN
-    volume = (teeth.cosine * np.sin(phase) - teeth.sine * np.cos(phase)) / teeth.count
-    return np.diff(np.where(seen, volume / np.cos(np.where(seen, half, 0.0)), 0.0)) / sample_time
+    share = np.where(seen, 1.0 / np.cos(np.where(seen, half, 0.0)), 0.0) / count
+    return np.diff(np.sin(phase) * share) / sample_time, np.diff(-np.cos(phase) * share) / sample_time
 
 
 def _likeliest(problem: Problem, theta: Array, errors: Array, counts: Sequence[int]) -> Sequence[_Sought]:
@@ -325,7 +330,7 @@ def _likeliest(problem: Problem, theta: Array, errors: Array, counts: Sequence[i
     speed, weighed, turn = speed[blocks], errors * delivers[blocks], np.exp(1j * angle[blocks])
     length, wave, found = log.sample_time * len(log.drives), np.ones_like(turn), list[tuple[float, _Sought]]()
     for count, more in zip(counts, np.diff(counts, prepend=0).tolist(), strict=True):
-        wave, passing = wave * turn**more, count * speed
+        wave, passing = wave * (turn if more == 1 else turn**more), count * speed
         seen = np.abs(passing) * log.sample_time < 2.0 * MOST_BETWEEN
         answer = passing * seen / (rate**2 + passing**2)  # times rate - 1j * passing: what real numbers can is quicker
         power = float(np.sum(answer * passing * delivers[blocks]))

@@ -176,16 +176,18 @@ def test_the_nine_keep_their_order_where_slopes_call_a_pump_worn_for_sure(board:
     assert sum(judged.probabilities.values()) == pytest.approx(0.01)
 
 
-def test_no_circuit_is_fitted_with_a_pump_that_the_balance_excludes(
+def test_no_condition_is_scored_with_a_pump_that_the_balance_excludes(
     board: Scoreboard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tried: list[float] = []
+    leakage = COORDINATES.index("leakage")
 
-    def fitted(_: Any, actuator: Any, **__: Any) -> Any:
-        tried.append(actuator.circuit.pump_displacement / ACTUATOR.circuit.pump_displacement)
-        return board.fits
+    def held(there: Any, *_: Any) -> Any:
+        tried.append(np.exp(there.coordinates - board.fits.best.coordinates)[leakage])
+        return board.fits.scores
 
-    monkeypatch.setattr(wear, "fit_classes", fitted)
+    monkeypatch.setattr(wear, "region_scores", held)
+    monkeypatch.setattr(wear, "scores_in_forces", held)
     near = (RigCode.WEAR_NOT_EXCLUDED.note(percent=15.0, half_width=5.0),)
     assert probabilities_over_wear(board, ACTUATOR, near, shipped_calibration()) is not None
     assert tried == [pytest.approx(0.9)]
