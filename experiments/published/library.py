@@ -2,7 +2,9 @@
 
 import json
 from collections.abc import Mapping
+from functools import cache
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +56,18 @@ def read_library(path: Path | None = None, which: str = "model") -> dict[str, Li
     HydrostateError
         If the file is no library, or of another version.
     """
-    source = files("experiments.published") / "transfer_function_library.json" if path is None else path
+    if path is None:
+        return dict(_shipped(which))
+    return _read(path, which)
+
+
+@cache
+def _shipped(which: str) -> dict[str, LinearModel]:
+    """Return the models that ship with the package, read for the first log of a process."""
+    return _read(files("experiments.published") / "transfer_function_library.json", which)
+
+
+def _read(source: Traversable, which: str) -> dict[str, LinearModel]:
     try:
         library = json.loads(source.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
