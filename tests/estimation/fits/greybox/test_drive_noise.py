@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from estimation.fits.greybox import drive_noise, freed_problem
-from estimation.fits.greybox.drive_noise import drive_covariance
+from estimation.fits.greybox.drive_noise import drive_covariance, moved_by_drives
+from estimation.models.flow import MASS_FLOW_FORM
 from tests.estimation.fits.short_logs import problem, usual
 
 
@@ -32,3 +33,15 @@ def test_a_run_without_noise_takes_no_kernel_of_its_own(monkeypatch: pytest.Monk
     )
     found = drive_covariance(one.on(one.log), theta, bread, slopes)
     np.testing.assert_allclose(found, given, rtol=1e-6, atol=1e-6 * float(np.max(given)))
+
+
+def test_what_the_drives_noise_does_to_one_balance_it_does_to_another() -> None:
+    one, other = problem(), problem(MASS_FLOW_FORM)
+    theta = usual(other)
+    slopes = other.slopes(theta)
+    bread = np.asarray(np.linalg.inv(slopes.T @ slopes + np.eye(len(theta))), dtype=np.float64)
+    own, shared = (
+        np.diag(drive_covariance(other, theta, bread, slopes, moved=moved))
+        for moved in (None, moved_by_drives(one, usual(one)))
+    )
+    np.testing.assert_allclose(shared, own, rtol=0.1)

@@ -164,6 +164,19 @@ def test_what_was_run_at_one_of_the_last_two_points_is_not_run_again(
         own.at(third)
 
 
+def test_a_point_near_a_known_one_lies_along_its_slopes_where_that_is_asked_for(
+    problem: FreedProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, (theta,) = problem.on(problem.log), points(problem, 1)
+    own.near, slopes = 0.2, own.slopes(theta)
+    near, far = (theta + size * np.eye(len(theta))[0] / np.linalg.norm(slopes[:, 0]) for size in (0.19, 0.21))
+    exact = problem.on(problem.log).at(near)
+    monkeypatch.setattr(own, "_side_by_side", lambda *_: pytest.fail("this point was run"))
+    assert own.at(near).cost == pytest.approx(exact.cost, abs=1e-2)
+    with pytest.raises(pytest.fail.Exception, match="this point was run"):
+        own.at(far)
+
+
 def test_residuals_under_several_rigs_are_those_of_each(problem: FreedProblem) -> None:
     (theta,) = points(problem, 1)
     wider = problem.log.parameters.copy()
