@@ -6,7 +6,7 @@ kernel without unknowns serves every hypothesis.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from itertools import islice
 from typing import Any
 
@@ -51,15 +51,10 @@ class FreedProblem(Problem):
         Typical sizes of parameters that are not fitted as logarithms [SI].
     ridge : Ridge, optional
         Two parameters that nearly cancel.
-
-    Attributes
-    ----------
-    near : float
-        How far a run moves the residuals from a known one, in deviations of their noise and all together, up to which
-        they are taken along its slopes instead [dimensionless]; 0 where what is told rests on the slopes.
     """
 
     near = 0.0
+    """How far a run moves all residuals from a known one, up to which they are taken along its slopes [deviations]."""
 
     def __init__(
         self,
@@ -84,9 +79,7 @@ class FreedProblem(Problem):
 
     @classmethod
     def of(cls, model: GreyBoxModel, log: GreyBoxLog) -> "FreedProblem":
-        """Return the problem of a model's own unknowns, its derivatives by finite differences.
-
-        Eight predictions side by side cost less than one with exact derivatives by seven unknowns.
+        """Return the problem of a model's own unknowns: eight runs cost less than exact derivatives by seven of them.
 
         Parameters
         ----------
@@ -271,21 +264,17 @@ class FreedProblem(Problem):
     def _remembered(self, theta: Array, variance: Array) -> tuple[Array, Array] | tuple[None, None]:
         """Return the residuals and slopes at one of the last two points, or so near to one that slopes lead there."""
         for point, known, here, columns in self._last[::-1]:
-            if not np.array_equal(known, variance):
-                continue
-            away = theta - point
-            if not np.any(away):
-                return here, columns
-            if self.near == 0.0:
-                continue
-            moved = columns @ away
-            if float(np.vdot(moved, moved)) < self.near**2:
-                return here + moved, columns
+            if np.array_equal(known, variance):
+                away = theta - point
+                if not np.any(away):
+                    return here, columns
+                if self.near > 0.0 and np.linalg.norm(moved := columns @ away) < self.near:
+                    return here + moved, columns
         return None, None
 
     def _nudged(self, theta: Array) -> Array:
         """Return a point and its neighbours, a row each; one that is on a ridge lies along it."""
-        points = theta + NUDGE * _neighbours(len(theta))
+        points = theta + NUDGE * np.eye(len(theta) + 1, len(theta), -1)
         if self._placed is not None:
             self._placed.turn(points, theta, NUDGE)
         return points
@@ -350,12 +339,6 @@ def _misfits(errors: Array) -> Array:
     """Return half the sum of squares of each run, where outliers count linearly, shape (lanes,)."""
     weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)
     return np.einsum("ijk,ijk->k", (1.0 - 0.5 * weight) * weight * errors, errors)
-
-
-@cache
-def _neighbours(unknowns: int) -> Array:
-    """Return the directions from a point to itself and to its neighbours, a row each."""
-    return np.eye(unknowns + 1, unknowns, -1)
 
 
 def _differences(found: Array, unknowns: int) -> tuple[Array, Array]:
