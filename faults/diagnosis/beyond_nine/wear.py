@@ -15,7 +15,7 @@ import numpy as np
 
 from estimation.eha.explanation_notes import WORN
 from estimation.eha.result import BulkModulusEstimate
-from estimation.eha.rig_share import delivery_left_open, wear_left_open
+from estimation.eha.rig_share import OpenDelivery, delivery_left_open, wear_left_open
 from estimation.finding import NORMAL_95
 from estimation.fits.hypotheses import OFFSET
 from estimation.notes import RigCode
@@ -52,6 +52,9 @@ TRIED = DELIVERIES[::2]
 UNLIKELY = math.log(1e-3)
 """Log-likelihood of a delivery below the likeliest one's that counts for nothing [dimensionless]."""
 
+FARTHEST, PUMPS = 4.0, 65
+"""How far from the likeliest pump others are looked at, in deviations, and how many [dimensionless, count]."""
+
 
 def whatever_the_pump_delivers(
     diagnosis: Diagnosis, actuator: Actuator, estimate: BulkModulusEstimate, strange: Sequence[Note] = ()
@@ -76,12 +79,15 @@ def whatever_the_pump_delivers(
         with classes weighed over it (`probabilities_over_wear`); else, and without pressure, the same. Classes sum to
         the probability that the pump is not worn (`chance_of_wear`).
     """
+    chance = chance_of_wear((*estimate.remarks, *strange))
     if known := known_of_flow(estimate):
         told = replace(diagnosis, against=tuple(note for note in diagnosis.against if note.code not in known))
     else:
-        found = probabilities_over_wear(diagnosis.scoreboard, actuator, estimate.remarks, shipped_calibration())
+        board, calibration, left = diagnosis.scoreboard, shipped_calibration(), delivery_left_open(estimate.remarks)
+        found = probabilities_over_wear(board, actuator, estimate.remarks, calibration)
         told = diagnosis if found is None else replace(diagnosis, probabilities=found)
-    chance = chance_of_wear((*estimate.remarks, *strange))
+        if found is not None and left is not None:
+            chance = chance_by_conditions(board, actuator, left, calibration)
     if chance == 0.0 or (chance < WORTH_SAYING and not wear_left_open(estimate.remarks)):
         return told
     note = ClassCode.WEAR_NOT_TOLD.note(percent=100.0 * chance, limit=100.0 * WORN)
@@ -110,6 +116,37 @@ def chance_of_wear(said: Sequence[Note]) -> float:
         if note.code is RigCode.AREA_TO_DISPLACEMENT:
             return _below(100.0 * WORN, note.data["percent"], note.data["half_width"] / NORMAL_95)
     return 0.0
+
+
+def chance_by_conditions(board: Scoreboard, actuator: Actuator, left: OpenDelivery, calibration: Calibration) -> float:
+    """Return the probability that a pump delivers less than `WORN`, by the balance of flow and by the conditions.
+
+    A worn pump looks like one that leaks more than a sound actuator in any condition, in oil that is softer. The
+    conditions weigh this by how well they hold the log with each pump, as much as they count in the class.
+
+    Parameters
+    ----------
+    board : Scoreboard
+        The evidences of a sound pump.
+    actuator : Actuator
+        The healthy actuator.
+    left : OpenDelivery
+        What the balance leaves open.
+    calibration : Calibration
+        Weights of the evidences.
+
+    Returns
+    -------
+    float
+        `SUREST` at most [probability].
+    """
+    reach = FARTHEST * left.deviation
+    deliveries = np.linspace(max(left.size - reach, left.least), left.size + reach, PUMPS)
+    held = np.array([np.logaddexp.reduce(_scores_at(board, one * FLOW_SCALE, actuator)) for one in deliveries])
+    weight = calibration.weights(board.blocks.pressure is not None)["parameters"]
+    likely = weight * held - 0.5 * ((deliveries - left.size) / left.deviation) ** 2
+    shares = np.exp(likely - np.max(likely))
+    return min(float(np.sum(shares[deliveries < math.log(WORN)]) / np.sum(shares)), SUREST)
 
 
 def _between(least: float, limit: float, mean: float, std: float) -> float:

@@ -7,14 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.eha.rig_share import DELIVERY_ENTRY
+from estimation.eha.rig_share import DELIVERY_ENTRY, delivery_left_open
 from estimation.finding import NORMAL_95, Gate
 from estimation.fits.hypotheses import PRESUMED
 from estimation.notes import RigCode
 from experiments.open_benchmark.kinds import make
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.beyond_nine import wear
-from faults.diagnosis.beyond_nine.wear import chance_of_wear, probabilities_over_wear, whatever_the_pump_delivers
+from faults.diagnosis.beyond_nine.wear import (
+    FLOW_SCALE,
+    chance_by_conditions,
+    chance_of_wear,
+    probabilities_over_wear,
+    whatever_the_pump_delivers,
+)
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
@@ -162,7 +168,35 @@ def test_the_nine_lose_the_probability_that_the_pump_is_worn(board: Scoreboard) 
     assert [note.code for note in judged.not_told] == [ClassCode.WEAR_NOT_TOLD]
     assert judged.not_told[0].data == {"percent": pytest.approx(100.0 * chance), "limit": pytest.approx(90.0)}
     open_ = whatever_the_pump_delivers(diagnosis, ACTUATOR, said(remarks=OPEN))
-    assert sum(open_.probabilities.values()) == pytest.approx(1.0 - chance_of_wear(OPEN))
+    left = delivery_left_open(OPEN)
+    assert left is not None
+    chance = chance_by_conditions(board, ACTUATOR, left, shipped_calibration())
+    assert sum(open_.probabilities.values()) == pytest.approx(1.0 - chance)
+
+
+def test_a_worn_pump_is_the_likelier_the_less_any_condition_holds_the_log_with_a_sound_one(board: Scoreboard) -> None:
+    """A stuck piston's log with a pump that delivers 80 % was major leakage at 93 %, beyond any major leakage."""
+    left = delivery_left_open(OPEN)
+    assert left is not None
+    best, major = board.fits.best, ACTUATOR.conditions[list(CONDITIONS).index("major_leakage")]
+    chances = {}
+    for share in (1.25, 1.0, 0.8):
+        there = replace(best, coordinates=major - np.log(share) * FLOW_SCALE)
+        with_it = replace(board, fits=replace(board.fits, best=there))
+        chances[share] = chance_by_conditions(with_it, ACTUATOR, left, shipped_calibration())
+    assert chances[1.25] < chances[1.0] < 0.4 < chances[0.8]
+
+
+def test_a_log_that_says_nothing_of_the_conditions_leaves_wear_as_the_balance_has_it(
+    board: Scoreboard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wear, "region_scores", lambda *_: np.zeros(9))
+    monkeypatch.setattr(wear, "scores_in_forces", lambda *_: np.zeros(9))
+    for note in (*OPEN, RigCode.WEAR_NOT_EXCLUDED.note(percent=20.0, half_width=24.0, likeliest=-11.5, most=20.0)):
+        left = delivery_left_open((note,))
+        assert left is not None
+        found = chance_by_conditions(board, ACTUATOR, left, shipped_calibration())
+        assert found == pytest.approx(chance_of_wear((note,)), abs=0.02)
 
 
 def test_the_nine_keep_their_order_where_slopes_call_a_pump_worn_for_sure(board: Scoreboard) -> None:
