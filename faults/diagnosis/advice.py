@@ -141,6 +141,18 @@ def oil_advice(
     return (AdviceCode.BLEED.note(percent=percent, volume=volume * sound / modulus.value),)
 
 
+def sensor_advice(left_out: Iterable[Note]) -> tuple[Note, ...]:
+    """Return advice on a velocity sensor that was not used, since all other channels contradict it.
+
+    Parameters
+    ----------
+    left_out : iterable of Note
+        What was left out of the log.
+    """
+    wrong = [note for note in left_out if note.code is ClassCode.VELOCITY_CONTRADICTED]
+    return tuple(AdviceCode.MEND_SENSOR.note(channel=note.data["channel"]) for note in wrong)
+
+
 def volume_advice(strange: Iterable[Note], healthy: EhaParameters, written: EhaParameters) -> tuple[Note, ...]:
     """Return advice on the chamber volume of the rig file, if it contradicts the log.
 

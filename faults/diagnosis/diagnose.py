@@ -22,7 +22,7 @@ from estimation.finding import Finding, Outcome, Quantity
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.notes import ChannelCode, RigCode
-from faults.diagnosis.advice import advice_for, oil_advice, volume_advice
+from faults.diagnosis.advice import advice_for, oil_advice, sensor_advice, volume_advice
 from faults.diagnosis.beyond_nine.accumulator import whatever_accumulator
 from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
 from faults.diagnosis.beyond_nine.balance_refused import class_without_balance
@@ -215,7 +215,7 @@ def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tupl
         healthy=diagnosis.healthy,
         not_told=not_told,
         since=board.onset,
-        advice=(*oil, *volume, *further),
+        advice=(*oil, *volume, *sensor_advice(case.log.left_out), *further),
     )
 
 

@@ -59,6 +59,7 @@ def test_a_wrong_velocity_costs_no_class_and_is_named(wrong: Callable[[Array], A
     found = diagnosed(wrong(log()[VELOCITY]))
     assert (found.condition, found.unknown, found.against) == ("minor_leakage", False, ())
     assert [note.data["channel"] for note in found.notes if note.code is ClassCode.VELOCITY_CONTRADICTED] == [VELOCITY]
+    assert [note.data["channel"] for note in found.advice if note.code is AdviceCode.MEND_SENSOR] == [VELOCITY]
 
 
 def test_a_position_that_is_wrong_leaves_both_sensors_accused() -> None:
