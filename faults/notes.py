@@ -45,6 +45,10 @@ class AgainstCode(Code):
         "motor speed reads wrong by {bias_rad_s:+.3g|rpm} rpm, or there is {load} on the rod that is not in the rig "
         "file ({entry} of about {value:.2g} {unit}): without differential_pressure_pa the log does not tell which"
     )
+    LOAD_VARIES = (
+        "a load on the rod that changes over the log explains its force balance: it varies by about {force_n:.2g} N "
+        "(root mean square), and the circuits have none"
+    )
     PRESSURE_BIAS = "differential pressure reads wrong by {bias_pa:+.3g|bar} bar"
     OIL_SOFT = "the oil's bulk modulus is {share:.2f} times that in the rig file: air in the oil, or a soft hose"
     OIL_STIFF = "the oil's bulk modulus is {share:.2f} times that in the rig file: another oil, or a wrong rig file"
@@ -144,6 +148,7 @@ class AdviceCode(Code):
     INSPECT_BORE = "inspect the bore and the piston seal near position {at_mm:.3g} mm"
     INSPECT_PUMP = "inspect the teeth and the side plates of the pump"
     FREE_PISTON = "check whether rod or piston is blocked, then log again while the piston moves"
+    HOLD_LOAD = "log again without the load on the rod, or with one that is constant"
     CHECK_INLET = "check the pump's inlet: accumulator pressure, suction line, strainer, oil temperature"
     CHECK_VALVES = "check the seats of relief and check valves, and the piston seal"
     CHECK_MAKEUP = "check the make-up valve of chamber {side}: poppet, seat and spring"

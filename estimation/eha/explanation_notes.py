@@ -85,17 +85,19 @@ def _late(found: Explanation, _: EhaParameters) -> Note:
     return RigCode.PRESSURE_LATE.note(late_ms=1e3 * lateness(found, PRESSURE), half_width_ms=width)
 
 
-def _speed_early(found: Explanation, _: EhaParameters) -> Note:
-    width, early = 1e3 * _half_width(found, LAGS[SPEED]), -1e3 * lateness(found, SPEED)
-    return RigCode.INPUT_EARLY.note(channel=SPEED, early_ms=early, half_width_ms=width)
-
-
 def _input_late(channel: str) -> Callable[[Explanation, EhaParameters], Note]:
     def note(found: Explanation, _: EhaParameters) -> Note:
         width = 1e3 * _half_width(found, LAGS[channel])
         return RigCode.INPUT_LATE.note(channel=channel, late_ms=1e3 * lateness(found, channel), half_width_ms=width)
 
     return note
+
+
+def _speed_early(found: Explanation, p: EhaParameters) -> Note:
+    width, early = 1e3 * _half_width(found, LAGS[SPEED]), -1e3 * lateness(found, SPEED)
+    if early <= 0.0:  # the search began with a delay that its lag more than took back
+        return _input_late(SPEED)(found, p)
+    return RigCode.INPUT_EARLY.note(channel=SPEED, early_ms=early, half_width_ms=width)
 
 
 def lateness(found: Explanation, channel: str) -> float:

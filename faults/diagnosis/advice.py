@@ -214,6 +214,8 @@ def _work_on(fault: Note) -> Note | None:
             return AdviceCode.CHECK_INLET.note()
         case AgainstCode.STUCK_OR_LEAKS | AgainstCode.ROD_BLOCKED:
             return AdviceCode.FREE_PISTON.note()
+        case AgainstCode.LOAD_VARIES:
+            return AdviceCode.HOLD_LOAD.note()
         case RigCode.LEAKAGE_LIFTS | RigCode.LEAKS_ONE_WAY:
             return AdviceCode.CHECK_VALVES.note()
         case RigCode.PUMP_WORN | AgainstCode.PUMP_DELIVERS_LESS:

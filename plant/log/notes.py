@@ -14,6 +14,10 @@ class LogCode(Code):
     TIME_ROUNDED = (
         "{channel} was rounded to {quantum_s:.2g} s; the even sample time of {sample_time_s:.6g} s was restored"
     )
+    TIME_STALLS = (
+        "{channel} stops and catches up (places: {count}, by up to {longest_s:.2g} s), as when a busy computer stamps "
+        "rows that waited; the rows were taken as evenly spaced by {sample_time_s:.6g} s"
+    )
     TIME_REPEATS = (
         "{channel} repeats the value of the row before in {count} of {total} rows ({percent:.2g} %); those rows were "
         "left out"

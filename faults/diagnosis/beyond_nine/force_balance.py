@@ -6,6 +6,7 @@ only, friction at rest is known as far as conditions differ in it, and a constan
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +86,27 @@ class Loads:
         return float(self.values[at]), float(self.std[at])
 
 
+class Balance(NamedTuple):
+    """Force balance of a piston over the m blocks, of n, in which it slides.
+
+    Parameters
+    ----------
+    use : ndarray, shape (n,)
+        Which these are.
+    columns : ndarray, shape (m, 6)
+        What goes with a force, a spring, an inertia, and friction at rest, linear and quadratic [SI].
+    push : ndarray, shape (m,)
+        Force of the pressure, less inertia and load of the rig file [N].
+    pressure : ndarray, shape (m,)
+        Differential pressure [Pa].
+    """
+
+    use: NDArray[np.bool_]
+    columns: Array
+    push: Array
+    pressure: Array
+
+
 def force_balance(blocks: Blocks, p: EhaParameters) -> Loads | None:
     """Return the load on the rod that the force balance shows where the piston slides.
 
@@ -100,6 +122,38 @@ def force_balance(blocks: Blocks, p: EhaParameters) -> Loads | None:
     Loads or None
         The load; None without pressure, and where the piston hardly slides.
     """
+    balance = sliding_balance(blocks, p)
+    if balance is None:
+        return None
+    columns, push = balance.columns, balance.push
+    believed, spread = friction_believed(p)
+    count = len(NAMES)
+    found, covariance = _regressed(
+        columns, push, np.append(np.zeros(count), believed), np.append(np.full(count, np.inf), spread)
+    )
+    values, std = found[:count], np.sqrt(np.maximum(np.diag(covariance)[:count], 0.0))
+    # two unlike areas turn that pressure into a force, and nothing measures it
+    std = np.hypot(std, [p.piston_area * p.area_difference * _held(p), 0.0, LAGGING])
+    size = p.piston_area * float(np.sqrt(np.mean(balance.pressure**2)))
+    forces = np.abs(values) * [1.0, float(np.std(columns[:, 1])), float(np.std(columns[:, 2]))]
+    return Loads(values, std, forces / max(size, np.finfo(np.float64).tiny))
+
+
+def sliding_balance(blocks: Blocks, p: EhaParameters) -> Balance | None:
+    """Return the force balance of the sliding piston: what pushes it, and what may hold it back.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The log.
+    p : EhaParameters
+        The actuator, as its rig file has it.
+
+    Returns
+    -------
+    Balance or None
+        None without pressure, and where the piston hardly slides.
+    """
     if blocks.pressure is None:
         return None
     step = blocks.block * blocks.sample_time
@@ -110,25 +164,18 @@ def force_balance(blocks: Blocks, p: EhaParameters) -> Loads | None:
     if np.count_nonzero(use) < FEWEST:
         return None
     v, dp, x, a = velocity[use], blocks.pressure[use], position[use], np.gradient(velocity, step)[use]
-    held = 2.0 * (p.accumulator_pressure - ATMOSPHERE)  # one chamber is at the inner circuit's pressure
     push = (
-        p.piston_area * (dp + p.area_difference * (held + np.abs(dp)))
+        p.piston_area * (dp + p.area_difference * (_held(p) + np.abs(dp)))
         - p.moving_mass * a
         - p.load_force
         - p.load_stiffness * x
     )
-    columns = np.column_stack([np.ones(len(v)), x, a, np.sign(v), v, v * np.abs(v)])
-    believed, spread = friction_believed(p)
-    count = len(NAMES)
-    found, covariance = _regressed(
-        columns, push, np.append(np.zeros(count), believed), np.append(np.full(count, np.inf), spread)
-    )
-    values, std = found[:count], np.sqrt(np.maximum(np.diag(covariance)[:count], 0.0))
-    # two unlike areas turn that pressure into a force, and nothing measures it
-    std = np.hypot(std, [p.piston_area * p.area_difference * held, 0.0, LAGGING])
-    size = p.piston_area * float(np.sqrt(np.mean(dp**2)))
-    forces = np.abs(values) * [1.0, float(np.std(x)), float(np.std(a))]
-    return Loads(values, std, forces / max(size, np.finfo(np.float64).tiny))
+    return Balance(use, np.column_stack([np.ones(len(v)), x, a, np.sign(v), v, v * np.abs(v)]), push, dp)
+
+
+def _held(p: EhaParameters) -> float:
+    """Return twice the gauge pressure of the chamber that is at the inner circuit's [Pa]."""
+    return 2.0 * (p.accumulator_pressure - ATMOSPHERE)
 
 
 def _regressed(columns: Array, push: Array, centre: Array, doubt: Array) -> tuple[Array, Array]:

@@ -14,6 +14,7 @@ import numpy as np
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import interval_95
 from faults.diagnosis.beyond_nine.force_balance import LEAST, SURE, Loads, force_balance, friction_believed
+from faults.diagnosis.beyond_nine.varying_load import varying_load
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.class_fit import LASTING, misfit
@@ -66,7 +67,8 @@ def under_load(diagnosed: Diagnosed, parameters: EhaParameters, estimate: BulkMo
     Returns
     -------
     Loaded
-        The diagnosis, and the actuator with its load; those of the rig file where no load explains the log.
+        The diagnosis, and the actuator with its load; those of the rig file where no load explains the log. Where a
+        load that changes does, that speaks against all conditions.
     """
     first = diagnosed(parameters, 0.0)
     blocks = first.scoreboard.blocks
@@ -78,7 +80,11 @@ def under_load(diagnosed: Diagnosed, parameters: EhaParameters, estimate: BulkMo
     elif asks and _open(seen, blocks, parameters):
         guesses = first_guesses(blocks, parameters, estimate, seen)
     found = _followed(diagnosed, guesses, seen, parameters)
-    return found if found is not None and (asks or _better(found.diagnosis, first)) else Loaded(first, parameters)
+    if found is not None and (asks or _better(found.diagnosis, first)):
+        return found
+    left = any(note.code is AgainstCode.UNEXPLAINED for note in first.against)
+    varies = varying_load(blocks, parameters) if left else None
+    return Loaded(first if varies is None else replace(first, against=(varies, *first.against)), parameters)
 
 
 def with_loads(p: EhaParameters, seen: Loads, names: Sequence[str]) -> EhaParameters:

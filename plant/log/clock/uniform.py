@@ -1,4 +1,4 @@
-"""The uniform clock of a log: samples left out are gaps, stamps that jitter, repeat or were rounded are mended."""
+"""The uniform clock of a log: gaps for samples left out; stamps that jitter, repeat, stall or were rounded, mended."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,6 +10,7 @@ from plant.arrays import Array
 from plant.errors import LogError, SparseLogError
 from plant.log.clock.jitter import GAP, grid_of, resampled, rounded_clock, usual_step
 from plant.log.clock.jumps import without_jumps, without_overruns
+from plant.log.clock.stalls import stalled_clock
 from plant.log.columns import TIME
 from plant.log.notes import LogCode
 from plant.notes import Note
@@ -139,7 +140,7 @@ def _steps_of_a_clock(time: Array, source: str) -> None:
 
 
 def _mended(time: Array, channels: Channels, source: str, notes: list[Note]) -> Checked:
-    """Put stamps that were rounded, repeat or jitter on a uniform clock; any other is no clock."""
+    """Put stamps that were rounded, stall, repeat or jitter on a uniform clock; any other is no clock."""
     step = np.diff(time)
     again = np.flatnonzero(step == 0.0) + 1
     if step.min() < 0.0 or len(again) == len(step):
@@ -154,6 +155,11 @@ def _mended(time: Array, channels: Channels, source: str, notes: list[Note]) -> 
             _few_left_out(len(time), slots[-1] + 1.0, source)
             notes.append(LogCode.TIME_ROUNDED.note(channel=TIME, quantum_s=quantum, sample_time_s=sample_time))
             return Checked(sample_time, start, _spread(channels, slots.astype(np.int64)))
+    if (behind := stalled_clock(time)) is not None:
+        start, sample_time, count, longest = behind
+        note = LogCode.TIME_STALLS.note(channel=TIME, count=count, longest_s=longest, sample_time_s=sample_time)
+        notes.append(note)
+        return Checked(sample_time, start, channels)
     if not len(again):
         return _resampled(time, channels, source, notes)
     if len(again) > MOST_MISSING * len(time):

@@ -1,0 +1,90 @@
+"""`stalled_clock(time)`: stamps of a computer that was busy at times, and wrote rows down as they came.
+
+A converter samples evenly and its rows wait in a queue. While the computer is busy none is stamped; then all that wait
+are stamped at once. So stamps are late, never early, and come back to the line that they left. Where rows are lost they
+do not come back, and where the clock itself jitters no row is late by several sample times.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from plant.arrays import Array
+
+EARLIEST = 0.5
+"""How early a row may be stamped at most, in sample times [dimensionless]: stamps jitter beside their stalls."""
+
+STALLED = 2.0
+"""How late a row is at least that waited, in sample times [dimensionless]."""
+
+AT_ONCE = 0.25
+"""Step between rows that are stamped at once, at most, in sample times [dimensionless]."""
+
+MOST_LATE = 0.2
+"""Share of rows that may have waited [fraction]: the rest tells the clock."""
+
+FEWEST_ROWS = 50
+"""Rows from which a clock is told apart from its stalls [count]."""
+
+
+class StalledClock(NamedTuple):
+    """An even clock behind stamps that stall.
+
+    Parameters
+    ----------
+    start : float
+        Time of the first row [s].
+    sample_time : float
+        Between rows [s].
+    stalls : int
+        How often stamps stalled.
+    longest : float
+        By how much a row was late at most [s].
+    """
+
+    start: float
+    sample_time: float
+    stalls: int
+    longest: float
+
+
+def stalled_clock(time: Array) -> StalledClock | None:
+    """Return the even clock behind stamps that stall and catch up.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Stamps, not falling [s].
+
+    Returns
+    -------
+    StalledClock or None
+        None where stamps do not stall, rows were lost, or over a fifth of them waited.
+
+    Examples
+    --------
+    >>> time = 0.01 * np.arange(400.0)
+    >>> time[100:110] = time[110]
+    >>> found = stalled_clock(time)
+    >>> found and (round(found.sample_time, 6), found.stalls, round(found.longest, 6))
+    (0.01, 1, 0.1)
+    >>> stalled_clock(0.01 * np.arange(400.0)) is None
+    True
+    """
+    if len(time) < FEWEST_ROWS:
+        return None
+    rows, half = np.arange(float(len(time))), len(time) // 2
+    sample_time = float(np.median(time[half:] - time[:-half])) / half
+    if not sample_time > 0.0:
+        return None
+    late = (time - time[0]) / sample_time - rows
+    late -= np.median(late)
+    waited = late > EARLIEST
+    begins = np.flatnonzero(waited[1:] & ~waited[:-1]) + 1
+    at_once = np.diff(time) < AT_ONCE * sample_time
+    stalls = [begin for begin in begins.tolist() if late[begin] > STALLED and at_once[begin]]
+    even = late.min() > -EARLIEST and not waited[0] and not waited[-1] and np.mean(waited) < MOST_LATE
+    if not stalls or not even:
+        return None
+    start = float(np.mean((time - sample_time * rows)[~waited]))
+    return StalledClock(start, sample_time, len(stalls), sample_time * float(np.max(late)))

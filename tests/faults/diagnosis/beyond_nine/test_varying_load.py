@@ -1,0 +1,55 @@
+"""A load that changes over a log is told from friction that comes and goes, by the force balance."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faults.diagnosis.advice import advice_for
+from faults.diagnosis.beyond_nine.varying_load import varying_load
+from faults.diagnosis.circuits.blocks import Blocks
+from faults.notes import AdviceCode, AgainstCode
+from plant.arrays import Array
+from plant.log.record import Record
+from tests.faults.diagnosis.beyond_nine.test_force_balance import PAPER, TIME, blocks_under, to_and_fro
+
+WAVE = 500.0 * np.sin(2.0 * np.pi * 0.3 * TIME)
+
+
+def under(force: Array, velocity: Array | None = None) -> Blocks:
+    blocks = blocks_under(PAPER, to_and_fro() if velocity is None else velocity)
+    assert blocks.pressure is not None
+    return replace(blocks, pressure=blocks.pressure + force / PAPER.piston_area)
+
+
+@pytest.mark.parametrize("size", [0.5, 1.0, 3.0])
+def test_a_wave_on_the_rod_is_named_with_its_size(size: float) -> None:
+    note = varying_load(under(size * WAVE), PAPER)
+    assert note is not None
+    assert note.code is AgainstCode.LOAD_VARIES
+    assert note.data["force_n"] == pytest.approx(size * 500.0 / np.sqrt(2.0), rel=0.1)
+
+
+def test_friction_that_comes_and_goes_is_no_load() -> None:
+    assert varying_load(under(np.abs(WAVE) * np.sign(to_and_fro())), PAPER) is None
+
+
+def test_constant_load_and_noise_are_none_that_varies() -> None:
+    noise = np.asarray(np.random.default_rng(2).normal(0.0, 100.0, len(TIME)), dtype=np.float64)
+    forces: list[Array] = [0.0 * TIME, 0.0 * TIME + 900.0, noise, 0.03 * WAVE]
+    for force in forces:
+        assert varying_load(under(force), PAPER) is None
+
+
+def test_a_piston_that_slides_one_way_alone_tells_no_load_from_friction() -> None:
+    assert varying_load(under(WAVE, to_and_fro(one_way=True)), PAPER) is None
+
+
+def test_without_pressure_nothing_is_said_of_it() -> None:
+    assert varying_load(replace(under(WAVE), pressure=None), PAPER) is None
+
+
+def test_the_next_log_is_asked_for_without_the_load() -> None:
+    note = AgainstCode.LOAD_VARIES.note(force_n=500.0)
+    record = Record(1e-3, {"motor_speed_rad_s": np.zeros(100)})
+    assert [one.code for one in advice_for(record, {}, (note,), (), ())] == [AdviceCode.HOLD_LOAD]

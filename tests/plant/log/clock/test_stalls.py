@@ -1,0 +1,58 @@
+"""Stamps of a computer that was busy at times."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from plant.arrays import Array
+from plant.errors import LogWarning
+from plant.log.clock.stalls import stalled_clock
+from plant.log.files import read_record
+from plant.log.frames import frame_table
+from plant.notes import Note
+
+EVEN = 1e-3 * np.arange(4000.0)
+RNG = np.random.default_rng(5)
+
+
+def stalled(at: tuple[float, ...] = (0.7, 1.9, 3.1), length: float = 0.02, apart: float = 0.0) -> Array:
+    """Return stamps that wait for `length` [s] each time, then follow each other by `apart` [s]."""
+    time = EVEN.copy()
+    for begin in at:
+        waits = (time > begin) & (time < begin + length)
+        time[waits] = begin + length + apart * np.arange(np.count_nonzero(waits))
+    return np.maximum.accumulate(time)
+
+
+def read(time: Array) -> tuple[float, Array, list[Note]]:
+    ramp = np.sin(9.0 * EVEN[: len(time)])
+    table = frame_table({"time_s": time, "motor_speed_rad_s": ramp, "position_m": 1e-2 * ramp})
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        record = read_record(table)
+    notes = [one.message.note for one in caught if isinstance(one.message, LogWarning)]
+    return record.sample_time, record["position_m"], notes
+
+
+@pytest.mark.parametrize("jitter", [0.0, 2e-4])
+@pytest.mark.parametrize("apart", [0.0, 1e-4])
+def test_rows_that_waited_are_put_back_where_they_were_sampled(apart: float, jitter: float) -> None:
+    time = np.sort(stalled(apart=apart) + jitter * RNG.uniform(0.0, 1.0, len(EVEN)))
+    sample_time, position, (note,) = read(time)
+    assert (note.code, note.data["count"]) == ("time_stalls", 3)
+    assert note.data["longest_s"] == pytest.approx(0.02, abs=2e-3)
+    assert sample_time == pytest.approx(1e-3, rel=1e-5)
+    np.testing.assert_array_equal(position, 1e-2 * np.sin(9.0 * EVEN))
+
+
+def test_rows_that_were_lost_or_a_clock_that_jitters_are_no_stall() -> None:
+    lost = np.delete(EVEN, np.arange(700, 720))
+    for time in (lost, EVEN, EVEN + 2e-4 * RNG.uniform(-1.0, 1.0, len(EVEN)), np.floor(EVEN / 0.02) * 0.02):
+        assert stalled_clock(time) is None
+
+
+def test_a_clock_that_goes_slower_for_a_while_is_no_stall() -> None:
+    """Rows that are late do not come at once then: they were sampled when they say."""
+    time = EVEN + 5e-3 * np.clip(1.0 - np.abs(EVEN - 2.0) / 0.05, 0.0, 1.0)
+    assert stalled_clock(time) is None
