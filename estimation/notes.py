@@ -228,6 +228,10 @@ class RigCode(Code):
         "the offset of differential_pressure_pa drifts by {drift_pa:.4g|bar} ± {half_width_pa:.2g|bar} bar over the "
         "log; the drift was subtracted"
     )
+    PRESSURE_SIDES = (
+        "differential_pressure_pa reads {percent:z.2f} ± {half_width:.2g} % more of it forward than backward, as two "
+        "chamber gauges with unlike gains do; the fit includes this"
+    )
     ENCODER_ZERO = "position_m reads {zero_mm:.1f} ± {half_width_mm:.1f} mm at mid-stroke; it was shifted to zero there"
     POSITION_PLAY = (
         "position_m follows the piston with about {play_um:.1g} um of play (backlash); the play was corrected"

@@ -128,6 +128,11 @@ def _drift(found: Explanation, _: EhaParameters) -> Note:
     return RigCode.PRESSURE_DRIFTS.note(drift_pa=value, half_width_pa=_half_width(found, "pressure_drift"))
 
 
+def _sides(found: Explanation, _: EhaParameters) -> Note:
+    value, half_width = found.values["pressure_sides"][0], _half_width(found, "pressure_sides")
+    return RigCode.PRESSURE_SIDES.note(percent=200.0 * value, half_width=200.0 * half_width)
+
+
 def _zero(found: Explanation, _: EhaParameters) -> Note:
     value = found.values["position_zero"][0]
     return RigCode.ENCODER_ZERO.note(zero_mm=1e3 * value, half_width_mm=1e3 * _half_width(found, "position_zero"))
@@ -229,6 +234,7 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
     "position_late": _input_late(POSITION),
     "pressure_offset": _offset,
     "pressure_drift": _drift,
+    "pressure_sides": _sides,
     "encoder_zero": _zero,
     "position_play": _play,
     "delivery": _delivery,

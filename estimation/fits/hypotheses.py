@@ -138,6 +138,9 @@ OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
 
 PRESSURE_DRIFT = Hypothesis("pressure_drift", ("pressure_drift",))
 
+PRESSURE_SIDES = Hypothesis("pressure_sides", ("pressure_sides",))
+"""Of two chamber gauges each has a gain of its own, and one gauge of a difference may have two, one a direction."""
+
 OFFSET_AT_REST = replace(OFFSET, from_first_sample=True)
 """The same of a log that begins at rest with a differential pressure: the offset is then that, or there is a load."""
 
@@ -264,6 +267,7 @@ HYPOTHESES = (
     Hypothesis("position_late", ("position_lag",), ({"position_lag": 1e-3},), LATE_TRIED, "position_m"),
     OFFSET,
     PRESSURE_DRIFT,
+    PRESSURE_SIDES,
     ENCODER_ZERO,
     PLAY,
     DELIVERY,
@@ -299,6 +303,7 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "position_lag": (0.0, 0.05),
     "pressure_offset": (-1e7, 1e7),
     "pressure_drift": (-1e7, 1e7),
+    "pressure_sides": (-0.1, 0.1),
     "position_zero": (-1.0, 1.0),
     "position_play": (0.0, 2e-3),
     "start_pressure": (-1e7, 1e7),

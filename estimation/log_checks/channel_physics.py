@@ -19,6 +19,7 @@ from estimation.log_checks.channel_blocks import (
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.flow_balance import FlowBalance, flow_balance
 from estimation.log_checks.measurement_noise import position_variance
+from estimation.log_checks.unit_slips import DEGREES, IN_DEGREES, LENGTHS, RPM, TURNS
 from estimation.notes import ChannelCode
 from plant.eha.model import EhaParameters
 from plant.log.columns import TIME
@@ -60,27 +61,6 @@ nine conditions under steps and binary signals. An encoder's noise has -0.5, a v
 FARTHEST = 3.0
 """Times the pumped flow that no piston moves, whatever is wrong in the rig file [dimensionless]."""
 
-RPM = 60.0 / (2.0 * np.pi)
-TURN = 2.0 * np.pi
-TURNS: Mapping[float, str] = {
-    1.0 / RPM: "rpm read as rad/s",
-    RPM: "rad/s read as rpm",
-    TURN: "rev/s read as rad/s",
-}
-"""Slips of the speed's unit, by how many times too far the piston then seems to go."""
-
-LENGTHS: Mapping[float, str] = {
-    10.0: "mm read as cm",
-    100.0: "cm read as m",
-    1e3: "mm read as m",
-    1e6: "um read as m",
-    0.1: "cm read as mm",
-    0.01: "m read as cm",
-    1e-3: "m read as mm",
-    1e-6: "m read as um",
-}
-"""Slips of a length's unit, by the factor that they make."""
-
 UNKNOWN_UNIT, UNKNOWN_RIG = "another unit", "another unit, or a rig file of another actuator"
 LOSSY = "another unit, such as mm read as m where much of the flow is lost, or a rig file of another actuator"
 """What is said of a factor that no known slip makes, or that one makes of a piston that loses most of the flow."""
@@ -88,6 +68,9 @@ LOSSY = "another unit, such as mm read as m where much of the flow is lost, or a
 EXPLAINED, KNOWN, TOLD = 0.9, 0.1, 4.0
 """Share of the flow that a balance must explain, relative deviation at which its factor counts, and deviations from
 zero at which a sign does."""
+
+FAST = 2.0
+"""Times the motor's limit that no speed in revolutions a minute is [dimensionless]; judged."""
 
 REFUTED = 2.0
 """Times what a balance leaves unexplained by which the piston's flow must differ from the rig's before a slip of units
@@ -284,13 +267,15 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
         believed, alike = (True, True), {one for one in TURNS if LOST <= gone / one <= NEAR}
         if length is not None and length < 100.0 and " and " in _moved(record):
             length = None  # two that agree: a piston that drifts as it sticks makes as much of a slip of the speed
-    if together > FOLLOWS and _too_fast(record, p) and gone < NEAR * min(TURNS):
+    fast = _over_limit(record, p)
+    if together > FOLLOWS and fast > FARTHEST and gone < NEAR * min(TURNS):
         turn, believed = min(TURNS), (True, believed[1])
     moved = _moved(record)
     slips: list[tuple[str, str, float]] = []
     if turn is not None and believed[0] and gone < NEAR * turn:
         said = " or ".join(TURNS[one] for one in TURNS if one == turn or one in alike)
-        slips.append((SPEED, said, 1.0 / turn))
+        degrees = turn == min(TURNS) and fast > FAST * RPM
+        slips.append((SPEED, IN_DEGREES, DEGREES) if degrees else (SPEED, said, 1.0 / turn))
     if (
         length is not None and believed[1] and gone < NEAR * length and not (slips and " and " in moved)
     ):  # two that agree are right
@@ -320,8 +305,9 @@ def _slides(record: Record, p: EhaParameters) -> bool:
     return highest * p.piston_area > HELD * p.friction_coulomb
 
 
-def _too_fast(record: Record, p: EhaParameters) -> bool:
-    return SPEED in record and float(np.nanmax(np.abs(record[SPEED]))) > FARTHEST * p.motor_speed_limit
+def _over_limit(record: Record, p: EhaParameters) -> float:
+    """Return the highest speed over the motor's limit [dimensionless]; 0 where none is logged."""
+    return float(np.nanmax(np.abs(record[SPEED]))) / p.motor_speed_limit if SPEED in record else 0.0
 
 
 def _resolved(record: Record, long: ChannelBlocks) -> bool:

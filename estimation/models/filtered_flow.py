@@ -4,7 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-from estimation.models.wide_flow import WIDE_FLOW_FORM, offset_at, wide_rates
+from estimation.models.wide_flow import WIDE_FLOW_FORM, misread, wide_rates
 from plant.compiled.functions import Scalar
 
 FILTER_TIME = "filter_time"
@@ -25,7 +25,7 @@ def _rates(
     circuit = p1, p2, behind, supply
     rise, fall, _, fed = wide_rates(circuit, drives, p, share, turbulent=turbulent, quick=quick)
     begun, next_begun = drives[2]
-    left = behind + offset_at(begun + share * (next_begun - begun), p) - p.pressure_lag * climbs
+    left = behind + misread((p1, p2), begun + share * (next_begun - begun), p) - p.pressure_lag * climbs
     return rise, fall, rise - fall - climbs, fed, left / (p.filter_time * p.filter_time)
 
 

@@ -56,6 +56,7 @@ class WideFlowParameters(FlowParameters):
     play_sprung: float = si(0.0, "1", "half plays that the piston springs back as pressure is lost", "fitted")
     pressure_offset: float = si(0.0, "Pa", "offset of the differential pressure", "fitted")
     pressure_drift: float = si(0.0, "Pa", "what that offset gains over the log, evenly", "fitted")
+    pressure_sides: float = si(0.0, "1", "half of what the gauge of side A reads more of a pressure than B's", "fitted")
     position_zero: float = si(0.0, "m", "encoder's reading in the middle position", "fitted")
     start_pressure: float = si(0.0, "Pa", "differential pressure before the first sample", "fitted")
     start_level: float = si(
@@ -143,15 +144,17 @@ def wide_rates(
     rise = tangent_stiffness(p1, air, p, quick=quick) * (at_1 - area_1 * velocity + into_1) / volume_1
     fall = tangent_stiffness(p2, air, p, quick=quick) * (area_2 * velocity - at_2 + into_2) / volume_2
     # how far the sensor is behind stays small where its lag is short, which a stiff step resolves
-    lagging = rise - fall - (behind + offset_at(elapsed, p)) / (p.pressure_lag + SHORTEST_LAG)
+    lagging = rise - fall - (behind + misread((p1, p2), elapsed, p)) / (p.pressure_lag + SHORTEST_LAG)
     return rise, fall, lagging, -p.accumulator_stiffness * (into_1 + into_2)
 
 
-def offset_at(elapsed: Scalar, p: SimpleNamespace) -> Scalar:
-    """Return what the pressure sensor reads of nothing [Pa].
+def misread(pressures: tuple[Scalar, Scalar], elapsed: Scalar, p: SimpleNamespace) -> Scalar:
+    """Return what the pressure sensor reads too much, once it has settled [Pa].
 
     Parameters
     ----------
+    pressures : tuple of float or Expression
+        Of the chambers, absolute [Pa].
     elapsed : float
         Share of the log that has gone [fraction].
     p : SimpleNamespace
@@ -162,7 +165,8 @@ def offset_at(elapsed: Scalar, p: SimpleNamespace) -> Scalar:
     float
         Pressure [Pa].
     """
-    return p.pressure_offset + p.pressure_drift * elapsed
+    above = pressures[0] + pressures[1] - 2.0 * p.accumulator_pressure
+    return p.pressure_offset + p.pressure_drift * elapsed + p.pressure_sides * above
 
 
 def _sides(courses: Any, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
@@ -318,6 +322,7 @@ LINEAR = {
     **dict.fromkeys(("pressure_lag", "speed_lag", "position_lag"), 1e-3),
     "position_play": 1e-5,
     **dict.fromkeys((*CROSSED, *GROWTH, "leakage_before", "pump_compression", "pilot_share"), 1.0),
+    "pressure_sides": 0.01,
     **dict.fromkeys(("pressure_offset", "pressure_drift", "start_level", "crack_pressure", "crack_difference"), 1e4),
     "position_zero": 1e-2,
     "start_pressure": 1e5,

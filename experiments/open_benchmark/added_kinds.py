@@ -3,7 +3,7 @@
 import numpy as np
 
 from experiments.open_benchmark.kind import MAYBE, Kind
-from experiments.open_benchmark.logger import POSITION, PRESSURES, SPEED, VELOCITY
+from experiments.open_benchmark.logger import POSITION, PRESSURE_A, PRESSURE_B, PRESSURES, SPEED, VELOCITY
 from experiments.open_benchmark.setup import Setup
 
 
@@ -15,6 +15,12 @@ def _hums(setup: Setup, rng: np.random.Generator) -> Setup:
 def _held_apart(setup: Setup, _: np.random.Generator) -> Setup:
     held = setup.with_sensor((SPEED,), hold=4).with_sensor((POSITION, VELOCITY), hold=2)
     return held.with_sensor(PRESSURES, hold=5)
+
+
+def _gauges_differ(setup: Setup, rng: np.random.Generator) -> Setup:
+    half = float(rng.choice((-1.0, 1.0)) * rng.uniform(0.003, 0.01))
+    gauges = setup.with_sensor((PRESSURE_A,), gain=1.0 + half).with_sensor((PRESSURE_B,), gain=1.0 - half)
+    return gauges.with_logger(channels=(SPEED, POSITION, VELOCITY, PRESSURE_A, PRESSURE_B))
 
 
 ADDED = (
@@ -46,6 +52,18 @@ ADDED = (
         ),
         MAYBE,
         named=r"\boffset|zero point|\breads?\b",
+    ),
+    Kind(
+        "pressure_gauges_differ",
+        "two chamber pressures, of which one reads 0.6 to 2 % more than the other",
+        _gauges_differ,
+        MAYBE,
+    ),
+    Kind(
+        "clock_stalls",
+        "a busy computer stamps rows that waited for 10 to 50 ms, 5 to 15 times",
+        lambda setup, rng: setup.with_logger(stalls=int(rng.integers(5, 16)), stall=rng.uniform(0.01, 0.05)),
+        named=r"\bclock\b|\bcatches up|\bstamps\b",
     ),
 )
 """Kinds by sensor and logger; the rig file describes their actuator."""

@@ -153,6 +153,10 @@ class Logger:
         Half width of what the clock is off, a fraction of the sample time; it is logged truly.
     begin : float
         How long the machine runs before the log begins [s].
+    stalls : int
+        How often the computer that stamps rows is busy; what it samples meanwhile waits, and is stamped at once.
+    stall : float
+        How long [s].
     """
 
     sensors: Mapping[str, Sensor] = field(default_factory=_sensors)
@@ -161,6 +165,8 @@ class Logger:
     sample_time: float = 1e-3
     jitter: float = 0.0
     begin: float = 0.0
+    stalls: int = 0
+    stall: float = 0.0
 
     def log(self, states: Array, rng: np.random.Generator) -> pd.DataFrame:
         """Return the log of a run, shape (samples, 1 + channels), columns as they are called in its file.
@@ -183,8 +189,16 @@ class Logger:
         clock = self.sample_time * np.arange(count)
         if self.jitter > 0.0:
             clock[1:-1] += self.jitter * self.sample_time * rng.uniform(-1.0, 1.0, count - 2)
-        columns = {"time_s": clock}
+        columns = {"time_s": self._stamped(clock, rng) if self.stalls else clock}
         for name in self.channels:
             read = self.sensors[name].read(self.begin + clock, fine, quantities[name], rng)
             columns[self.headings.get(name, name)] = read
         return pd.DataFrame(columns)
+
+    def _stamped(self, clock: Array, rng: np.random.Generator) -> Array:
+        """Return the stamps of a computer that is busy at times [s]; a row takes it a twentieth of the sample time."""
+        stamps = clock.copy()
+        for begin in rng.uniform(0.05, 0.9, self.stalls) * clock[-1]:
+            waits = np.flatnonzero((clock > begin) & (clock < begin + self.stall))
+            stamps[waits] = begin + self.stall + 0.05 * self.sample_time * np.arange(len(waits))
+        return np.maximum.accumulate(stamps)

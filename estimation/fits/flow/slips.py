@@ -8,10 +8,7 @@ import numpy as np
 
 from estimation.fits.flow.plain import Logged
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
-from estimation.log_checks.channel_physics import LENGTHS, RPM, TURNS
-
-DEGREES = 180.0 / np.pi
-"""Degrees in a radian [dimensionless]."""
+from estimation.log_checks.unit_slips import DEGREES, IN_DEGREES, LENGTHS, RPM, TURNS
 
 PSI = 6894.757
 """A pound-force per square inch [Pa]."""
@@ -41,7 +38,7 @@ PRESSURES: Mapping[float, str] = {
 SPEEDS: Mapping[float, str] = {
     **TURNS,
     1e3 / RPM: "krpm read as rad/s",
-    1.0 / DEGREES: "deg/s read as rad/s",
+    1.0 / DEGREES: IN_DEGREES,
     1.0 / 6.0: "deg/s read as rpm",
     60.0: "rev/s read as rpm",
 }

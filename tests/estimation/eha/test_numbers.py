@@ -38,6 +38,7 @@ VALUES: dict[str, tuple[float, float]] = {
     "position_lag": (3e-3, 3e-4),
     "pressure_offset": (-1e5, 2e3),
     "pressure_drift": (5e4, 1e3),
+    "pressure_sides": (0.01, 1e-4),
     "position_zero": (4e-3, 1e-4),
     "position_play": (5e-5, 1e-6),
     "pump_displacement": (0.8 * P.pump_displacement, 0.01 * P.pump_displacement),

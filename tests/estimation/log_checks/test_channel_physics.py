@@ -307,6 +307,12 @@ def test_position_and_velocity_that_agree_are_not_accused_of_tens() -> None:
     assert (said.code, said.data["channel"]) == (ChannelCode.CHANNEL_UNIT, SPEED)
 
 
+@pytest.mark.parametrize(("times", "slip"), [(30.0 / np.pi, "rpm"), (180.0 / np.pi, "deg/s")])
+def test_a_speed_in_degrees_is_not_taken_for_revolutions(times: float, slip: str) -> None:
+    (said,) = channel_mistakes(scaled(SPEED, times)(run()), HEALTHY)
+    assert (said.data["channel"], said.data["slip"]) == (SPEED, f"{slip} read as rad/s")
+
+
 def test_a_piston_that_pressure_cannot_move_tells_no_unit_of_speed() -> None:
     log = scaled(POSITION, 0.1)(scaled(VELOCITY, 0.1)(run("major_leakage")))
     (note,) = channel_mistakes(log, HEALTHY)

@@ -14,8 +14,9 @@ from estimation.log_checks.channel_blocks import (
     gone_together,
     power_of,
 )
-from estimation.log_checks.channel_physics import LENGTHS, TURNS, channel_mistakes
+from estimation.log_checks.channel_physics import channel_mistakes
 from estimation.log_checks.flow_balance import FlowBalance, flow_balance
+from estimation.log_checks.unit_slips import LENGTHS, TURNS
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note

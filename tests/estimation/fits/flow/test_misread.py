@@ -17,7 +17,8 @@ from estimation.fits.flow.slips import DEGREES, PSI, SLIPS, Slip
 from estimation.fits.greybox.work_limit import Work
 from estimation.fits.hypotheses import DELIVERY, OFFSET
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
-from estimation.log_checks.channel_physics import RPM, channel_mistakes
+from estimation.log_checks.channel_physics import channel_mistakes
+from estimation.log_checks.unit_slips import RPM
 from estimation.notes import ChannelCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters

@@ -35,9 +35,8 @@ def test_friction_that_comes_and_goes_is_no_load() -> None:
 
 
 def test_constant_load_and_noise_are_none_that_varies() -> None:
-    noise = np.asarray(np.random.default_rng(2).normal(0.0, 100.0, len(TIME)), dtype=np.float64)
-    forces: list[Array] = [0.0 * TIME, 0.0 * TIME + 900.0, noise, 0.03 * WAVE]
-    for force in forces:
+    noise: Array = 100.0 * np.random.default_rng(2).standard_normal(len(TIME))
+    for force in (np.zeros(len(TIME)), np.full(len(TIME), 900.0), noise, np.multiply(0.03, WAVE)):
         assert varying_load(under(force), PAPER) is None
 
 

@@ -1,0 +1,32 @@
+"""Slips of the units of speed and length, by the factors that they make."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+RPM = 60.0 / (2.0 * np.pi)
+TURN = 2.0 * np.pi
+TURNS: Mapping[float, str] = {
+    1.0 / RPM: "rpm read as rad/s",
+    RPM: "rad/s read as rpm",
+    TURN: "rev/s read as rad/s",
+}
+"""Slips of the speed's unit, by how many times too far the piston then seems to go."""
+
+DEGREES = 180.0 / np.pi
+"""Degrees in a radian [dimensionless]."""
+
+IN_DEGREES = "deg/s read as rad/s"
+"""Slip of a speed that is too fast in revolutions a minute too."""
+
+LENGTHS: Mapping[float, str] = {
+    10.0: "mm read as cm",
+    100.0: "cm read as m",
+    1e3: "mm read as m",
+    1e6: "um read as m",
+    0.1: "cm read as mm",
+    0.01: "m read as cm",
+    1e-3: "m read as mm",
+    1e-6: "m read as um",
+}
+"""Slips of a length's unit, by the factor that they make."""
