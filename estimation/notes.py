@@ -225,12 +225,10 @@ class RigCode(Code):
         "subtracted"
     )
     PRESSURE_DRIFTS = (
-        "the offset of differential_pressure_pa drifts by {drift_pa:.4g|bar} ± {half_width_pa:.2g|bar} bar over the "
-        "log; the drift was subtracted"
+        "pressure's offset drifts by {drift_pa:.4g|bar} ± {half_width_pa:.2g|bar} bar over the log; it was subtracted"
     )
     PRESSURE_SIDES = (
-        "differential_pressure_pa reads {percent:z.2f} ± {half_width:.2g} % more of it forward than backward, as two "
-        "chamber gauges with unlike gains do; the fit includes this"
+        "one chamber gauge reads {percent:z.2f} ± {half_width:.2g} % more than the other; the fit includes this"
     )
     ENCODER_ZERO = "position_m reads {zero_mm:.1f} ± {half_width_mm:.1f} mm at mid-stroke; it was shifted to zero there"
     POSITION_PLAY = (

@@ -22,10 +22,9 @@ from estimation.fits.hypothesis_search.form_fit import FormFit
 from estimation.fits.hypothesis_search.pump_delivery import delivered
 from estimation.fits.motion.fit import MOTION_CHANNELS, fit_motion
 from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED
-from estimation.log_checks.channel_physics import FARTHEST
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.log_checks.first_belief import START_STD, begins_in_motion, first_belief, first_load
-from estimation.log_checks.unit_slips import RPM, TURNS
+from estimation.log_checks.unit_slips import FARTHEST, RPM, TURNS
 from estimation.models.eha_forms import FORMS
 from estimation.notes import ChannelCode, EstimateCode
 from estimation.trust.bounds import bulk_modulus_bound

@@ -135,7 +135,6 @@ MAKEUP_BENDS = Hypothesis("makeup_bends", (BEND,), ({BEND: 3e-5},), least=LEAST_
 """Wide open, a make-up valve is an orifice. Asked where a load pulls the piston faster than the pump feeds it."""
 
 OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
-
 PRESSURE_DRIFT = Hypothesis("pressure_drift", ("pressure_drift",))
 
 PRESSURE_SIDES = Hypothesis("pressure_sides", ("pressure_sides",))

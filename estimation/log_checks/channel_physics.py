@@ -19,7 +19,7 @@ from estimation.log_checks.channel_blocks import (
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.flow_balance import FlowBalance, flow_balance
 from estimation.log_checks.measurement_noise import position_variance
-from estimation.log_checks.unit_slips import DEGREES, IN_DEGREES, LENGTHS, RPM, TURNS
+from estimation.log_checks.unit_slips import DEGREES, FARTHEST, IN_DEGREES, LENGTHS, RPM, TURNS
 from estimation.notes import ChannelCode
 from plant.eha.model import EhaParameters
 from plant.log.columns import TIME
@@ -57,9 +57,6 @@ velocities, and what is pumped meanwhile [fraction]; judged."""
 MOVES_ON = 0.5
 """Correlation of a moving piston's speed from block to block, at the least [dimensionless]: it is 0.81 to 0.99 in the
 nine conditions under steps and binary signals. An encoder's noise has -0.5, a velocity sensor's 0."""
-
-FARTHEST = 3.0
-"""Times the pumped flow that no piston moves, whatever is wrong in the rig file [dimensionless]."""
 
 UNKNOWN_UNIT, UNKNOWN_RIG = "another unit", "another unit, or a rig file of another actuator"
 LOSSY = "another unit, such as mm read as m where much of the flow is lost, or a rig file of another actuator"

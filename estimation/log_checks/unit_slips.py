@@ -4,6 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+FARTHEST = 3.0
+"""Times the pumped flow that no piston moves, whatever is wrong in the rig file [dimensionless]."""
+
 RPM = 60.0 / (2.0 * np.pi)
 TURN = 2.0 * np.pi
 TURNS: Mapping[float, str] = {
