@@ -227,9 +227,7 @@ class RigCode(Code):
     PRESSURE_DRIFTS = (
         "pressure's offset drifts by {drift_pa:.4g|bar} ± {half_width_pa:.2g|bar} bar over the log; it was subtracted"
     )
-    PRESSURE_SIDES = (
-        "one chamber gauge reads {percent:z.2f} ± {half_width:.2g} % more than the other; the fit includes this"
-    )
+    PRESSURE_SIDES = "chamber gauges differ by {percent:z.2f} ± {half_width:.2g} % in gain; the fit includes this"
     ENCODER_ZERO = "position_m reads {zero_mm:.1f} ± {half_width_mm:.1f} mm at mid-stroke; it was shifted to zero there"
     POSITION_PLAY = (
         "position_m follows the piston with about {play_um:.1g} um of play (backlash); the play was corrected"

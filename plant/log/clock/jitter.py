@@ -146,8 +146,12 @@ def resampled(grid: Grid, time: Array, values: Array) -> Array:
     return out
 
 
+TOGETHER = 0.01
+"""Step up to which two stamps count as one, over the usual step [fraction]; judged."""
+
+
 def _slopes(t: Array, y: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the slope of a cubic through five samples at each, and whether no gap lies between them."""
+    """Return the slope of a cubic through five samples at each, and whether they tell one: no gap lies between them."""
     half, usual = POINTS // 2, float(np.median(np.diff(t)))
     first = np.clip(np.arange(len(t)) - half, 0, len(t) - POINTS)
     rows = first[:, None] + np.arange(POINTS)
@@ -156,6 +160,7 @@ def _slopes(t: Array, y: Array) -> tuple[Array, NDArray[np.bool_]]:
     normal = np.swapaxes(powers, 1, 2) @ powers
     right = np.swapaxes(powers, 1, 2) @ (y[rows] - y[:, None])[:, :, None]
     whole = np.ptp(t[rows], axis=1) <= GAP * (POINTS - 1) * usual
+    whole &= np.count_nonzero(np.diff(t[rows], axis=1) > TOGETHER * usual, axis=1) >= 3  # a cubic takes four
     normal[~whole] = np.eye(4)
     slopes: Array = np.linalg.solve(normal, right)[:, 1, 0].astype(np.float64) / usual
     return slopes, whole

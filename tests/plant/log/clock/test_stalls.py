@@ -56,3 +56,14 @@ def test_a_clock_that_goes_slower_for_a_while_is_no_stall() -> None:
     """Rows that are late do not come at once then: they were sampled when they say."""
     time = EVEN + 5e-3 * np.clip(1.0 - np.abs(EVEN - 2.0) / 0.05, 0.0, 1.0)
     assert stalled_clock(time) is None
+
+
+def test_rows_that_come_at_once_beside_lost_ones_are_read() -> None:
+    """No clock is told then, and no cubic goes through stamps a nanosecond apart."""
+    time = np.delete(stalled(apart=1e-9), np.arange(2500, 2503))
+    sample_time, position, notes = read(
+        np.sort(time + 1e-4 * RNG.uniform(0.0, 1.0, len(time)) * (np.diff(time, append=9.0) > 1e-6))
+    )
+    assert sample_time == pytest.approx(1e-3, rel=0.02)
+    assert notes[0].code == "time_jitters"
+    assert np.nanstd(position) > 0.0
