@@ -66,8 +66,9 @@ EXPLAINED, KNOWN, TOLD = 0.9, 0.1, 4.0
 """Share of the flow that a balance must explain, relative deviation at which its factor counts, and deviations from
 zero at which a sign does."""
 
-FAST = 2.0
-"""Times the motor's limit that no speed in revolutions a minute is [dimensionless]; judged."""
+FAST, SIX = 2.0, 6.0
+"""Times the motor's limit that no speed in revolutions a minute is, judged; and deg/s in one such [dimensionless]. Half
+way between the two the piston goes the root of that as far as deg/s say."""
 
 REFUTED = 2.0
 """Times what a balance leaves unexplained by which the piston's flow must differ from the rig's before a slip of units
@@ -271,7 +272,7 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
     slips: list[tuple[str, str, float]] = []
     if turn is not None and believed[0] and gone < NEAR * turn:
         said = " or ".join(TURNS[one] for one in TURNS if one == turn or one in alike)
-        degrees = turn == min(TURNS) and fast > FAST * RPM
+        degrees = turn == min(TURNS) and fast > FAST * RPM and gone * DEGREES < SIX**0.5
         slips.append((SPEED, IN_DEGREES, DEGREES) if degrees else (SPEED, said, 1.0 / turn))
     if (
         length is not None and believed[1] and gone < NEAR * length and not (slips and " and " in moved)
