@@ -80,8 +80,17 @@ class IdentificationCode(Code):
         "linear model was chosen"
     )
     SIGN_NOT_MEASURED = (
-        "{output!r} seems to be measured without its sign: log the sign, or use --structure wiener, which leaves "
-        "{left:.0%} of the linear model's error on held-back data"
+        "{output!r} seems to be measured without its sign: a linear model of the signed output was taken, whose "
+        "absolute value leaves {left:.0%} of the error of a linear model of the column as it is (held-back data); log "
+        "the sign, and poles and gain are told too"
+    )
+    OUTPUT_CUT_OFF = (
+        "{output!r} is cut off at {limits} ({share:.0%} of the samples): the transfer function is that of the plant "
+        "before, from the other samples, and simulated outputs end there"
+    )
+    OUTPUT_STOPPED = (
+        "{output!r} stands at a stop at {limits} ({share:.0%} of the samples): the transfer function is that of the "
+        "plant between its stops, and simulated outputs end there"
     )
     UNRELATED = (
         "the inputs explain {output!r} no better than the same inputs in a shuffled order: the output drifts by itself,"
@@ -139,6 +148,8 @@ WARNED = (
     IdentificationCode.INTEGRATES,
     IdentificationCode.SLOWER_THAN_PERIOD,
     IdentificationCode.SIGN_NOT_MEASURED,
+    IdentificationCode.OUTPUT_CUT_OFF,
+    IdentificationCode.OUTPUT_STOPPED,
     IdentificationCode.FEEDBACK,
     IdentificationCode.INPUTS_ALIKE,
     IdentificationCode.OUTLIERS,

@@ -52,6 +52,9 @@ class ColumnFit:
     response: Path | None = None
 
 
+AT_OUTPUT = ("absolute-value", "cut-off", "stops")
+"""Kinds of nonlinearity that are at the output, as friction is; others are at the input."""
+
 BLANK: Result = {
     **dict.fromkeys(("inputs", "input", "output", "structure", "order", "n_values", "sample_time_s")),
     **dict.fromkeys(("fit_percent", "rmse", "one_step_percent", "one_step_rmse", "held_back_percent", "offset")),
@@ -198,7 +201,7 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
                 for name, one in bend.items()
                 if name != "kind"
             )
-            place = "output" if "friction" in bend["kind"] or bend["kind"] == "absolute-value" else "input"
+            place = "output" if "friction" in bend["kind"] or bend["kind"] in AT_OUTPUT else "input"
             yield f"{result['output']}: {bend['kind'].replace('-', ' ')} at {result[place]}, {values}"
     yield (
         f"From {', '.join(results[0]['inputs'])}. Fits are of free runs: on the fitted logs, on blocks held back from "

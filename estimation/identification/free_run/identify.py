@@ -8,25 +8,13 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimation.identification.free_run.absolute_dynamics import AbsoluteDynamics
-from estimation.identification.free_run.absolute_output import refitted_absolute
-from estimation.identification.free_run.candidate_rows import (
-    absolute_row,
-    hammerstein_row,
-    polynomial_row,
-)
-from estimation.identification.free_run.choose_absolute import (
-    AbsoluteCandidate,
-    absolute_candidates,
-    chosen_absolute,
-    from_zero,
-    may_lack_sign,
-)
+from estimation.identification.free_run.candidate_rows import hammerstein_row, polynomial_row
 from estimation.identification.free_run.choose_hammerstein import (
     HammersteinCandidate,
     hammerstein_candidates,
     worthwhile,
 )
+from estimation.identification.free_run.choose_limited import LimitedCandidate, limited_candidate
 from estimation.identification.free_run.choose_linear import Candidate
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate, polynomial_candidates
 from estimation.identification.free_run.data import (
@@ -52,6 +40,7 @@ from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.log_offsets import believed, levelled
 from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.nonlinear_outputs import absolute, limited, told, without_sign
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.random_walk import followed_walk, from_changes, wandering
@@ -70,9 +59,6 @@ HIGHEST = 6
 MOST_CHOSEN, MOST_COMPARED, MOST_FITTED = 10_000, 5_000, 100_000
 """Samples on which linear models are compared, on which nonlinear ones are compared with them, and on which a nonlinear
 model is fitted at the end."""
-
-SIGNLESS = 0.5
-"""Share of the linear model's held-back error that a model without a sign may leave: signs that are told are many."""
 
 ROUNDING = 1e-9
 """Held-back error of a linear model below which nothing is left but rounding: no bend is looked for [dimensionless]."""
@@ -100,9 +86,9 @@ def identify_channels(
         unless the polynomial one is clearly better on blocks held back, or of one input the next. Of one input also
         ``"hammerstein"``: a dead zone, saturation or backlash in front of a linear model, where one of them is better
         there than none; and the keys of `other_structures.ADOPTED`, at the order that output error is given.
-        ``"wiener"``: linear, its output measured without a sign; of outputs that may be, ``"auto"`` tries it too.
-        Where the output wanders by itself, ``"output-error"`` and ``"auto"`` fit a linear model to changes from sample
-        to sample (`random_walk`).
+        ``"wiener"``: linear, its output measured without a sign. ``"output-error"`` and ``"auto"`` take it where the
+        output seems to lack its sign, give a model limits where the output stands at them, and fit it to changes from
+        sample to sample where the output wanders by itself (`random_walk`).
     order, delay, n_numerator : int, optional
         Of every input; chosen by the free run on blocks held back where not given.
 
@@ -176,16 +162,23 @@ def _identified(
         return _adopted(structure, linear)
     if structure == "auto" and linear.best.held_back < ROUNDING:
         structure = "output-error"
+    asked = structure == "wiener"
     if structure in ("output-error", "auto", "wiener"):
-        signless = _without_sign(linear, surely=structure != "wiener")
-        if signless is not None and structure != "output-error":
-            return _absolute(signless, linear)
-        if signless is not None:
-            left = signless.held_back / linear.best.held_back
-            linear.notes.insert(0, IdentificationCode.SIGN_NOT_MEASURED.note(output=data.output, left=left))
-            # where inputs of the log keep one sign, blocks show nothing of what others bring
-            return replace(linear.identified(), sound=False)
+        signless, within = without_sign(linear, MOST_COMPARED, surely=not asked), None
+        if not asked:
+            within = limited_candidate(linear)
+        if signless is not None and (within is None or signless.held_back < within.held_back):
+            return absolute(signless, linear, MOST_FITTED, asked=asked)
+        if within is not None:
+            return _limited(within, linear, structure)
     return linear.identified() if structure == "output-error" else _nonlinear_or_linear(structure, linear)
+
+
+def _limited(within: LimitedCandidate, linear: LinearComparison, structure: str) -> Identified:
+    """Return a linear model whose output has limits, or of ``auto`` a nonlinear one that leaves less held back."""
+    found = limited(within, linear)
+    other = _nonlinear_or_linear(structure, linear) if structure == "auto" else found
+    return other if other.held_back_percent > found.held_back_percent else found
 
 
 def _nonlinear_or_linear(structure: str, linear: LinearComparison) -> Identified:
@@ -245,7 +238,7 @@ def _polynomial(
     data, by = linear.task.data, linear.task.by
     dynamics = replace(_refitted(taken, linear.task.whole), fallback=fallback)
     model = FreeRunModel(data.inputs, data.output, data.sample_time, "narx", by, dynamics)
-    found = _told(model, data, taken.held_back, linear.rows)
+    found = told(model, linear, taken.held_back)
     if related:
         return found
     return replace(found, notes=(IdentificationCode.UNRELATED.note(output=data.output), *found.notes), sound=False)
@@ -270,40 +263,7 @@ def _bent(taken: HammersteinCandidate, linear: LinearComparison, fallback: Fallb
     fit = finished(taken.fit, whole) if section(whole, MOST_COMPARED) is whole else refitted(taken.fit, part)
     dynamics = replace(HammersteinDynamics.of(fit, deviations(fit, part)), fallback=fallback)
     model = FreeRunModel(data.inputs, data.output, data.sample_time, "hammerstein", by, dynamics)
-    return _told(model, data, taken.held_back, linear.rows)
-
-
-def _told(model: FreeRunModel, data: Channels, held_back: float, rows: list[dict[str, Any]]) -> Identified:
-    """Return a nonlinear model with its quality, not to be believed where it has none."""
-    quality = model.quality(data.u, data.y)
-    sound = quality.fit_percent > 0.0 and held_back < 1.0
-    notes = () if sound else (IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent),)
-    return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(rows), notes, sound)
-
-
-def _without_sign(linear: LinearComparison, *, surely: bool) -> AbsoluteCandidate | None:
-    """Return the best model of a size whose sign is not measured; None where there is none, or a linear one will do."""
-    data, by = section(linear.task.whole, MOST_COMPARED), linear.task.by
-    if surely and not may_lack_sign(data, by):
-        return None
-    found = absolute_candidates(data, by, linear.task.asked)
-    linear.rows.extend(map(absolute_row, found))
-    if not found and not surely:
-        raise HydrostateError(f"no model of {data.output!r} without its sign has poles quicker than a held-back block")
-    if not found:
-        return None
-    taken = chosen_absolute(found)
-    # a block that holds the only step of the inputs says little, so the fit of all of them has to agree
-    explains = taken.bic / data.n_samples < linear.best.bic / linear.task.part.n_samples
-    return None if surely and not (explains and taken.held_back < SIGNLESS * linear.best.held_back) else taken
-
-
-def _absolute(taken: AbsoluteCandidate, linear: LinearComparison) -> Identified:
-    """Return a model whose output has no sign, fitted to all data."""
-    data, by = linear.task.data, linear.task.by
-    fit = refitted_absolute(taken.fit, from_zero(section(linear.task.whole, MOST_FITTED), by))
-    model = FreeRunModel(data.inputs, data.output, data.sample_time, "wiener", by, AbsoluteDynamics.of(fit, taken.zero))
-    return _told(model, data, taken.held_back, linear.rows)
+    return told(model, linear, taken.held_back)
 
 
 def _adopted(structure: str, compared: LinearComparison) -> Identified:

@@ -12,6 +12,7 @@ from estimation.identification.free_run.absolute_dynamics import AbsoluteDynamic
 from estimation.identification.free_run.data import Scaling
 from estimation.identification.free_run.dynamics import Dynamics
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
+from estimation.identification.free_run.limited_dynamics import LimitedDynamics
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.state_space.dynamics import StateSpaceDynamics
@@ -30,7 +31,14 @@ VERSION = 1
 
 KINDS: Mapping[str, Any] = {
     one.kind: one
-    for one in (LinearDynamics, PolynomialDynamics, HammersteinDynamics, AbsoluteDynamics, StateSpaceDynamics)
+    for one in (
+        LinearDynamics,
+        PolynomialDynamics,
+        HammersteinDynamics,
+        AbsoluteDynamics,
+        LimitedDynamics,
+        StateSpaceDynamics,
+    )
 }
 """Dynamics by what a saved model calls them."""
 
@@ -93,6 +101,8 @@ class FreeRunModel:
             return self.dynamics.nonlinearity(self.scaling, self.sample_time)
         if isinstance(self.dynamics, AbsoluteDynamics):
             return self.dynamics.nonlinearity(self.sample_time)
+        if isinstance(self.dynamics, LimitedDynamics):
+            return self.dynamics.limits.nonlinearity(self.scaling)
         return None
 
     def simulate(self, u: ArrayLike, y: ArrayLike | None = None) -> Array:

@@ -1,0 +1,150 @@
+"""Whether an output has limits, and the linear model between them: by the free run on blocks held back."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.identification.free_run.choose_linear import criteria, slowest_pole, smallest
+from estimation.identification.free_run.data import FEWEST, Channels, blocks
+from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled, told_apart
+from estimation.identification.free_run.integrating import fit_integrating
+from estimation.identification.free_run.limited_output import LimitedProblem, Limits, at_limits, between, limits_of
+from estimation.identification.free_run.linear_comparison import LinearComparison
+from estimation.identification.free_run.linear_fit import COARSE, fit_linear
+from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
+from estimation.progress import tell
+from estimation.stretches import stretches
+
+ORDERS = 3
+"""Order of the linear model at most."""
+
+MARGIN = 0.02
+"""Share by which limits must do better than none on what was held back, as a nonlinearity at the input must."""
+
+
+@dataclass(frozen=True, eq=False)
+class LimitedCandidate:
+    """A fit between limits with its held-back error.
+
+    Parameters
+    ----------
+    block_errors : tuple of float
+        Root-mean-square free-run error of each block held back, over the output's deviation [dimensionless].
+    bic : float
+        Information criterion of the free run [dimensionless].
+    """
+
+    fit: LinearFit
+    limits: Limits
+    block_errors: tuple[float, ...]
+    bic: float
+
+    @property
+    def held_back(self) -> float:
+        """Root mean square over the blocks [dimensionless]."""
+        return pooled(self.block_errors)
+
+    def outlasts(self, length: float) -> bool:
+        """Return whether a time constant is longer than so many samples."""
+        return slowest_pole(self.fit.f) > float(np.exp(-1.0 / length))
+
+
+def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
+    """Return the best model between limits, where it is better than the linear one; None where there is none.
+
+    Parameters
+    ----------
+    one : LinearComparison
+        Models without limits.
+    """
+    data = one.task.part
+    limits = limits_of(data)
+    if limits is None:
+        return None
+    orders = sorted({one.task.orders[0]} if len(one.task.orders) == 1 else set(one.task.orders[:ORDERS]))
+    delays = one.task.delays or one.best.form.delays
+    found = [
+        _judged(_fitted(form, data, limited, one), data, limited)
+        for limited in (limits, replace(limits, stops=True))
+        for order in orders
+        for form in _forms(order, delays, one.task.asked.n_numerator)
+    ]
+    # what is cut off and slow would go far behind the limit, and come back late: a stop is another thing
+    found = [each for each in found if each.limits.stops or not each.outlasts(data.told / (BLOCKS + 1.0))]
+    if not found:
+        return None
+    taken = smallest(found, min(each.held_back for each in found))
+    best = one.best
+    if not taken.held_back < (1.0 - MARGIN) * best.held_back:
+        return None
+    return taken if told_apart(taken.block_errors, best.block_errors) else None
+
+
+def refitted_limited(taken: LimitedCandidate, data: Channels) -> LinearFit:
+    """Return the fit of a candidate taken on, on the same data or more of them.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    """
+    problem, fit = LimitedProblem(taken.fit.form, data, taken.limits), taken.fit
+    theta = fit.theta
+    if theta.size != problem.inner.n_parameters:
+        theta = _begun(fit.f, data, taken.limits, fit.form)
+    return problem.descend(theta)
+
+
+def _forms(order: int, delays: tuple[int, ...], sizes: int | None) -> list[Form]:
+    """Return forms of one order, with and without an answer within one sample."""
+    if sizes is not None:
+        return [Form(order, (sizes,) * len(delays), delays)]
+    late = tuple(max(delay, 1) for delay in delays)
+    return [Form(order, (order + 1,) * len(delays), delays), Form(order, (order,) * len(delays), late)]
+
+
+def _fitted(form: Form, data: Channels, limits: Limits, one: LinearComparison) -> LinearFit:
+    """Return the best fit of one form: begun at what outputs between limits tell, and at models without limits."""
+    tell("outputs with limits")
+    problem = LimitedProblem(form, data, limits)
+    free = _pieces(data, limits) if limits.stops else between(data, limits)
+    starts = [fit_linear(form, free, least_gain=COARSE).f]
+    if limits.stops and form.order > 0:
+        integrating = fit_integrating(form, free, starts, search=True, least_gain=COARSE)
+        starts += [integrating.f] if np.isfinite(integrating.cost) else []
+    starts += [each.fit.f for each in one.candidates if each.form == form]
+    fits = [problem.descend(_begun(f, data, limits, form), least_gain=COARSE) for f in starts]
+    return min(fits, key=lambda fit: fit.cost)
+
+
+def _begun(f: Array, data: Channels, limits: Limits, form: Form) -> Array:
+    """Return values of a denominator, from outputs between limits."""
+    if not limits.stops:
+        return Problem(form, between(data, limits)).profiled(f)[1]
+    values = Problem(form, _pieces(data, limits)).profiled(f)[1][: form.n_values]
+    problem = LimitedProblem(form, data, limits)
+    return problem.begun(np.concatenate([values, np.zeros(form.order * len(data.y))]))
+
+
+def _pieces(data: Channels, limits: Limits) -> Channels:
+    """Return what lies between stays at a limit as logs of their own."""
+    u, y = list[Array](), list[Array]()
+    for inputs, output in zip(data.u, data.y, strict=True):
+        for first, last in zip(*stretches(~at_limits(output, limits)), strict=True):
+            if np.count_nonzero(np.isfinite(output[first:last])) >= FEWEST:
+                u.append(np.ascontiguousarray(inputs[first:last]))
+                y.append(output[first:last])
+    return replace(data, u=tuple(u), y=tuple(y)) if u else between(data, limits)
+
+
+def _judged(fit: LinearFit, data: Channels, limits: Limits) -> LimitedCandidate:
+    """Return a fit with its errors on blocks held back, each by a fit to the others."""
+    target, errors, whole = np.concatenate(data.y), list[float](), LimitedProblem(fit.form, data, limits)
+    for masks in blocks(data, BLOCKS):
+        tell("outputs with limits")
+        part = LimitedProblem(fit.form, data.without(masks), limits).descend(fit.theta, least_gain=COARSE)
+        output = whole.jacobian(part.theta)[0]
+        errors.append(block_error(output - target, np.concatenate(masks) & np.isfinite(target)))
+    values = fit.theta.size + limits.count
+    return LimitedCandidate(fit, limits, tuple(errors), criteria(fit.cost, values, data.n_samples)[0])

@@ -1,0 +1,83 @@
+"""A linear model whose output is cut off or held by stops, in the data's scale: its free run and its JSON form."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from estimation.arrays import Array
+from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.limited_output import LimitedProblem, Limits, at_limits
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
+from estimation.identification.free_run.linear_problem import Form, LinearFit
+
+
+@dataclass(frozen=True, eq=False)
+class LimitedDynamics(LinearDynamics):
+    """Transfer functions with one denominator, an offset, and limits of the output.
+
+    Parameters
+    ----------
+    limits : Limits
+        Where the output ends, and how.
+    """
+
+    limits: Limits
+    kind: ClassVar[str] = "limited"
+
+    @property
+    def n_values(self) -> int:
+        """Fitted coefficients, limits among them."""
+        return self.theta.size + self.limits.count
+
+    def run(self, u: Array, y: Array) -> Array:
+        """Return the free run, its initial state by least squares of the outputs that are there.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n, m)
+            Inputs, scaled.
+        y : ndarray, shape (n,)
+            Output, scaled; NaN where missing.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output, scaled.
+        """
+        problem = LimitedProblem(self.form, Channels((), "", 1.0, (u,), (y,)), self.limits)
+        known = np.isfinite(y)
+        if self.limits.stops:
+            # behind a stop nothing is left of what came before it
+            ends = np.flatnonzero(at_limits(y, self.limits))
+            known &= np.arange(y.size) < (ends[0] if ends.size else y.size)
+        else:
+            known &= ~at_limits(y, self.limits)
+        theta, states = np.concatenate([self.theta, np.zeros(self.form.order)]), slice(self.theta.size, None)
+        if np.count_nonzero(known) <= self.form.order:
+            return self._carried(problem, theta, y)
+        driven, slopes = problem.inner.jacobian(theta)
+        theta[states] = np.linalg.lstsq(slopes[known, states], (y - driven)[known], rcond=None)[0]
+        return self._carried(problem, theta, y)
+
+    def _carried(self, problem: LimitedProblem, theta: Array, y: Array) -> Array:
+        """Return the run after initial states were taken on, all outputs counted."""
+        if np.count_nonzero(np.isfinite(y)) > self.form.order:
+            theta = problem.begun(theta)
+        return problem.jacobian(theta)[0]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return JSON values."""
+        return {**super().to_dict(), "limits": self.limits.to_dict()}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> "LimitedDynamics":
+        """Return the dynamics that `to_dict` wrote."""
+        form = Form(int(values["order"]), tuple(values["sizes"]), tuple(values["delays"]))
+        return cls(form, np.array(values["values"], dtype=np.float64), Limits.from_dict(values["limits"]))
+
+    @classmethod
+    def within(cls, fit: LinearFit, limits: Limits) -> "LimitedDynamics":
+        """Return the dynamics of a fit between limits."""
+        return cls(fit.form, fit.theta[: fit.form.n_values], limits)

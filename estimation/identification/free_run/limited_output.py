@@ -1,0 +1,232 @@
+"""Output error of a linear model whose output has limits: a sensor or converter that is cut off, or a stop.
+
+What is cut off goes on behind its limit. What leans on a stop does not: it leaves as soon as it is driven away, so its
+output is the sum of what the linear model's changes, held between the limits. Both have exact derivatives: none by what
+came before the last time that a stop was left, and none at a limit.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from estimation.arrays import Array, BoolArray, IntArray
+from estimation.identification.free_run.data import Channels, Scaling
+from estimation.identification.free_run.linear_kernel import settles
+from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
+from estimation.identification.search.jit import compiled
+from estimation.identification.search.levenberg import levenberg
+
+TOLERANCE, MOST_STEPS = 1e-9, 60
+"""Share of the cost that a further step may promise at the end, and evaluations at most."""
+
+STATE_STEPS = 8
+"""Evaluations of a run whose initial state alone is fitted, at most."""
+
+NOISE_BAND = 6.0
+"""Deviations of the noise over which outputs at a limit spread, three to each side [dimensionless]."""
+
+ROUNDING = 1e-9
+"""Share of the output's range over which outputs at a limit without noise spread [dimensionless]."""
+
+LEAST_SHARE, LONGEST, PILED = 0.01, 5, 2.0
+"""Share of all samples that stand at a limit, samples of the longest stay, and how many times as many there are as in
+the next band of the same width, at least. They only ask for a comparison, which decides [dimensionless]."""
+
+SMOOTH = np.sqrt(6.0) * 0.6745
+"""Median of the magnitude of second differences of white noise, over its deviation [dimensionless]."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Where an output ends.
+
+    Parameters
+    ----------
+    low, high : float
+        Infinite where there is no limit [scaled].
+    near : float
+        How far outputs at a limit are from it at most [scaled].
+    stops : bool
+        Whether the plant itself stops there; else only what is measured is cut off.
+    """
+
+    low: float
+    high: float
+    near: float
+    stops: bool = False
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return int(np.isfinite(self.low)) + int(np.isfinite(self.high))
+
+    def nonlinearity(self, by: Scaling) -> dict[str, Any]:
+        """Return the kind, and limits without intervals [output unit].
+
+        Parameters
+        ----------
+        by : Scaling
+            Of the channels.
+        """
+        ends = {"low": self.low, "high": self.high}
+        told = {name: by.y_mean + by.y_std * end for name, end in ends.items() if np.isfinite(end)}
+        kind = "stops" if self.stops else "cut-off"
+        return {"kind": kind, **{name: {"value": end, "std": None, "ci95": None} for name, end in told.items()}}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return JSON values; no limit is None."""
+        low, high = (one if np.isfinite(one) else None for one in (self.low, self.high))
+        return {"low": low, "high": high, "near": self.near, "stops": self.stops}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> "Limits":
+        """Return the limits that `to_dict` wrote."""
+        low = -np.inf if values["low"] is None else float(values["low"])
+        high = np.inf if values["high"] is None else float(values["high"])
+        return cls(low, high, float(values["near"]), bool(values["stops"]))
+
+
+def limits_of(data: Channels) -> Limits | None:
+    """Return the ends at which an output stands for a while, or None where it does not.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    """
+    bends = np.concatenate([np.abs(np.diff(y, 2)) for y in data.y])
+    known = np.concatenate(data.y)
+    known = known[np.isfinite(known)]
+    if not np.isfinite(bends).any():
+        return None
+    noise = float(np.nanmedian(bends)) / SMOOTH
+    band = max(NOISE_BAND * noise, ROUNDING * float(np.ptp(known)))
+    high, low = _end(data.y, band), -_end([-y for y in data.y], band)
+    return Limits(low, high, band / 2.0) if np.isfinite([low, high]).any() else None
+
+
+def _end(logs: Sequence[Array], band: float) -> float:
+    """Return the upper end at which outputs stand, infinite where they do not."""
+    y = np.concatenate(logs)
+    top = float(np.nanmax(y))
+    there, below = y >= top - band, (y < top - band) & (y >= top - 2.0 * band)
+    share = np.count_nonzero(there) / np.count_nonzero(np.isfinite(y))
+    many = share >= LEAST_SHARE and np.count_nonzero(there) > PILED * np.count_nonzero(below)
+    longest = max(_longest(one >= top - band) for one in logs)
+    return float(np.median(y[there])) if many and longest >= LONGEST else float("inf")
+
+
+def _longest(mask: BoolArray) -> int:
+    """Return the length of the longest run of a mask."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+def at_limits(y: Array, limits: Limits) -> BoolArray:
+    """Return where an output stands at a limit, shape (n,); nowhere where it is missing."""
+    return np.asarray((y >= limits.high - limits.near) | (y <= limits.low + limits.near))
+
+
+def between(data: Channels, limits: Limits) -> Channels:
+    """Return channels without the outputs at a limit."""
+    return data.without([at_limits(y, limits) for y in data.y])
+
+
+class LimitedProblem:
+    """Sensitivities of one form on given data, its output between limits."""
+
+    def __init__(self, form: Form, data: Channels, limits: Limits) -> None:
+        self.inner, self.form, self.limits = Problem(form, data), form, limits
+
+    def jacobian(self, theta: Array) -> tuple[Array, Array]:
+        """Return the output and its derivative by every value.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (p,)
+            As the linear model has them.
+
+        Returns
+        -------
+        tuple of ndarray, shapes (n,) and (n, p)
+            Output and derivatives, scaled.
+        """
+        free, slopes = self.inner.jacobian(theta)
+        if not self.limits.stops:
+            output = np.clip(free, self.limits.low, self.limits.high)
+            slopes[output != free] = 0.0
+            return output, slopes
+        output, left = np.empty_like(free), np.full(free.size, -1)
+        for first, last in zip(self.inner.bounds[:-1], self.inner.bounds[1:], strict=True):
+            part = slice(int(first), int(last))
+            stopped(free[part], self.limits.low, self.limits.high, output[part], left[part])
+            left[part][left[part] >= 0] += int(first)
+        behind = left >= 0
+        slopes[behind] -= slopes[left[behind]]
+        return output, slopes
+
+    def descend(self, theta: Array, *, least_gain: float = 0.0) -> LinearFit:
+        """Return the minimum that one start leads to.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (p,)
+            As the linear model has them.
+        least_gain : float
+            As `levenberg` takes it [dimensionless].
+        """
+        poles = slice(self.form.n_b, self.form.n_b + self.form.order)
+        cost, best = levenberg(
+            self._at,
+            theta,
+            lambda values: settles(values[poles]),
+            tolerance=TOLERANCE,
+            most_steps=MOST_STEPS,
+            least_gain=least_gain,
+        )
+        return LinearFit(self.form, best, self.inner.share * cost)
+
+    def begun(self, theta: Array) -> Array:
+        """Return values with the initial states that suit the outputs best, all others as they are."""
+        free = self.form.n_values
+
+        def at(states: Array) -> tuple[float, Array, Array]:
+            cost, gram, slope = self._at(np.concatenate([theta[:free], states]))
+            return cost, gram[free:, free:], slope[free:]
+
+        states = levenberg(at, theta[free:], lambda _: True, tolerance=TOLERANCE, most_steps=STATE_STEPS)[1]
+        return np.concatenate([theta[:free], states])
+
+    def _at(self, values: Array) -> tuple[float, Array, Array]:
+        output, slopes = self.jacobian(values)
+        left = output - self.inner.y
+        return self.inner.counted.square(left), *self.inner.counted.normal_equations(slopes, left)
+
+
+@compiled
+def stopped(free: Array, low: float, high: float, output: Array, left: IntArray) -> None:
+    """Hold a series between stops: it moves as a free one does, but for what would lead beyond them.
+
+    Parameters
+    ----------
+    free : ndarray, shape (n,)
+        The free series.
+    low, high : float
+        Stops.
+    output : ndarray, shape (n,)
+        The series between them; overwritten.
+    left : ndarray of int, shape (n,)
+        The latest sample at a stop, or -1 before any; overwritten.
+    """
+    above, last = 0.0, -1
+    for t in range(free.size):
+        value = free[t] + above
+        if value > high:
+            value, last = high, t
+        elif value < low:
+            value, last = low, t
+        above = value - free[t]
+        output[t] = value
+        left[t] = last

@@ -1,0 +1,157 @@
+"""Outputs that are a nonlinear function of what a linear model gives: without its sign, cut off, or held by stops."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from estimation.identification.fit.feedback import feedback_note
+from estimation.identification.free_run.absolute_dynamics import AbsoluteDynamics
+from estimation.identification.free_run.absolute_output import refitted_absolute
+from estimation.identification.free_run.candidate_rows import absolute_row
+from estimation.identification.free_run.choose_absolute import (
+    AbsoluteCandidate,
+    absolute_candidates,
+    chosen_absolute,
+    from_zero,
+    may_lack_sign,
+)
+from estimation.identification.free_run.choose_limited import LimitedCandidate, refitted_limited
+from estimation.identification.free_run.data import section
+from estimation.identification.free_run.identified import Identified
+from estimation.identification.free_run.limited_dynamics import LimitedDynamics
+from estimation.identification.free_run.limited_output import at_limits, between
+from estimation.identification.free_run.linear_comparison import LinearComparison
+from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.transfer_function import linear_model
+from estimation.identification.notes import IdentificationCode
+from plant.errors import HydrostateError
+from plant.notes import Note
+
+SIGNLESS = 0.5
+"""Share of the linear model's held-back error that a model without a sign may leave: signs that are told are many."""
+
+
+def without_sign(linear: LinearComparison, most: int, *, surely: bool) -> AbsoluteCandidate | None:
+    """Return the best model of an output without its sign; None where there is none, or a linear one will do.
+
+    Parameters
+    ----------
+    linear : LinearComparison
+        Models of the output as it is.
+    most : int
+        Samples on which nonlinear models are compared.
+    surely : bool
+        Whether it must be clearly better: nobody has asked for it.
+
+    Raises
+    ------
+    HydrostateError
+        If one was asked for and there is none.
+    """
+    data, by = section(linear.task.whole, most), linear.task.by
+    if surely and not may_lack_sign(data, by):
+        return None
+    found = absolute_candidates(data, by, linear.task.asked)
+    linear.rows.extend(map(absolute_row, found))
+    if not found and not surely:
+        raise HydrostateError(f"no model of {data.output!r} without its sign has poles quicker than a held-back block")
+    if not found:
+        return None
+    taken = chosen_absolute(found)
+    # a block that holds the only step of the inputs says little, so the fit of all of them has to agree
+    explains = taken.bic / data.n_samples < linear.best.bic / linear.task.part.n_samples
+    return None if surely and not (explains and taken.held_back < SIGNLESS * linear.best.held_back) else taken
+
+
+def absolute(taken: AbsoluteCandidate, linear: LinearComparison, most: int, *, asked: bool) -> Identified:
+    """Return a model whose output has no sign, fitted to all data.
+
+    Parameters
+    ----------
+    taken : AbsoluteCandidate
+        What was chosen.
+    linear : LinearComparison
+        Models of the output as it is.
+    most : int
+        Samples that are fitted at most.
+    asked : bool
+        Whether it was asked for; else a note says that it was taken.
+    """
+    data, by = linear.task.data, linear.task.by
+    fit = refitted_absolute(taken.fit, from_zero(section(linear.task.whole, most), by))
+    model = FreeRunModel(data.inputs, data.output, data.sample_time, "wiener", by, AbsoluteDynamics.of(fit, taken.zero))
+    found, left = told(model, linear, taken.held_back), taken.held_back / max(linear.best.held_back, 1e-300)
+    said = () if asked else (IdentificationCode.SIGN_NOT_MEASURED.note(output=data.output, left=left),)
+    return replace(found, notes=(*said, *found.notes))
+
+
+def limited(taken: LimitedCandidate, linear: LinearComparison) -> Identified:
+    """Return a linear model whose output has limits, fitted to all data.
+
+    Parameters
+    ----------
+    taken : LimitedCandidate
+        What was chosen.
+    linear : LinearComparison
+        Models without limits.
+    """
+    data, whole, by, limits = linear.task.data, linear.task.whole, linear.task.by, taken.limits
+    fit = refitted_limited(taken, whole)
+    linear.rows.append(_limited_row(taken))
+    # behind a stop nothing is left of the transfer function's own run, so that it has no covariance from one
+    transfer = None if limits.stops or len(data.inputs) > 1 else linear_model(fit, between(whole, limits), by)
+    named = data.inputs, data.output, data.sample_time, "output-error"
+    model = FreeRunModel(*named, by, LimitedDynamics.within(fit, limits), transfer)
+    found, notes = told(model, linear, taken.held_back), list[Note]()
+    ends = [by.y_mean + by.y_std * one for one in (limits.low, limits.high)]
+    shown = " and ".join(f"{end:.4g}" for end in ends if np.isfinite(end))
+    at = [at_limits(y, limits) for y in whole.y]
+    share = sum(map(np.count_nonzero, at)) / whole.n_samples
+    told_by = {"output": data.output, "limits": shown, "share": share}
+    if limits.stops:
+        notes.append(IdentificationCode.OUTPUT_STOPPED.note(**told_by))
+    else:
+        notes.append(IdentificationCode.OUTPUT_CUT_OFF.note(**told_by))
+    if taken.outlasts(whole.told):
+        notes.append(IdentificationCode.INTEGRATES.note(output=data.output))
+    if len(data.inputs) == 1:
+        k = int(np.argmax([y.size for y in data.y]))
+        left = np.where(at[k], np.nan, data.y[k] - model.simulate(data.u[k], data.y[k]))
+        said = feedback_note(left, data.u[k][:, 0], (data.inputs[0], data.output))
+        notes += [] if said is None else [said]
+    return replace(found, notes=(*notes, *found.notes))
+
+
+def told(model: FreeRunModel, linear: LinearComparison, held_back: float) -> Identified:
+    """Return a nonlinear model with its quality, not to be believed where it has none.
+
+    Parameters
+    ----------
+    model : FreeRunModel
+        Fitted to all data.
+    linear : LinearComparison
+        Linear models that it was compared with.
+    held_back : float
+        Its error on blocks held back, over the output's deviation [dimensionless].
+    """
+    data = linear.task.data
+    quality = model.quality(data.u, data.y)
+    sound = quality.fit_percent > 0.0 and held_back < 1.0
+    notes = () if sound else (IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent),)
+    return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(linear.rows), notes, sound)
+
+
+def _limited_row(one: LimitedCandidate) -> dict[str, Any]:
+    """Return the row of a candidate whose output has limits."""
+    form = one.fit.form
+    return {
+        "structure": "output-error",
+        "nonlinearity": "stops" if one.limits.stops else "cut-off",
+        "order": form.order,
+        "numerator": list(form.sizes),
+        "delay": list(form.delays),
+        "held_back_percent": 100.0 * (1.0 - one.held_back),
+        "bic": one.bic,
+        "doubt": None,
+    }
