@@ -15,6 +15,11 @@ class IdentificationCode(Code):
         "input {input!r} follows the noise of {output!r} (p = {p_value:.1g}): the data seem to come from a closed loop,"
         " where output error is biased; fit ARMAX or Box-Jenkins, or name the column that drives the loop (--reference)"
     )
+    SWAPPED = (
+        "{input!r} seems to answer {output!r}, not the other way round (a model in that direction leaves {back:.0%} of "
+        "the deviation, this one {left:.0%}): exchange --input and --output; if they are right, a controller computes "
+        "{input!r} from {output!r}, and --reference is needed with the column that drives the loop"
+    )
     TWO_STAGES = (
         "only the part of input {input!r} that {reference} explains is used, {share:.0%} of its power: the rest may be "
         "noise fed back by a closed loop"
@@ -151,6 +156,7 @@ WARNED = (
     IdentificationCode.OUTPUT_CUT_OFF,
     IdentificationCode.OUTPUT_STOPPED,
     IdentificationCode.FEEDBACK,
+    IdentificationCode.SWAPPED,
     IdentificationCode.INPUTS_ALIKE,
     IdentificationCode.OUTLIERS,
     IdentificationCode.RANDOM_WALK,

@@ -1,5 +1,6 @@
 """Entries of the JSON contract for identified models: a transfer function, or a model between columns."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.terminal import clauses
@@ -29,9 +30,42 @@ def linear_entries(model: "LinearModel") -> dict[str, Any]:
         "delay": {"samples": model.delay, "seconds": model.delay * model.sample_time},
         "message": (
             f"{model.structure} of order {model.denominator.size - 1}, fit {model.fit_percent:.1f} %, "
-            f"gain {model.dc_gain:.4g}, bandwidth {extent}"
+            f"gain {gain_shown(model.dc_gain, model.dc_gain_std)}, bandwidth {extent}"
         ),
     }
+
+
+def gains_shown(result: Mapping[str, Any]) -> str:
+    """Return the steady gain from each input with one standard deviation; one that is less than it is not determined.
+
+    Parameters
+    ----------
+    result : mapping
+        With ``dc_gain`` and ``notes``.
+    """
+    from estimation.identification.notes import GAIN_MEANS_NOTHING
+
+    gain = result["dc_gain"]
+    if gain is None or gain["value"] is None:
+        return "-"
+    values, spreads = gain["value"], gain.get("std") or 0.0
+    values = [values] if isinstance(values, float) else values
+    each = zip(values, spreads if isinstance(spreads, list) else [spreads] * len(values), strict=True)
+    nothing = not GAIN_MEANS_NOTHING.isdisjoint(note["code"] for note in result.get("notes", ()))
+    return " ".join("undetermined" if nothing else gain_shown(one, spread) for one, spread in each)
+
+
+def gain_shown(value: float, std: float) -> str:
+    """Return a gain with one standard deviation, where it is more than that.
+
+    Parameters
+    ----------
+    value, std : float
+        Gain and deviation, zero where there is none [output unit / input unit].
+    """
+    if not std <= abs(value):
+        return "undetermined"
+    return f"{value:.4g} ± {std:.1g}" if std else f"{value:.4g}"
 
 
 def with_std(roots: Any, spreads: Any) -> list[dict[str, float]]:

@@ -12,7 +12,7 @@ from experiments.command.options import require_positive
 from experiments.command.output_paths import own_paths, page_place
 from experiments.command.pages import Pages
 from experiments.command.terminal import note, short_names, table
-from experiments.identification.entries import FORMAT_VERSION, linear_entries
+from experiments.identification.entries import FORMAT_VERSION, gains_shown, linear_entries
 from plant.errors import require_known
 
 if TYPE_CHECKING:
@@ -190,10 +190,9 @@ def _judged(model: "LinearModel", u: "Array", y: "Array", log: Path, figure: Pat
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     shown = table("log", "fit [%]", "gain", "bandwidth [Hz]", "coefficients, q^0 q^-1 ...")
     for name, result in zip(short_names(results), results, strict=True):
-        gain = result["dc_gain"]
         bandwidth = "-" if result["bandwidth_hz"] is None else f"{result['bandwidth_hz']:.3g}"
         coefficients = f"b {_spaced(result['numerator'])}\nf {_spaced(result['denominator'])}"
-        said = (f"{result['fit_percent']:.2f}", f"{gain['value']:.4g} ± {gain['std']:.1g}", bandwidth)
+        said = (f"{result['fit_percent']:.2f}", gains_shown(result), bandwidth)
         shown.add_row(name, *said, coefficients)
     yield shown
     ends = f"From {results[0]['input']} to {results[0]['output']}"

@@ -12,7 +12,7 @@ from experiments.command.options import require_positive
 from experiments.command.output_paths import own_paths, page_place
 from experiments.command.pages import Pages
 from experiments.command.terminal import table
-from experiments.identification.entries import column_entries
+from experiments.identification.entries import column_entries, gains_shown
 from experiments.identification.simulate_model import quality_of, record_of, write_simulated
 from plant.errors import HydrostateError, require_known
 
@@ -190,7 +190,7 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
             f"{result['held_back_percent']:.2f}",
             "-" if test is None or isnan(test["fit_percent"]) else f"{test['fit_percent']:.2f}",
             f"{result['rmse']:.4g}",
-            _gains(result),
+            gains_shown(result),
         )
     yield shown
     for result in results:
@@ -205,22 +205,9 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
             yield f"{result['output']}: {bend['kind'].replace('-', ' ')} at {result[place]}, {values}"
     yield (
         f"From {', '.join(results[0]['inputs'])}. Fits are of free runs: on the fitted logs, on blocks held back from "
-        f"the fit, and on --validate. One-step fits, models and candidates are in --json and --out."
+        f"the fit, and on --validate; gains ± one standard deviation. One-step fits, models and candidates are in "
+        f"--json and --out."
     )
-
-
-def _gains(result: Result) -> str:
-    """Return the steady gain from each input; one that is less than its standard deviation is not determined."""
-    from estimation.identification.notes import GAIN_MEANS_NOTHING
-
-    gain = result["dc_gain"]
-    if gain is None:
-        return "-"
-    values, spreads = gain["value"], gain.get("std") or 0.0
-    values = [values] if isinstance(values, float) else values
-    each = zip(values, spreads if isinstance(spreads, list) else [spreads] * len(values), strict=True)
-    nothing = not GAIN_MEANS_NOTHING.isdisjoint(note["code"] for note in result["notes"])
-    return " ".join("undetermined" if nothing or spread > abs(one) else f"{one:.4g}" for one, spread in each)
 
 
 def _with_interval(one: Mapping[str, Any]) -> str:

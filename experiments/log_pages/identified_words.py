@@ -39,7 +39,7 @@ LEVEL = 0.05
 """Level of the tests of the residual [probability]."""
 
 REASONS = {
-    IdentificationCode.SIGN_NOT_MEASURED: "the output seems to be measured without its sign",
+    IdentificationCode.SWAPPED: "its input seems to answer its output",
     IdentificationCode.WALK_FOLLOWED: "it follows what the output does by itself",
     IdentificationCode.ANSWERS_LATE: "the output seems to answer later than this model does",
 }

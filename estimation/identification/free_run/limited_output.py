@@ -30,7 +30,7 @@ NOISE_BAND = 6.0
 ROUNDING = 1e-9
 """Share of the output's range over which outputs at a limit without noise spread [dimensionless]."""
 
-LEAST_SHARE, LONGEST, PILED = 0.01, 5, 2.0
+LEAST_SHARE, LONGEST, PILED = 0.005, 4, 2.0
 """Share of all samples that stand at a limit, samples of the longest stay, and how many times as many there are as in
 the next band of the same width, at least. They only ask for a comparison, which decides [dimensionless]."""
 
@@ -101,10 +101,13 @@ def limits_of(data: Channels) -> Limits | None:
     known = known[np.isfinite(known)]
     if not np.isfinite(bends).any():
         return None
-    noise = float(np.nanmedian(bends)) / SMOOTH
-    band = max(NOISE_BAND * noise, ROUNDING * float(np.ptp(known)))
-    high, low = _end(data.y, band), -_end([-y for y in data.y], band)
-    return Limits(low, high, band / 2.0) if np.isfinite([low, high]).any() else None
+    noise, exact = float(np.nanmedian(bends)) / SMOOTH, ROUNDING * float(np.ptp(known))
+    # behind a sensor's noise a limit is sharp, before it not
+    for band in (exact, max(NOISE_BAND * noise, exact)):
+        high, low = _end(data.y, band), -_end([-y for y in data.y], band)
+        if np.isfinite([low, high]).any():
+            return Limits(low, high, band / 2.0)
+    return None
 
 
 def _end(logs: Sequence[Array], band: float) -> float:

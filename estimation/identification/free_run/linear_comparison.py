@@ -5,20 +5,28 @@ from typing import Any
 
 import numpy as np
 
+from estimation.arrays import Array
 from estimation.identification.fit.feedback import feedback_note
 from estimation.identification.free_run.believable import believable
 from estimation.identification.free_run.candidate_rows import linear_row
 from estimation.identification.free_run.choose_linear import Candidate, linear_candidates
-from estimation.identification.free_run.data import Channels, Scaling
+from estimation.identification.free_run.data import Channels, Scaling, scaled
 from estimation.identification.free_run.dense_polynomial import Asked
 from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.integrating import refitted_linear
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
+from estimation.identification.free_run.linear_fit import COARSE, fit_linear
+from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.transfer_function import linear_model
 from estimation.identification.free_run.unrelated import linear_explains
 from estimation.identification.notes import IdentificationCode
+from estimation.log_checks.bridging import bridged
 from plant.notes import Note
+
+BACKWARDS, REVERSED = (1, 2), 0.5
+"""Orders of models from output to input, and share of the error that they may leave where columns are swapped: a model
+in the right direction leaves noise, and one against it all that is not seen in advance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +100,8 @@ class LinearComparison:
         named = data.inputs, data.output, data.sample_time, "output-error"
         model = FreeRunModel(*named, by, LinearDynamics.of(fit), transfer)
         quality = model.quality(data.u, data.y)
-        notes, sound = [*self.notes, *fed_back(model, data)], self.sound
+        notes = [*self.notes, *fed_back(model, data)]
+        sound = self.sound and not any(note.code == IdentificationCode.SWAPPED for note in notes)
         if best.doubt == "no_fit" or not quality.fit_percent > 0.0 or not best.held_back < 1.0:
             notes = [*notes, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
             sound = False
@@ -139,4 +148,28 @@ def fed_back(model: FreeRunModel, data: Channels, *, changes: bool = False) -> l
     if changes:
         left, followed = np.diff(left), np.diff(followed)
     said = feedback_note(left, followed, (data.inputs[0], data.output))
-    return [] if said is None else [said]
+    if said is None:
+        return []
+    return [said if changes else swapped(left, data, k) or said]
+
+
+def swapped(left: Array, data: Channels, log: int) -> Note | None:
+    """Return a note where the input answers the output rather than the other way round, or None.
+
+    Parameters
+    ----------
+    left : ndarray, shape (n,)
+        What the model leaves of the output of one log [output unit].
+    data : Channels
+        In units of the channels.
+    log : int
+        Which log.
+    """
+    u, y = data.u[log][:, 0], data.y[log]
+    back, _ = scaled(Channels((data.output,), data.inputs[0], data.sample_time, (bridged(y)[:, None],), (u,)))
+    fits = (fit_linear(Form(order, (order + 1,), (0,)), back, least_gain=COARSE) for order in BACKWARDS)
+    share = float(np.sqrt(min(fit.cost for fit in fits) / back.n_samples))
+    own = float(np.sqrt(np.nanmean(left**2)) / np.nanstd(y))
+    if not share < REVERSED * own:
+        return None
+    return IdentificationCode.SWAPPED.note(input=data.inputs[0], output=data.output, back=share, left=own)

@@ -50,9 +50,9 @@ def detrended(one: LinearComparison, orders: Sequence[int]) -> Detrended | None:
         Of models that are compared; the first few tell the trend.
     """
     task = one.task
-    if not lasts(one.best, one):
-        return None
     part, slow = _beside_time(task.part), one.best.fit
+    if not lasts(one.best, one) and not _leans(one, part):
+        return None
     quickest = float(np.exp(-(BLOCKS + 1.0) / task.part.told))
     delays = slow.form.delays
     # a trend takes the place of the slow pole: of an order that is asked for, one less is left
@@ -85,6 +85,15 @@ def detrended(one: LinearComparison, orders: Sequence[int]) -> Detrended | None:
     slope = rate / (task.whole.longest * task.data.sample_time)
     own.notes.append(IdentificationCode.TREND.note(output=task.data.output, slope=slope))
     return Detrended(own, trends)
+
+
+def _leans(one: LinearComparison, part: Channels) -> bool:
+    """Return whether a trend explains more than chance beside a model that settles, and leaves white noise."""
+    fit = fit_linear(_beside(one.best.form), part, [one.best.fit.f], least_gain=COARSE)
+    if not _bic(fit, part) < _bic(one.best.fit, one.task.part):
+        return False
+    rest = longest_rest(fit, part)
+    return rest.size >= FEWEST and not remembers(rest)
 
 
 def _beside_time(data: Channels) -> Channels:

@@ -13,7 +13,7 @@ from benchmarks.identification.bent_inputs import PLANTED, logged
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
 from experiments.cli import app
-from experiments.identification.of_columns import _gains
+from experiments.identification.entries import gains_shown
 
 
 @pytest.fixture(scope="module")
@@ -299,11 +299,11 @@ def test_a_test_log_whose_input_leaves_the_fitted_range_is_named(tmp_path: Path)
     ],
 )
 def test_a_gain_less_than_its_deviation_is_not_shown_as_a_number(gain: dict[str, object] | None, shown: str) -> None:
-    assert _gains({"dc_gain": gain, "notes": []}) == shown
+    assert gains_shown({"dc_gain": gain, "notes": []}) == shown
 
 
 def test_a_gain_that_means_nothing_is_not_shown_as_a_number() -> None:
-    assert _gains({"dc_gain": {"value": 9.7e6, "std": 1e6}, "notes": [{"code": "integrates"}]}) == "undetermined"
+    assert gains_shown({"dc_gain": {"value": 9.7e6, "std": 1e6}, "notes": [{"code": "integrates"}]}) == "undetermined"
 
 
 def test_a_log_without_time_is_simulated_on_the_model_s_sample_time(logs: list[Path], tmp_path: Path) -> None:
