@@ -125,6 +125,11 @@ class IdentificationCode(Code):
         "input {channel!r} is a linear function of {others}, so how the gain is shared between them means nothing: "
         "leave one out, or log inputs that differ"
     )
+    MORE_THAN_NOISE = (
+        "the linear model leaves {left:.0%} of the deviation of {output!r}, most of which is no noise from sample to "
+        "sample: the plant is nonlinear, or something else drives it. Poles and gain are those of a linear "
+        "approximation, and their deviations do not count this; --structure auto tries nonlinear models"
+    )
     ANSWERS_LATE = (
         "{output!r} seems to answer {input!r} after {dead_time_s:.4g} s, more than a fifth of the log, which is too "
         "long to be judged (a model with this delay leaves {left:.0%} of the error): try --delay {samples}, or a "

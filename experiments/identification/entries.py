@@ -104,6 +104,8 @@ def column_entries(found: "Identified") -> dict[str, Any]:
         result |= {"numerator": [b.tolist() for b, _ in transfer], "denominator": transfer[0][1].tolist()}
         gains = [float(b.sum() / f.sum()) for b, f in transfer]
         result |= {"order": transfer[0][1].size - 1, "offset": model.offset, "dc_gain": {"value": gains}}
+        if found.gain_std:
+            result["dc_gain"]["std"] = list(found.gain_std)
     elif isinstance(model.dynamics, StateSpaceDynamics):
         result |= _state_space_entries(model, model.dynamics)
     result["nonlinearity"] = model.nonlinearity

@@ -179,6 +179,8 @@ def _response(data: "Channels", log: str, path: Path) -> dict[str, Any]:
 
 
 def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
+    from estimation.identification.notes import IdentificationCode
+
     shown = table("output", "structure", "values [-]", "fit [%]", "held back [%]", "test [%]", "rms error", "gain")
     for result in results:
         test = result["test"]
@@ -203,6 +205,10 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
             )
             place = "output" if "friction" in bend["kind"] or bend["kind"] in AT_OUTPUT else "input"
             yield f"{result['output']}: {bend['kind'].replace('-', ' ')} at {result[place]}, {values}"
+    for result in results:
+        if result["outcome"] == "mismatch":
+            yield f"Do not use the model of {result['output']} (outcome mismatch): see the warning above."
+        yield from (note["text"] for note in result["notes"] if note["code"] == IdentificationCode.MORE_THAN_NOISE)
     yield (
         f"From {', '.join(results[0]['inputs'])}. Fits are of free runs: on the fitted logs, on blocks held back from "
         f"the fit, and on --validate; gains ± one standard deviation. One-step fits, models and candidates are in "

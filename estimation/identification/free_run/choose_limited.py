@@ -60,7 +60,7 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
     """
     data = one.task.part
     limits = limits_of(data)
-    if limits is None:
+    if limits is None or min(np.isfinite(y).sum() for y in between(data, limits).y) < FEWEST:
         return None
     orders = sorted({one.task.orders[0]} if len(one.task.orders) == 1 else set(one.task.orders[:ORDERS]))
     delays = one.task.delays or one.best.form.delays

@@ -12,6 +12,10 @@ ALIKE = 1e-10
 """Share of an input's variance that other inputs may leave of it for it to be their linear function: far above what
 rounding leaves, and far below the noise of any sensor or converter [fraction]."""
 
+MUCH, NOISY = 0.1, 0.5
+"""Share of the output's deviation from which what a linear model leaves is worth a word, and share of what is left, by
+deviation, that changes from sample to sample explain as white noise where it is nothing else [dimensionless]."""
+
 MOST_OF_IT = 0.5
 """Share of a model's squared error above which a few outputs decide what is fitted, and not the others [fraction]."""
 
@@ -80,3 +84,29 @@ def outputs_that_stand_out(model: FreeRunModel, data: Channels) -> list[Note]:
     if not theirs > MOST_OF_IT * (theirs + others) and not others > spread:
         return []
     return [IdentificationCode.OUTLIERS.note(output=data.output, count=count, total=data.n_samples)]
+
+
+def more_than_noise(model: FreeRunModel, data: Channels) -> list[Note]:
+    """Return a note if a linear model leaves much of the output, and more than noise from sample to sample.
+
+    Parameters
+    ----------
+    model : FreeRunModel
+        Fitted to the logs.
+    data : Channels
+        In units of the channels.
+
+    Returns
+    -------
+    list of Note
+        One at most.
+    """
+    left = [y - model.simulate(u, y) for u, y in zip(data.u, data.y, strict=True)]
+    total = float(np.nanstd(np.concatenate(left)))
+    changes = np.concatenate([np.diff(one) for one in left])
+    if not np.isfinite(changes).any():
+        return []
+    noise, share = float(np.nanstd(changes)) / 2.0**0.5, total / float(np.nanstd(np.concatenate(data.y)))
+    if not (share > MUCH and noise < NOISY * total):
+        return []
+    return [IdentificationCode.MORE_THAN_NOISE.note(output=data.output, left=share)]

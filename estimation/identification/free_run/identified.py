@@ -27,6 +27,8 @@ class Identified:
         Whether the model may be believed.
     above : tuple of float, or of ndarray, shape (n,)
         How much each log's offset is above the model's, or its trend; empty where they have none [output unit].
+    gain_std : tuple of float
+        Standard deviation of the steady gain from each of several inputs of a linear model [output unit / input unit].
     """
 
     model: FreeRunModel
@@ -36,6 +38,7 @@ class Identified:
     notes: tuple[Note, ...]
     sound: bool
     above: tuple[float | Array, ...] = ()
+    gain_std: tuple[float, ...] = ()
 
     def at_one_offset(self, data: Channels) -> Channels:
         """Return the fitted logs with the model's offset, where each has its own or drifts.

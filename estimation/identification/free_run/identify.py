@@ -27,7 +27,7 @@ from estimation.identification.free_run.data import (
 )
 from estimation.identification.free_run.dead_times import late_answers
 from estimation.identification.free_run.dense_polynomial import Asked
-from estimation.identification.free_run.doubtful_channels import doubtful_channels
+from estimation.identification.free_run.doubtful_channels import doubtful_channels, more_than_noise
 from estimation.identification.free_run.fallback import Fallback
 from estimation.identification.free_run.fewer_samples import on_fewer
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
@@ -129,7 +129,10 @@ def _with_doubts(found: Identified, data: Channels, structure: str, *, looked_fo
         notes += followed_walk(whole, part, range(1, HIGHEST + 1), structure)
     elif looked_for and not any(note.code == IdentificationCode.RANDOM_WALK for note in found.notes):
         notes += late_answers(part, found.quality.rmse / by.y_std)
-    return replace(found, notes=(*found.notes, *notes), sound=found.sound and not notes)
+    doubtful, walks = bool(notes), any(note.code == IdentificationCode.RANDOM_WALK for note in found.notes)
+    if structure == "output-error" == found.model.structure and found.sound and not (doubtful or walks):
+        notes += more_than_noise(found.model, data)
+    return replace(found, notes=(*found.notes, *notes), sound=found.sound and not doubtful)
 
 
 def _identified(

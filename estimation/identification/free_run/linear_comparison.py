@@ -18,7 +18,7 @@ from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import COARSE, fit_linear
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
-from estimation.identification.free_run.transfer_function import linear_model
+from estimation.identification.free_run.transfer_function import gain_deviations, linear_model
 from estimation.identification.free_run.unrelated import linear_explains
 from estimation.identification.notes import IdentificationCode
 from estimation.log_checks.bridging import bridged
@@ -96,7 +96,11 @@ class LinearComparison:
         fit = refitted_linear(best.fit, whole)
         # fitted on, a model with a pole at 1 may come where it cannot be written: what was judged stays
         fit = best.fit if self.task.part is whole and not fit.cost <= best.fit.cost else fit
-        transfer = linear_model(fit, whole, by) if len(data.inputs) == 1 else None
+        alone = len(data.inputs) == 1
+        transfer, spread = (
+            linear_model(fit, whole, by) if alone else None,
+            () if alone else gain_deviations(fit, whole, by),
+        )
         named = data.inputs, data.output, data.sample_time, "output-error"
         model = FreeRunModel(*named, by, LinearDynamics.of(fit), transfer)
         quality = model.quality(data.u, data.y)
@@ -105,7 +109,8 @@ class LinearComparison:
         if best.doubt == "no_fit" or not quality.fit_percent > 0.0 or not best.held_back < 1.0:
             notes = [*notes, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
             sound = False
-        return Identified(model, quality, 100.0 * (1.0 - best.held_back), tuple(self.rows), tuple(notes), sound)
+        held = 100.0 * (1.0 - best.held_back)
+        return Identified(model, quality, held, tuple(self.rows), tuple(notes), sound, gain_std=spread)
 
 
 def linear_comparison(task: Task) -> LinearComparison:

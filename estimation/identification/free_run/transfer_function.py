@@ -24,17 +24,11 @@ def linear_model(fit: LinearFit, data: Channels, by: Scaling) -> LinearModel:
         What they were scaled by.
     """
     form, problem = fit.form, Problem(fit.form, data)
-    output, jacobian = problem.jacobian(fit.theta)
+    output, residual, spreads, coloured = _spreads(fit, problem)
     used = problem.used
-    residual = np.where(used, problem.y - output, 0.0)
-    jacobian[~used] = 0.0
     n_main, gain = form.n_b + form.order, by.y_std / float(by.u_std[0])
-    experiments = _experiments(data, problem)
     unscale = np.concatenate([np.full(form.n_b, gain), np.ones(form.order)])
-    *spreads, _ = covariances(jacobian, residual, experiments)
-    white, robust = (spread[:n_main, :n_main] * np.outer(unscale, unscale) for spread in spreads)
-    lags = DEFAULT_LAGS if data.n_samples > DEFAULT_LAGS else data.n_samples // 2
-    coloured = ljung_box(np.where(used, residual, np.nan), n_lags=lags).p_value < COLOURED
+    white, robust = (spread * np.outer(unscale, unscale) for spread in spreads)
     b = fit.theta[: form.n_b] * gain
     level = by.y_mean + by.y_std * float(fit.theta[n_main])
     rss, n_used = float(residual @ residual) * by.y_std**2, int(np.count_nonzero(used))
@@ -54,11 +48,51 @@ def linear_model(fit: LinearFit, data: Channels, by: Scaling) -> LinearModel:
         rmse=float(np.sqrt(rss / n_used)),
         residual_std=float(np.sqrt(rss / max(n_used - fit.theta.size, 1))),
         n_samples=n_used,
-        data_hash=data_hash(experiments, data.sample_time),
+        data_hash=data_hash(_experiments(data, problem), data.sample_time),
         structure="output-error",
         offset=level - float(b.sum() / fit.f.sum()) * float(by.u_mean[0]),
     )
     return _with_initial_state(found, output[: data.y[0].size] * by.y_std + by.y_mean, data.u[0][:, 0], by)
+
+
+def gain_deviations(fit: LinearFit, data: Channels, by: Scaling) -> tuple[float, ...]:
+    """Return the standard deviation of the steady gain from each input, robust where the residual is not white.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    by : Scaling
+        What they were scaled by.
+
+    Returns
+    -------
+    tuple of float
+        One an input [output unit / input unit].
+    """
+    form, total = fit.form, float(fit.f.sum())
+    _, _, (white, robust), coloured = _spreads(fit, Problem(form, data))
+    ends = np.cumsum([0, *form.sizes])
+    deviations = list[float]()
+    for k, b in enumerate(fit.numerators):
+        slope = np.zeros(form.n_b + form.order)
+        slope[ends[k] : ends[k + 1]] = 1.0 / total
+        slope[form.n_b :] = -float(b.sum()) / total**2
+        variance = float(slope @ (robust if coloured else white) @ slope)
+        deviations.append(float(np.sqrt(variance)) * by.y_std / float(by.u_std[k]))
+    return tuple(deviations)
+
+
+def _spreads(fit: LinearFit, problem: Problem) -> tuple[Array, Array, tuple[Array, Array], bool]:
+    """Return output, residual, both covariances of numerators and denominator, and whether the residual is coloured."""
+    output, jacobian = problem.jacobian(fit.theta)
+    used, data, n_main = problem.used, problem.data, fit.form.n_b + fit.form.order
+    residual = np.where(used, problem.y - output, 0.0)
+    jacobian[~used] = 0.0
+    white, robust, _ = covariances(jacobian, residual, _experiments(data, problem))
+    lags = DEFAULT_LAGS if data.n_samples > DEFAULT_LAGS else data.n_samples // 2
+    coloured = ljung_box(np.where(used, residual, np.nan), n_lags=lags).p_value < COLOURED
+    return output, residual, (white[:n_main, :n_main], robust[:n_main, :n_main]), coloured
 
 
 def _with_initial_state(model: LinearModel, simulated: Array, u: Array, by: Scaling) -> LinearModel:

@@ -292,10 +292,10 @@ def test_a_test_log_whose_input_leaves_the_fitted_range_is_named(tmp_path: Path)
     ("gain", "shown"),
     [
         (None, "-"),
-        ({"value": 2.5, "std": 0.1}, "2.5"),
+        ({"value": 2.5, "std": 0.1}, "2.5 ± 0.1"),
         ({"value": 7e10, "std": 3e22}, "undetermined"),
         ({"value": [1.0, 2.0]}, "1 2"),
-        ({"value": [1.0, 2.0], "std": [0.1, 3.0]}, "1 undetermined"),
+        ({"value": [1.0, 2.0], "std": [0.1, 3.0]}, "1 ± 0.1 undetermined"),
     ],
 )
 def test_a_gain_less_than_its_deviation_is_not_shown_as_a_number(gain: dict[str, object] | None, shown: str) -> None:
