@@ -120,11 +120,9 @@ def _fitted(form: Form, data: Channels, limits: Limits, one: LinearComparison) -
 
 def _begun(f: Array, data: Channels, limits: Limits, form: Form) -> Array:
     """Return values of a denominator, from outputs between limits."""
-    if not limits.stops:
-        return Problem(form, between(data, limits)).profiled(f)[1]
-    values = Problem(form, _pieces(data, limits)).profiled(f)[1][: form.n_values]
-    problem = LimitedProblem(form, data, limits)
-    return problem.begun(np.concatenate([values, np.zeros(form.order * len(data.y))]))
+    free = _pieces(data, limits) if limits.stops else between(data, limits)
+    values = Problem(form, free).profiled(f)[1][: form.n_values]
+    return LimitedProblem(form, data, limits).begun(values)
 
 
 def _pieces(data: Channels, limits: Limits) -> Channels:

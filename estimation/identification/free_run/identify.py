@@ -180,6 +180,8 @@ def _identified(
 def _limited(within: LimitedCandidate, linear: LinearComparison, structure: str) -> Identified:
     """Return a linear model whose output has limits, or of ``auto`` a nonlinear one that leaves less held back."""
     found = limited(within, linear)
+    if not found.sound:
+        return linear.identified() if structure == "output-error" else _nonlinear_or_linear(structure, linear)
     other = _nonlinear_or_linear(structure, linear) if structure == "auto" else found
     return other if other.held_back_percent > found.held_back_percent else found
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.limited_output import LimitedProblem, Limits, at_limits
+from estimation.identification.free_run.limited_output import LimitedProblem, Limits
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_problem import Form, LinearFit
 
@@ -47,25 +47,9 @@ class LimitedDynamics(LinearDynamics):
             Output, scaled.
         """
         problem = LimitedProblem(self.form, Channels((), "", 1.0, (u,), (y,)), self.limits)
-        known = np.isfinite(y)
-        if self.limits.stops:
-            # behind a stop nothing is left of what came before it
-            ends = np.flatnonzero(at_limits(y, self.limits))
-            known &= np.arange(y.size) < (ends[0] if ends.size else y.size)
-        else:
-            known &= ~at_limits(y, self.limits)
-        theta, states = np.concatenate([self.theta, np.zeros(self.form.order)]), slice(self.theta.size, None)
-        if np.count_nonzero(known) <= self.form.order:
-            return self._carried(problem, theta, y)
-        driven, slopes = problem.inner.jacobian(theta)
-        theta[states] = np.linalg.lstsq(slopes[known, states], (y - driven)[known], rcond=None)[0]
-        return self._carried(problem, theta, y)
-
-    def _carried(self, problem: LimitedProblem, theta: Array, y: Array) -> Array:
-        """Return the run after initial states were taken on, all outputs counted."""
         if np.count_nonzero(np.isfinite(y)) > self.form.order:
-            theta = problem.begun(theta)
-        return problem.jacobian(theta)[0]
+            return problem.jacobian(problem.begun(self.theta))[0]
+        return problem.jacobian(np.concatenate([self.theta, np.zeros(self.form.order)]))[0]
 
     def to_dict(self) -> dict[str, Any]:
         """Return JSON values."""

@@ -21,8 +21,11 @@ from estimation.identification.search.levenberg import levenberg
 TOLERANCE, MOST_STEPS = 1e-9, 60
 """Share of the cost that a further step may promise at the end, and evaluations at most."""
 
-STATE_STEPS = 8
+STATE_STEPS = 12
 """Evaluations of a run whose initial state alone is fitted, at most."""
+
+BEGINNINGS, MOST_STARTS = (0.02, 0.1), 4
+"""Shares of a log whose outputs tell its initial state at first, and starts of it at most."""
 
 NOISE_BAND = 6.0
 """Deviations of the noise over which outputs at a limit spread, three to each side [dimensionless]."""
@@ -191,16 +194,46 @@ class LimitedProblem:
         )
         return LinearFit(self.form, best, self.inner.share * cost)
 
-    def begun(self, theta: Array) -> Array:
-        """Return values with the initial states that suit the outputs best, all others as they are."""
-        free = self.form.n_values
+    def begun(self, values: Array) -> Array:
+        """Return values with the initial states that suit the outputs best, begun at what several parts of them tell.
+
+        Parameters
+        ----------
+        values : ndarray, shape (p,)
+            As the model has them, without initial states.
+        """
+        y, free = self.inner.y, self.form.n_values
+        theta = np.concatenate([values[:free], np.zeros(self.inner.n_parameters - free)])
+        driven, slopes = self.inner.jacobian(theta)
+        slopes = slopes[:, free:].copy()
+        starts = [theta]
+        for part in self._beginnings():
+            if np.count_nonzero(part) > self.form.order:
+                states = np.linalg.lstsq(slopes[part], (y - driven)[part], rcond=None)[0]
+                starts.append(np.concatenate([theta[:free], states]))
 
         def at(states: Array) -> tuple[float, Array, Array]:
             cost, gram, slope = self._at(np.concatenate([theta[:free], states]))
             return cost, gram[free:, free:], slope[free:]
 
-        states = levenberg(at, theta[free:], lambda _: True, tolerance=TOLERANCE, most_steps=STATE_STEPS)[1]
-        return np.concatenate([theta[:free], states])
+        steps: Any = {"tolerance": TOLERANCE, "most_steps": STATE_STEPS}
+        ended = [levenberg(at, start[free:], lambda _: True, **steps) for start in starts[-MOST_STARTS:]]
+        return np.concatenate([theta[:free], min(ended, key=lambda one: one[0])[1]])
+
+    def _beginnings(self) -> list[BoolArray]:
+        """Return masks of outputs that tell the initial states, of each log alike."""
+        known, free = self.inner.used, self.inner.used & ~at_limits(self.inner.y, self.limits)
+        if not self.limits.stops:
+            return [free]
+        masks = [np.zeros_like(known) for _ in range(len(BEGINNINGS) + 1)]
+        for first, last in zip(self.inner.bounds[:-1].tolist(), self.inner.bounds[1:].tolist(), strict=True):
+            for mask, share in zip(masks, BEGINNINGS, strict=False):
+                mask[first : first + max(int(share * (last - first)), 4 * self.form.order)] = True
+                mask[last:] = False
+            # behind a stop nothing is left of what came before it
+            stays = np.flatnonzero(known[first:last] & ~free[first:last])
+            masks[-1][first : first + int(stays[0]) if stays.size else last] = True
+        return [known & mask for mask in masks]
 
     def _at(self, values: Array) -> tuple[float, Array, Array]:
         output, slopes = self.jacobian(values)
