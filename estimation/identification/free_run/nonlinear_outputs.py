@@ -107,7 +107,7 @@ def limited(taken: LimitedCandidate, linear: LinearComparison) -> Identified:
     ends = [by.y_mean + by.y_std * one for one in (limits.low, limits.high)]
     shown = " and ".join(f"{end:.4g}" for end in ends if np.isfinite(end))
     at = [at_limits(y, limits) for y in whole.y]
-    share = sum(map(np.count_nonzero, at)) / whole.n_samples
+    share = int(np.count_nonzero(np.concatenate(at))) / whole.n_samples
     told_by = {"output": data.output, "limits": shown, "share": share}
     if limits.stops:
         notes.append(IdentificationCode.OUTPUT_STOPPED.note(**told_by))

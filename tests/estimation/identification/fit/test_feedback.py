@@ -10,6 +10,7 @@ from estimation.identification.fit.residual_tests import DEFAULT_LAGS, feedback_
 from estimation.identification.free_run import other_structures
 from estimation.identification.free_run.data import channels_from
 from estimation.identification.free_run.identify import identify_channels
+from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
 from plant.errors import HydrostateError, LogWarning
 from plant.log.record import Record
@@ -87,3 +88,21 @@ def test_an_adopted_model_that_is_unstable_does_not_run_free() -> None:
     data: Any = SimpleNamespace(output="speed")
     with pytest.raises(HydrostateError, match="the arx model of 'speed' is unstable and does not run free: use"):
         other_structures._dynamics(unstable, data, data)
+
+
+def test_columns_that_are_swapped_are_told_and_not_ok() -> None:
+    rng = np.random.default_rng(4)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 80), 10)
+    y = filtered(np.array([0.0, 0.2]), np.array([1.0, -0.9]), u) + 0.01 * rng.normal(size=u.size)
+    with pytest.warns(LogWarning, match="exchange --input and --output"):
+        found = identify_channels(channels_from([y[:, None]], [u], 0.01, ["pressure"], "valve"))
+    assert not found.sound
+    (note,) = (one for one in found.notes if one.code == IdentificationCode.SWAPPED)
+    assert note.data["back"] < 0.05 < 0.2 < note.data["left"]
+
+
+def test_a_loop_that_is_driven_by_its_set_point_is_not_swapped() -> None:
+    u, y = closed_loop(np.random.default_rng(5), 2_000, 0.8)
+    with pytest.warns(LogWarning, match="closed loop"):
+        found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"), order=1, delay=1)
+    assert IdentificationCode.SWAPPED not in {note.code for note in found.notes}

@@ -11,6 +11,8 @@ from estimation.identification.free_run.doubtful_channels import inputs_alike, o
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.input_range import doubts_about_inputs
 from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.model.recursion import filtered
+from estimation.identification.notes import IdentificationCode
 
 DELAY = 30
 
@@ -75,3 +77,15 @@ def test_an_output_that_is_its_input_is_identified_as_that() -> None:
     assert found.sound
     assert found.model.structure == "output-error"
     assert found.quality.fit_percent == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize(("dead", "told"), [(0.5, True), (0.0, False)])
+def test_a_linear_model_says_where_it_leaves_more_than_noise(dead: float, told: bool) -> None:
+    rng = np.random.default_rng(3)
+    u = filtered(np.array([0.1]), np.array([1.0, -0.9]), rng.normal(size=800))
+    bent = np.sign(u) * np.maximum(np.abs(u) - dead * u.std(), 0.0)
+    y = filtered(np.array([0.0, 0.2]), np.array([1.0, -0.8]), bent)
+    found = identify_channels(
+        channels_from([u[:, None]], [y + 0.02 * y.std() * rng.normal(size=800)], 0.01, ["u"], "y"), order=1, delay=1
+    )
+    assert (IdentificationCode.MORE_THAN_NOISE in {note.code for note in found.notes}) is told

@@ -53,3 +53,10 @@ def test_what_is_drawn_beside_the_model_has_no_trend() -> None:
 @pytest.mark.parametrize(("pole", "slope"), [(1.0, 0.0), (0.998, 0.0), (0.9, 0.0), (1.0, -0.1)])
 def test_a_plant_that_integrates_or_is_slow_is_none(pole: float, slope: float) -> None:
     assert not told(identify_channels(channels(2, pole, slope), order=2, delay=1))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_trend_too_small_to_bring_a_slow_pole_is_told_too(seed: int) -> None:
+    found = identify_channels(channels(seed, 0.9, 0.02))
+    (note,) = (one for one in found.notes if one.code == IdentificationCode.TREND)
+    assert note.data["slope"] == pytest.approx(0.02, rel=0.15)

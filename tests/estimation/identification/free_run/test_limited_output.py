@@ -1,0 +1,108 @@
+"""An output that is cut off, or held by stops, gets the linear model between its limits."""
+
+import json
+
+import numpy as np
+import pytest
+
+from estimation.identification.free_run.data import Channels, channels_from, scaled
+from estimation.identification.free_run.identify import identify_channels
+from estimation.identification.free_run.limited_dynamics import LimitedDynamics
+from estimation.identification.free_run.limited_output import LimitedProblem, Limits, limits_of, stopped
+from estimation.identification.free_run.linear_problem import Form
+from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.model.recursion import filtered
+from estimation.identification.notes import IdentificationCode
+from plant.arrays import Array
+from plant.errors import LogWarning
+
+
+def driven(seed: int, n: int = 600) -> tuple[Array, Array]:
+    """Return an input in steps, and the output of a plant of first order with a gain of 2."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-1.0, 1.0, n), rng.integers(5, 40, n))[:n]
+    return u, filtered(np.array([0.0, 0.2]), np.array([1.0, -0.9]), u)
+
+
+def cut_off(seed: int, high: float, *, after: float = 0.01) -> Channels:
+    """Return a log whose output is cut off, with noise before or behind that."""
+    u, clean = driven(seed)
+    rng = np.random.default_rng([seed, 1])
+    y = np.clip(clean + (0.01 - after) * rng.normal(size=u.size), -np.inf, high) + after * rng.normal(size=u.size)
+    return channels_from([u[:, None]], [y], 0.01, ["u"], "y")
+
+
+def between_stops(seed: int, n: int = 600) -> tuple[Array, Array]:
+    """Return an input in steps, and the output of an integrator that leans on stops, with noise."""
+    u = driven(seed, n)[0]
+    y = np.zeros(n)
+    for t in range(1, n):
+        y[t] = min(max(y[t - 1] + 0.08 * u[t - 1], -0.5), 0.5)
+    return u, y + 0.005 * np.random.default_rng([seed, 2]).normal(size=n)
+
+
+@pytest.mark.parametrize("after", [0.0, 0.01])
+def test_the_gain_of_an_output_that_is_cut_off_is_that_of_the_plant(after: float) -> None:
+    with pytest.warns(LogWarning, match="cut off at"):
+        found = identify_channels(cut_off(0, 0.4, after=after))
+    assert found.sound
+    assert found.model.linear is not None
+    assert abs(found.model.linear.dc_gain - 2.0) < 3.0 * found.model.linear.dc_gain_std < 0.05
+    assert found.held_back_percent > 95.0
+    u, y = driven(5)
+    # without outputs a run begins where its first input would have brought it
+    assert np.abs(found.model.simulate(u) - np.minimum(y, 0.4))[80:].max() < 0.05
+
+
+def test_an_output_that_is_nowhere_cut_off_has_no_limits() -> None:
+    found = identify_channels(cut_off(0, np.inf))
+    assert not {IdentificationCode.OUTPUT_CUT_OFF, IdentificationCode.OUTPUT_STOPPED} & {n.code for n in found.notes}
+    assert not isinstance(found.model.dynamics, LimitedDynamics)
+
+
+@pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
+def test_an_output_between_stops_leaves_them_at_once() -> None:
+    u, y = between_stops(0)
+    found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"))
+    codes = {note.code for note in found.notes}
+    assert {IdentificationCode.OUTPUT_STOPPED, IdentificationCode.INTEGRATES} <= codes
+    assert found.sound
+    v, z = between_stops(1)
+    run = found.model.simulate(v, np.where(np.arange(z.size) < 50, z, np.nan))
+    assert np.sqrt(np.mean((run - z) ** 2)) < 0.1 * z.std()
+    again = FreeRunModel.from_dict(json.loads(json.dumps(found.model.to_dict())))
+    np.testing.assert_array_equal(again.simulate(v, z), found.model.simulate(v, z))
+    assert found.model.nonlinearity is not None
+    assert found.model.nonlinearity["kind"] == "stops"
+    assert found.model.nonlinearity["high"]["value"] == pytest.approx(0.5, abs=0.005)
+
+
+def test_what_moves_between_stops_moves_as_a_free_series_does() -> None:
+    free = np.array([0.0, 2.0, 3.0, 2.5, -4.0, -3.0])
+    output, left = np.empty(6), np.empty(6, dtype=np.int64)
+    stopped(free, -1.0, 1.0, output, left)
+    assert output.tolist() == [0.0, 1.0, 1.0, 0.5, -1.0, 0.0]
+    assert left.tolist() == [-1, 1, 2, 2, 4, 4]
+
+
+@pytest.mark.parametrize("stops", [False, True])
+def test_derivatives_are_exact_where_no_sample_reaches_a_limit(stops: bool) -> None:
+    u, y = between_stops(3)
+    data, _ = scaled(channels_from([u[:, None]], [y], 0.01, ["u"], "y"))
+    problem = LimitedProblem(Form(2, (2,), (0,)), data, Limits(-1.1, 0.9, 0.01, stops))
+    theta = np.array([0.05, 0.04, -1.5, 0.55, 0.1, 0.3, -0.1])
+    output, jacobian = problem.jacobian(theta)
+    assert 20 < np.count_nonzero((output == 0.9) | (output == -1.1)) < output.size - 20
+    for k in range(theta.size):
+        step = np.zeros(theta.size)
+        step[k] = 1e-7
+        ahead, behind = (problem.jacobian(theta + side * step)[0] for side in (1.0, -1.0))
+        np.testing.assert_allclose((ahead - behind) / 2e-7, jacobian[:, k], atol=1e-4 * np.abs(jacobian).max())
+
+
+def test_limits_are_where_an_output_stands() -> None:
+    data, by = scaled(cut_off(1, 0.4))
+    limits = limits_of(data)
+    assert limits is not None
+    assert by.y_mean + by.y_std * limits.high == pytest.approx(0.4, abs=0.005)
+    assert Limits.from_dict(json.loads(json.dumps(limits.to_dict()))) == limits
