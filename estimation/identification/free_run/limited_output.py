@@ -209,7 +209,7 @@ class LimitedProblem:
         starts = [theta]
         for part in self._beginnings():
             if np.count_nonzero(part) > self.form.order:
-                states = np.linalg.lstsq(slopes[part], (y - driven)[part], rcond=None)[0]
+                states: Array = np.asarray(np.linalg.lstsq(slopes[part], (y - driven)[part], rcond=None)[0], np.float64)
                 starts.append(np.concatenate([theta[:free], states]))
 
         def at(states: Array) -> tuple[float, Array, Array]:

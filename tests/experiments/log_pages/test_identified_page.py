@@ -52,9 +52,9 @@ def seen(model: LinearModel = TRUTH, held: float | None = 95.0, **changes: Any) 
         (lambda: seen(held=-3.0), False, "Do not use this model of velocity: on held-back data it is no better"),
         (lambda: seen(outcome="mismatch"), False, "Do not use this model of velocity: the log does not show"),
         (
-            lambda: seen(outcome="mismatch", notes=[{"code": "sign_not_measured"}]),
+            lambda: seen(outcome="mismatch", notes=[{"code": "swapped"}]),
             False,
-            "Do not use this model of velocity: the output seems to be measured without its sign.",
+            "Do not use this model of velocity: its input seems to answer its output.",
         ),
         (
             lambda: seen(replace(TRUTH, denominator=[1.0, -2.1, 1.2])),
