@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.arrays import Array
+from estimation.identification.free_run.believable import BELIEVED
 from estimation.identification.free_run.choose_linear import criteria, slowest_pole, smallest
 from estimation.identification.free_run.data import FEWEST, Channels, blocks
 from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled, told_apart
@@ -77,6 +78,9 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
     taken = smallest(found, min(each.held_back for each in found))
     best = one.best
     if not taken.held_back < (1.0 - MARGIN) * best.held_back:
+        return None
+    # a run between stops may drift as a pole at 1 does, and is believed where that is: not if it leaves most of it
+    if taken.limits.stops and not taken.held_back < BELIEVED:
         return None
     return taken if told_apart(taken.block_errors, best.block_errors) else None
 
