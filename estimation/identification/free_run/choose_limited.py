@@ -47,7 +47,13 @@ class LimitedCandidate:
         return pooled(self.block_errors)
 
     def outlasts(self, length: float) -> bool:
-        """Return whether a time constant is longer than so many samples."""
+        """Return whether a time constant is longer than a time.
+
+        Parameters
+        ----------
+        length : float
+            The time [samples].
+        """
         return slowest_pole(self.fit.f) > float(np.exp(-1.0 / length))
 
 

@@ -48,9 +48,9 @@ class Limits:
     Parameters
     ----------
     low, high : float
-        Infinite where there is no limit [scaled].
+        Infinite where there is no limit; scaled [dimensionless].
     near : float
-        How far outputs at a limit are from it at most [scaled].
+        How far outputs at a limit are from it at most; scaled [dimensionless].
     stops : bool
         Whether the plant itself stops there; else only what is measured is cut off.
     """
@@ -131,7 +131,20 @@ def _longest(mask: BoolArray) -> int:
 
 
 def at_limits(y: Array, limits: Limits) -> BoolArray:
-    """Return where an output stands at a limit, shape (n,); nowhere where it is missing."""
+    """Return where an output stands at a limit; nowhere where it is missing.
+
+    Parameters
+    ----------
+    y : ndarray, shape (n,)
+        Output, scaled.
+    limits : Limits
+        Of the output.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        Mask.
+    """
     return np.asarray((y >= limits.high - limits.near) | (y <= limits.low + limits.near))
 
 
@@ -201,6 +214,11 @@ class LimitedProblem:
         ----------
         values : ndarray, shape (p,)
             As the model has them, without initial states.
+
+        Returns
+        -------
+        ndarray, shape (p,)
+            With initial states.
         """
         y, free = self.inner.y, self.form.n_values
         theta = np.concatenate([values[:free], np.zeros(self.inner.n_parameters - free)])
@@ -250,7 +268,7 @@ def stopped(free: Array, low: float, high: float, output: Array, left: IntArray)
     free : ndarray, shape (n,)
         The free series.
     low, high : float
-        Stops.
+        Stops, scaled [dimensionless].
     output : ndarray, shape (n,)
         The series between them; overwritten.
     left : ndarray of int, shape (n,)

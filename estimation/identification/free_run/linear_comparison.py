@@ -24,9 +24,10 @@ from estimation.identification.notes import IdentificationCode
 from estimation.log_checks.bridging import bridged
 from plant.notes import Note
 
-BACKWARDS, REVERSED = (1, 2), 0.5
-"""Orders of models from output to input, and share of the error that they may leave where columns are swapped: a model
-in the right direction leaves noise, and one against it all that is not seen in advance."""
+BACKWARDS, REVERSED, FOLLOWED = (1, 2), 0.5, 0.2
+"""Orders of models from output to input, and what they may leave where columns are swapped, over the model's error and
+over the deviation: in the right direction noise is left, against it all that is not seen in advance, and of what a
+controller does its set-point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +176,6 @@ def swapped(left: Array, data: Channels, log: int) -> Note | None:
     fits = (fit_linear(Form(order, (order + 1,), (0,)), back, least_gain=COARSE) for order in BACKWARDS)
     share = float(np.sqrt(min(fit.cost for fit in fits) / back.n_samples))
     own = float(np.sqrt(np.nanmean(left**2)) / np.nanstd(y))
-    if not share < REVERSED * own:
+    if not share < min(REVERSED * own, FOLLOWED):
         return None
     return IdentificationCode.SWAPPED.note(input=data.inputs[0], output=data.output, back=share, left=own)
