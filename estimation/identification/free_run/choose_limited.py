@@ -52,7 +52,7 @@ class LimitedCandidate:
         Parameters
         ----------
         length : float
-            The time [samples].
+            The time in samples [count].
         """
         return slowest_pole(self.fit.f) > float(np.exp(-1.0 / length))
 
