@@ -2,7 +2,7 @@
 
 from types import SimpleNamespace
 
-from plant.compiled.functions import Scalar, maximum, sqrt
+from plant.compiled.functions import Scalar, absolute, sqrt
 from plant.components.check_valve import make_up_flow
 
 BEND, USUAL_BEND = "makeup_bend", 1e-4
@@ -66,4 +66,4 @@ def narrowed(drop: Scalar, conductance: Scalar, bend: Scalar) -> Scalar:
     """
     if isinstance(bend, float) and bend == 0.0:
         return conductance
-    return conductance / sqrt(1.0 + bend * maximum(drop, 0.0))
+    return conductance / sqrt(1.0 + bend * absolute(drop))

@@ -292,6 +292,11 @@ def outruns_pump(log: GreyBoxLog, p: EhaParameters) -> bool:
     return p.piston_area * fastest > OUTRUNS * p.pump_displacement * float(np.max(np.abs(speed)))
 
 
+def opens_wide(log: GreyBoxLog, p: EhaParameters) -> bool:
+    """Return whether make-up valves are orifices: of a piston that outruns its pump, or of a single rod with pilots."""
+    return p.pilot_share > 0.0 or outruns_pump(log, p)
+
+
 def _block(log: GreyBoxLog, p: EhaParameters) -> int:
     """Return over how many samples a fast log is averaged: as many as leave corners of the pumped flow unnoticed.
 

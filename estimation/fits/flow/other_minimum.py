@@ -6,7 +6,7 @@ from typing import TypeAlias
 import numpy as np
 
 from estimation.fits.flow.accumulator import first_stiffness
-from estimation.fits.flow.log import outruns_pump
+from estimation.fits.flow.log import opens_wide
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
@@ -95,7 +95,7 @@ def lower_minimum(
     """
     if log.gaps.size:
         return None
-    bent = outruns_pump(log, parameters)
+    bent = opens_wide(log, parameters)
     values = {STIFFNESS: first_stiffness(log), BEND: 0.0, **fit.values, **dict.fromkeys(CRACKS, 0.0)}
     values |= {name: value for name, (value, _) in found.items()}
     if CRACKS[0] not in fit.values:
@@ -148,7 +148,7 @@ def completed_form(form: GreyBoxModel, *, bent: bool) -> GreyBoxModel:
     form : GreyBoxModel
         The form, completed or not.
     bent : bool
-        Whether make-up valves must let in more than the pump delivers, so that they are orifices.
+        Whether make-up valves must let in so much that they are orifices.
     """
     known = CRACKS[0] in form.unknowns or form.rates is HELD_FLOW_FORM.rates
     return form if known else completed(form, bent=bent)

@@ -236,13 +236,14 @@ def with_shorter_steps(plain: PlainFits) -> FitStart | None:
     Returns
     -------
     FitStart or None
-        None where steps are short enough, or were shortened already. Not asked of a log that is explained, but for one
-        with pilots, whose chatter may pass for a bulk modulus that the log does not tell, and for one whose slopes
-        leap: the deviation of bulk modulus came out 26 times too small.
+        None where steps are short enough, or were shortened already. Not asked of a log that is explained, but for that
+        of a single rod, whose chatter may pass for a bulk modulus that the log does not tell or end a search above its
+        minimum, and for one whose slopes leap: the deviation of bulk modulus came out 26 times too small.
     """
     swinging = [fit for fit in plain.fits if fit.model.rates is not HELD_FLOW_FORM.rates]
     explained = plain.explains(plain.best)
-    asked = not explained or plain.start.parameters.pilot_share or any(map(_leaps, swinging))
+    single = plain.start.parameters.area_difference != 0.0
+    asked = not explained or single or any(map(_leaps, swinging))
     if not asked or plain.start.finer > 1:
         return None
     felt = any(_chatters(plain.log, fit, 0.0 if explained else LEAST_ERROR) for fit in swinging)

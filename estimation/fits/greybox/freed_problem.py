@@ -16,6 +16,7 @@ from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.kernel import compile_kernel
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.normal_loops import fill_differences
+from estimation.fits.greybox.nudges import nudge_for
 from estimation.fits.greybox.problem import OUTLIER, Problem, weighed
 from estimation.fits.greybox.ridge import Ridge
 from estimation.fits.greybox.side_by_side import LANES, MANY, ResidualsRun, compile_side_by_side, lanes_for
@@ -24,10 +25,6 @@ from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.solvers.steps import parameter_names
 from plant.spare_processors import each
-
-NUDGE = 1e-4
-"""Step of the finite differences in the fitted coordinates [dimensionless]. Residuals of a piston that sticks and slips
-have many small corners: a step of 1e-7 sees the slope between two of them, and searches stop far from the optimum."""
 
 MOST_SIDE_BY_SIDE = 200_000
 """Longest log whose drives are copied once for each run side by side [samples]: some 30 MB."""
@@ -69,6 +66,7 @@ class FreedProblem(Problem):
             model = replace(model, jump=())
         super().__init__(replace(model, unknowns=tuple(free), linear=sizes), log, partial(_by_itself, model))
         self._bare, self._sizes, self._ridge = model, linear, ridge
+        self._nudge = nudge_for(log, model, free)
         self._most = LANES if model.jump else MANY  # with gaps, `MANY` take twice as long as `LANES`
         self._last: list[tuple[Array, Array, Array, Array]] = []
         self._columns = [parameter_names(model.parameters).index(name) for name in free]
@@ -138,7 +136,7 @@ class FreedProblem(Problem):
         rows = self._rows(self._nudged(theta)[[0, *(1 + place for place in asked)]], self.log.parameters)
         # what is asked beside it takes `MANY`, and a kernel takes longer to compile than this run
         rows = np.concatenate([rows, np.repeat(rows[-1:], max(0, LANES + 1 - len(rows)), axis=0)])
-        here, columns = _differences(self._residuals(rows, None, self._variances(theta)), len(asked))
+        here, columns = self._differences(self._residuals(rows, None, self._variances(theta)), len(asked))
         slopes = np.empty((*here.shape, len(names)))
         slopes[..., asked] = columns
         for place, name in enumerate(names):
@@ -274,16 +272,22 @@ class FreedProblem(Problem):
 
     def _nudged(self, theta: Array) -> Array:
         """Return a point and its neighbours, a row each; one that is on a ridge lies along it."""
-        points = theta + NUDGE * np.eye(len(theta) + 1, len(theta), -1)
+        points = theta + self._nudge * np.eye(len(theta) + 1, len(theta), -1)
         if self._placed is not None:
-            self._placed.turn(points, theta, NUDGE)
+            self._placed.turn(points, theta, self._nudge)
         return points
 
     def _slopes(self, found: Array, theta: Array) -> tuple[Array, Array]:
         """Return the residuals at a point and their slopes, of those at `_nudged`."""
-        here, slopes = _differences(found, len(theta))
+        here, slopes = self._differences(found, len(theta))
         if self._placed is not None:
             self._placed.turn_back(slopes, theta)
+        return here, slopes
+
+    def _differences(self, found: Array, unknowns: int) -> tuple[Array, Array]:
+        """Return the residuals at a point and their slopes, of the residuals there and at its neighbours."""
+        here, slopes = np.empty(found.shape[:2]), np.empty((*found.shape[:2], unknowns))
+        fill_differences(found, self._nudge, here, slopes)
         return here, slopes
 
     def _rows(self, thetas: Array, parameters: Array) -> Array:
@@ -339,10 +343,3 @@ def _misfits(errors: Array) -> Array:
     """Return half the sum of squares of each run, where outliers count linearly, shape (lanes,)."""
     weight = OUTLIER / np.maximum(np.abs(errors), OUTLIER)
     return np.einsum("ijk,ijk->k", (1.0 - 0.5 * weight) * weight * errors, errors)
-
-
-def _differences(found: Array, unknowns: int) -> tuple[Array, Array]:
-    """Return the residuals at a point and their slopes, of the residuals there and at its neighbours."""
-    here, slopes = np.empty(found.shape[:2]), np.empty((*found.shape[:2], unknowns))
-    fill_differences(found, NUDGE, here, slopes)
-    return here, slopes
