@@ -264,11 +264,11 @@ class RigCode(Code):
         "leakage, and bulk modulus would be too low by the same share"
     )
     SINGLE_ROD = (
-        "side B of the piston has {percent:.1f} ± {half_width:.2g} % of the area of side A (rig file: "
-        "{rig_percent:.1f} %), chamber B has {volume_percent:.0f} % of the volume of chamber A (rig file: "
-        "{rig_volume_percent:.0f} %), and pilot-operated make-up valves pass {pilot_share:.2g} times the flow of "
-        "plain ones (pilot_share in the rig file: {rig_pilot_share:.2g})"
+        "looks like a single rod, give two areas and volumes: side B has {percent:.1f} ± {half_width:.2g} % of the "
+        "area of side A (rig file: {rig_percent:.1f} %) and {volume_percent:.0f} % of its volume (rig file: "
+        "{rig_volume_percent:.0f} %), pilot_share is {pilot_share:.2g} (rig file: {rig_pilot_share:.2g})"
     )
+    AREAS_VAGUE = "the ratio of the piston's areas is known to ± {percent:.0f} % only: give two areas in the rig file"
     VOLUME_DIFFERS = "the chamber volume is {percent:.0f} ± {half_width:.0f} % of that in the rig file"
     STARTS_UNDER_LOAD = (
         "the log begins at a differential pressure of {pressure_pa:.3g|bar} bar: the piston moves, or a load of "

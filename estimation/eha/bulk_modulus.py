@@ -11,8 +11,9 @@ from estimation.eha.another_rig import unless_another_rig
 from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
 from estimation.eha.foreign_oil import shows_no_motion, unless_foreign
 from estimation.eha.named_methods import NAMED
-from estimation.eha.result import LARGEST_BOUND, VAGUE, BulkModulusEstimate, too_wide, without_number
+from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, is_vague, too_wide, without_number
 from estimation.eha.rig_share import fitted_responses, scaled_responses, with_wear
+from estimation.eha.vague_areas import vague_areas
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
 from estimation.fits.flow.fit import REPORTED, fit_flow
@@ -325,12 +326,12 @@ def _with_rig(
 
 def _fitted(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEstimate:
     value, std = fit.parameters["bulk_modulus"]
-    gate = Gate(not fit.reasons, fit.reasons)
-    outcome = Outcome.OK
+    reasons = (*fit.reasons, *vague_areas(fit.explanation))
+    gate, outcome = Gate(not reasons, reasons), Outcome.OK
     if fit.chi_square >= MISMATCH_NIS:
         outcome = Outcome.MISMATCH
-    elif (vague := max(fit.bound, std / value if std > VAGUE * value else 0.0)) > LARGEST_BOUND:
-        outcome, gate = Outcome.NOT_OBSERVABLE, Gate(False, (too_wide(vague), *fit.reasons))
+    elif (known_to := max(fit.bound, std / value if is_vague(value, std) else 0.0)) > LARGEST_BOUND:
+        outcome, gate = Outcome.NOT_OBSERVABLE, Gate(False, (too_wide(known_to), *reasons))
     known = outcome is Outcome.OK
     return BulkModulusEstimate(
         outcome=outcome,

@@ -160,12 +160,12 @@ def _single_rod(found: Explanation, p: EhaParameters) -> Note:
     differ, volumes = found.values["area_difference"][0], found.values["volume_difference"][0]
     half_width = 2.0 * _half_width(found, "area_difference") / (1.0 + differ) ** 2
     return RigCode.SINGLE_ROD.note(
-        percent=100.0 * _b_over_a(differ),
+        percent=100.0 * b_over_a(differ),
         half_width=100.0 * half_width,
-        volume_percent=100.0 * _b_over_a(volumes),
+        volume_percent=100.0 * b_over_a(volumes),
         pilot_share=found.values["pilot_share"][0],
-        rig_percent=100.0 * _b_over_a(p.area_difference),
-        rig_volume_percent=100.0 * _b_over_a(p.volume_difference),
+        rig_percent=100.0 * b_over_a(p.area_difference),
+        rig_volume_percent=100.0 * b_over_a(p.volume_difference),
         rig_pilot_share=p.pilot_share,
     )
 
@@ -182,8 +182,8 @@ def of_another_rod(note: Note) -> bool:
     return abs(written) > THROUGH and abs(told - written) > OTHER_ROD
 
 
-def _b_over_a(difference: float) -> float:
-    """Return side B over side A, given their difference over their sum."""
+def b_over_a(difference: float) -> float:
+    """Return side B over side A, given their difference over their sum [dimensionless]."""
     return (1.0 - difference) / (1.0 + difference)
 
 

@@ -9,7 +9,7 @@ from math import log as ln
 
 import numpy as np
 
-from estimation.eha.result import BulkModulusEstimate, without_number
+from estimation.eha.result import BulkModulusEstimate, is_vague, without_number
 from estimation.finding import Outcome
 from estimation.fits.flow.misread import KIN
 from estimation.log_checks.channel_names import POSITION, PRESSURE, VELOCITY
@@ -85,8 +85,7 @@ def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters)
     unlike = abs(ln(ratio))
     doubted = gone.stuck or unlike > UNLIKE
     said = (EstimateCode.PISTON_STANDS_STILL.note(moved_m=gone.piston, pumped_m=gone.pump),) if doubted else ()
-    vague = found.std is None or found.std > VAGUE_STILL * found.value
-    if unlike < ln(KIN) and not vague:
+    if unlike < ln(KIN) and not is_vague(found.value, found.std, VAGUE_STILL):
         return replace(found, remarks=(*found.remarks, *said))
     return _without(found, Outcome.NOT_OBSERVABLE, *said, EstimateCode.STILL_AND_FOREIGN.note(ratio=ratio))
 

@@ -124,6 +124,26 @@ class BulkModulusEstimate:
         return positive_interval_95(self.value, self.std)
 
 
+def is_vague(value: float, std: float | None, share: float = VAGUE) -> bool:
+    """Return whether a value is known so poorly that it is none.
+
+    Parameters
+    ----------
+    value : float
+        The value [in its unit].
+    std : float or None
+        Its standard deviation [in its unit]; None where nothing is known of it.
+    share : float
+        Relative standard deviation above which it is none [fraction].
+
+    Examples
+    --------
+    >>> is_vague(2e8, 1.2e8), is_vague(2e8, 9e7), is_vague(2e8, 9e7, 0.1), is_vague(2e8, None)
+    (True, False, True, True)
+    """
+    return std is None or not std <= share * abs(value)
+
+
 def too_wide(bound: float) -> Note:
     """Return the note for a bound that is over the largest.
 

@@ -288,6 +288,7 @@ HYPOTHESES = (
         ("area_difference", "volume_difference", "pilot_share"),
         tuple({"area_difference": differ, "volume_difference": differ, "pilot_share": 1.0} for differ in (-0.15, 0.15)),
         least=LEAST_ROD,
+        beside=(BEND,),
     ),
     CHECKS_CRACK,
     *PORTS_DRAIN,

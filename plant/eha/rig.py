@@ -72,7 +72,7 @@ class Rig(Generic[P]):
     ------
     RigError
         If an uncertainty is of no parameter or negative, if what was measured is nothing that is doubted or has an
-        uncertainty too, or if a column's channel or unit is unknown.
+        uncertainty too, or if either is said of an entry without a value, or if a column's channel or unit is unknown.
 
     Examples
     --------
@@ -91,6 +91,9 @@ class Rig(Generic[P]):
         doubted = doubts_of(self.parameters)
         _known(self.uncertainties, dict.fromkeys((*_names(type(self.parameters)), *doubted)), "uncertainty")
         _known(self.measured, doubted, "measured")
+        for name in (*self.measured, *self.uncertainties):
+            if getattr(self.parameters, name, 1.0) is None:
+                raise RigError(f"{name} is said to be known, and has no value: give it below [parameters]")
         for name, value in self.uncertainties.items():
             if not 0.0 <= value <= MOST_UNCERTAIN:
                 raise RigError(

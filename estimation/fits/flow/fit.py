@@ -18,7 +18,7 @@ from estimation.fits.flow.asked_hypotheses import (
 from estimation.fits.flow.belief import hopeless_cost, play_explained, wanted_cost
 from estimation.fits.flow.log import homed_at_stop, require_flow_channels, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
-from estimation.fits.flow.losses import with_lumped, with_lumped_slopes
+from estimation.fits.flow.losses import UNEVEN_OIL, is_single, with_lumped, with_lumped_slopes
 from estimation.fits.flow.misread import UNLIKE_SLIPS, CorrectedLogs
 from estimation.fits.flow.offset_beside import offset_settled
 from estimation.fits.flow.other_minimum import lower_minimum
@@ -258,7 +258,7 @@ def _losing_fit(plain: PlainFits, loss: VaryingLoss, sensed: ShownPlay) -> FormF
     untaken, open_play = plain.play_untaken(one.play, sensed)
     value, std = one.values["bulk_modulus"], one.std["bulk_modulus"]
     found = {name: (each, one.std[name]) for name, each in one.values.items()}
-    found, correlation = with_lumped(found, [one], np.ones(1), plain.start.parameters)
+    found, correlation = with_lumped(found, [one], np.ones(1), plain.start.parameters, plain.usual_pressure)
     return FormFit(
         parameters=with_structure(found, float(np.linalg.norm([UNEVEN, untaken, loss.opened]))),
         bound=std / value,
@@ -306,11 +306,13 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
         shown = play_left(one.play, NO_PLAY)
     else:
         untaken, open_play = plain.play_untaken(one.play, sensed)
-        left, shown = float(np.hypot(FILTERED if traits.filtered else STRUCTURE, untaken)), play_left(one.play, sensed)
+        least = UNEVEN_OIL if is_single(strange.values, plain.start.parameters) else STRUCTURE
+        left, shown = float(np.hypot(FILTERED if traits.filtered else least, untaken)), play_left(one.play, sensed)
     if {AIR.name, AIR_MIDWAY.name} & set(strange.names):
         left = float(np.hypot(left, BUBBLES))
     most = share_lost(plain.log, one.values, plain.start.parameters.pump_displacement, strange.names)
-    found, correlation = with_lumped(strange.values, strange.fits, weights_of(strange.fits), plain.start.parameters)
+    weights, p = weights_of(strange.fits), plain.start.parameters
+    found, correlation = with_lumped(strange.values, strange.fits, weights, p, plain.usual_pressure)
     return FormFit(
         parameters=with_structure(with_small_ripple(found, one.small_teeth), left),
         bound=bound,
@@ -329,16 +331,18 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     best = plain.best
     beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in plain.fits]
     weights = weights_of(plain.fits, SURER * plain.log.passes, beforehand)
-    found, correlation = with_lumped(averaged(plain.fits, weights), plain.fits, weights, plain.start.parameters)
+    p = plain.start.parameters
+    found, correlation = with_lumped(averaged(plain.fits, weights), plain.fits, weights, p, plain.usual_pressure)
     found = with_small_ripple(found, best.small_teeth)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
+    left = UNEVEN_OIL if is_single({}, p) else DISCRETISED
     untaken, open_play = plain.play_untaken(plain.swinging.play, sensed)
     reasons = (*objections(best, plain.log.passes_on), *play_left(plain.swinging.play, sensed)) or plain.teeth_left
     if begun and not reasons and not _told_by(plain, begun=begun)(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
     value, std = found["bulk_modulus"]
     return FormFit(
-        parameters=with_structure(found, float(np.hypot(DISCRETISED if sure else STRUCTURE, untaken))),
+        parameters=with_structure(found, float(np.hypot(left if sure else max(left, STRUCTURE), untaken))),
         bound=std / value,
         chi_square=best.chi_square[0],
         reasons=reasons,
