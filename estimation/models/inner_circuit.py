@@ -43,7 +43,7 @@ def inner_flows(
 
 
 def narrowed(drop: Scalar, conductance: Scalar, bend: Scalar) -> Scalar:
-    """Return the conductance of a make-up valve, which falls with the root of a large drop, as an orifice's.
+    """Return the conductance of a make-up valve, which falls with the root of a large drop either way, as an orifice's.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def narrowed(drop: Scalar, conductance: Scalar, bend: Scalar) -> Scalar:
     Examples
     --------
     >>> narrowed(6e4, 1e-9, 0.0), float(narrowed(6e4, 1e-9, 5e-5)), float(narrowed(-6e4, 1e-9, 5e-5))
-    (1e-09, 5e-10, 1e-09)
+    (1e-09, 5e-10, 5e-10)
     """
     if isinstance(bend, float) and bend == 0.0:
         return conductance

@@ -122,6 +122,8 @@ def test_every_parameter_refuses_text(tmp_path: Path, field: str) -> None:
             'measured = ["moving_mass"]\n[uncertainty]\nmoving_mass = 0.1',
             r"uncertainty\.moving_mass and measured both say how well it is known, give one",
         ),
+        ('measured = ["accumulator_gas"]', r"accumulator_gas is said to be known, and has no value"),
+        ("[uncertainty]\naccumulator_gas = 0.1", r"accumulator_gas is said to be known, and has no value"),
         ("[parameters]\npiston_area = -1.0", r"piston_area must be positive, got -1\.0"),
         ("[parameters]\npiston_area = inf", r"piston_area must be a finite number"),
         ("[parameters]\npiston_area = true", r"parameters\.piston_area must be a valid number, got True"),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.fits.flow.losses import losses, with_lumped, with_lumped_slopes
+from estimation.fits.flow.losses import UNEVEN_SIDES, losses, with_lumped, with_lumped_slopes
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.hypothesis_search.form_fit import DISCRETISED
 from estimation.models.flow import FLOW_FORM
@@ -52,6 +52,15 @@ def test_no_leakage_is_known_better_than_the_forms_steps_balance_the_pumped_flow
     steps = DISCRETISED * PAPER.pump_displacement * PAPER.rated_speed / PAPER.relief_pressure
     assert told[LEAKAGE][1] == pytest.approx(steps, rel=1e-3)
     assert abs(correlation) < 0.01
+
+
+def test_losses_of_a_single_rod_are_known_no_better_than_its_balance_and_its_drain() -> None:
+    """Four rods were told a leakage 7 to 110 deviations off: the low side is held, so that a drain looks like a leak."""
+    sure, single = replace(fit(), covariance=1e-12 * fit().covariance), replace(PAPER, area_difference=0.2)
+    told, _ = with_lumped(found(sure), [sure], weights(1.0), single, 1e6)
+    left_out = UNEVEN_SIDES * PAPER.rated_flow
+    assert told[LEAKAGE][1] == pytest.approx(np.hypot(left_out / 1e6, 0.5 * DRAINED), rel=1e-3)
+    assert told[BIAS][1] == pytest.approx(np.hypot(found(sure)[BIAS][1], left_out), rel=1e-3)
 
 
 def test_what_fits_disagree_on_is_not_known() -> None:
