@@ -55,7 +55,7 @@ def test_no_leakage_is_known_better_than_the_forms_steps_balance_the_pumped_flow
 
 
 def test_losses_of_a_single_rod_are_known_no_better_than_its_balance_and_its_drain() -> None:
-    """Four rods were told a leakage 7 to 110 deviations off: the low side is held, so that a drain looks like a leak."""
+    """Four rods were told a leakage 7 to 110 deviations off: a drain of the other side looks like a leak."""
     sure, single = replace(fit(), covariance=1e-12 * fit().covariance), replace(PAPER, area_difference=0.2)
     told, _ = with_lumped(found(sure), [sure], weights(1.0), single, 1e6)
     left_out = UNEVEN_SIDES * PAPER.rated_flow
