@@ -327,10 +327,9 @@ def _with_rig(
 def _fitted(fit: FormFit, form: str, channels: tuple[str, ...]) -> BulkModulusEstimate:
     value, std = fit.parameters["bulk_modulus"]
     reasons = (*fit.reasons, *vague_areas(fit.explanation))
-    gate, outcome = Gate(not reasons, reasons), Outcome.OK
-    if fit.chi_square >= MISMATCH_NIS:
-        outcome = Outcome.MISMATCH
-    elif (known_to := max(fit.bound, std / value if is_vague(value, std) else 0.0)) > LARGEST_BOUND:
+    gate, outcome = Gate(not reasons, reasons), Outcome.OK if fit.chi_square < MISMATCH_NIS else Outcome.MISMATCH
+    known_to = max(fit.bound, std / value if is_vague(value, std) else 0.0)
+    if outcome is Outcome.OK and known_to > LARGEST_BOUND:
         outcome, gate = Outcome.NOT_OBSERVABLE, Gate(False, (too_wide(known_to), *reasons))
     known = outcome is Outcome.OK
     return BulkModulusEstimate(
