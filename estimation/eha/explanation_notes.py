@@ -183,7 +183,13 @@ def of_another_rod(note: Note) -> bool:
 
 
 def b_over_a(difference: float) -> float:
-    """Return side B over side A, given their difference over their sum [dimensionless]."""
+    """Return side B over side A.
+
+    Parameters
+    ----------
+    difference : float
+        Of sides A and B over their sum [dimensionless].
+    """
     return (1.0 - difference) / (1.0 + difference)
 
 
