@@ -183,12 +183,17 @@ def of_another_rod(note: Note) -> bool:
 
 
 def b_over_a(difference: float) -> float:
-    """Return side B over side A.
+    """Return the ratio of two sides.
 
     Parameters
     ----------
     difference : float
         Of sides A and B over their sum [dimensionless].
+
+    Returns
+    -------
+    float
+        Side B over side A [dimensionless].
     """
     return (1.0 - difference) / (1.0 + difference)
 
