@@ -20,6 +20,7 @@ from estimation.fits.flow.log import homed_at_stop, require_flow_channels, witho
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import UNEVEN_OIL, is_single, with_lumped, with_lumped_slopes
 from estimation.fits.flow.misread import UNLIKE_SLIPS, CorrectedLogs
+from estimation.fits.flow.motor_course import by_course
 from estimation.fits.flow.offset_beside import offset_settled
 from estimation.fits.flow.other_minimum import lower_minimum
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer, with_shorter_steps
@@ -170,6 +171,7 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
         if (shorter := with_shorter_steps(plain)) is not None:
             start = shorter
             continue
+        plain = by_course(logged, plain)
         asked, open_ends = _asked(plain, sensed, traits)
         try:
             with work.counted():
@@ -182,7 +184,7 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
         elsewhere = strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))
         if elsewhere is None:
             return Answered(plain, asked, open_ends, strange)
-        start = elsewhere
+        start = elsewhere  # with the motor's course that was found
 
 
 def _misread(corrected: CorrectedLogs, plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> bool:
@@ -314,7 +316,7 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
     weights, p = weights_of(strange.fits), plain.start.parameters
     found, correlation = with_lumped(strange.values, strange.fits, weights, p, plain.usual_pressure)
     return FormFit(
-        parameters=with_structure(with_small_ripple(found, one.small_teeth), left),
+        parameters=with_structure(with_small_ripple(with_small_ripple(found, one.small_teeth), one.noise_shift), left),
         bound=bound,
         chi_square=one.chi_square[0],
         reasons=(*shown, *contradicted(strange, plain.start.parameters)),
@@ -333,7 +335,7 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     weights = weights_of(plain.fits, SURER * plain.log.passes, beforehand)
     p = plain.start.parameters
     found, correlation = with_lumped(averaged(plain.fits, weights), plain.fits, weights, p, plain.usual_pressure)
-    found = with_small_ripple(found, best.small_teeth)
+    found = with_small_ripple(with_small_ripple(found, best.small_teeth), best.noise_shift)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     left = UNEVEN_OIL if is_single({}, p) else DISCRETISED
     untaken, open_play = plain.play_untaken(plain.swinging.play, sensed)

@@ -138,7 +138,12 @@ def speed_gaps(record: Record, parameters: EhaParameters, noise: float) -> Array
 
 
 def flow_log(
-    record: Record, parameters: EhaParameters, uncertainties: Mapping[str, float], variances: Mapping[str, float]
+    record: Record,
+    parameters: EhaParameters,
+    uncertainties: Mapping[str, float],
+    variances: Mapping[str, float],
+    *,
+    held: bool = False,
 ) -> GreyBoxLog:
     """Return a log for the flow form.
 
@@ -156,6 +161,8 @@ def flow_log(
         Relative standard deviation of its parameters [fraction].
     variances : Mapping[str, float]
         Of the noise of the channels [SI squared].
+    held : bool
+        Whether the motor's course bends at the samples, see `estimation.fits.flow.motor_course`.
 
     Returns
     -------
@@ -176,7 +183,8 @@ def flow_log(
     speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
     swept = _swept_share(log.drives[:, position], parameters)
     drives = log.drives.copy()
-    drives[:, speed] = straightened(log.drives[:, speed], slow=record.sample_time >= SLOW)
+    if not held:
+        drives[:, speed] = straightened(log.drives[:, speed], slow=record.sample_time >= SLOW)
     passed_on = swept * position_variance(sensed["position_m"]) ** 0.5
     open_gaps = speed_gaps(record, parameters, variances["differential_pressure_pa"] ** 0.5)
     log = replace(

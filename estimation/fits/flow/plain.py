@@ -67,9 +67,9 @@ class Logged:
     variances: Mapping[str, float]
     uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
 
-    def seen_at(self, parameters: EhaParameters) -> GreyBoxLog:
-        """Return the log as the flow form sees it in an actuator."""
-        return flow_log(self.record, parameters, self.uncertainties, self.variances)
+    def seen_at(self, parameters: EhaParameters, *, held: bool = False) -> GreyBoxLog:
+        """Return the log as the flow form sees it in an actuator, whose motor's command may be held."""
+        return flow_log(self.record, parameters, self.uncertainties, self.variances, held=held)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +92,9 @@ class FitStart:
         Whether what a slow log's turns pump is read off the samples after them, see `with_turns_read`.
     finer : int
         How many times shorter than usual model steps are, see `with_shorter_steps` [count].
+    held, turns_open : bool
+        Whether the motor's command is held between samples, and whether the course of its turns is open in a log that
+        is not slow; see `estimation.fits.flow.motor_course`.
     """
 
     parameters: EhaParameters
@@ -101,6 +104,8 @@ class FitStart:
     stiffest: float = np.inf
     turns_read: bool = False
     finer: int = 1
+    held: bool = False
+    turns_open: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +214,7 @@ def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
         Where searches begin.
     """
     parameters = start.parameters
-    log = logged.seen_at(parameters)
+    log = logged.seen_at(parameters, held=start.held)
     if start.turns_read:
         log = with_turns_read(log, parameters)
     if start.finer > 1:
@@ -218,7 +223,7 @@ def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
     explains = partial(fit_explains, noisy=log.passes_on)
     largest, _ = limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))
     fitted = partial(balanced, parameters=parameters, starts=starts, valley=start.valley, stiffest=start.stiffest)
-    unturned = with_course(log, fitted, parameters)
+    unturned = with_course(log, fitted, parameters, always=start.turns_open)
     log, fits, teeth, left = with_pump_ripple(unturned, fitted, explains, largest, start.speed_offset)
     turning = Turning(log.teeth, log.speed_offset)
     found = _swinging(fits).values

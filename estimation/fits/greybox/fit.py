@@ -16,6 +16,7 @@ from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.deviations import Information, believed, covariance_of, information
 from estimation.fits.greybox.lateness import changes_beside, lateness, left_by
 from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.noise_shift import noise_shift
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, shown_play
 from estimation.fits.greybox.problem import Problem, search_bounds
 from estimation.fits.greybox.pump_ripple import NO_OFFSET, ShownOffset, ShownRipple, shown_ripple
@@ -77,6 +78,8 @@ class GreyBoxFit:
         What they say of an offset of the logged speed, the same.
     small_teeth : tuple of Mapping[str, float]
         By how much teeth that are not taken up move each coordinate, and add to its variance [dimensionless].
+    noise_shift : tuple of Mapping[str, float]
+        The same of noise of motor speed, see `noise_shift`.
     seen : float
         Residuals of the first output that count; without end where they are not counted [count].
     steps : ndarray of int, shape (n,), optional
@@ -98,6 +101,7 @@ class GreyBoxFit:
     teeth: Mapping[int, ShownRipple] = field(default_factory=dict[int, ShownRipple])
     speed_offset: ShownOffset = NO_OFFSET
     small_teeth: tuple[Mapping[str, float], Mapping[str, float]] = NOT_MOVED
+    noise_shift: tuple[Mapping[str, float], Mapping[str, float]] = NOT_MOVED
     seen: float = np.inf
     steps: IntArray | None = None
 
@@ -276,7 +280,7 @@ def concluded(
     effects = np.einsum("ij,ij->j", all_slopes, all_slopes)
     felt = np.flatnonzero(effects > np.where(believed(problem) > 0.0, 0.0, LEAST_EFFECT**2))
     whole, rig, late = np.diag(np.full(len(theta), np.inf)), dict[str, Array](), dict[str, tuple[float, float]]()
-    play, teeth, offset = NO_PLAY, dict[int, ShownRipple](), NO_OFFSET
+    play, teeth, offset, by_noise = NO_PLAY, dict[int, ShownRipple](), NO_OFFSET, NOT_MOVED
     used, names = int(np.count_nonzero(errors)), [model.unknowns[place] for place in felt]
     if len(felt) and used > len(theta):
         known_of = information(problem, theta, errors, all_slopes, felt, warned=warned)
@@ -294,6 +298,7 @@ def concluded(
             covariance = covariance + np.diag(opened + (offset.opened if shifted and not held else np.zeros(len(felt))))
         whole[np.ix_(felt, felt)] = covariance
         if told:
+            by_noise = noise_shift(problem, theta, known_of)
             rig = dict(answers_by_rig(with_steps(problem, steps), theta, known_of))
             late, play = _late_and_play(problem, known_of, moved, effects[felt] > LEAST_EFFECT**2)
     noise = np.where(effects > LEAST_EFFECT**2, np.sqrt(np.diag(whole)), np.inf)  # else it is not known from this log
@@ -315,6 +320,7 @@ def concluded(
         teeth=teeth,
         speed_offset=offset,
         small_teeth=small_pump_ripple(asked_of_teeth, names),
+        noise_shift=by_noise,
         covariance=whole,
         cost=point.cost,
         chi_square=chi_square,

@@ -27,7 +27,11 @@ ALIKE = 3.0
 
 
 def with_course(
-    log: GreyBoxLog, fitted: Callable[[GreyBoxLog], Sequence[GreyBoxFit]], parameters: EhaParameters
+    log: GreyBoxLog,
+    fitted: Callable[[GreyBoxLog], Sequence[GreyBoxFit]],
+    parameters: EhaParameters,
+    *,
+    always: bool = False,
 ) -> GreyBoxLog:
     """Return a slow log with what the motor's course between samples leaves open; any other as it is.
 
@@ -39,13 +43,15 @@ def with_course(
         ``fitted(log)``: its fits by every form that counts.
     parameters : EhaParameters
         The actuator.
+    always : bool
+        Whether a log that is not slow has it too.
 
     Returns
     -------
     GreyBoxLog
         The log. One with gaps in its speed is left as it is: there its kernel follows what they leave open.
     """
-    if log.sample_time < SLOW or log.gaps.size:
+    if (log.sample_time < SLOW and not always) or log.gaps.size:
         return log
     turned, staying, passing, kept, modulus = turns(log), FIRST, FIRST, 1.0, parameters.bulk_modulus
 

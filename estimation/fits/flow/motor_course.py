@@ -1,0 +1,75 @@
+"""`by_course(logged, plain)`: plain fits of a log, with the course of its motor between samples that the log shows.
+
+A motor whose speed is asked for continuously bends its course smoothly, and straight lines between samples are put
+right by its bends (`straightened`). One whose command is held from sample to sample bends at the samples alone: there
+the lead on the straight line is all, and what is added for bends is wrong. Neither is in a rig file, and both are
+built: where it is felt, the log says which.
+
+And a motor at its current limit, or under a position loop that is sampled, has neither course. In the paper's chambers
+a millisecond of that is not felt; a pump that turns fast beside small chambers of stiff oil moves pressure by ten
+times as much. See decision 399.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.fits.flow.plain import Logged, PlainFits, plain_fits
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.greybox.intersample_doubt import SLOW, turns
+from estimation.fits.hypothesis_search.between_samples import FIRST
+
+HELD_WORTH = 1.0
+"""Gain in log-likelihood from which a command is taken as held [dimensionless]; judged."""
+
+FELT = 0.1
+"""What the largest turn may leave open beside the pressure's noise, from which it is felt [fraction]; judged. In the
+paper's actuator at 1 kHz it is 0.06 at its motor's limit."""
+
+
+def by_course(logged: Logged, plain: PlainFits) -> PlainFits:
+    """Return the plain fits of a log with the course of its motor between samples.
+
+    Parameters
+    ----------
+    logged : Logged
+        The log.
+    plain : PlainFits
+        Its fits, the motor's course smooth.
+
+    Returns
+    -------
+    PlainFits
+        The same ones where a smooth course is as good.
+    """
+    if plain.log.gaps.size or plain.unturned.sample_time >= SLOW:
+        return plain
+    if not plain.start.held and _held_gains(logged, plain) > HELD_WORTH:
+        other = plain_fits(logged, replace(plain.start, held=True))
+        plain = other if other.best.cost < plain.best.cost else plain
+    if not plain.start.turns_open and not plain.explains(plain.best) and _turns_felt(plain):
+        for held in (plain.start.held, not plain.start.held):
+            other = plain_fits(logged, replace(plain.start, held=held, turns_open=True))
+            if other.explains(other.best):
+                return other
+    return plain
+
+
+def _held_gains(logged: Logged, plain: PlainFits) -> float:
+    """Return the gain in log-likelihood, to first order, if the motor's command is held; under the same noise."""
+    log, best, parameters = plain.log, plain.best, plain.start.parameters
+    smooth, bare = (logged.seen_at(parameters, held=held).drives for held in (False, True))
+    problem, theta = FreedProblem.of(best.model, log), best.model.theta(best.values)
+    known, other = problem.disturbed(theta, [log.drives, log.drives + bare - smooth])
+    change, slopes = (other - known).ravel(), best.slopes
+    if len(slopes) != len(change):
+        return 0.0
+    change = change - slopes @ np.linalg.lstsq(slopes, change, rcond=None)[0]
+    return -float(change @ known.ravel()) - 0.5 * float(change @ change)
+
+
+def _turns_felt(plain: PlainFits) -> bool:
+    """Return whether what the largest turn of the motor leaves open is felt beside the pressure's noise."""
+    log, p = plain.unturned, plain.start.parameters
+    rise = log.sample_time * p.pump_displacement * plain.best.values["bulk_modulus"] / p.chamber_volume
+    return FIRST * rise * float(np.max(turns(log))) > FELT * log.noise[0].variance ** 0.5
