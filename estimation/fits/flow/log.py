@@ -181,11 +181,10 @@ def flow_log(
         uncertainties={name: one for name, one in uncertainties.items() if name != GAS},  # its stiffness is fitted
     )
     speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
-    swept = _swept_share(log.drives[:, position], parameters)
     drives = log.drives.copy()
     if not held:
         drives[:, speed] = straightened(log.drives[:, speed], slow=record.sample_time >= SLOW)
-    passed_on = swept * position_variance(sensed["position_m"]) ** 0.5
+    passed_on = _swept_share(log.drives[:, position], parameters) * position_variance(sensed["position_m"]) ** 0.5
     open_gaps = speed_gaps(record, parameters, variances["differential_pressure_pa"] ** 0.5)
     log = replace(
         log,

@@ -1,0 +1,41 @@
+"""Whether a motor's command is held between samples is read off the log, where it is felt."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.fits.flow.log import without_strays
+from estimation.fits.flow.motor_course import by_course
+from estimation.fits.flow.plain import FitStart, Logged, plain_fits
+from plant.eha.circuit_parameters import circuit_of
+from plant.eha.simulate import CIRCUIT, simulate
+from plant.log.record import Record
+from plant.sensors.sensors import BENCH
+from tests.estimation.fits.short_logs import PAPER, POSITION, PRESSURE, SPEED
+
+STIFF = replace(PAPER, bulk_modulus=1.4e9)
+
+FINE = 10
+"""Steps of a run between two samples."""
+
+
+def logged(*, held: bool) -> Logged:
+    """Return a log of a motor that follows a fast command, held from sample to sample or not."""
+    rng, time = np.random.default_rng(2), np.arange(3000.0 * FINE) / FINE
+    tones = 2.0 * np.pi * np.array([0.011, 0.023, 0.041, 0.061])
+    waves = [np.sin(tone * (np.floor(time) if held else time) + k) for k, tone in enumerate(tones)]
+    sensors = replace(BENCH, pressure_noise=1e3, pressure_quantum=0.0, speed_noise=0.01)
+    record = simulate(CIRCUIT, 40.0 * np.sum(waves, axis=0), 1e-3 / FINE, circuit_of(STIFF), sensors=sensors, rng=rng)
+    sampled = {name: record[name][::FINE] for name in (SPEED, POSITION, PRESSURE)}
+    return Logged(*without_strays(Record(1e-3, sampled)))
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_log_says_whether_its_motors_command_was_held(held: bool) -> None:
+    log = logged(held=held)
+    plain = plain_fits(log, FitStart(STIFF, STIFF.bulk_modulus))
+    found = by_course(log, plain)
+    assert found.start.held is held
+    error = found.swinging.values["bulk_modulus"] / STIFF.bulk_modulus - 1.0
+    assert abs(error) < 2e-3
