@@ -26,6 +26,10 @@ FELT = 0.1
 """What the largest turn may leave open beside the pressure's noise, from which it is felt [fraction]; judged. In the
 paper's actuator at 1 kHz it is 0.06 at its motor's limit."""
 
+NEARLY = 4.0
+"""Mean squared normalised residual of a plain fit up to which the turns' course may be what is left [dimensionless];
+judged: a load at the start leaves thousands."""
+
 
 def by_course(logged: Logged, plain: PlainFits) -> PlainFits:
     """Return the plain fits of a log with the course of its motor between samples.
@@ -47,7 +51,8 @@ def by_course(logged: Logged, plain: PlainFits) -> PlainFits:
     if not plain.start.held and _held_gains(logged, plain) > HELD_WORTH:
         other = plain_fits(logged, replace(plain.start, held=True))
         plain = other if other.best.cost < plain.best.cost else plain
-    if not plain.start.turns_open and not plain.explains(plain.best) and _turns_felt(plain):
+    left = plain.best.chi_square[0]
+    if not plain.start.turns_open and not plain.explains(plain.best) and left < NEARLY and _turns_felt(plain):
         for held in (plain.start.held, not plain.start.held):
             other = plain_fits(logged, replace(plain.start, held=held, turns_open=True))
             if other.explains(other.best):

@@ -68,14 +68,14 @@ def small_pump_ripple(
 def with_small_ripple(
     found: Mapping[str, tuple[float, float]], small: tuple[Mapping[str, float], Mapping[str, float]]
 ) -> dict[str, tuple[float, float]]:
-    """Return the result, shifted and widened by a small pump ripple.
+    """Return the result, shifted and widened by a small pump ripple; or by noise of motor speed, see `noise_shift`.
 
     Parameters
     ----------
     found : Mapping[str, tuple of float]
         Value and deviation by parameter [SI].
     small : tuple of Mapping[str, float]
-        As of `small_pump_ripple` [dimensionless].
+        As of `small_pump_ripple` or `noise_shift` [dimensionless].
 
     Returns
     -------
