@@ -46,7 +46,7 @@ def by_course(logged: Logged, plain: PlainFits) -> PlainFits:
     PlainFits
         The same ones where a smooth course is as good.
     """
-    if plain.log.gaps.size or plain.unturned.sample_time >= SLOW:
+    if plain.log.gaps.size or plain.unturned.sample_time >= SLOW or not plain.best.slopes.size:
         return plain
     if not plain.start.held and _held_gains(logged, plain) > HELD_WORTH:
         other = plain_fits(logged, replace(plain.start, held=True))
@@ -67,8 +67,6 @@ def _held_gains(logged: Logged, plain: PlainFits) -> float:
     problem, theta = FreedProblem.of(best.model, log), best.model.theta(best.values)
     known, other = problem.disturbed(theta, [log.drives, log.drives + bare - smooth])
     change, slopes = (other - known).ravel(), best.slopes
-    if len(slopes) != len(change):
-        return 0.0
     change = change - slopes @ np.linalg.lstsq(slopes, change, rcond=None)[0]
     return -float(change @ known.ravel()) - 0.5 * float(change @ change)
 
