@@ -3,8 +3,9 @@
 from collections.abc import Callable, Mapping, Sequence
 
 from estimation.fits.flow.accumulator import is_far_stiffer
-from estimation.fits.flow.log import homed_at_stop, outruns_pump
+from estimation.fits.flow.log import homed_at_stop
 from estimation.fits.flow.search import MAKEUP_TRIED
+from estimation.fits.flow.wide_valves import outruns_pump
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.lateness import most_late
 from estimation.fits.greybox.log import GreyBoxLog

@@ -1,13 +1,15 @@
 """From which cost on hypotheses about a log are hopeless, and below which they are believed."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
+from estimation.fits.flow.plain import PlainFits
 from estimation.fits.greybox.fit import GreyBoxFit
-from estimation.fits.hypotheses import ENCODER_ZERO, HYPOTHESES, PLAY, PRESSURE_LATE, Hypothesis
+from estimation.fits.hypotheses import ENCODER_ZERO, HYPOTHESES, OFFSET, PLAY, PRESSURE_LATE, Hypothesis
 from estimation.fits.hypothesis_search.explain import WORTH
-from estimation.fits.hypothesis_search.fit_objections import doubted
+from estimation.fits.hypothesis_search.fit_objections import doubted, fit_explains_all
 
 LITTLE = 0.01
 """Share of what the plain form leaves beside noise that the best hypothesis must take up before pairs are tried
@@ -94,3 +96,20 @@ def play_explained(names: Sequence[str], fit: GreyBoxFit) -> bool:
         The fit under them.
     """
     return PLAY.name not in names or not doubted(fit)
+
+
+def told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:
+    """Return the test of whether a fit explains the log, stricter if its initial conditions are asked for.
+
+    That has so many valleys that one is believed only where sensors' noise is all that it leaves. An offset of a log
+    that begins at rest is no such beginning.
+
+    Parameters
+    ----------
+    plain : PlainFits
+        The log's plain fits.
+    begun : bool
+        Whether initial conditions are asked for.
+    """
+    strictly = partial(fit_explains_all, noisy=plain.log.passes_on) if begun else plain.explains
+    return lambda fit: (plain.explains if OFFSET.free[0] in fit.values else strictly)(fit)

@@ -1,6 +1,6 @@
 """`fit_flow(record, parameters, ...) -> FormFit`: bulk modulus, leakage and flow bias of a log, by the flow form."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -15,7 +15,7 @@ from estimation.fits.flow.asked_hypotheses import (
     is_astray,
     near_starts,
 )
-from estimation.fits.flow.belief import hopeless_cost, play_explained, wanted_cost
+from estimation.fits.flow.belief import hopeless_cost, play_explained, told_by, wanted_cost
 from estimation.fits.flow.log import homed_at_stop, require_flow_channels, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import UNEVEN_OIL, is_single, with_lumped, with_lumped_slopes
@@ -25,7 +25,6 @@ from estimation.fits.flow.offset_beside import offset_settled
 from estimation.fits.flow.other_minimum import lower_minimum
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer, with_shorter_steps
 from estimation.fits.flow.search import MAKEUP_TRIED
-from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
 from estimation.fits.greybox.small_pump_ripple import with_small_ripple
 from estimation.fits.greybox.work_limit import Work, WorkSpentError
@@ -35,14 +34,13 @@ from estimation.fits.hypotheses import (
     BEGUN,
     CHECKS_HIDDEN,
     HYPOTHESES,
-    OFFSET,
     PLAY,
     PRESSURE_LATE,
     Hypothesis,
 )
 from estimation.fits.hypothesis_search.explain import WORTH, explain
 from estimation.fits.hypothesis_search.explanation import Explanation
-from estimation.fits.hypothesis_search.fit_objections import fit_explains_all, limits, objections
+from estimation.fits.hypothesis_search.fit_objections import limits, objections
 from estimation.fits.hypothesis_search.form_fit import DISCRETISED, FormFit, averaged, weights_of, with_structure
 from estimation.fits.hypothesis_search.not_excluded import open_wear_note, share_lost, unseen_valve_note
 from estimation.fits.hypothesis_search.pump_delivery import contradicted
@@ -212,7 +210,7 @@ def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequ
 
 def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> Explanation | None:
     """Return the explanation of a log by hypotheses, if it is believed rather than the plain form."""
-    explains = _told_by(plain, begun=BEGUN in asked)
+    explains = told_by(plain, begun=BEGUN in asked)
     in_motion = traits.loaded or traits.moving
     astray = is_astray(plain.log, plain.swinging, plain.start.parameters)
     near = near_starts(plain.swinging, plain.starts, explains, in_motion=in_motion, astray=astray)
@@ -273,16 +271,6 @@ def _losing_fit(plain: PlainFits, loss: VaryingLoss, sensed: ShownPlay) -> FormF
     )
 
 
-def _told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:
-    """Return the test of whether a fit explains the log, stricter if its initial conditions are asked for.
-
-    That has so many valleys that one is believed only where sensors' noise is all that it leaves. An offset of a log
-    that begins at rest is no such beginning.
-    """
-    strictly = partial(fit_explains_all, noisy=plain.log.passes_on) if begun else plain.explains
-    return lambda fit: (plain.explains if OFFSET.free[0] in fit.values else strictly)(fit)
-
-
 def _elsewhere(plain: PlainFits, strange: Explanation) -> FitStart | None:
     """Return from where the plain form explains the log better than what is strange; None where it does not."""
     start, cost = plain.start, strange.fit.cost
@@ -340,7 +328,7 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     left = UNEVEN_OIL if is_single({}, p) else DISCRETISED
     untaken, open_play = plain.play_untaken(plain.swinging.play, sensed)
     reasons = (*objections(best, plain.log.passes_on), *play_left(plain.swinging.play, sensed)) or plain.teeth_left
-    if begun and not reasons and not _told_by(plain, begun=begun)(best):
+    if begun and not reasons and not told_by(plain, begun=begun)(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
     value, std = found["bulk_modulus"]
     return FormFit(

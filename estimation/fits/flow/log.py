@@ -64,10 +64,6 @@ BESIDE_STOP = 0.02
 """Share of its travel that an encoder homed at an end stop may read beyond the stop, which is soft; and what a log that
 begins in mid-stroke, at a reading of none, may read at first [fraction]."""
 
-OUTRUNS, OUTRUN_SPAN = 1.2, 5e-3
-"""How many times as fast as the pump's whole flow would move it a piston is that outruns it [dimensionless], and over
-which time [s]. Of 100 training logs without a constant load none is 0.95, of 20 with one seven are 1.8."""
-
 NOISY_BLOCK = 5e-3
 """Length over which residuals are averaged then [s]: what they say of bulk modulus is slower, the noise is not. With 1
 ms, 50 um of noise put bulk modulus of leaky actuators up to 4 % low, with 5 ms 2.5 %."""
@@ -276,32 +272,6 @@ def homed_at_stop(log: GreyBoxLog) -> bool:
     low, high = float(np.min(read)), float(np.max(read))
     beside = BESIDE_STOP * (high - low)
     return min(max(-low, 0.0), max(high, 0.0)) <= beside < abs(float(read[0]))
-
-
-def outruns_pump(log: GreyBoxLog, p: EhaParameters) -> bool:
-    """Return whether the piston moves faster than the full pump flow would move it, as under a pulling load.
-
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log, as the flow form sees it.
-    p : EhaParameters
-        The actuator.
-
-    Returns
-    -------
-    bool
-        Whether it does.
-    """
-    speed, position = (log.drives[:, FLOW_FORM.drives.index(name)] for name in FLOW_FORM.drives)
-    samples = min(max(1, round(OUTRUN_SPAN / log.sample_time)), len(position) - 1)
-    fastest = float(np.max(np.abs(position[samples:] - position[:-samples]))) / (samples * log.sample_time)
-    return p.piston_area * fastest > OUTRUNS * p.pump_displacement * float(np.max(np.abs(speed)))
-
-
-def opens_wide(log: GreyBoxLog, p: EhaParameters) -> bool:
-    """Return whether make-up valves are orifices: of a piston that outruns its pump, or of a single rod with pilots."""
-    return p.pilot_share > 0.0 or outruns_pump(log, p)
 
 
 def _block(log: GreyBoxLog, p: EhaParameters) -> int:

@@ -6,7 +6,7 @@ from typing import TypeAlias
 import numpy as np
 
 from estimation.fits.flow.accumulator import first_stiffness
-from estimation.fits.flow.log import opens_wide
+from estimation.fits.flow.wide_valves import opens_wide
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem

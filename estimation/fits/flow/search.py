@@ -7,10 +7,11 @@ import numpy as np
 
 from estimation.arrays import IntArray
 from estimation.fits.flow.accumulator import first_stiffness
-from estimation.fits.flow.log import DRAIN_START, OPENING_START, carried, opens_wide
+from estimation.fits.flow.log import DRAIN_START, OPENING_START, carried
 from estimation.fits.flow.other_minimum import FINISHING, Found, completed_form, from_minimum, nearest
 from estimation.fits.flow.rough_search import RIVAL, UNLIKELY, RoughOptimum, rough_optima
 from estimation.fits.flow.swept import swept_evenly
+from estimation.fits.flow.wide_valves import opens_wide
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import descend
 from estimation.fits.greybox.drive_noise import SAMPLES_KEPT, moved_by_drives

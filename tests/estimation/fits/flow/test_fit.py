@@ -8,7 +8,8 @@ import pandas as pd
 import pytest
 
 from estimation.eha.bulk_modulus import LEAST_SQUARES, estimate_bulk_modulus
-from estimation.fits.flow.fit import _told_by, fit_flow  # pyright: ignore[reportPrivateUsage]
+from estimation.fits.flow.belief import told_by
+from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import speed_gaps
 from estimation.fits.flow.misread import CorrectedLogs
 from estimation.fits.flow.plain import PlainFits
@@ -65,7 +66,7 @@ def test_what_a_log_begins_with_must_leave_noise_alone_and_an_offset_no_more_tha
     fit = made_fit(50.0, 2e8, 1e5, chi=chi)
     fit = replace(fit, values={**fit.values, **({"pressure_offset": 1e5} if offset else {})}, seen=10_000.0)
     plain: Any = SimpleNamespace(log=SimpleNamespace(passes_on=False), explains=lambda fit: fit.chi_square[0] < 1.44)
-    assert _told_by(plain, begun=begun)(fit) is explained
+    assert told_by(plain, begun=begun)(fit) is explained
 
 
 @pytest.mark.slow

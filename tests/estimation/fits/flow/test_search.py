@@ -8,9 +8,10 @@ import pytest
 from estimation.fits.flow import rough_search
 from estimation.fits.flow import search as flow_search
 from estimation.fits.flow.fit import fit_flow
-from estimation.fits.flow.log import flow_log, outruns_pump
+from estimation.fits.flow.log import flow_log
 from estimation.fits.flow.other_minimum import Found
 from estimation.fits.flow.search import balanced, flow_starts
+from estimation.fits.flow.wide_valves import outruns_pump
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.fit import GreyBoxFit, concluded, roughly
 from estimation.fits.greybox.log import GreyBoxLog
@@ -228,7 +229,7 @@ def test_make_up_valves_are_orifices_where_a_load_pulls_the_piston_faster_than_t
     bent = min(balanced(loaded, HEALTHY, STARTS), key=lambda fit: fit.cost)
     assert bent.values["makeup_bend"] > 1e-5
     assert bent.values["bulk_modulus"] == pytest.approx(Machine().bulk_modulus, rel=0.004)
-    monkeypatch.setattr(flow_search, "outruns_pump", lambda *_: False)
+    monkeypatch.setattr(flow_search, "opens_wide", lambda *_: False)
     assert min(fit.cost for fit in balanced(loaded, HEALTHY, STARTS)) > bent.cost + 30.0
 
 
