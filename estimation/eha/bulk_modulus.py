@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from estimation.eha.another_rig import unless_another_rig
+from estimation.eha.another_rod import vague_areas
 from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
 from estimation.eha.foreign_oil import shows_no_motion, unless_foreign
 from estimation.eha.named_methods import NAMED
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, is_vague, too_wide, without_number
 from estimation.eha.rig_share import fitted_responses, scaled_responses, with_wear
-from estimation.eha.vague_areas import vague_areas
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
 from estimation.fits.flow.fit import REPORTED, fit_flow

@@ -1,11 +1,11 @@
 """Notes on rig and logger for a log that the plain flow form does not explain, and the corrected log."""
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from estimation.eha.another_rod import b_over_a
 from estimation.eha.changing_leakage import growth_note, leakage_over, step_note
 from estimation.eha.entrained_air import air_note
 from estimation.eha.port_drains import drain_note
@@ -21,7 +21,6 @@ from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import CROSSED, GROWTH, TURBULENT_AT
 from estimation.notes import RigCode
 from plant.arrays import Array
-from plant.eha.doubts import DOUBTS
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
@@ -49,12 +48,6 @@ OUTSIDE = {
     RigCode.LEAKS_ONE_WAY,
 }
 """Faults that are none of the nine conditions."""
-
-THROUGH = 0.001
-"""Difference of the logarithm of a piston's two areas up to which its rod is a through rod [dimensionless]."""
-
-OTHER_ROD = 2.0 * 2.0**0.5 * max(DOUBTS["piston_area"].usual)
-"""The same between fit and rig file from which the areas are not the file's [dimensionless]: two deviations."""
 
 
 def notes_of(found: Explanation, parameters: EhaParameters) -> tuple[Note, ...]:
@@ -168,34 +161,6 @@ def _single_rod(found: Explanation, p: EhaParameters) -> Note:
         rig_volume_percent=100.0 * b_over_a(p.volume_difference),
         rig_pilot_share=p.pilot_share,
     )
-
-
-def of_another_rod(note: Note) -> bool:
-    """Return whether a note tells areas that are not those of a rig file which says a single rod.
-
-    What is wrong with such a rig is taken up by its areas at times, a displacement that is 6 % off by 10 % of one. Its
-    bulk modulus may be right then, but its force balance is not.
-    """
-    if note.code is not RigCode.SINGLE_ROD:
-        return False
-    told, written = (math.log(0.01 * float(note.data[name])) for name in ("percent", "rig_percent"))
-    return abs(written) > THROUGH and abs(told - written) > OTHER_ROD
-
-
-def b_over_a(difference: float) -> float:
-    """Return the ratio of two sides.
-
-    Parameters
-    ----------
-    difference : float
-        Of sides A and B over their sum [dimensionless].
-
-    Returns
-    -------
-    float
-        Side B over side A [dimensionless].
-    """
-    return (1.0 - difference) / (1.0 + difference)
 
 
 def _load(found: Explanation, p: EhaParameters) -> Note:

@@ -1,7 +1,6 @@
 """Hypotheses about a rig, its oil and its logger that a log accepts or rejects.
 
-A log that the plain flow form explains is not asked. One that it does not is fitted under them by
-`estimation.fits.hypothesis_search.explain`.
+A log that the plain flow form does not explain is fitted under them (`estimation.fits.hypothesis_search.explain`).
 """
 
 from collections.abc import Mapping
@@ -138,7 +137,7 @@ OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
 PRESSURE_DRIFT = Hypothesis("pressure_drift", ("pressure_drift",))
 
 PRESSURE_SIDES = Hypothesis("pressure_sides", ("pressure_sides",))
-"""Of two chamber gauges each has a gain of its own, and one gauge of a difference may have two, one a direction."""
+"""Two chamber gauges have a gain each, and one gauge of a difference may have two, one a direction."""
 
 OFFSET_AT_REST = replace(OFFSET, from_first_sample=True)
 """The same of a log that begins at rest with a differential pressure: the offset is then that, or there is a load."""
@@ -344,8 +343,8 @@ LEAST_SHARE, MOST_SHARE = 0.6, 1.25
 [fraction]: the usual doubts of the two allow 1.07 (two deviations), and a pump is renewed before it delivers 0.6."""
 
 WORN = 0.9
-"""Delivery over the pump's displacement below which the pump counts as worn, and not the rig file as rounded."""
+"""Delivery over the pump's displacement below which the pump is worn, and the rig file not rounded [dimensionless]."""
 
 LEAST_ZERO = 0.5
-"""Least reading of the encoder in the middle position that is sought, in its typical size of 10 mm: 5 mm change a
-chamber of the paper's actuator by a third of a percent [dimensionless]."""
+"""Least reading of the encoder in the middle position that is sought, in its typical size of 10 mm [dimensionless]:
+5 mm change a chamber of the paper's actuator by 0.3 %."""

@@ -12,10 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimation.eha.another_rod import of_another_rod
 from estimation.eha.bulk_modulus import EstimateOptions
 from estimation.eha.entrained_air import amount_of_air, with_air
 from estimation.eha.estimate import estimated, explained, finding_of, refused
-from estimation.eha.explanation_notes import OUTSIDE, at_pump_speed, of_another_rod, rig_set_right, set_right
+from estimation.eha.explanation_notes import OUTSIDE, at_pump_speed, rig_set_right, set_right
 from estimation.eha.result import BulkModulusEstimate
 from estimation.eha.rig_share import SOFT, scaled_responses, with_total
 from estimation.finding import Finding, Outcome, Quantity

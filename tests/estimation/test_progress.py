@@ -28,5 +28,6 @@ def test_an_identification_tells_each_kind_of_model_more_than_once() -> None:
     with listening(heard.append):
         identify_channels(data, structure="auto", order=1, delay=1)
     kinds = list(dict.fromkeys(heard))
-    assert kinds == ["linear models", "nonlinear inputs", "products that grow", "polynomial models"]
+    grown = ["products that grow", "polynomial models"]
+    assert kinds == ["linear models", "outputs with limits", "nonlinear inputs", *grown]
     assert all(heard.count(one) > 1 for one in kinds if one != "linear models")

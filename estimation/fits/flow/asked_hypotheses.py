@@ -263,5 +263,10 @@ def unheld(values: Mapping[str, float]) -> dict[str, float]:
     ----------
     values : Mapping[str, float]
         The plain form's [SI].
+
+    Returns
+    -------
+    dict
+        The others [SI].
     """
     return {name: value for name, value in values.items() if name not in HELD}

@@ -20,7 +20,7 @@ from estimation.fits.flow.log import homed_at_stop, require_flow_channels, witho
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import UNEVEN_OIL, is_single, with_lumped, with_lumped_slopes
 from estimation.fits.flow.misread import UNLIKE_SLIPS, CorrectedLogs
-from estimation.fits.flow.motor_course import by_course
+from estimation.fits.flow.motor_course import by_course, with_open_turns
 from estimation.fits.flow.offset_beside import offset_settled
 from estimation.fits.flow.other_minimum import lower_minimum
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer, with_shorter_steps
@@ -181,6 +181,7 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
             return Answered(plain, asked, open_ends, None, ended=True)
         elsewhere = strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))
         if elsewhere is None:
+            plain = plain if strange or not asked else with_open_turns(logged, plain)
             return Answered(plain, asked, open_ends, strange)
         start = elsewhere  # with the motor's course that was found
 

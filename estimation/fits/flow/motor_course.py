@@ -1,4 +1,4 @@
-"""`by_course(logged, plain)`: plain fits of a log, with the course of its motor between samples that the log shows.
+"""`by_course(logged, plain)`, `with_open_turns(...)`: plain fits with the motor's course that the log shows, or none.
 
 A motor whose speed is asked for continuously bends its course smoothly, and straight lines between samples are put
 right by its bends (`straightened`). One whose command is held from sample to sample bends at the samples alone: there
@@ -48,15 +48,36 @@ def by_course(logged: Logged, plain: PlainFits) -> PlainFits:
     """
     if plain.log.gaps.size or plain.unturned.sample_time >= SLOW or not plain.best.slopes.size:
         return plain
-    if not plain.start.held and _held_gains(logged, plain) > HELD_WORTH:
-        other = plain_fits(logged, replace(plain.start, held=True))
-        plain = other if other.best.cost < plain.best.cost else plain
-    left = plain.best.chi_square[0]
-    if not plain.start.turns_open and not plain.explains(plain.best) and left < NEARLY and _turns_felt(plain):
-        for held in (plain.start.held, not plain.start.held):
-            other = plain_fits(logged, replace(plain.start, held=held, turns_open=True))
-            if other.explains(other.best):
-                return other
+    if plain.start.held or _held_gains(logged, plain) <= HELD_WORTH:
+        return plain
+    other = plain_fits(logged, replace(plain.start, held=True))
+    return other if other.best.cost < plain.best.cost else plain
+
+
+def with_open_turns(logged: Logged, plain: PlainFits) -> PlainFits:
+    """Return the plain fits of a log that nothing explains with the course of its motor's turns left open.
+
+    It is asked last: what is left open at turns would take up what a gain or a lag of the pressure does there.
+
+    Parameters
+    ----------
+    logged : Logged
+        The log.
+    plain : PlainFits
+        Its fits.
+
+    Returns
+    -------
+    PlainFits
+        The same ones where turns are not felt, or do not explain the log either.
+    """
+    bare, left = not plain.log.gaps.size and plain.unturned.sample_time < SLOW, plain.best.chi_square[0]
+    if not bare or plain.start.turns_open or plain.explains(plain.best) or left >= NEARLY or not _turns_felt(plain):
+        return plain
+    for held in (plain.start.held, not plain.start.held):
+        other = plain_fits(logged, replace(plain.start, held=held, turns_open=True))
+        if other.explains(other.best):
+            return other
     return plain
 
 

@@ -79,7 +79,7 @@ class GreyBoxFit:
     small_teeth : tuple of Mapping[str, float]
         By how much teeth that are not taken up move each coordinate, and add to its variance [dimensionless].
     noise_shift : tuple of Mapping[str, float]
-        The same of noise of motor speed, see `noise_shift`.
+        The same of noise of motor speed [dimensionless], see `noise_shift`.
     seen : float
         Residuals of the first output that count; without end where they are not counted [count].
     steps : ndarray of int, shape (n,), optional

@@ -49,7 +49,7 @@ def noise_shift(
         In the fitted coordinates [dimensionless], by unknown that is felt; nothing where noise of speed is not felt.
     """
     log = problem.log
-    if not any(noise.walk > 0.0 for noise in log.noise) or log.course is not None:
+    if not log.drive_std or not any(noise.walk > 0.0 for noise in log.noise) or log.course is not None:
         return NOT_MOVED
     names = [problem.model.unknowns[place] for place in known_of.felt]
     spread = min(log.drive_std[0] ** 2, struck_variance(log.drives[:, 0])) ** 0.5

@@ -80,7 +80,7 @@ def stalled_clock(time: Array) -> StalledClock | None:
     late = (time - time[0]) / sample_time - rows
     late -= np.median(late)
     waited = late > EARLIEST
-    begins = np.flatnonzero(waited[1:] & ~waited[:-1]) + 1
+    begins = np.flatnonzero(waited[1:-1] & ~waited[:-2]) + 1
     at_once = np.diff(time) < AT_ONCE * sample_time
     stalls = [begin for begin in begins.tolist() if late[begin] > STALLED and at_once[begin]]
     even = late.min() > -EARLIEST and not waited[0] and not waited[-1] and np.mean(waited) < MOST_LATE

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from estimation.eha.another_rod import of_another_rod
 from estimation.eha.bulk_modulus import _channel_slips
 from estimation.eha.changing_leakage import WARMED
 from estimation.eha.explanation_notes import (
@@ -14,7 +15,6 @@ from estimation.eha.explanation_notes import (
     OUTSIDE,
     at_pump_speed,
     notes_of,
-    of_another_rod,
     rig_set_right,
     set_right,
 )

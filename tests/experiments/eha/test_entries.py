@@ -143,12 +143,12 @@ def test_a_rig_around_which_no_circuit_fits_gets_a_condition_without_probabiliti
 
 
 def test_without_a_circuit_an_accused_sensor_makes_the_condition_unknown_too() -> None:
-    frozen = with_fault(log(), SensorFault(channel="velocity_m_s", kind="freeze", start=1.5))
+    frozen = with_fault(log(), SensorFault(channel="position_m", kind="freeze", start=1.5))
     entries = diagnosis_entries(diagnose_log(frozen, NO_CIRCUIT))
     assert entries["unknown"]
     assert entries["message"].startswith("UNKNOWN")
     assert codes(entries).count(SensorCode.SENSOR_FROZE) == 1
-    assert entries["advice"] == [str(AdviceCode.CHECK_SENSOR.note(channels="velocity_m_s"))]
+    assert entries["advice"] == [str(AdviceCode.CHECK_SENSOR.note(channels="position_m"))]
 
 
 def test_a_log_too_short_for_a_circuit_says_so_and_keeps_its_scores() -> None:

@@ -5,14 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimation.fits.flow import motor_course
 from estimation.fits.flow.log import without_strays
-from estimation.fits.flow.motor_course import by_course
-from estimation.fits.flow.plain import FitStart, Logged, plain_fits
+from estimation.fits.flow.motor_course import NEARLY, by_course, with_open_turns
+from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits
+from estimation.fits.greybox.pump_ripple import EVENLY
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
-from tests.estimation.fits.short_logs import PAPER, POSITION, PRESSURE, SPEED
+from tests.estimation.fits.short_logs import PAPER, POSITION, PRESSURE, SPEED, log, made_fit, seen
 
 STIFF = replace(PAPER, bulk_modulus=1.4e9)
 
@@ -39,3 +41,31 @@ def test_a_log_says_whether_its_motors_command_was_held(held: bool) -> None:
     assert found.start.held is held
     error = found.swinging.values["bulk_modulus"] / STIFF.bulk_modulus - 1.0
     assert abs(error) < 2e-3
+
+
+@pytest.mark.parametrize(
+    ("left", "felt", "then", "opened"),
+    [
+        (2.0, True, 1.0, True),
+        (2.0, True, 1.9, False),  # turns do not explain it either
+        (2.0, False, 1.0, False),
+        (1.1, True, 1.0, False),  # it is explained
+        (NEARLY + 0.1, True, 1.0, False),
+    ],
+)
+def test_turns_are_left_open_in_a_log_that_nothing_else_explains(
+    monkeypatch: pytest.MonkeyPatch, left: float, felt: bool, then: float, opened: bool
+) -> None:
+    """Asked before gains of two gauges, they took these up."""
+
+    def fits(chi: float, start: FitStart) -> PlainFits:
+        fit, bare = made_fit(500.0 * chi, 2e8, 1e5, chi=chi), seen(log(0.2))
+        explains = [fit].__contains__ if chi < 1.44 else lambda _: False
+        return PlainFits(start, (), lambda _: [fit], bare, bare, [fit], explains, (), (), EVENLY)
+
+    monkeypatch.setattr(motor_course, "_turns_felt", lambda _: felt)
+    monkeypatch.setattr(motor_course, "plain_fits", lambda _, start: fits(then, start))
+    plain = fits(left, FitStart(PAPER, PAPER.bulk_modulus))
+    found = with_open_turns(Logged(Record(1e-3, {}), {}), plain)
+    assert found.start.turns_open is opened
+    assert (found is plain) is not opened

@@ -113,7 +113,7 @@ def test_what_looks_strange_is_believed_where_it_gains_with_turns_read_too(
         )
 
     monkeypatch.setattr(plain_flow, "balanced", fitted)
-    monkeypatch.setattr(plain_flow, "with_course", lambda log, fitted, _: (fitted(log), log)[1])
+    monkeypatch.setattr(plain_flow, "with_course", lambda log, fitted, *_, **__: (fitted(log), log)[1])
     monkeypatch.setattr(flow_fit, "hypotheses_asked", lambda *_, **__: ((PUMP_COMPRESSES,), ()))
     monkeypatch.setattr(flow_fit, "explain", explain)
     monkeypatch.setattr(flow_fit, "lower_minimum", lambda *_: None)

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from estimation.fits.flow.accumulator import presumed_stiffness
-from estimation.fits.greybox import freed_problem, side_by_side
-from estimation.fits.greybox.freed_problem import NUDGE, FreedProblem
+from estimation.fits.greybox import freed_problem, nudges, side_by_side
+from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.gap_loops import residuals_across_gaps
 from estimation.fits.greybox.log import greybox_log
 from estimation.fits.greybox.loops import RUNAWAY
+from estimation.fits.greybox.nudges import NUDGE
 from estimation.fits.greybox.problem import OUTLIER, Problem
 from estimation.fits.greybox.side_by_side import LANES, MANY, compile_side_by_side
 from estimation.fits.greybox.side_by_side_loops import residuals_side_by_side
@@ -122,7 +123,7 @@ def test_a_run_that_escapes_keeps_a_finite_residual_and_leaves_its_neighbours_al
 def test_finite_differences_give_the_normal_equations_of_exact_derivatives(
     problem: FreedProblem, form: GreyBoxModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(freed_problem, "NUDGE", 3e-7)  # exact derivatives do not see what lies behind the next corner
+    monkeypatch.setattr(nudges, "NUDGE", 3e-7)  # exact derivatives do not see what lies behind the next corner
     p = flow_parameters(HEALTHY)
     log = replace(problem.log, drives=problem.log.drives[:, :2], parameters=parameter_row(p))
     start = {"case_leakage": 1e-13, "speed_lead": 1e-5, "accumulator_stiffness": 1e8, "makeup_opening": 1e3}

@@ -22,7 +22,15 @@ from estimation.models.flow import STIFFNESS
 from plant.arrays import Array
 from tests.estimation.fits.short_logs import PAPER, PRESSURE, VARIANCES, WORN, log
 
-UNSEEN = {"position_play", "air_midway", "relief_low", "leakage_step", "makeup_blocked", "port_a_drains"}
+UNSEEN = {
+    "position_play",
+    "air_midway",
+    "relief_low",
+    "leakage_step",
+    "makeup_blocked",
+    "single_rod",
+    "port_a_drains",
+}
 
 
 def names(found: Any) -> set[str]:

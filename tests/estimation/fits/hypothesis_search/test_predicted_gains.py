@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from estimation.fits.flow.search import flow_starts
-from estimation.fits.greybox import freed_problem
+from estimation.fits.greybox import nudges
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import AIR, DELIVERY, MAKEUP_BLOCKED, MAY_HIDE, OFFSET
 from estimation.fits.hypothesis_search import conclusion, explain, predicted_gains
@@ -88,7 +88,7 @@ def test_what_a_worn_pump_at_one_speed_promises_does_not_hang_on_the_step_of_its
     """Forward slopes by delivery and flow bias hold curvature that does not cancel, which looked like knowledge."""
     worn = seen(at_one_speed())
     fine = predicted_gain(worn, PAPER, lost_in_bias(), DELIVERY)
-    monkeypatch.setattr(freed_problem, "NUDGE", 10.0 * freed_problem.NUDGE)
+    monkeypatch.setattr(nudges, "NUDGE", 10.0 * nudges.NUDGE)
     assert predicted_gain(worn, PAPER, lost_in_bias(), DELIVERY) == pytest.approx(fine, rel=0.02)
 
 

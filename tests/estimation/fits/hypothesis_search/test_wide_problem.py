@@ -8,7 +8,7 @@ import pytest
 from benchmarks.diagnosis.rig_draws import draw_bench
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.fits.flow.accumulator import presumed_stiffness
-from estimation.fits.greybox import freed_problem
+from estimation.fits.greybox import nudges
 from estimation.fits.greybox.deviations import believed
 from estimation.fits.greybox.log import greybox_log
 from estimation.fits.hypotheses import BEGUN, ENCODER_ZERO, HYPOTHESES, LIMITS, OFFSET_AT_REST, Hypothesis
@@ -98,7 +98,7 @@ def test_slopes_of_the_widest_make_up_valve_are_those_of_the_model_and_no_chatte
     theta[place] = flow_bounds(problem.model, [theta], log)[1][place]
 
     def effects(nudge: float) -> np.ndarray:
-        monkeypatch.setattr(freed_problem, "NUDGE", nudge)
+        monkeypatch.setattr(nudges, "NUDGE", nudge)
         slopes = freed(log, (BEGUN,)).linearised(theta)[1]
         return np.sqrt(np.einsum("ij,ij->j", slopes, slopes))
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from estimation.eha.another_rod import vague_areas
 from estimation.eha.result import is_vague
-from estimation.eha.vague_areas import vague_areas
 from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.notes import RigCode
 

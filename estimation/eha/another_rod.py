@@ -1,6 +1,7 @@
-"""`vague_areas(found)`: a single rod that explains a log, and whose areas are known no better than a rig file's."""
+"""A single rod that explains a log: whether its areas are known, and whether they are those of the rig file."""
 
-from estimation.eha.explanation_notes import b_over_a
+import math
+
 from estimation.eha.result import is_vague
 from estimation.finding import NORMAL_95
 from estimation.fits.hypothesis_search.explanation import Explanation
@@ -12,6 +13,12 @@ VAGUE_AREAS = 0.5 * max(DOUBTS["piston_area"].usual)
 """Relative standard deviation of the ratio of a piston's areas from which an explanation by it is doubted [fraction]:
 half that of an area in a rig file. Right ones are known to 0.7 % at most; one that was wrong, with bulk modulus 14 to
 22 % too high, to 2 to 3 %."""
+
+THROUGH = 0.001
+"""Difference of the logarithm of a piston's two areas up to which its rod is a through rod [dimensionless]."""
+
+OTHER_ROD = 2.0 * 2.0**0.5 * max(DOUBTS["piston_area"].usual)
+"""The same between fit and rig file from which the areas are not the file's [dimensionless]: two deviations."""
 
 
 def vague_areas(found: Explanation | None) -> tuple[Note, ...]:
@@ -34,3 +41,31 @@ def vague_areas(found: Explanation | None) -> tuple[Note, ...]:
     if not is_vague(ratio, std, VAGUE_AREAS):
         return ()
     return (RigCode.AREAS_VAGUE.note(percent=min(100.0 * NORMAL_95 * std / ratio, 999.0)),)
+
+
+def of_another_rod(note: Note) -> bool:
+    """Return whether a note tells areas that are not those of a rig file which says a single rod.
+
+    What is wrong with such a rig is taken up by its areas at times, a displacement that is 6 % off by 10 % of one. Its
+    bulk modulus may be right then, but its force balance is not.
+    """
+    if note.code is not RigCode.SINGLE_ROD:
+        return False
+    told, written = (math.log(0.01 * float(note.data[name])) for name in ("percent", "rig_percent"))
+    return abs(written) > THROUGH and abs(told - written) > OTHER_ROD
+
+
+def b_over_a(difference: float) -> float:
+    """Return the ratio of two sides.
+
+    Parameters
+    ----------
+    difference : float
+        Of sides A and B over their sum [dimensionless].
+
+    Returns
+    -------
+    float
+        Side B over side A [dimensionless].
+    """
+    return (1.0 - difference) / (1.0 + difference)
