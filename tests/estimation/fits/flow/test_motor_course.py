@@ -66,6 +66,6 @@ def test_turns_are_left_open_in_a_log_that_nothing_else_explains(
     monkeypatch.setattr(motor_course, "_turns_felt", lambda _: felt)
     monkeypatch.setattr(motor_course, "plain_fits", lambda _, start: fits(then, start))
     plain = fits(left, FitStart(PAPER, PAPER.bulk_modulus))
-    found = with_open_turns(Logged(Record(1e-3, {}), {}), plain)
+    found = with_open_turns(Logged(log(0.2), {}), plain)
     assert found.start.turns_open is opened
     assert (found is plain) is not opened
