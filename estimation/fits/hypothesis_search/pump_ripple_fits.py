@@ -49,6 +49,11 @@ ONE_SIDED_95 = 1.645
 """Deviations by which teeth that are left must be larger than small ones [dimensionless]: pumps are sound up to there,
 and in one of 400 plain logs of pumps with 0 to 3 % noise alone carried a ripple of 2 % above 3 %."""
 
+SURELY_WORTH = 15.0
+"""Gain in log-likelihood from which large teeth that do not move bulk modulus are left all the same [dimensionless]: by
+chance one log in 220,000 has it. A sound log was refused for teeth of 5 % that gained 11 and moved it by 0.02
+deviations."""
+
 MOST_TEETH = 0.4
 """Amplitude up to which teeth are believed, as a share of the flow [fraction]; judged: a pump's flow does not pulse so.
 Where speed is logged with an offset, teeth seem to wander, and another count took up 59 %."""
@@ -273,11 +278,13 @@ def _asked_for(fit: GreyBoxFit) -> ShownRipple | None:
 def _left(found: RippleFits) -> tuple[Note, ...]:
     """Return the note on a ripple left in residuals; none for a slow log, in which motor speed can imitate one.
 
-    Teeth that may be as small as any pump's are integrated out, so they are left only where they move bulk modulus.
+    Teeth that may be as small as any pump's, or chance, are integrated out: they are left only where they move bulk
+    modulus.
     """
     likeliest = [] if found.log.course is not None else _shown(found.best)[:1]
     felt = _felt(found.best) > MOST_LINEAR
-    shown = [one.teeth for one in likeliest if felt or one.offset != 0.0 or _surely_large(one)]
+    sure = [_surely_large(one) and one.gain > SURELY_WORTH for one in likeliest]
+    shown = [one.teeth for one, large in zip(likeliest, sure, strict=True) if felt or one.offset != 0.0 or large]
     return tuple(EstimateCode.TEETH_LEFT.note(percent=100.0 * one.amplitude, teeth=one.count) for one in shown)
 
 

@@ -31,6 +31,7 @@ from estimation.fits.hypothesis_search.pump_ripple_fits import (
     SETTLED,
     STANDS_OUT,
     SURE,
+    SURELY_WORTH,
     TEETH_WORTH,
     RippleFits,
     with_pump_ripple,
@@ -172,17 +173,17 @@ def test_teeth_that_do_not_explain_the_log_or_do_not_stand_out_are_left() -> Non
 
 
 def test_teeth_that_may_be_as_small_as_any_pumps_are_left_only_where_they_move_bulk_modulus() -> None:
-    def doubted(size: float, moved: float, offset: float = 0.0) -> bool:
-        rivals = fit(500.0, shown(12, 50.0, size, offset), shown(13, 40.0), off=(offset, 0.0))
+    def doubted(size: float, moved: float, offset: float = 0.0, gain: float = 50.0) -> bool:
+        rivals = fit(500.0, shown(12, gain, size, offset), shown(13, gain - 5.0), off=(offset, 0.0))
         felt = rivals.std["bulk_modulus"] / rivals.values["bulk_modulus"] * moved
         fitted, _ = told(replace(rivals, small_teeth=({"bulk_modulus": felt}, {"bulk_modulus": 0.0})))
         return bool(with_pump_ripple(PLAIN, fitted, well).left)
 
     most = LEAST_TEETH + 0.01 * ONE_SIDED_95  # their deviation is 0.01
-    assert not doubted(most - 1e-4, MOST_LINEAR - 0.01)
-    assert doubted(most - 1e-4, MOST_LINEAR + 0.01)
+    assert [doubted(most - 1e-4, MOST_LINEAR + by) for by in (0.01, -0.01)] == [True, False]
     assert doubted(most + 1e-4, MOST_LINEAR - 0.01)
     assert doubted(most - 1e-4, 0.0, offset=0.1)
+    assert [doubted(most + 1e-4, 0.0, gain=SURELY_WORTH + by) for by in (0.1, -0.1)] == [True, False]  # chance
     assert not doubted(LEAST_TEETH - 1e-4, MOST_LINEAR + 0.01)
 
 

@@ -11,6 +11,7 @@ from estimation.fits.hypothesis_search.pump_ripple_fits import (
     KEPT,
     LEAST_TEETH,
     ONE_SIDED_95,
+    SURELY_WORTH,
     TEETH_WORTH,
     with_pump_ripple,
 )
@@ -45,7 +46,9 @@ def test_small_teeth_that_need_an_offset_of_speed_which_the_flow_contradicts_shu
     ("promised", "gained", "left"),
     [
         (TEETH_WORTH + 0.5, TEETH_WORTH - 1.0, False),  # a simulated chirp was unknown for it
-        (TEETH_WORTH + 0.5, KEPT * TEETH_WORTH, True),  # the search with teeth ended short
+        (SURELY_WORTH - 0.5, KEPT * TEETH_WORTH, False),
+        (SURELY_WORTH + 0.5, TEETH_WORTH - 1.0, False),
+        (SURELY_WORTH + 0.5, KEPT * SURELY_WORTH, True),  # the search with teeth ended short
         (10.0 * TEETH_WORTH, TEETH_WORTH - 1.0, True),
     ],
 )
