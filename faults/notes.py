@@ -132,7 +132,7 @@ class AdviceCode(Code):
     """Advice on what to do or measure next."""
 
     CHECK_SENSOR = "check the sensor and the wiring of {channels}, then log again"
-    MEND_SENSOR = "check the sensor and the wiring of {channel} before it is needed: this log told enough without it"
+    MEND_SENSOR = "check the sensor and the wiring of {channel}: this log was judged without it"
     MEND_COLUMNS = (
         "correct the sign, unit or name of {channels} under [columns] in the rig file, or with --columns, then read "
         "the same log again"

@@ -72,7 +72,8 @@ def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters)
     -------
     BulkModulusEstimate
         Without a number where no oil is like that, or, of a piston that stands still, where it is vague or no kin of
-        the rig's. That no motion confirms the units is said where the pump turns, and of oil unlike the rig's.
+        the rig's; no kin is what is unlike it at all where something strange explains the log. That no motion confirms
+        the units is said where the pump turns, and of oil unlike the rig's.
     """
     if found.value is None:
         return found
@@ -85,7 +86,8 @@ def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters)
     unlike = abs(ln(ratio))
     doubted = gone.stuck or unlike > UNLIKE
     said = (EstimateCode.PISTON_STANDS_STILL.note(moved_m=gone.piston, pumped_m=gone.pump),) if doubted else ()
-    if unlike < ln(KIN) and not is_vague(found.value, found.std, VAGUE_STILL):
+    most = ln(KIN) if found.explanation is None else UNLIKE  # an offset takes up half of what tells the scale
+    if unlike < most and not is_vague(found.value, found.std, VAGUE_STILL):
         return replace(found, remarks=(*found.remarks, *said))
     return _without(found, Outcome.NOT_OBSERVABLE, *said, EstimateCode.STILL_AND_FOREIGN.note(ratio=ratio))
 

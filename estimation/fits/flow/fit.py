@@ -176,7 +176,7 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
                 if not start.turns_read and _misread(corrected, plain, asked, traits):
                     return Answered(plain, (), (), None)
                 strange = _strange(plain, asked, traits) if asked else None
-                plain, strange = offset_settled(plain, strange, partial(_strange, traits=traits))
+                plain, strange = offset_settled(plain, strange, asked, partial(_strange, traits=traits))
         except WorkSpentError:
             return Answered(plain, asked, open_ends, None, ended=True)
         elsewhere = strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))
@@ -297,8 +297,9 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
         shown = play_left(one.play, NO_PLAY)
     else:
         untaken, open_play = plain.play_untaken(one.play, sensed)
-        least = UNEVEN_OIL if is_single(strange.values, plain.start.parameters) else STRUCTURE
-        left, shown = float(np.hypot(FILTERED if traits.filtered else least, untaken)), play_left(one.play, sensed)
+        left, shown = float(np.hypot(FILTERED if traits.filtered else STRUCTURE, untaken)), play_left(one.play, sensed)
+    if is_single(strange.values, plain.start.parameters):
+        left = float(np.hypot(left, UNEVEN_OIL))
     if {AIR.name, AIR_MIDWAY.name} & set(strange.names):
         left = float(np.hypot(left, BUBBLES))
     most = share_lost(plain.log, one.values, plain.start.parameters.pump_displacement, strange.names)

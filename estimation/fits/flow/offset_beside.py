@@ -10,7 +10,7 @@ from dataclasses import replace
 from estimation.finding import NORMAL_95
 from estimation.fits.flow.plain import PlainFits
 from estimation.fits.greybox.pump_ripple import MOST_OFFSET, Turning, with_ripple
-from estimation.fits.hypotheses import HYPOTHESES, Hypothesis
+from estimation.fits.hypotheses import Hypothesis
 from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.fits.hypothesis_search.pump_ripple_fits import KEPT, OFFSET_SETTLED, OFFSET_WORTH, told_offset
 from estimation.notes import RigCode
@@ -19,6 +19,7 @@ from estimation.notes import RigCode
 def offset_settled(
     plain: PlainFits,
     strange: Explanation | None,
+    asked: Sequence[Hypothesis],
     explained: Callable[[PlainFits, Sequence[Hypothesis]], Explanation | None],
 ) -> tuple[PlainFits, Explanation | None]:
     """Return a log's fits and what explains it, at the offset of speed that the explanation leaves.
@@ -29,6 +30,8 @@ def offset_settled(
         The log's plain fits, with the offset that they take up.
     strange : Explanation or None
         What explains the log beside them.
+    asked : sequence of Hypothesis
+        What it was asked.
     explained : callable
         ``explained(plain, asked)``: the explanation of a log by hypotheses, None where it is not believed.
 
@@ -48,8 +51,9 @@ def offset_settled(
     if abs(offset) > MOST_OFFSET:
         return plain, strange
     other = _turned(plain, offset, shown.std)
-    again = explained(other, [one for one in HYPOTHESES if one.name in strange.names])
-    if again is None or again.names != strange.names or again.fit.cost > strange.fit.cost - KEPT * shown.gain:
+    again = explained(other, [one for one in asked if one.name in strange.names])
+    kept = again is not None and again.fit.cost <= strange.fit.cost - KEPT * shown.gain
+    if again is None or not kept or set(again.names) != set(strange.names):
         return plain, strange
     return other, again
 

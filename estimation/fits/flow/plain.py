@@ -252,7 +252,7 @@ def with_shorter_steps(plain: PlainFits) -> FitStart | None:
     """
     swinging = [fit for fit in plain.fits if fit.model.rates is not HELD_FLOW_FORM.rates]
     explained = plain.explains(plain.best)
-    single = plain.start.parameters.area_difference != 0.0
+    single = plain.start.parameters.area_difference != 0.0 or plain.start.parameters.pilot_share > 0.0
     asked = not explained or single or any(map(_leaps, swinging))
     if not asked or plain.start.finer > 1:
         return None

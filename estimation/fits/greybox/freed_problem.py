@@ -261,13 +261,13 @@ class FreedProblem(Problem):
 
     def _remembered(self, theta: Array, variance: Array) -> tuple[Array, Array] | tuple[None, None]:
         """Return the residuals and slopes at one of the last two points, or so near to one that slopes lead there."""
-        for point, known, here, columns in self._last[::-1]:
-            if np.array_equal(known, variance):
-                away = theta - point
-                if not np.any(away):
-                    return here, columns
-                if self.near > 0.0 and np.linalg.norm(moved := columns @ away) < self.near:
-                    return here + moved, columns
+        last = [(theta - one[0], *one[2:]) for one in self._last if np.array_equal(one[1], variance)]
+        for away, here, columns in last:
+            if not np.any(away):
+                return here, columns
+        for away, here, columns in last[::-1]:
+            if self.near > 0.0 and np.linalg.norm(moved := columns @ away) < self.near:
+                return here + moved, columns
         return None, None
 
     def _nudged(self, theta: Array) -> Array:

@@ -86,7 +86,7 @@ def whatever_the_pump_delivers(
         board, calibration, left = diagnosis.scoreboard, shipped_calibration(), delivery_left_open(estimate.remarks)
         found = probabilities_over_wear(board, actuator, estimate.remarks, calibration)
         told = diagnosis if found is None else replace(diagnosis, probabilities=found)
-        if found is not None and left is not None:
+        if left is not None and found is not None:
             chance = chance_by_conditions(board, actuator, left, calibration)
     if chance == 0.0 or (chance < WORTH_SAYING and not wear_left_open(estimate.remarks)):
         return told
@@ -122,7 +122,7 @@ def chance_by_conditions(board: Scoreboard, actuator: Actuator, left: OpenDelive
     """Return the probability that a pump delivers less than `WORN`, by the balance of flow and by the conditions.
 
     A worn pump looks like one that leaks more than a sound actuator in any condition, in oil that is softer. The
-    conditions weigh this by how well they hold the log with each pump, as much as they count in the class.
+    conditions weigh this by how well they hold the log with each pump, with the weight that they have in the class.
 
     Parameters
     ----------
@@ -140,13 +140,16 @@ def chance_by_conditions(board: Scoreboard, actuator: Actuator, left: OpenDelive
     float
         `SUREST` at most [probability].
     """
-    reach = FARTHEST * left.deviation
-    deliveries = np.linspace(max(left.size - reach, left.least), left.size + reach, PUMPS)
-    held = np.array([np.logaddexp.reduce(_scores_at(board, one * FLOW_SCALE, actuator)) for one in deliveries])
+    limit, reach = math.log(WORN), FARTHEST * left.deviation
+    least = max(left.size - reach, left.least)
+    if limit <= least or not left.deviation > 0.0:
+        return 0.0
+    deliveries = np.linspace(least, max(left.size, left.least) + reach, PUMPS)
+    held = np.array([np.logaddexp.reduce(_regions_at(board, one * FLOW_SCALE, actuator)) for one in deliveries])
     weight = calibration.weights(board.blocks.pressure is not None)["parameters"]
     likely = weight * held - 0.5 * ((deliveries - left.size) / left.deviation) ** 2
     shares = np.exp(likely - np.max(likely))
-    return min(float(np.sum(shares[deliveries < math.log(WORN)]) / np.sum(shares)), SUREST)
+    return min(float(np.sum(shares[deliveries < limit]) / np.sum(shares)), SUREST)
 
 
 def _between(least: float, limit: float, mean: float, std: float) -> float:
@@ -260,13 +263,17 @@ def probabilities_over_wear(
 
 def _scores_at(board: Scoreboard, along: Array, actuator: Actuator) -> Array:
     """Return the scores of a circuit that explains a log as well as the best one and lies elsewhere, shape (9,)."""
+    best = board.fits.best
+    return _regions_at(board, along, actuator) - misfit(board.blocks, best.fitted, best.scales) / LASTING
+
+
+def _regions_at(board: Scoreboard, along: Array, actuator: Actuator) -> Array:
+    """Return how well each condition's region holds such a circuit, shape (9,)."""
     fits = board.fits
     there = replace(fits.best, coordinates=fits.best.coordinates + along)
     if np.any(fits.moved):
-        scores = scores_in_forces(there, told_of_bent(fits.information, fits.moved), actuator)
-    else:
-        scores = region_scores(there, fits.information, actuator)
-    return scores - misfit(board.blocks, there.fitted, there.scales) / LASTING
+        return scores_in_forces(there, told_of_bent(fits.information, fits.moved), actuator)
+    return region_scores(there, fits.information, actuator)
 
 
 def summed_over_wear(

@@ -91,7 +91,7 @@ def test_a_log_that_is_fitted_anew_is_asked_for_slips_anew(monkeypatch: pytest.M
     monkeypatch.setattr(flow_fit, "with_shorter_steps", lambda *_: None)
     monkeypatch.setattr(flow_fit, "by_course", lambda _, plain: plain)
     monkeypatch.setattr(flow_fit, "with_open_turns", lambda _, plain: plain)
-    monkeypatch.setattr(flow_fit, "offset_settled", lambda plain, strange, _: (plain, strange))
+    monkeypatch.setattr(flow_fit, "offset_settled", lambda plain, strange, *_: (plain, strange))
     monkeypatch.setattr(flow_fit, "_asked", lambda *_: ((DELIVERY,), ()))
     monkeypatch.setattr(flow_fit, "_strange", lambda *_: "a lower valley")
     monkeypatch.setattr(flow_fit, "_elsewhere", lambda *_: FitStart(RIG, 2e8))
@@ -118,7 +118,7 @@ def test_slips_are_tried_of_what_nothing_explains_unless_an_offset_of_pressure_d
     monkeypatch.setattr(flow_fit, "with_shorter_steps", lambda *_: None)
     monkeypatch.setattr(flow_fit, "by_course", lambda _, plain: plain)
     monkeypatch.setattr(flow_fit, "with_open_turns", lambda _, plain: plain)
-    monkeypatch.setattr(flow_fit, "offset_settled", lambda plain, strange, _: (plain, strange))
+    monkeypatch.setattr(flow_fit, "offset_settled", lambda plain, strange, *_: (plain, strange))
     monkeypatch.setattr(flow_fit, "_asked", lambda *_: ((DELIVERY, OFFSET), ()))
     by_offset = named == OFFSET.name
     monkeypatch.setattr(flow_fit, "_strange", lambda _, asked, __: strange if by_offset or len(asked) > 1 else None)

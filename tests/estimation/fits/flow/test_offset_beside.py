@@ -9,7 +9,7 @@ import pytest
 from estimation.fits.flow.offset_beside import offset_settled
 from estimation.fits.flow.plain import FitStart, PlainFits
 from estimation.fits.greybox.pump_ripple import MOST_OFFSET, ShownOffset, Turning, with_ripple
-from estimation.fits.hypotheses import ENCODER_ZERO, Hypothesis
+from estimation.fits.hypotheses import BEGUN, ENCODER_ZERO, HYPOTHESES, OFFSET, Hypothesis
 from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.fits.hypothesis_search.pump_ripple_fits import KEPT, OFFSET_SETTLED, OFFSET_WORTH, told_offset
 from estimation.notes import RigCode
@@ -55,7 +55,7 @@ def test_a_log_is_explained_at_the_offset_that_the_explanation_leaves(
         assert raw - other.log.drives[:, 0] == pytest.approx(left)
         return again
 
-    found, strange = offset_settled(plain, first, explained)
+    found, strange = offset_settled(plain, first, HYPOTHESES, explained)
     assert found.turning.offset == found.log.speed_offset == pytest.approx(left)
     assert strange is (first if left == taken else again)
     assert [note.code for note in found.teeth] == [RigCode.SPEED_OFFSET] * (left != 0.0)
@@ -64,5 +64,20 @@ def test_a_log_is_explained_at_the_offset_that_the_explanation_leaves(
 def test_an_offset_that_does_not_keep_its_promise_stays_as_it_was() -> None:
     plain, first = told(0.2), explanation(500.0, -0.2, 80.0)
     for again in (None, explanation(501.0 - KEPT * 80.0), replace(explanation(100.0), names=("volume",))):
-        assert offset_settled(plain, first, lambda *_, again=again: again) == (plain, first)
-    assert offset_settled(plain, None, lambda *_: None) == (plain, None)
+        assert offset_settled(plain, first, HYPOTHESES, lambda *_, again=again: again) == (plain, first)
+    assert offset_settled(plain, None, (), lambda *_: None) == (plain, None)
+
+
+def test_a_pair_is_the_same_in_either_order_and_is_asked_as_it_was() -> None:
+    """What a log that begins in motion is asked has the name of what another one is asked."""
+    plain = told(0.2)
+    first = replace(explanation(500.0, -0.2, 80.0), names=(OFFSET.name, BEGUN.name))
+    heard: list[Sequence[Hypothesis]] = []
+
+    def explained(_: PlainFits, asked: Sequence[Hypothesis]) -> Explanation:
+        heard.append(asked)
+        return replace(explanation(420.0), names=(BEGUN.name, OFFSET.name))
+
+    found, strange = offset_settled(plain, first, (BEGUN, OFFSET, ENCODER_ZERO), explained)
+    assert heard == [[BEGUN, OFFSET]]
+    assert (found.turning.offset, strange and strange.fit.cost) == (0.0, 420.0)

@@ -199,6 +199,15 @@ def test_a_log_that_says_nothing_of_the_conditions_leaves_wear_as_the_balance_ha
         assert found == pytest.approx(chance_of_wear((note,)), abs=0.02)
 
 
+def test_no_pump_is_worn_where_oil_would_leak_backwards(board: Scoreboard) -> None:
+    """Slopes promised a pump of a third, and no flow was lost: a sound actuator was worn at 99 %."""
+    for likeliest, width in ((-104.0, 5.8), (-104.0, 0.0), (0.0, 5.8)):
+        note = RigCode.WEAR_NOT_EXCLUDED.note(percent=3.7, half_width=width, likeliest=likeliest, most=3.7)
+        left = delivery_left_open((note,))
+        assert left is not None
+        assert chance_by_conditions(board, ACTUATOR, left, shipped_calibration()) == chance_of_wear((note,)) == 0.0
+
+
 def test_the_nine_keep_their_order_where_slopes_call_a_pump_worn_for_sure(board: Scoreboard) -> None:
     """A probability of 100 % left nothing to the nine, and the first of them was told: a healthy actuator."""
     found = board.probabilities(shipped_calibration())
