@@ -5,6 +5,7 @@ are stamped at once. So stamps are late, never early, and come back to the line 
 do not come back, and where the clock itself jitters no row is late by several sample times.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,9 @@ AT_ONCE = 0.25
 
 MOST_LATE = 0.2
 """Share of rows that may have waited [fraction]: the rest tells the clock."""
+
+UNEVEN = 0.2
+"""How far a row's stamp is from halfway between its neighbours', from which its value tells its time [fraction]."""
 
 FEWEST_ROWS = 50
 """Rows from which a clock is told apart from its stalls [count]."""
@@ -88,3 +92,32 @@ def stalled_clock(time: Array) -> StalledClock | None:
         return None
     start = float(np.mean((time - sample_time * rows)[~waited]))
     return StalledClock(start, sample_time, len(stalls), sample_time * float(np.max(late)))
+
+
+def waited_in_a_queue(time: Array, channels: Mapping[str, Array], sample_time: float) -> bool:
+    """Return whether rows of stamps that stall were sampled evenly, and not when they were stamped.
+
+    A loop in software that overruns has the same stamps, and samples late as well. Where a channel moves, values tell
+    the two apart: on the right times each lies nearer to the line between its neighbours.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Stamps, not falling [s].
+    channels : Mapping[str, ndarray]
+        What was logged [any unit].
+    sample_time : float
+        Of the even clock [s].
+    """
+    late = (time - time[0]) / sample_time - np.arange(float(len(time)))
+    waited = np.abs(late - np.median(late)) > EARLIEST
+    span = time[2:] - time[:-2]
+    share = np.divide(time[1:-1] - time[:-2], span, out=np.full_like(span, 0.5), where=span > 0.0)
+    near = (waited[:-2] | waited[1:-1] | waited[2:]) & (np.abs(share - 0.5) > UNEVEN)
+    votes = 0.0
+    for values in channels.values():
+        rise, whole = values[1:-1] - values[:-2], values[2:] - values[:-2]
+        even, stamped = (np.nansum((rise - part * whole)[near] ** 2) for part in (0.5, share))
+        if even > 0.0 and stamped > 0.0:
+            votes += float(np.log(even / stamped))
+    return votes <= 0.0

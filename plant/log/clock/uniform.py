@@ -10,7 +10,7 @@ from plant.arrays import Array
 from plant.errors import LogError, SparseLogError
 from plant.log.clock.jitter import GAP, grid_of, resampled, rounded_clock, usual_step
 from plant.log.clock.jumps import without_jumps, without_overruns
-from plant.log.clock.stalls import stalled_clock
+from plant.log.clock.stalls import stalled_clock, waited_in_a_queue
 from plant.log.columns import TIME
 from plant.log.notes import LogCode
 from plant.notes import Note
@@ -155,7 +155,7 @@ def _mended(time: Array, channels: Channels, source: str, notes: list[Note]) -> 
             _few_left_out(len(time), slots[-1] + 1.0, source)
             notes.append(LogCode.TIME_ROUNDED.note(channel=TIME, quantum_s=quantum, sample_time_s=sample_time))
             return Checked(sample_time, start, _spread(channels, slots.astype(np.int64)))
-    if (behind := stalled_clock(time)) is not None:
+    if (behind := stalled_clock(time)) is not None and waited_in_a_queue(time, channels, behind.sample_time):
         start, sample_time, count, longest = behind
         note = LogCode.TIME_STALLS.note(channel=TIME, count=count, longest_s=longest, sample_time_s=sample_time)
         notes.append(note)

@@ -7,7 +7,7 @@ import pytest
 
 from plant.arrays import Array
 from plant.errors import LogWarning
-from plant.log.clock.stalls import stalled_clock
+from plant.log.clock.stalls import stalled_clock, waited_in_a_queue
 from plant.log.files import read_record
 from plant.log.frames import frame_table
 from plant.notes import Note
@@ -25,8 +25,8 @@ def stalled(at: tuple[float, ...] = (0.7, 1.9, 3.1), length: float = 0.02, apart
     return np.maximum.accumulate(time)
 
 
-def read(time: Array) -> tuple[float, Array, list[Note]]:
-    ramp = np.sin(9.0 * EVEN[: len(time)])
+def read(time: Array, sampled: Array = EVEN) -> tuple[float, Array, list[Note]]:
+    ramp = np.sin(9.0 * sampled[: len(time)])
     table = frame_table({"time_s": time, "motor_speed_rad_s": ramp, "position_m": 1e-2 * ramp})
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -44,6 +44,24 @@ def test_rows_that_waited_are_put_back_where_they_were_sampled(apart: float, jit
     assert note.data["longest_s"] == pytest.approx(0.02, abs=2e-3)
     assert sample_time == pytest.approx(1e-3, rel=1e-5)
     np.testing.assert_array_equal(position, 1e-2 * np.sin(9.0 * EVEN))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_rows_of_a_loop_that_sampled_late_and_caught_up_are_taken_when_they_say(noise: float) -> None:
+    """Its stamps are those of a queue: put on an even clock, a sine of 2 Hz was off by its amplitude."""
+    time = stalled(length=0.0098, apart=1e-5)
+    _, position, notes = read(time, time + noise / 9.0 * RNG.standard_normal(len(time)))
+    assert notes[0].code == "time_jitters"
+    even = np.arange(len(position)) * (time[-1] / (len(position) - 1))
+    assert np.nanmax(np.abs(position - 1e-2 * np.sin(9.0 * even))) < 1e-4 + 6e-2 * noise
+
+
+def test_channels_that_stand_still_leave_an_even_clock() -> None:
+    time = stalled(apart=1e-4)
+    still = {"held": np.ones(len(time)), "noise": RNG.standard_normal(len(time)), "missing": np.full(len(time), np.nan)}
+    found = stalled_clock(time)
+    assert found is not None
+    assert waited_in_a_queue(time, still, found.sample_time)
 
 
 def test_rows_that_were_lost_or_a_clock_that_jitters_are_no_stall() -> None:
