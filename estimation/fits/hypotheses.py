@@ -137,7 +137,8 @@ OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
 PRESSURE_DRIFT = Hypothesis("pressure_drift", ("pressure_drift",))
 
 PRESSURE_SIDES = Hypothesis("pressure_sides", ("pressure_sides",))
-"""Two chamber gauges have a gain each, and one gauge of a difference may have two, one a direction."""
+"""Two chamber gauges have a gain each, and one gauge of a difference may have two, one a direction. Asked by itself:
+beside others it takes up part of an offset of speed, and right pairs of them are no longer found."""
 
 OFFSET_AT_REST = replace(OFFSET, from_first_sample=True)
 """The same of a log that begins at rest with a differential pressure: the offset is then that, or there is a load."""
@@ -265,7 +266,6 @@ HYPOTHESES = (
     Hypothesis("position_late", ("position_lag",), ({"position_lag": 1e-3},), LATE_TRIED, "position_m"),
     OFFSET,
     PRESSURE_DRIFT,
-    PRESSURE_SIDES,
     ENCODER_ZERO,
     PLAY,
     DELIVERY,

@@ -9,6 +9,7 @@ from estimation.fits.flow.plain import PlainFits
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.hypotheses import ENCODER_ZERO, HYPOTHESES, OFFSET, PLAY, PRESSURE_LATE, Hypothesis
 from estimation.fits.hypothesis_search.explain import WORTH
+from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.fits.hypothesis_search.fit_objections import doubted, fit_explains_all
 
 LITTLE = 0.01
@@ -113,3 +114,16 @@ def told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:
     """
     strictly = partial(fit_explains_all, noisy=plain.log.passes_on) if begun else plain.explains
     return lambda fit: (plain.explains if OFFSET.free[0] in fit.values else strictly)(fit)
+
+
+def likelier(one: Explanation | None, other: Explanation | None) -> Explanation | None:
+    """Return the likelier of two explanations of a log, the first where they are alike; either may be none.
+
+    Parameters
+    ----------
+    one, other : Explanation or None
+        What explains it.
+    """
+    if one is None or other is None:
+        return one or other
+    return other if other.fit.cost < one.fit.cost else one

@@ -15,7 +15,7 @@ from estimation.fits.flow.asked_hypotheses import (
     is_astray,
     near_starts,
 )
-from estimation.fits.flow.belief import hopeless_cost, play_explained, told_by, wanted_cost
+from estimation.fits.flow.belief import hopeless_cost, likelier, play_explained, told_by, wanted_cost
 from estimation.fits.flow.log import homed_at_stop, require_flow_channels, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import UNEVEN_OIL, is_single, with_lumped, with_lumped_slopes
@@ -36,6 +36,7 @@ from estimation.fits.hypotheses import (
     HYPOTHESES,
     PLAY,
     PRESSURE_LATE,
+    PRESSURE_SIDES,
     Hypothesis,
 )
 from estimation.fits.hypothesis_search.explain import WORTH, explain
@@ -176,6 +177,8 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
                 if not start.turns_read and _misread(corrected, plain, asked, traits):
                     return Answered(plain, (), (), None)
                 strange = _strange(plain, asked, traits) if asked else None
+                if len(asked) >= len(HYPOTHESES):
+                    strange = likelier(strange, _strange(plain, (PRESSURE_SIDES,), traits))
                 plain, strange = offset_settled(plain, strange, asked, partial(_strange, traits=traits))
         except WorkSpentError:
             return Answered(plain, asked, open_ends, None, ended=True)
@@ -224,7 +227,7 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
         near,
         explains,
         asked=asked,
-        paired=any(one not in (*ALWAYS_ASKED, CHECKS_HIDDEN, PLAY) for one in asked),
+        paired=any(one not in (*ALWAYS_ASKED, CHECKS_HIDDEN, PLAY, PRESSURE_SIDES) for one in asked),
         hopeless=hopeless_cost(plain.swinging, asked),
         by_mass=balances_mass(plain.swinging.model),
         useful=_wanted((asked[0].name,), plain, traits, 0.0) if alone else np.inf,

@@ -51,7 +51,8 @@ def offset_settled(
     if abs(offset) > MOST_OFFSET:
         return plain, strange
     other = _turned(plain, offset, shown.std)
-    again = explained(other, [one for one in asked if one.name in strange.names])
+    same = [one for one in asked if one.name in strange.names]
+    again = explained(other, same) if len(same) == len(strange.names) else None
     kept = again is not None and again.fit.cost <= strange.fit.cost - KEPT * shown.gain
     if again is None or not kept or set(again.names) != set(strange.names):
         return plain, strange
