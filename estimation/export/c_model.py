@@ -3,9 +3,11 @@
 import numpy as np
 
 from estimation.arrays import Array
+from estimation.identification.free_run.limited_dynamics import LimitedDynamics
 from estimation.identification.free_run.model import FreeRunModel
 from plant.compiled.c99.files import c_files, checked_name
 from plant.compiled.c99.precision import precision_of
+from plant.errors import HydrostateError
 
 NO_LEVEL = 1e-9
 """Sum of a denominator's coefficients, over that of their sizes, below which the model integrates [fraction]."""
@@ -31,8 +33,9 @@ def model_in_c(model: FreeRunModel, *, name: str, precision: str = "double") -> 
     Raises
     ------
     HydrostateError
-        If the model is not linear, the name is none of C, or the precision is not known.
+        If the model is not linear or has limits, the name is none of C, or the precision is not known.
     """
+    require_no_limits(model)
     real, name = precision_of(precision), checked_name(name)
     both = model.transfer_functions()
     order = max(1, *(max(b.size, f.size) - 1 for b, f in both))
@@ -57,3 +60,27 @@ def model_in_c(model: FreeRunModel, *, name: str, precision: str = "double") -> 
         "level": real.literal(model.level),
     }
     return c_files("estimation", "model", name, real, facts)
+
+
+def require_no_limits(model: FreeRunModel) -> None:
+    """Refuse a model whose output has limits: a transfer function alone goes on behind them.
+
+    Parameters
+    ----------
+    model : FreeRunModel
+        Any.
+
+    Raises
+    ------
+    HydrostateError
+        If it has limits; they are named.
+    """
+    if not isinstance(model.dynamics, LimitedDynamics):
+        return
+    told = model.dynamics.limits.nonlinearity(model.scaling)
+    ends = " and ".join(f"{told[end]['value']:.4g}" for end in ("low", "high") if end in told)
+    how = "held by stops" if model.dynamics.limits.stops else "cut off"
+    raise HydrostateError(
+        f"the output {model.output!r} of this model is {how} at {ends}, and a transfer function alone does not end "
+        "there: a model with limits is not exported"
+    )

@@ -5,6 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from estimation.export.c_model import require_no_limits
 from estimation.identification.free_run.model import FreeRunModel
 from plant.compiled.c99.files import checked_name
 
@@ -30,10 +31,11 @@ def model_in_mat(model: FreeRunModel, *, name: str) -> dict[str, bytes]:
     Raises
     ------
     HydrostateError
-        If the model is not linear, or the name is no name.
+        If the model is not linear or has limits, or the name is no name.
     """
     from scipy.io import savemat
 
+    require_no_limits(model)
     numerators, denominators = model.padded_transfer_functions()
     held = BytesIO()
     savemat(

@@ -272,7 +272,7 @@ class FreeRunModel:
         return numerators, denominators
 
     def to_control(self) -> "control.TransferFunction":
-        """Return a linear model as a python-control object, one column an input; its offset is left out."""
+        """Return a linear model as a python-control object, one column an input, without offset and limits."""
         import control
 
         numerators, denominators = self.padded_transfer_functions()

@@ -1,5 +1,6 @@
 """An identified linear model in C and in a MAT file gives the output that Python gives."""
 
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -11,9 +12,12 @@ from scipy.signal import lfilter, lfiltic
 from estimation.export.c_model import model_in_c
 from estimation.export.mat_model import model_in_mat
 from estimation.identification.free_run.data import Scaling
+from estimation.identification.free_run.limited_dynamics import LimitedDynamics
+from estimation.identification.free_run.limited_output import Limits
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
+from plant.errors import HydrostateError
 from tests.c_compiler import compiled, ran
 
 
@@ -69,3 +73,19 @@ def test_a_mat_file_holds_the_transfer_functions() -> None:
     for b, f, one in zip(held["numerator"], held["denominator"], (u - held["input_mean"]).T, strict=True):
         out += lfilter(b, f, one)
     np.testing.assert_allclose(out, model.simulate(u), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("limits", "named"),
+    [
+        (Limits(-np.inf, 0.5, 0.01), "cut off at 12,"),
+        (Limits(-1.0, 0.5, 0.01, stops=True), "held by stops at 6 and 12,"),
+    ],
+)
+def test_a_model_with_limits_is_refused_by_their_names(limits: Limits, named: str) -> None:
+    free = linear(DECAYING)
+    assert isinstance(free.dynamics, LinearDynamics)
+    model = replace(free, dynamics=LimitedDynamics(free.dynamics.form, free.dynamics.theta, limits))
+    for export in (model_in_c, model_in_mat):
+        with pytest.raises(HydrostateError, match=named):
+            export(model, name="speed")
