@@ -1,5 +1,7 @@
 """Whether an input follows the noise of the output that it drives, said as a note."""
 
+import numpy as np
+
 from estimation.arrays import Array
 from estimation.identification.fit.residual_tests import DEFAULT_LAGS, feedback_test
 from estimation.identification.notes import IdentificationCode
@@ -30,7 +32,7 @@ def feedback_note(residual: Array, u: Array, names: tuple[str, str]) -> Note | N
         With the probability of such a record in open loop.
     """
     part = slice(0, FEEDBACK_SAMPLES)
-    if u[part].size < 8 * DEFAULT_LAGS:
+    if u[part].size < 8 * DEFAULT_LAGS or np.count_nonzero(np.isfinite(residual[part])) < 3 * DEFAULT_LAGS:
         return None
     found = feedback_test(residual[part], u[part])
     if not found.p_value < FEEDBACK:

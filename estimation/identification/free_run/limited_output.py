@@ -99,26 +99,27 @@ def limits_of(data: Channels) -> Limits | None:
     data : Channels
         Scaled.
     """
-    bends = np.concatenate([np.abs(np.diff(y, 2)) for y in data.y])
-    known = np.concatenate(data.y)
-    known = known[np.isfinite(known)]
-    if not np.isfinite(bends).any():
+    # of outputs that are there alone: of a slow sensor most rows are empty
+    known = [y[np.isfinite(y)] for y in data.y]
+    known = [y for y in known if y.size]
+    bends = np.concatenate([np.abs(np.diff(y, 2)) for y in known])
+    if not bends.size:
         return None
-    noise, exact = float(np.nanmedian(bends)) / SMOOTH, ROUNDING * float(np.ptp(known))
+    noise, exact = float(np.median(bends)) / SMOOTH, ROUNDING * float(np.ptp(np.concatenate(known)))
     # behind a sensor's noise a limit is sharp, before it not
     for band in (exact, max(NOISE_BAND * noise, exact)):
-        high, low = _end(data.y, band), -_end([-y for y in data.y], band)
+        high, low = _end(known, band), -_end([-y for y in known], band)
         if np.isfinite([low, high]).any():
             return Limits(low, high, band / 2.0)
     return None
 
 
 def _end(logs: Sequence[Array], band: float) -> float:
-    """Return the upper end at which outputs stand, infinite where they do not."""
+    """Return the upper end at which known outputs stand, infinite where they do not."""
     y = np.concatenate(logs)
-    top = float(np.nanmax(y))
+    top = float(y.max())
     there, below = y >= top - band, (y < top - band) & (y >= top - 2.0 * band)
-    share = np.count_nonzero(there) / np.count_nonzero(np.isfinite(y))
+    share = np.count_nonzero(there) / y.size
     many = share >= LEAST_SHARE and np.count_nonzero(there) > PILED * np.count_nonzero(below)
     longest = max(_longest(one >= top - band) for one in logs)
     return float(np.median(y[there])) if many and longest >= LONGEST else float("inf")

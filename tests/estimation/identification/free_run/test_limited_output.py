@@ -1,6 +1,7 @@
 """An output that is cut off, or held by stops, gets the linear model between its limits."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -52,6 +53,18 @@ def test_the_gain_of_an_output_that_is_cut_off_is_that_of_the_plant(after: float
     u, y = driven(5)
     # without outputs a run begins where its first input would have brought it
     assert np.abs(found.model.simulate(u) - np.minimum(y, 0.4))[80:].max() < 0.05
+
+
+@pytest.mark.parametrize("every", [3, 10])
+@pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
+def test_limits_are_looked_for_where_outputs_are_missing_regularly(every: int) -> None:
+    data = cut_off(0, 0.5)
+    rows = np.arange(data.y[0].size) % every
+    missing = rows == 2 if every == 3 else rows > 0
+    found = identify_channels(replace(data, y=(np.where(missing, np.nan, data.y[0]),)))
+    assert IdentificationCode.OUTPUT_CUT_OFF in {note.code for note in found.notes}
+    assert found.model.linear is not None
+    assert abs(found.model.linear.dc_gain - 2.0) < 3.0 * found.model.linear.dc_gain_std < 0.2
 
 
 def test_an_output_that_is_nowhere_cut_off_has_no_limits() -> None:
