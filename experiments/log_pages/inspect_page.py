@@ -54,7 +54,7 @@ def inspect_page(result: Mapping[str, Any], tables: "Sequence[TableFacts]") -> s
         "title": f"This log can be diagnosed{unsure}." if result["reads"] else "This log cannot be diagnosed yet.",
         "message": f"{result['message'][:1].upper()}{result['message'][1:]}.",
         "block": block_of(result["columns"], guessed),
-        "guessed": list(guessed.values()),
+        "guessed": [name for _, name in guessed],
         "clocks": [sentence(clock_sentence(one)) for one in result["tables"]],
         "most": MOST_COLUMNS,
         "columns": pd.DataFrame([_row(row) for row in rows]),

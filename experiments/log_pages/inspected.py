@@ -154,15 +154,15 @@ def _options(columns: Mapping[str, str], plant: str, sample_time: float | None, 
     return " ".join(kind + told + ([] if sample_time is None else [f"--sample-time {sample_time:g}"]))
 
 
-def block_of(columns: Mapping[str, str], guessed: Collection[str] = ()) -> str:
+def block_of(columns: Mapping[str, str], guessed: Collection[tuple[str, str]] = ()) -> str:
     """Return the ``[columns]`` block of a rig file.
 
     Parameters
     ----------
     columns : Mapping[str, str]
         Column with its unit, by channel.
-    guessed : collection of str
-        Channels whose unit the file does not give.
+    guessed : collection of tuple of str
+        Channels and columns whose unit the file does not give.
 
     Returns
     -------
@@ -170,14 +170,19 @@ def block_of(columns: Mapping[str, str], guessed: Collection[str] = ()) -> str:
         TOML.
     """
     lines = [
-        f"{channel} = {json.dumps(spec, ensure_ascii=True)}{GUESSED if channel in guessed else ''}"
+        f"{channel} = {json.dumps(spec, ensure_ascii=True)}{GUESSED if _is_one_of(channel, spec, guessed) else ''}"
         for channel, spec in columns.items()
     ]
     return "\n".join(["[columns]", *lines])
 
 
-def without_unit(tables: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """Return the columns whose unit was guessed, since the file gives none, by channel.
+def _is_one_of(channel: str, spec: str, guessed: Collection[tuple[str, str]]) -> bool:
+    """Return whether a channel's own column is one of those whose unit was guessed."""
+    return any(channel == of and name in (spec, spec.rpartition(":")[0]) for of, name in guessed)
+
+
+def without_unit(tables: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
+    """Return channel and column of each unit that was guessed, since the file gives none.
 
     Parameters
     ----------
@@ -186,10 +191,9 @@ def without_unit(tables: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     """
     from estimation.log_checks.notes import GuessCode
 
-    rows = (row for one in tables for row in one["columns"])
-    return {
-        row["channel"]: row["name"] for row in rows if GuessCode.UNIT_GUESSED in (why["code"] for why in row["why"])
-    }
+    rows = [row for one in tables for row in one["columns"]]
+    guessed = [row for row in rows if GuessCode.UNIT_GUESSED in (why["code"] for why in row["why"])]
+    return list(dict.fromkeys((row["channel"], row["name"]) for row in guessed))
 
 
 def clock_sentence(one: Mapping[str, Any]) -> str:

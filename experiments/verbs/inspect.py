@@ -102,7 +102,7 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
         yield ""
         yield (visible(_block(result)) if result["columns"] else "no column was recognised; name the columns yourself")
         if named := without_unit(result["tables"]):
-            yield visible(f"check the unit of {', '.join(named.values())}: the file gives none")
+            yield visible(f"check the unit of {', '.join(name for _, name in named)}: the file gives none")
         yield ""
         if result["options"]:
             yield visible(f"or add to one command: {result['options']}")

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from estimation.log_checks.notes import GuessCode
 from experiments.log_pages.inspect_page import inspect_page
-from experiments.log_pages.inspected import looked_into
+from experiments.log_pages.inspected import GUESSED, block_of, looked_into, without_unit
 
 
 def page_of(folder: Path, names: str, *columns: np.ndarray) -> str:
@@ -73,3 +74,16 @@ def test_a_unit_that_was_guessed_is_marked_in_the_heading_and_in_the_rig_file(tm
     assert "<h1>This log can be diagnosed; check the units that were guessed.</h1>" in page
     assert "# the file gives no unit: check this one" in page
     assert "# the file" not in page_of(tmp_path, "time_s,motor_speed_rad_s,position_m", TIME, SPEED, WAY)
+
+
+def test_a_guessed_unit_is_marked_where_the_column_is_the_block_s_own() -> None:
+    """Two tables may hold the same channel, of which one has its unit."""
+    why = [{"code": GuessCode.UNIT_GUESSED}]
+    tables = [
+        {"columns": [{"channel": "position_m", "name": "Weg", "why": why}]},
+        {"columns": [{"channel": "position_m", "name": "Hub", "why": why}]},
+    ]
+    guessed = without_unit(tables)
+    assert guessed == [("position_m", "Weg"), ("position_m", "Hub")]
+    for spec, marked in (("Weg:mm", True), ("Hub", True), ("Position:mm", False), ("Wegmesser:mm", False)):
+        assert (GUESSED in block_of({"position_m": spec}, guessed)) is marked
