@@ -61,13 +61,18 @@ def wanders(view: IdentifiedView) -> bool:
     return IdentificationCode.RANDOM_WALK in {one["code"] for one in view.result.get("notes", ())}
 
 
+def has_limits(view: IdentifiedView) -> bool:
+    """Return whether the output is cut off or held by stops."""
+    return (view.result.get("nonlinearity") or {}).get("kind") in ("cut-off", "stops")
+
+
 def title_of(view: IdentifiedView) -> str:
     """Return the verdict in one sentence."""
     held, own = view.result["held_back_percent"], view.result["fit_percent"]
     if not is_usable(view):
         return f"Do not use this model of {view.output.name}: {_why_not(view)}."
     order = view.result.get("order") or (None if view.linear is None else view.linear.denominator.size - 1)
-    kind = KINDS.get(view.result["structure"], view.result["structure"])
+    kind = "linear with limits" if has_limits(view) else KINDS.get(view.result["structure"], view.result["structure"])
     said = f"Model of {view.output.name} ({kind}{f', order {order}' if order else ''})"
     if wanders(view):
         return f"{said}, fitted to changes: the output also wanders by itself."
@@ -174,7 +179,9 @@ def uses_of(view: IdentifiedView, measured: MeasuredCurve | None) -> tuple[list[
         bad.append("Inputs beyond that range: the log says nothing about them.")
         if wanders(view):
             bad.append(f"The level of {view.output.name}: it also moves by itself.")
-    band = told_band(measured) if usable and view.is_linear else None
+    # the measured response holds samples at the limits, and the transfer function is that of the plant without
+    compared = usable and view.is_linear and not has_limits(view)
+    band = told_band(measured) if compared else None
     if band is not None and measured is not None:
         apart = distance(view, measured, band)
         said = f"{number(band[0], 2)} to {number(band[1], 2)} Hz"
@@ -187,8 +194,10 @@ def uses_of(view: IdentifiedView, measured: MeasuredCurve | None) -> tuple[list[
                 f"Controller design: from {said}, it differs from the measured response by "
                 f"{100.0 * apart:.0f} % (median)."
             )
-    elif usable and view.is_linear and len(view.inputs) == 1:
+    elif compared and len(view.inputs) == 1:
         bad.append("Controller design: the log tells the response at no frequency well enough to check the model.")
+    if usable and has_limits(view):
+        bad.append("Controller design without a check: the measured response holds samples at the limits.")
     bad += [*_of_gain(view), *_of_residual(view)]
     if (view.result["input"], view.result["output"]) == (INPUT, OUTPUT):
         bad.append("Diagnosis: the model does not tell leakage, friction and oil apart. Use hydrostate diagnose.")

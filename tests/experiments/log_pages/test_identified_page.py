@@ -90,6 +90,15 @@ def test_a_right_model_may_be_used_for_control_and_a_wrong_one_not() -> None:
         assert any(said.startswith("Controller design") for said in bad) != allowed
 
 
+@pytest.mark.parametrize("kind", ["cut-off", "stops"])
+def test_a_model_with_limits_is_not_compared_with_a_response_that_holds_them(kind: str) -> None:
+    view = seen(replace(TRUTH, numerator=1.6 * TRUTH.numerator), nonlinearity={"kind": kind})
+    good, bad = uses_of(view, measured_curve(view))
+    assert not any("differs from the measured response" in said for said in [*good, *bad])
+    assert any(said.startswith("Controller design without a check") for said in bad)
+    assert "(linear with limits, order 2)" in title_of(view)
+
+
 def test_what_tests_and_gain_forbid_is_said() -> None:
     tests = {"whiteness_p": 1e-9, "cross_correlation_p": 1e-9}
     view = seen(validation=tests, dc_gain={"value": 1e-4, "std": 1e-4, "ci95": (-1e-4, 3e-4)})
