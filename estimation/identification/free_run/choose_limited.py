@@ -102,7 +102,7 @@ def refitted_limited(taken: LimitedCandidate, data: Channels) -> LinearFit:
     problem, fit = LimitedProblem(taken.fit.form, data, taken.limits), taken.fit
     theta = fit.theta
     if theta.size != problem.inner.n_parameters:
-        theta = _begun(fit.f, data, taken.limits, fit.form)
+        theta = _begun(fit.f, _free(data, taken.limits), problem)
     return problem.descend(theta)
 
 
@@ -118,21 +118,25 @@ def _fitted(form: Form, data: Channels, limits: Limits, one: LinearComparison) -
     """Return the best fit of one form: begun at what outputs between limits tell, and at models without limits."""
     tell("outputs with limits")
     problem = LimitedProblem(form, data, limits)
-    free = _pieces(data, limits) if limits.stops else between(data, limits)
+    free = _free(data, limits)
     starts = [fit_linear(form, free, least_gain=COARSE).f]
     if limits.stops and form.order > 0:
         integrating = fit_integrating(form, free, starts, search=True, least_gain=COARSE)
         starts += [integrating.f] if np.isfinite(integrating.cost) else []
     starts += [each.fit.f for each in one.candidates if each.form == form]
-    fits = [problem.descend(_begun(f, data, limits, form), least_gain=COARSE) for f in starts]
+    fits = [problem.descend(_begun(f, free, problem), least_gain=COARSE) for f in starts]
     return min(fits, key=lambda fit: fit.cost)
 
 
-def _begun(f: Array, data: Channels, limits: Limits, form: Form) -> Array:
+def _begun(f: Array, free: Channels, problem: LimitedProblem) -> Array:
     """Return values of a denominator, from outputs between limits."""
-    free = _pieces(data, limits) if limits.stops else between(data, limits)
-    values = Problem(form, free).profiled(f)[1][: form.n_values]
-    return LimitedProblem(form, data, limits).begun(values)
+    values = Problem(problem.form, free).profiled(f)[1][: problem.form.n_values]
+    return problem.begun(values)
+
+
+def _free(data: Channels, limits: Limits) -> Channels:
+    """Return what lies between limits: of stops as logs of their own."""
+    return _pieces(data, limits) if limits.stops else between(data, limits)
 
 
 def _pieces(data: Channels, limits: Limits) -> Channels:
