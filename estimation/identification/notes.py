@@ -20,6 +20,10 @@ class IdentificationCode(Code):
         "the deviation, this one {left:.0%}): exchange --input and --output; if they are right, a controller computes "
         "{input!r} from {output!r}, and --reference is needed with the column that drives the loop"
     )
+    INPUT_LATE = (
+        "{input!r} seems to be logged late: moved ahead by {samples} samples, it leaves {ahead:.0%} of the deviation "
+        "of {output!r}, as it is {left:.0%}. Move the column, or poles and dead time are not the plant's"
+    )
     TWO_STAGES = (
         "only the part of input {input!r} that {reference} explains is used, {share:.0%} of its power: the rest may be "
         "noise fed back by a closed loop"
@@ -90,12 +94,12 @@ class IdentificationCode(Code):
         "the sign, and poles and gain are told too"
     )
     OUTPUT_CUT_OFF = (
-        "{output!r} is cut off at {limits} ({share:.0%} of the samples): the transfer function is that of the plant "
-        "before, from the other samples, and simulated outputs end there"
+        "{output!r} seems to be cut off at {limits} ({share:.0%} of the samples): the transfer function is that of the "
+        "plant ahead of the limit; simulated outputs are limited too"
     )
     OUTPUT_STOPPED = (
-        "{output!r} stands at a stop at {limits} ({share:.0%} of the samples): the transfer function is that of the "
-        "plant between its stops, and simulated outputs end there"
+        "{output!r} seems to be held by stops at {limits} ({share:.0%} of the samples): the transfer function is that "
+        "of the plant between its stops; simulated outputs are limited too"
     )
     UNRELATED = (
         "the inputs explain {output!r} no better than the same inputs in a shuffled order: the output drifts by itself,"
@@ -126,9 +130,10 @@ class IdentificationCode(Code):
         "leave one out, or log inputs that differ"
     )
     MORE_THAN_NOISE = (
-        "the linear model leaves {left:.0%} of the deviation of {output!r}, most of which is no noise from sample to "
-        "sample: the plant is nonlinear, or something else drives it. Poles and gain are those of a linear "
-        "approximation, and their deviations do not count this; --structure auto tries nonlinear models"
+        "the model leaves {left:.0%} of the deviation of {output!r}, most of which is no noise from sample to sample "
+        "and goes with the inputs: the plant may be nonlinear, or something else that goes with them drives it, or "
+        "(less likely) sensor noise that is filtered or held looks so. Poles and gain may be those of an approximation "
+        "alone; --structure auto tries nonlinear models"
     )
     ANSWERS_LATE = (
         "{output!r} seems to answer {input!r} after {dead_time_s:.4g} s, more than a fifth of the log, which is too "
@@ -151,6 +156,9 @@ GAIN_MEANS_NOTHING = frozenset(
 )
 """Notes by which a steady gain must not be used."""
 
+AGAINST = frozenset({IdentificationCode.SWAPPED, IdentificationCode.WALK_FOLLOWED, IdentificationCode.ANSWERS_LATE})
+"""Notes by which a model is not to be relied on, whatever else is told of it."""
+
 WARNED = (
     IdentificationCode.TIME_CONSTANT_BEYOND_RECORD,
     IdentificationCode.NO_FIT,
@@ -162,6 +170,7 @@ WARNED = (
     IdentificationCode.OUTPUT_STOPPED,
     IdentificationCode.FEEDBACK,
     IdentificationCode.SWAPPED,
+    IdentificationCode.INPUT_LATE,
     IdentificationCode.INPUTS_ALIKE,
     IdentificationCode.OUTLIERS,
     IdentificationCode.RANDOM_WALK,

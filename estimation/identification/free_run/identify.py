@@ -130,8 +130,11 @@ def _with_doubts(found: Identified, data: Channels, structure: str, *, looked_fo
     elif looked_for and not any(note.code == IdentificationCode.RANDOM_WALK for note in found.notes):
         notes += late_answers(part, found.quality.rmse / by.y_std)
     doubtful, walks = bool(notes), any(note.code == IdentificationCode.RANDOM_WALK for note in found.notes)
-    if structure == "output-error" == found.model.structure and found.sound and not (doubtful or walks):
+    fed = any(note.code in (IdentificationCode.FEEDBACK, IdentificationCode.INPUT_LATE) for note in found.notes)
+    if structure == "output-error" and found.sound and not (doubtful or walks or fed):
         notes += more_than_noise(found.model, data)
+        # without a sign a model stands in for a linear one that was not to be relied on: it has to do well
+        doubtful = bool(notes) and found.model.structure != "output-error"
     return replace(found, notes=(*found.notes, *notes), sound=found.sound and not doubtful)
 
 
@@ -165,13 +168,13 @@ def _identified(
         return _adopted(structure, linear)
     if structure == "auto" and linear.best.held_back < ROUNDING:
         structure = "output-error"
-    asked = structure == "wiener"
+    wanted = structure == "wiener"
     if structure in ("output-error", "auto", "wiener"):
-        signless, within = without_sign(linear, MOST_COMPARED, surely=not asked), None
-        if not asked:
+        signless, within = without_sign(linear, MOST_COMPARED, surely=not wanted), None
+        if not wanted:
             within = limited_candidate(linear)
         if signless is not None and (within is None or signless.held_back < within.held_back):
-            return absolute(signless, linear, MOST_FITTED, asked=asked)
+            return absolute(signless, linear, MOST_FITTED, asked=wanted)
         if within is not None:
             return _limited(within, linear, structure)
     return linear.identified() if structure == "output-error" else _nonlinear_or_linear(structure, linear)

@@ -1,6 +1,6 @@
 """Linear models of one output, compared on blocks held back, and the one of them that may be believed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,9 @@ BACKWARDS, REVERSED, FOLLOWED = (1, 2), 0.5, 0.2
 """Orders of models from output to input, and what they may leave where columns are swapped, over the model's error and
 over the deviation: in the right direction noise is left, against it all that is not seen in advance, and of what a
 controller does its set-point."""
+
+LEADS = (1, 2, 3, 4, 5)
+"""Samples by which an input may be logged late [count]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +163,9 @@ def fed_back(model: FreeRunModel, data: Channels, *, changes: bool = False) -> l
 
 
 def swapped(left: Array, data: Channels, log: int) -> Note | None:
-    """Return a note where the input answers the output rather than the other way round, or None.
+    """Return a note where the input answers the output rather than the other way round, or is logged late; else None.
+
+    Both models of the other direction and of an input logged late look ahead: the one that leaves less is told.
 
     Parameters
     ----------
@@ -172,10 +177,20 @@ def swapped(left: Array, data: Channels, log: int) -> Note | None:
         Which log.
     """
     u, y = data.u[log][:, 0], data.y[log]
-    back, _ = scaled(Channels((data.output,), data.inputs[0], data.sample_time, (bridged(y)[:, None],), (u,)))
-    fits = (fit_linear(Form(order, (order + 1,), (0,)), back, least_gain=COARSE) for order in BACKWARDS)
-    share = float(np.sqrt(min(fit.cost for fit in fits) / back.n_samples))
+    back = _left(Channels((data.output,), data.inputs[0], data.sample_time, (bridged(y)[:, None],), (u,)))
     own = float(np.sqrt(np.nanmean(left**2)) / np.nanstd(y))
-    if not share < min(REVERSED * own, FOLLOWED):
+    if not back < min(REVERSED * own, FOLLOWED):
         return None
-    return IdentificationCode.SWAPPED.note(input=data.inputs[0], output=data.output, back=share, left=own)
+    moved = [replace(data, u=(data.u[log][lead:],), y=(y[:-lead],)) for lead in LEADS]
+    ahead, lead = min((_left(one), lead) for one, lead in zip(moved, LEADS, strict=True))
+    names = {"input": data.inputs[0], "output": data.output}
+    if ahead <= back:
+        return IdentificationCode.INPUT_LATE.note(**names, samples=lead, ahead=ahead, left=own)
+    return IdentificationCode.SWAPPED.note(**names, back=back, left=own)
+
+
+def _left(data: Channels) -> float:
+    """Return what a small linear model without dead time leaves, over the output's deviation [dimensionless]."""
+    whole, _ = scaled(data)
+    fits = (fit_linear(Form(order, (order + 1,), (0,)), whole, least_gain=COARSE) for order in BACKWARDS)
+    return float(np.sqrt(min(fit.cost for fit in fits) / whole.n_samples))

@@ -6,10 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.identification.free_run.data import Channels, channels_from
-from estimation.identification.free_run.doubtful_channels import inputs_alike, outputs_that_stand_out
+from estimation.identification.free_run.data import Channels, Scaling, channels_from
+from estimation.identification.free_run.doubtful_channels import inputs_alike, more_than_noise, outputs_that_stand_out
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.input_range import doubts_about_inputs
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
+from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
@@ -89,3 +91,59 @@ def test_a_linear_model_says_where_it_leaves_more_than_noise(dead: float, told: 
         channels_from([u[:, None]], [y + 0.02 * y.std() * rng.normal(size=800)], 0.01, ["u"], "y"), order=1, delay=1
     )
     assert (IdentificationCode.MORE_THAN_NOISE in {note.code for note in found.notes}) is told
+
+
+def with_noise(kind: str, seed: int, n: int = 800) -> set[object]:
+    """Return the codes told of a linear plant behind coloured sensor noise of 15 %."""
+    rng = np.random.default_rng(seed)
+    u = filtered(np.array([0.1]), np.array([1.0, -0.9]), rng.normal(size=n))
+    y = filtered(np.array([0.0, 0.2]), np.array([1.0, -0.8]), u)
+    white = rng.normal(size=n)
+    noise = np.repeat(white, 7)[:n] if kind == "held" else filtered(np.array([1.0]), np.array([1.0, -0.85]), white)
+    data = channels_from([u[:, None]], [y + 0.15 * y.std() * noise / noise.std()], 0.01, ["u"], "y")
+    return {note.code for note in identify_channels(data, order=1, delay=1).notes}
+
+
+@pytest.mark.parametrize("kind", ["held", "filtered"])
+def test_sensor_noise_that_is_filtered_or_held_is_no_nonlinear_plant(kind: str) -> None:
+    for seed in range(20, 24):
+        assert IdentificationCode.MORE_THAN_NOISE not in with_noise(kind, seed)
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_more_than_noise_is_asked_of_samples_that_are_there_and_answer_the_log(every: int) -> None:
+    rng = np.random.default_rng(3)
+    u = filtered(np.array([0.1]), np.array([1.0, -0.97]), rng.normal(size=2000))
+    y = np.concatenate([np.full(100, 5.0 * u.std()), u[:-100]]) + 0.05 * u.std() * rng.normal(size=2000)
+    y[np.arange(2000) % every != 0] = np.nan
+    form, by = Form(1, (1,), (100,)), Scaling(np.zeros(1), np.ones(1), 0.0, 1.0)
+    model = FreeRunModel(("u",), "y", 0.01, "output-error", by, LinearDynamics(form, np.array([1.0, 0.0, 0.0])))
+    assert more_than_noise(model, Channels(("u",), "y", 0.01, (u[:, None],), (y,))) == []
+    bent = y + 0.5 * np.abs(np.concatenate([np.zeros(100), u[:-100]]))
+    assert more_than_noise(model, Channels(("u",), "y", 0.01, (u[:, None],), (bent,))) != []
+
+
+def test_an_output_without_sign_that_is_cut_off_is_no_match() -> None:
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 100), 12)[:1000]
+    y = np.minimum(np.abs(filtered(np.array([0.0, 0.2]), np.array([1.0, -0.9]), u)), 1.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # which model is taken is not asked
+        found = identify_channels(channels_from([u[:, None]], [y + 0.005 * rng.normal(size=1000)], 0.01, ["u"], "y"))
+    assert IdentificationCode.SIGN_NOT_MEASURED in {note.code for note in found.notes}
+    assert not found.sound
+
+
+@pytest.mark.parametrize(("late", "told"), [(2, "INPUT_LATE"), (None, "SWAPPED")])
+def test_an_input_that_is_logged_late_is_not_told_as_swapped(late: int | None, told: str) -> None:
+    rng = np.random.default_rng(50)
+    u = filtered(np.array([0.1]), np.array([1.0, -0.9]), rng.normal(size=800))
+    y = filtered(np.array([0.0, 0.2]), np.array([1.0, -0.8]), u)
+    y = y + 0.01 * y.std() * rng.normal(size=800)
+    one, other = (y, u) if late is None else (u[:-late], y[late:])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # notes are asked
+        found = identify_channels(channels_from([one[:, None]], [other], 0.01, ["one"], "other"))
+    codes = {note.code for note in found.notes}
+    both = {IdentificationCode.SWAPPED, IdentificationCode.INPUT_LATE}
+    assert codes & both == {IdentificationCode[told]}
