@@ -1,7 +1,9 @@
 """Entries of the JSON contract for identified models: a transfer function, or a model between columns."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from experiments.command.terminal import clauses
 
@@ -78,7 +80,7 @@ def with_std(roots: Any, spreads: Any) -> list[dict[str, float]]:
 
 def column_entries(found: "Identified") -> dict[str, Any]:
     """Return a model between columns by the names of the JSON contract."""
-    from estimation.identification.notes import WARNED
+    from estimation.identification.notes import AGAINST, WARNED
     from estimation.identification.state_space.dynamics import StateSpaceDynamics
 
     model, linear = found.model, found.model.linear
@@ -100,24 +102,40 @@ def column_entries(found: "Identified") -> dict[str, Any]:
         result = {**linear_entries(linear), **result, "order": linear.denominator.size - 1, "offset": model.offset}
         result["dc_gain"] = {"value": linear.dc_gain, "std": linear.dc_gain_std}
     elif model.structure == "output-error":
-        transfer = model.transfer_functions()
-        result |= {"numerator": [b.tolist() for b, _ in transfer], "denominator": transfer[0][1].tolist()}
-        gains = [float(b.sum() / f.sum()) for b, f in transfer]
-        result |= {"order": transfer[0][1].size - 1, "offset": model.offset, "dc_gain": {"value": gains}}
-        if found.gain_std:
-            result["dc_gain"]["std"] = list(found.gain_std)
+        result |= _transfer_entries(model, found.gain_std)
     elif isinstance(model.dynamics, StateSpaceDynamics):
         result |= _state_space_entries(model, model.dynamics)
     result["nonlinearity"] = model.nonlinearity
-    quality = found.quality
+    quality, why = found.quality, sorted(found.notes, key=lambda note: note.code not in AGAINST)
     result["message"] = clauses(
         [
             f"{model.structure} with {model.n_values} values: fit {quality.fit_percent:.1f} % running free, "
             f"{found.held_back_percent:.1f} % on blocks held back, rms error {quality.rmse:.4g}",
-            *map(str, found.notes[:1] if not found.sound else ()),
+            *map(str, why[:1] if not found.sound else ()),
         ]
     )
     return result
+
+
+def _transfer_entries(model: "FreeRunModel", gain_std: Sequence[float]) -> dict[str, Any]:
+    """Return transfer functions without covariance: of one input in the form of `linear_entries`, else by inputs."""
+    transfer = model.transfer_functions()
+    f = transfer[0][1]
+    numerators, gains = [b.tolist() for b, _ in transfer], [float(b.sum() / f.sum()) for b, _ in transfer]
+    entries: dict[str, Any] = {"denominator": f.tolist(), "order": f.size - 1, "offset": model.offset}
+    if len(transfer) > 1:
+        return {**entries, "numerator": numerators, "dc_gain": {"value": gains, "std": list(gain_std) or None}}
+    late = int(np.argmax(transfer[0][0] != 0.0))
+    return {
+        **entries,
+        "numerator": numerators[0],
+        "dc_gain": {"value": gains[0], "std": None},
+        "poles": [
+            {"real": float(one.real), "imag": float(one.imag), "real_std": None, "imag_std": None}
+            for one in np.roots(f)
+        ],
+        "delay": {"samples": late, "seconds": late * model.sample_time},
+    }
 
 
 def _state_space_entries(model: "FreeRunModel", dynamics: "StateSpaceDynamics") -> dict[str, Any]:
