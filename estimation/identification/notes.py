@@ -22,7 +22,7 @@ class IdentificationCode(Code):
     )
     INPUT_LATE = (
         "{input!r} seems to be logged late: moved ahead by {samples} samples, it leaves {ahead:.0%} of the deviation "
-        "of {output!r}, as it is {left:.0%}. Move the column, or poles and dead time are not the plant's"
+        "of {output!r}, as it is {left:.0%}. Poles and gain are not the plant's: move the column"
     )
     TWO_STAGES = (
         "only the part of input {input!r} that {reference} explains is used, {share:.0%} of its power: the rest may be "

@@ -20,7 +20,7 @@ from experiments.log_pages.identified_charts import (
     step_charts,
 )
 from experiments.log_pages.identified_view import AS_LOGGED, IdentifiedView
-from experiments.log_pages.identified_words import answer_of, notes_of, tests_of, title_of, uses_of
+from experiments.log_pages.identified_words import answer_of, has_limits, notes_of, tests_of, title_of, uses_of
 from experiments.page.numbers import MISSING, alike_in_digits, number
 from experiments.page.render import render_page
 from experiments.page.tables import Column, right
@@ -208,6 +208,7 @@ def control_text(view: IdentifiedView) -> str:
         clock, late = repr(view.sample_time), ""
     offset = view.result.get("offset")
     told = f"# The output also has an offset of {offset!r}, which a transfer function leaves out.\n" if offset else ""
+    told += "# The output also has limits, which a transfer function leaves out.\n" if has_limits(view) else ""
     return (
         f"# Identified by Hydrostate from {view.result['file']!r}.\n{late}{told}"
         "import control\n\n"

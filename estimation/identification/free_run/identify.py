@@ -130,7 +130,7 @@ def _with_doubts(found: Identified, data: Channels, structure: str, *, looked_fo
     elif looked_for and not any(note.code == IdentificationCode.RANDOM_WALK for note in found.notes):
         notes += late_answers(part, found.quality.rmse / by.y_std)
     doubtful, walks = bool(notes), any(note.code == IdentificationCode.RANDOM_WALK for note in found.notes)
-    fed = any(note.code in (IdentificationCode.FEEDBACK, IdentificationCode.INPUT_LATE) for note in found.notes)
+    fed = any(note.code == IdentificationCode.FEEDBACK for note in found.notes)
     if structure == "output-error" and found.sound and not (doubtful or walks or fed):
         notes += more_than_noise(found.model, data)
         # without a sign a model stands in for a linear one that was not to be relied on: it has to do well

@@ -109,7 +109,8 @@ class LinearComparison:
         model = FreeRunModel(*named, by, LinearDynamics.of(fit), transfer)
         quality = model.quality(data.u, data.y)
         notes = [*self.notes, *fed_back(model, data)]
-        sound = self.sound and not any(note.code == IdentificationCode.SWAPPED for note in notes)
+        ahead = (IdentificationCode.SWAPPED, IdentificationCode.INPUT_LATE)
+        sound = self.sound and not any(note.code in ahead for note in notes)
         if best.doubt == "no_fit" or not quality.fit_percent > 0.0 or not best.held_back < 1.0:
             notes = [*notes, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
             sound = False

@@ -97,6 +97,7 @@ def test_a_model_with_limits_is_not_compared_with_a_response_that_holds_them(kin
     assert not any("differs from the measured response" in said for said in [*good, *bad])
     assert any(said.startswith("Controller design without a check") for said in bad)
     assert "(linear with limits, order 2)" in title_of(view)
+    assert "The output also has limits" in control_text(view)
 
 
 def test_what_tests_and_gain_forbid_is_said() -> None:
