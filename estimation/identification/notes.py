@@ -20,7 +20,7 @@ class IdentificationCode(Code):
         "the deviation, this one {left:.0%}): exchange --input and --output; if they are right, a controller computes "
         "{input!r} from {output!r}, and --reference is needed with the column that drives the loop"
     )
-    INPUT_LATE = (
+    INPUT_LOGGED_LATE = (
         "{input!r} seems to be logged late: moved ahead by {samples} samples, it leaves {ahead:.0%} of the deviation "
         "of {output!r}, as it is {left:.0%}. Poles and gain are not the plant's: move the column"
     )
@@ -170,7 +170,7 @@ WARNED = (
     IdentificationCode.OUTPUT_STOPPED,
     IdentificationCode.FEEDBACK,
     IdentificationCode.SWAPPED,
-    IdentificationCode.INPUT_LATE,
+    IdentificationCode.INPUT_LOGGED_LATE,
     IdentificationCode.INPUTS_ALIKE,
     IdentificationCode.OUTLIERS,
     IdentificationCode.RANDOM_WALK,

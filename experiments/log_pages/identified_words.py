@@ -40,7 +40,7 @@ LEVEL = 0.05
 
 REASONS = {
     IdentificationCode.SWAPPED: "its input seems to answer its output",
-    IdentificationCode.INPUT_LATE: "its input seems to be logged late",
+    IdentificationCode.INPUT_LOGGED_LATE: "its input seems to be logged late",
     IdentificationCode.WALK_FOLLOWED: "it follows what the output does by itself",
     IdentificationCode.ANSWERS_LATE: "the output seems to answer later than this model does",
 }

@@ -109,7 +109,7 @@ class LinearComparison:
         model = FreeRunModel(*named, by, LinearDynamics.of(fit), transfer)
         quality = model.quality(data.u, data.y)
         notes = [*self.notes, *fed_back(model, data)]
-        ahead = (IdentificationCode.SWAPPED, IdentificationCode.INPUT_LATE)
+        ahead = (IdentificationCode.SWAPPED, IdentificationCode.INPUT_LOGGED_LATE)
         sound = self.sound and not any(note.code in ahead for note in notes)
         if best.doubt == "no_fit" or not quality.fit_percent > 0.0 or not best.held_back < 1.0:
             notes = [*notes, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
@@ -186,7 +186,7 @@ def swapped(left: Array, data: Channels, log: int) -> Note | None:
     ahead, lead = min((_left(one), lead) for one, lead in zip(moved, LEADS, strict=True))
     names = {"input": data.inputs[0], "output": data.output}
     if ahead <= back:
-        return IdentificationCode.INPUT_LATE.note(**names, samples=lead, ahead=ahead, left=own)
+        return IdentificationCode.INPUT_LOGGED_LATE.note(**names, samples=lead, ahead=ahead, left=own)
     return IdentificationCode.SWAPPED.note(**names, back=back, left=own)
 
 

@@ -134,7 +134,7 @@ def test_an_output_without_sign_that_is_cut_off_is_no_match() -> None:
     assert not found.sound
 
 
-@pytest.mark.parametrize(("late", "told"), [(2, "INPUT_LATE"), (None, "SWAPPED")])
+@pytest.mark.parametrize(("late", "told"), [(2, "INPUT_LOGGED_LATE"), (None, "SWAPPED")])
 def test_an_input_that_is_logged_late_is_not_told_as_swapped(late: int | None, told: str) -> None:
     rng = np.random.default_rng(50)
     u = filtered(np.array([0.1]), np.array([1.0, -0.9]), rng.normal(size=800))
@@ -145,6 +145,6 @@ def test_an_input_that_is_logged_late_is_not_told_as_swapped(late: int | None, t
         warnings.simplefilter("ignore")  # notes are asked
         found = identify_channels(channels_from([one[:, None]], [other], 0.01, ["one"], "other"))
     codes = {note.code for note in found.notes}
-    both = {IdentificationCode.SWAPPED, IdentificationCode.INPUT_LATE}
+    both = {IdentificationCode.SWAPPED, IdentificationCode.INPUT_LOGGED_LATE}
     assert codes & both == {IdentificationCode[told]}
     assert not found.sound  # gains are off by many of their deviations
