@@ -69,3 +69,10 @@ def test_turns_are_left_open_in_a_log_that_nothing_else_explains(
     found = with_open_turns(Logged(log(0.2), {}), plain)
     assert found.start.turns_open is opened
     assert (found is plain) is not opened
+
+
+def test_a_fast_log_that_is_averaged_otherwise_under_a_held_command_has_no_course() -> None:
+    """Corners of a speed decide over how many samples it is averaged: such a log ended in an internal error."""
+    plain = plain_fits(Logged(*without_strays(log(0.3))), FitStart(PAPER, PAPER.bulk_modulus))
+    halved = Logged(*without_strays(log(0.3).slice(0, 150)))
+    assert by_course(halved, plain) is plain
