@@ -37,6 +37,10 @@ LEAST_SHARE, LONGEST, PILED = 0.005, 4, 2.0
 """Share of all samples that stand at a limit, samples of the longest stay, and how many times as many there are as in
 the next band of the same width, at least. They only ask for a comparison, which decides [dimensionless]."""
 
+SPARSE_SHARES = (1.0, 0.5, 0.25, 0.125)
+"""Shares of that band that are tried where most rows are empty: what moves from one sample to the next is not noise
+alone there [fraction]."""
+
 SMOOTH = np.sqrt(6.0) * 0.6745
 """Median of the magnitude of second differences of white noise, over its deviation [dimensionless]."""
 
@@ -107,7 +111,8 @@ def limits_of(data: Channels) -> Limits | None:
         return None
     noise, exact = float(np.median(bends)) / SMOOTH, ROUNDING * float(np.ptp(np.concatenate(known)))
     # behind a sensor's noise a limit is sharp, before it not
-    for band in (exact, max(NOISE_BAND * noise, exact)):
+    shares = SPARSE_SHARES if 2 * sum(y.size for y in known) < sum(y.size for y in data.y) else (1.0,)
+    for band in (exact, *(max(share * NOISE_BAND * noise, exact) for share in shares)):
         high, low = _end(known, band), -_end([-y for y in known], band)
         if np.isfinite([low, high]).any():
             return Limits(low, high, band / 2.0)
