@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from experiments.command.terminal import clauses
 
 if TYPE_CHECKING:
@@ -119,6 +117,8 @@ def column_entries(found: "Identified") -> dict[str, Any]:
 
 def _transfer_entries(model: "FreeRunModel", gain_std: Sequence[float]) -> dict[str, Any]:
     """Return transfer functions without covariance: of one input in the form of `linear_entries`, else by inputs."""
+    import numpy as np  # late: help waits for no heavy import
+
     transfer = model.transfer_functions()
     f = transfer[0][1]
     numerators, gains = [b.tolist() for b, _ in transfer], [float(b.sum() / f.sum()) for b, _ in transfer]

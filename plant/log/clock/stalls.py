@@ -104,7 +104,7 @@ def waited_in_a_queue(time: Array, channels: Mapping[str, Array], sample_time: f
     ----------
     time : ndarray, shape (n,)
         Stamps, not falling [s].
-    channels : Mapping[str, ndarray]
+    channels : Mapping[str, ndarray of shape (n,)]
         What was logged [any unit].
     sample_time : float
         Of the even clock [s].
