@@ -262,7 +262,7 @@ def _losing_fit(plain: PlainFits, loss: VaryingLoss, sensed: ShownPlay) -> FormF
     untaken, open_play = plain.play_untaken(one.play, sensed)
     value, std = one.values["bulk_modulus"], one.std["bulk_modulus"]
     found = {name: (each, one.std[name]) for name, each in one.values.items()}
-    found, correlation = with_lumped(found, [one], np.ones(1), plain.start.parameters, plain.usual_pressure)
+    found, correlation = with_lumped(found, [one], np.ones(1), plain.start.parameters, plain.log.measured_rms)
     return FormFit(
         parameters=with_structure(found, float(np.linalg.norm([UNEVEN, untaken, loss.opened]))),
         bound=std / value,
@@ -307,7 +307,7 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
         left = float(np.hypot(left, BUBBLES))
     most = share_lost(plain.log, one.values, plain.start.parameters.pump_displacement, strange.names)
     weights, p = weights_of(strange.fits), plain.start.parameters
-    found, correlation = with_lumped(strange.values, strange.fits, weights, p, plain.usual_pressure)
+    found, correlation = with_lumped(strange.values, strange.fits, weights, p, plain.log.measured_rms)
     return FormFit(
         parameters=with_structure(with_small_ripple(with_small_ripple(found, one.small_teeth), one.noise_shift), left),
         bound=bound,
@@ -327,7 +327,7 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in plain.fits]
     weights = weights_of(plain.fits, SURER * plain.log.passes, beforehand)
     p = plain.start.parameters
-    found, correlation = with_lumped(averaged(plain.fits, weights), plain.fits, weights, p, plain.usual_pressure)
+    found, correlation = with_lumped(averaged(plain.fits, weights), plain.fits, weights, p, plain.log.measured_rms)
     found = with_small_ripple(with_small_ripple(found, best.small_teeth), best.noise_shift)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     left = UNEVEN_OIL if is_single({}, p) else DISCRETISED

@@ -83,9 +83,9 @@ def with_open_turns(logged: Logged, plain: PlainFits) -> PlainFits:
 
 def _held_gains(logged: Logged, plain: PlainFits) -> float:
     """Return the gain in log-likelihood, to first order, if the motor's command is held; under the same noise."""
-    log, best, parameters = plain.log, plain.best, plain.start.parameters
-    smooth, bare = (logged.seen_at(parameters, held=held).drives for held in (False, True))
-    if not len(smooth) == len(bare) == len(log.drives):  # averaged over other samples: so fast that no course is felt
+    log, best, smooth = plain.log, plain.best, plain.unturned.drives
+    bare = logged.seen_at(plain.start.parameters, held=True).drives
+    if len(bare) != len(smooth):  # averaged over other samples: so fast that no course is felt
         return 0.0
     problem, theta = FreedProblem.of(best.model, log), best.model.theta(best.values)
     known, other = problem.disturbed(theta, [log.drives, log.drives + bare - smooth])

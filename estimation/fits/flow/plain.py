@@ -160,11 +160,6 @@ class PlainFits:
         """The likeliest with volumes that swing."""
         return _swinging(self.fits)
 
-    @property
-    def usual_pressure(self) -> float:
-        """Root mean square of differential pressure [Pa]."""
-        return float(np.nanmean(self.log.measured[:, 0] ** 2)) ** 0.5
-
     def yields(self, sensed: ShownPlay, bulk_modulus: float) -> float:
         """Return the compliance within the encoder's play over that of the oil.
 

@@ -212,6 +212,11 @@ class GreyBoxLog:
         return any(noise.passed_on > 0.0 for noise in self.noise)
 
     @property
+    def measured_rms(self) -> float:
+        """Root mean square of what is measured [output unit]."""
+        return float(np.sqrt(np.nanmean(self.measured**2)))
+
+    @property
     def passes(self) -> float:
         """Number of bends of a slow log's motor speed, at least 1; 1 for any other log [count].
 

@@ -112,7 +112,7 @@ def usual_pressure(log: GreyBoxLog, parameters: EhaParameters) -> float:
     float
         Absolute [Pa].
     """
-    return parameters.accumulator_pressure + float(np.sqrt(np.nanmean(log.measured**2)))
+    return parameters.accumulator_pressure + log.measured_rms
 
 
 def usual_values(log: GreyBoxLog) -> dict[str, float]:

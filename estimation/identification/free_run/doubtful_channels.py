@@ -83,12 +83,17 @@ def outputs_that_stand_out(model: FreeRunModel, data: Channels) -> list[Note]:
     count = int(np.count_nonzero(outside))
     if not count:
         return []
-    left = np.concatenate([model.simulate(u, one) for u, one in zip(data.u, data.y, strict=True)]) - y
+    left = np.concatenate(_runs(model, data)) - y
     theirs, others = float(np.sum(left[outside] ** 2)), float(np.nansum(left[~outside] ** 2))
     spread = float(np.nansum((sound - np.nanmean(sound)) ** 2))
     if not theirs > MOST_OF_IT * (theirs + others) and not others > spread:
         return []
     return [IdentificationCode.OUTLIERS.note(output=data.output, count=count, total=data.n_samples)]
+
+
+def _runs(model: FreeRunModel, data: Channels) -> list[Array]:
+    """Return the free run of each log, begun as its outputs say."""
+    return [model.simulate(u, y) for u, y in zip(data.u, data.y, strict=True)]
 
 
 def more_than_noise(model: FreeRunModel, data: Channels) -> list[Note]:
@@ -109,7 +114,7 @@ def more_than_noise(model: FreeRunModel, data: Channels) -> list[Note]:
     list of Note
         One at most.
     """
-    runs = [model.simulate(u, y) for u, y in zip(data.u, data.y, strict=True)]
+    runs = _runs(model, data)
     begins = [model.dynamics.unanswered(y.size) for y in data.y]
     left = [(y - run)[begin:] for y, run, begin in zip(data.y, runs, begins, strict=True)]
     known = np.concatenate(left)
