@@ -160,6 +160,7 @@ class EstimateCode(Code):
         "position alone does not fix the scale of the forces: any bulk modulus from {least_pa:.3g|MPa} to "
         "{most_pa:.3g|MPa} MPa explains the log, with friction in proportion; log differential pressure"
     )
+    NOT_HELD = "position alone does not determine bulk modulus: with any value, the piston would move as logged"
     WEAKLY_HELD = (
         "position alone determines bulk modulus only weakly: noise gives it a standard deviation of "
         "{noise_percent:.2g} %, and a misfit too small to detect may move it by {percent:.0f} %"
@@ -228,7 +229,7 @@ class RigCode(Code):
         "pressure's offset drifts by {drift_pa:.4g|bar} ± {half_width_pa:.2g|bar} bar over the log; it was subtracted"
     )
     PRESSURE_SIDES = "chamber gauges differ by {percent:z.2f} ± {half_width:.2g} % in gain; the fit includes this"
-    ENCODER_ZERO = "position_m reads {zero_mm:.1f} ± {half_width_mm:.1f} mm at mid-stroke; it was shifted to zero there"
+    ENCODER_ZERO = "position_m reads {zero_mm:.1f} ± {half_width_mm:.2g} mm at mid-stroke; it was shifted to zero there"
     POSITION_PLAY = (
         "position_m follows the piston with about {play_um:.1g} um of play (backlash); the play was corrected"
     )
@@ -237,15 +238,15 @@ class RigCode(Code):
         "play (backlash): the interval of bulk modulus includes its effect"
     )
     AREA_TO_DISPLACEMENT = (
-        "the ratio of pump displacement to piston area is {percent:.1f} ± {half_width:.1f} % of that in the rig file: "
+        "the ratio of pump displacement to piston area is {percent:.1f} ± {half_width:.2g} % of that in the rig file: "
         "one of the two is wrong, or (below 100 %) the pump is worn, and the log does not show which"
     )
     PUMP_WORN = (
-        "the pump delivers {percent:.1f} ± {half_width:.1f} % of its displacement: it is worn, or displacement or "
+        "the pump delivers {percent:.1f} ± {half_width:.2g} % of its displacement: it is worn, or displacement or "
         "piston area in the rig file is wrong"
     )
     PUMP_RIPPLES = (
-        "the pump's teeth ({teeth} per turn) make its flow ripple by {percent:.1f} ± {half_width:.1f} %; the fit "
+        "the pump's teeth ({teeth} per turn) make its flow ripple by {percent:.1f} ± {half_width:.2g} %; the fit "
         "includes this"
     )
     MAKEUP_BENDS = (
@@ -269,7 +270,7 @@ class RigCode(Code):
         "{rig_volume_percent:.0f} %), pilot_share is {pilot_share:.2g} (rig file: {rig_pilot_share:.2g})"
     )
     AREAS_VAGUE = "the ratio of the piston's areas is known to ± {percent:.0f} % only: give two areas in the rig file"
-    VOLUME_DIFFERS = "the chamber volume is {percent:.0f} ± {half_width:.0f} % of that in the rig file"
+    VOLUME_DIFFERS = "the chamber volume is {percent:.1f} ± {half_width:.2g} % of that in the rig file"
     STARTS_UNDER_LOAD = (
         "the log begins at a differential pressure of {pressure_pa:.3g|bar} bar: the piston moves, or a load of "
         "{force_n:.3g} N acts"
@@ -313,7 +314,7 @@ class RigCode(Code):
         "compared at the measured value"
     )
     LEAKAGE_TURBULENT = (
-        "{percent:.0f} ± {half_width:.0f} % of the leakage at {at_pa:.3g|bar} bar is turbulent (it grows with the "
+        "{percent:.0f} ± {half_width:.2g} % of the leakage at {at_pa:.3g|bar} bar is turbulent (it grows with the "
         "square root of pressure), as at a worn edge or scratch; leakage is given at that pressure"
     )
     PUMP_COMPRESSES = (

@@ -24,6 +24,7 @@ NOT_THE_LOGS = {
     EstimateCode.FRICTION_LAWS_DISAGREE,
     EstimateCode.FORCES_ON_ANY_SCALE,
     EstimateCode.WEAKLY_HELD,
+    EstimateCode.NOT_HELD,
 }
 """Reasons of a gate that speak against bulk modulus alone: the log holds too little of it, its oil is too stiff for the
 noise of position, or it depends on how the piston starts and stops, which decides no condition."""

@@ -54,6 +54,9 @@ NOISY = 0.3
 COARSE = 0.2
 """A channel that repeats its last sample more often shows no noise, and a relief valve's plateau is flat [fraction]."""
 
+FEWEST_DEAD = 100
+"""Samples below which a pressure sensor is not called dead: of 20, many a live one looks like noise."""
+
 NOISE_SHARE = 0.9
 """A channel whose white noise is more than this share of all that it shows, shows nothing [fraction]."""
 
@@ -237,7 +240,7 @@ def _dead_pressure(record: Record) -> Note | None:
     if PRESSURE not in record or SPEED not in record:
         return None
     pressure, speed = (record[name][np.isfinite(record[name])] for name in (PRESSURE, SPEED))
-    if min(len(pressure), len(speed)) < FEWEST_HELD or np.ptp(pressure) == 0.0 or np.ptp(speed) == 0.0:
+    if min(len(pressure), len(speed)) < FEWEST_DEAD or np.ptp(pressure) == 0.0 or np.ptp(speed) == 0.0:
         return None
     shown = record[POSITION][np.isfinite(record[POSITION])] if POSITION in record else pressure
     if len(shown) and np.ptp(shown) <= _quantum(shown):

@@ -30,6 +30,7 @@ from faults.watch.loss import (
     learn_loss_again,
     measure_lag,
     measure_work,
+    oil_allows,
 )
 from faults.watch.memory import (
     ALL,
@@ -257,7 +258,16 @@ def watch_kernel() -> NativeKernel:
     constants |= {"NOTHING": NOTHING, "READY": READY, "LOSS": LOSS, "REFRESHED": REFRESHED, "INTERVALS": INTERVALS}
     constants |= {"ALLOWANCE": ALLOWANCE, "LEVEL": LEVEL, "MOVING": MOVING}
     of_balances = (regress, shift, learn, count_gains, solve, accumulate, excitation_octave, standardise)
-    of_loss = (count_work, count_lag, measure_work, measure_lag, learn_loss_again, drive_is_alike, judge_loss)
+    of_loss = (
+        count_work,
+        count_lag,
+        measure_work,
+        measure_lag,
+        oil_allows,
+        learn_loss_again,
+        drive_is_alike,
+        judge_loss,
+    )
     of_blocks = (drop_span, end_span, renew_thresholds, score_balances, end_block)
     small = pasted(*of_balances, *of_loss, *of_blocks, constants=constants, inlined=True)
     entries = threshold, advance, begin_again

@@ -206,10 +206,15 @@ def judge_loss(told: Array, now: float, loss: Array, levels: Array) -> bool:
     loss[SEEN] += 1.0
     if loss[SPANS] < loss[WANTED]:
         return False
-    allowed = (OIL - 1.0) * max(loss[SHARE], LEAST_LOSS)
+    allowed = oil_allows(loss[SHARE])
     deviation = max(math.sqrt(loss[SPREAD]) * (1.0 + 2.0 / math.sqrt(loss[KNOWN] + 1.0)), NARROWEST * allowed)
     loss[RISEN] = max(0.0, loss[RISEN] + min((level - loss[SHARE] - allowed) / deviation, LARGEST) - ALLOWED)
     return loss[RISEN] > loss[LIMIT]
+
+
+def oil_allows(usual: float) -> float:
+    """Return how much more may be lost than is usual before it is a leak [fraction]."""
+    return (OIL - 1.0) * max(usual, LEAST_LOSS)
 
 
 def learn_loss_again(loss: Array) -> None:

@@ -34,6 +34,7 @@ from faults.watch.loss import (
     WANTED,
     learn_loss_again,
     loss_threshold,
+    oil_allows,
 )
 from faults.watch.memory import (
     ALL,
@@ -318,6 +319,8 @@ class Watch:
         if not self.pressure or min(*before[[GAIN_WP, GAIN_VV]], *after[[GAIN_WP, GAIN_VV]]) <= 0.0:
             return [Change(self.time, alarm, None, None)]
         lost = float(before[GAIN_QP] / before[GAIN_WP]), float(after[GAIN_QP] / after[GAIN_WP])
+        if lost[1] - lost[0] > oil_allows(lost[0]):  # told here, so the loss must not tell it again
+            learn_loss_again(self._known)
         resistance = before[GAIN_PV] / before[GAIN_VV], after[GAIN_PV] / after[GAIN_VV]
         resisted = float(resistance[1] / resistance[0] - 1.0)
         return [Change(self.time, alarm, lost, resisted)]

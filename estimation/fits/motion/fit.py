@@ -158,7 +158,9 @@ def _concluded(ended: list[Ended], log: GreyBoxLog, *, sparing: bool) -> tuple[F
     moved = unseen(best.chi_square[0], len(log.measured)) * std / value
     believed = with_structure(found, float(np.linalg.norm([STRUCTURE, apart, moved])))
     reasons = _objections(fits, best, others, share_of_motion(best.chi_square[0], log))
-    if not reasons and moved > MOST_MOVED:
+    if not reasons and not np.isfinite(moved):
+        reasons = (EstimateCode.NOT_HELD.note(),)
+    elif not reasons and moved > MOST_MOVED:
         reasons = (EstimateCode.WEAKLY_HELD.note(percent=100.0 * moved, noise_percent=100.0 * std / value),)
     return FormFit(believed, bound, best.chi_square[0], reasons, best.rig_slopes), spared
 

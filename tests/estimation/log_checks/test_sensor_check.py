@@ -108,6 +108,17 @@ def test_a_pressure_sensor_is_alive_though_the_motor_rests() -> None:
     assert [one.code for one in sensor_objections(turns, RIG_PARAMETERS)] == [SensorCode.SENSOR_NOISE_ONLY]
 
 
+@pytest.mark.parametrize("seed", [2, 4, 11])
+def test_twenty_samples_are_too_few_to_call_a_pressure_sensor_dead(seed: int) -> None:
+    """Of live sensors that keep four tenths of a sample in the next, one in six was called dead, these among them."""
+    rng = np.random.default_rng(seed)
+    load = np.convolve(rng.normal(size=21), [0.9, 0.4], mode="valid")
+    short = Record(
+        5e-2, {"motor_speed_rad_s": 100.0 + rng.normal(size=20), "position_m": np.cumsum(load), PRESSURE: load}
+    )
+    assert sensor_objections(short, RIG_PARAMETERS) == ()
+
+
 def clipped(record: Record, share: float) -> tuple[Record, float]:
     limit = 500.0 * round(share * float(np.max(np.abs(record[PRESSURE]))) / 500.0)
     return with_fault(record, SensorFault(channel=PRESSURE, kind="saturation", size=limit)), limit

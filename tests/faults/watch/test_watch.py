@@ -48,6 +48,12 @@ def test_an_abrupt_leak_is_found_within_half_a_second_and_dated(leaking: np.ndar
     assert change.lost[1] - change.lost[0] > 0.15
 
 
+def test_a_sudden_leak_is_told_once() -> None:
+    """The loss that had been learnt before was passed by it some spans later, as `loss`."""
+    events = Watch(P, T, learning=60.0).take(_run(leak_from=90.0, seconds=240.0))
+    assert [event.balance for event in events if isinstance(event, Alarm)] == ["flow"]
+
+
 @pytest.mark.parametrize("most", [1, 7, 25000])
 def test_events_do_not_depend_on_how_samples_are_cut(leaking: np.ndarray, most: int) -> None:
     watch = Watch(P, T, learning=60.0)
