@@ -7,6 +7,7 @@ from estimation.log_checks.channel_names import MEASURED, POSITION, PRESSURE, SP
 from estimation.log_checks.channel_physics import channel_mistakes
 from estimation.log_checks.discontinuities import without_discontinuities
 from estimation.log_checks.dropout import without_dropouts
+from estimation.log_checks.few_digits import with_even_steps
 from estimation.log_checks.filtered import independent_variance, without_correlated_noise
 from estimation.log_checks.held import without_held
 from estimation.log_checks.held_alone import without_held_alone
@@ -40,7 +41,7 @@ class CleanLog:
     record : Record
         The log, without repeated samples and rows, dropouts, gross outliers, clipped pressures and positions, steps of
         a zero, hum, a late velocity or an offset of it, and samples of like noise; its longest part where rows were
-        lost.
+        lost. Steps of a channel with few significant digits are of one size.
     variances : Mapping[str, float]
         Measurement variance of each of its channels [SI squared].
     left_out : tuple of Note
@@ -104,7 +105,8 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
         If samples are more than a tenth of a second apart.
     """
     require_fast_enough(record.sample_time)
-    sampled, held = without_held(record)
+    written, digits = with_even_steps(record)
+    sampled, held = without_held(written)
     sent_once, twice = without_rows_sent_twice(sampled)
     whole, dropouts = without_dropouts(sent_once)
     changes = unit_changes(whole)
@@ -127,7 +129,8 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
     if mistakes:  # a sensor cannot be judged by channels of another meaning
         objections = steps = ()
     every, (sound, filtered) = sound, without_correlated_noise(sound, natural_frequency(parameters))
-    left_out = (*held, *twice, *dropouts, *alone, *outliers, *clipped, *beyond, *steps, *hum, *offset, *late, *filtered)
+    as_logged = (*digits, *held, *twice, *dropouts, *alone)
+    left_out = (*as_logged, *outliers, *clipped, *beyond, *steps, *hum, *offset, *late, *filtered)
     variances = {**measurement_variances(sound, known), **_thinned_variances(sound, filtered, every)}
     return CleanLog(sound, variances, left_out, objections, mistakes)
 

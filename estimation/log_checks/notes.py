@@ -22,9 +22,13 @@ class GuessCode(Code):
 
 
 class LoggerCode(Code):
-    """Why a logger's way to write a channel leaves no measurement in each row."""
+    """What a logger's way to write a channel has cost."""
 
     LOGGED_ON_CHANGE = (
         "{channel} was logged only when it had changed by {percent:.2g} % of its standard deviation, and repeated in "
         "between (dead band or compression of the logger)"
+    )
+    FEW_DIGITS = (
+        "{channel} was written with {digits} significant digits: its steps grow with its size, so it was rounded to "
+        "the largest step; write 7 digits or more"
     )

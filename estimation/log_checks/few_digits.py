@@ -1,0 +1,92 @@
+"""`with_even_steps(record)`: channels written with few significant digits, whose steps grow with their size.
+
+A logger that prints ``%.4g`` writes 9.999 mm and 41.76 mm: near mid-stroke its steps are a thousand times smaller than
+at the end of the travel. Noise read off the smallest steps is then far too low for the rest of the log, and the fit
+finds causes for what is rounding. Rounded to the largest step, such a channel is one of a coarse converter.
+"""
+
+import numpy as np
+
+from estimation.log_checks.channel_names import POSITION, PRESSURE
+from estimation.log_checks.notes import LoggerCode
+from plant.arrays import Array
+from plant.log.record import Record
+from plant.notes import Note
+
+MOST_DIGITS = 5
+"""Significant digits up to which a channel is looked at [count]; with six, steps are finer than any encoder's."""
+
+LOOKED_AT = 200
+"""Samples that are looked at first, spread over the log [count]."""
+
+EXACT = 1e-9
+"""Share of a value up to which it equals its rounding [fraction]: a change of unit costs 1e-16."""
+
+FEWEST, USED = 50, 0.5
+"""Samples of a power of ten that tell how many digits it has [count], and the share of them whose last digit is not 0:
+written digits have 0.9, steps that are the same at any size 0 in the lower one of two powers."""
+
+
+def with_even_steps(record: Record) -> tuple[Record, tuple[Note, ...]]:
+    """Return a log whose position and pressure have steps of one size, and a note for each that was rounded.
+
+    Parameters
+    ----------
+    record : Record
+        The log, as its logger wrote it.
+
+    Returns
+    -------
+    tuple of Record and tuple of Note
+        The log, and none for a log with more digits.
+    """
+    rounded: dict[str, Array] = {}
+    notes: list[Note] = []
+    for channel in (POSITION, PRESSURE):
+        if channel in record and (digits := written_digits(record[channel])):
+            step = 10.0 ** (_power(np.nanmax(np.abs(record[channel]))) - digits + 1)
+            rounded[channel] = step * np.rint(record[channel] / step)
+            notes.append(LoggerCode.FEW_DIGITS.note(channel=channel, digits=digits))
+    return (record.replace(**rounded), tuple(notes)) if rounded else (record, ())
+
+
+def written_digits(values: Array) -> int:
+    """Return with how many significant digits a channel was written; 0 where steps of one size, or many digits, were.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        The channel [any unit]; NaN where missing.
+
+    Returns
+    -------
+    int
+        Digits, at most `MOST_DIGITS`.
+
+    Examples
+    --------
+    >>> course = 0.05 * np.sin(0.01 * np.arange(2000.0))
+    >>> written_digits(np.array([float(f"{value:.3g}") for value in course])), written_digits(course.round(4))
+    (3, 0)
+    """
+    there = np.abs(values[np.isfinite(values) & (values != 0.0)])
+    if len(there) < FEWEST or not _has_digits(there[:: 1 + len(there) // LOOKED_AT], MOST_DIGITS):
+        return 0
+    digits = next((count for count in range(1, MOST_DIGITS + 1) if _has_digits(there, count)), 0)
+    if not digits:
+        return 0
+    powers = _power(there)
+    last_used = np.rint(there * 10.0 ** (digits - 1 - powers)) % 10.0 != 0.0
+    told = [last_used[powers == power] for power in np.unique(powers)]
+    return digits if sum(len(one) >= FEWEST and bool(np.mean(one) > USED) for one in told) > 1 else 0
+
+
+def _has_digits(sizes: Array, digits: int) -> bool:
+    """Return whether so many significant digits are all that positive values have."""
+    scale = 10.0 ** (digits - 1 - _power(sizes))
+    return bool(np.all(np.abs(np.rint(sizes * scale) - sizes * scale) <= EXACT * sizes * scale))
+
+
+def _power(sizes: Array) -> Array:
+    """Return the power of ten of positive values; one that rounding has left just below a power is taken for it."""
+    return np.floor(np.log10(sizes * (1.0 + EXACT)))
