@@ -16,7 +16,7 @@ from benchmarks.diagnosis.rig_draws import draw_bench, wrong_file
 from benchmarks.diagnosis.scores import share_interval
 from benchmarks.targets import Check, printed
 from estimation.finding import NORMAL_95
-from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class
+from experiments.open_benchmark.judge import judge_bulk_modulus, judge_class, named
 from experiments.python_user.log import Log
 from plant.eha.rig import Rig
 from plant.errors import HydrostateError, LogWarning
@@ -77,7 +77,7 @@ def row_of(log: Log, truth: dict[str, Any], *, pressure: bool) -> dict[str, Any]
     log : Log
         The log with its rig.
     truth : dict
-        True ``bulk_modulus`` [Pa] and ``condition``.
+        True ``bulk_modulus`` [Pa] and ``condition``, or what stands in a row of `truth.csv` in their place.
     pressure : bool
         Whether it may be used.
 
@@ -88,12 +88,13 @@ def row_of(log: Log, truth: dict[str, Any], *, pressure: bool) -> dict[str, Any]
     """
     estimate, diagnosis = (_asked(log, verb, pressure) for verb in ("estimate", "diagnose"))
     modulus = truth["bulk_modulus"]
-    judged = {"beta_lo": modulus, "beta_hi": modulus, "accept": truth["condition"]}
+    judged = {"beta_lo": modulus, "beta_hi": modulus, "accept": truth["condition"], **truth}
     row: dict[str, Any] = {"z": None, **judge_bulk_modulus(estimate, judged), **judge_class(diagnosis, judged)}
     said = estimate.get("bulk_modulus_pa") or {}
     if said.get("value") is not None:
         low, high = said["ci95"]
         row["z"] = 2.0 * NORMAL_95 * (said["value"] - modulus) / (high - low)
+    row["named"] = named(judged.get("named", ""), estimate, diagnosis)
     condition = diagnosis.get("condition")
     row["said"] = condition, (diagnosis.get("probabilities") or {}).get(condition, 0.0)
     told = (*estimate.get("notes", ()), *diagnosis.get("notes", ()))

@@ -16,12 +16,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from benchmarks.diagnosis.random_rigs import line_of, row_of, summarised
 from benchmarks.targets import printed
 from experiments.open_benchmark.draws import course_of
 from experiments.open_benchmark.drives import CLOSED
-from experiments.open_benchmark.logger import DIFFERENCE, POSITION, SPEED, VELOCITY, Logger, Sensor
+from experiments.open_benchmark.logger import POSITION, PRESSURES, SPEED, VELOCITY, Logger, Sensor
 from experiments.open_benchmark.machine import PRELOAD, Machine, machine_of
 from experiments.open_benchmark.run import RECORD, at_rest, run, substeps_for
 from experiments.open_benchmark.setup import Setup
@@ -144,21 +145,53 @@ def logged(name: str, rig: Rig[EhaParameters], seed: int) -> tuple[Setup, Record
     tuple of (Setup, Record)
         The setup, and channels in SI.
     """
-    use, healthy, rng = USES[name], rig.parameters, stream(seed, "typed rigs", name)
+    rng = stream(seed, "typed rigs", name)
     condition = "normal" if seed % 3 == 0 else str(rng.choice(list(CONDITIONS)))
-    drive = use.drives[seed % len(use.drives)]
+    setup = plain_setup(rig.parameters, USES[name], condition, seed, rng)
+    table = table_of(setup, rng)
+    return setup, Record(setup.logger.sample_time, {one: table[one].to_numpy() for one in setup.logger.channels})
+
+
+def plain_setup(healthy: EhaParameters, use: Use, condition: str, turn: int, rng: np.random.Generator) -> Setup:
+    """Return what is true of a log with nothing strange.
+
+    Parameters
+    ----------
+    healthy : EhaParameters
+        What the rig's file says.
+    use : Use
+        How the rig is used.
+    condition : str
+        One of the nine.
+    turn : int
+        Which of its drives comes, in turn.
+    rng : numpy.random.Generator
+        Source of all that differs from log to log.
+    """
+    drive = use.drives[turn % len(use.drives)]
     machine = _machine(healthy, condition, use, rng)
     travel = 0.5 * use.travel * (healthy.stroke or 0.0)
     if drive in CLOSED:
         glide = healthy.pump_displacement / healthy.piston_area
         machine = machine._replace(loop_gain=10.0 / glide, speed_limit=healthy.rated_speed)
     setup = Setup(condition, machine, drive, travel, DURATION, rated_speed=healthy.rated_speed)
-    setup = setup.with_logger(sensors=_sensors(healthy), sample_time=use.sample_time)
+    return setup.with_logger(sensors=_sensors(healthy), sample_time=use.sample_time)
+
+
+def table_of(setup: Setup, rng: np.random.Generator) -> pd.DataFrame:
+    """Return the log of a setup as its file has it, shape (samples, 1 + channels).
+
+    Parameters
+    ----------
+    setup : Setup
+        What the log is made of.
+    rng : numpy.random.Generator
+        Source of the drive and of noise.
+    """
     course = course_of(setup, rng)
-    states = run(machine, course, _held(machine), refine=_refined(machine))
-    states[:, 4:6] = np.maximum(states[:, 4:6], machine.vapour)
-    table = setup.logger.log(states, rng)
-    return setup, Record(use.sample_time, {one: table[one].to_numpy() for one in setup.logger.channels})
+    states = run(setup.machine, course, _held(setup.machine), refine=_refined(setup.machine))
+    states[:, 4:6] = np.maximum(states[:, 4:6], setup.machine.vapour)
+    return setup.logger.log(states, rng)
 
 
 def _machine(healthy: EhaParameters, condition: str, use: Use, rng: np.random.Generator) -> Machine:
@@ -204,7 +237,7 @@ def _sensors(p: EhaParameters) -> Mapping[str, Sensor]:
         SPEED: Sensor(noise=4e-4 * p.rated_speed),
         POSITION: Sensor(quantum=1e-6),
         VELOCITY: Sensor(noise=5e-3 * velocity),
-        DIFFERENCE: Sensor(noise=7e-4 * p.relief_pressure, quantum=2.0**-14 * p.relief_pressure),
+        **dict.fromkeys(PRESSURES, Sensor(noise=7e-4 * p.relief_pressure, quantum=2.0**-14 * p.relief_pressure)),
     }
 
 
