@@ -164,8 +164,7 @@ def made(rig: str, kind: str, seed: int) -> tuple[Setup, pd.DataFrame, dict[str,
     use = replace(use, drives=drives)
     condition = str(rng.choice(one.conditions))
     setup = plain_setup(healthy, use, condition, int(rng.integers(99)), rng)
-    if setup.logger.sample_time < 4e-4:
-        setup = replace(setup, duration=5.0)
+    setup = replace(setup, duration=6.0)
     major = parameters_for(CONDITIONS["major_leakage"], healthy).leakage_coefficient
     global MAJOR
     MAJOR = major * healthy.relief_pressure / (healthy.rated_speed * healthy.pump_displacement)

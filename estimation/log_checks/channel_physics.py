@@ -21,7 +21,7 @@ from estimation.log_checks.flow_balance import FlowBalance, flow_balance
 from estimation.log_checks.measurement_noise import position_variance
 from estimation.log_checks.unit_slips import DEGREES, FARTHEST, IN_DEGREES, LENGTHS, RPM, TURNS
 from estimation.notes import ChannelCode
-from plant.eha.model import EhaParameters
+from plant.eha.model import EhaParameters, piston_areas
 from plant.log.columns import TIME
 from plant.log.plausibility import LIMITS, SAMPLE_TIME
 from plant.log.record import Record
@@ -245,13 +245,17 @@ def _unsigned(record: Record, middle: ChannelBlocks, balance: FlowBalance | None
 
 
 def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: FlowBalance | None) -> tuple[Note, ...]:
-    """Compare how far the piston goes with what is pumped, leakage and compression counted where pressure is logged."""
+    """Compare how far the piston goes with what is pumped, leakage and compression counted where pressure is logged.
+
+    Where areas differ it goes farthest by the smaller one.
+    """
     together, ratio = gone_together(long.piston, long.pumped)
-    gone = p.piston_area * ratio
+    gone = min(piston_areas(p)) * ratio
     far = gone > FARTHEST
     turn = length = None
     believed, alike = (False, False), set[float]()
     told = balance if balance is not None and 0.0 < balance.swept_std < KNOWN * balance.swept else None
+    degrees = told is not None and 1.0 / MOST <= DEGREES / told.swept <= 1.0 / LEAST
     if told is not None and told.contradicts_rig > REFUTED and (far or _slides(record, p)):
         times = 1.0 / told.swept
         far = far and times > 1.0
@@ -266,14 +270,15 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
         if length is not None and length < 100.0 and " and " in _moved(record):
             length = None  # two that agree: a piston that drifts as it sticks makes as much of a slip of the speed
     fast = _over_limit(record, p)
-    if together > FOLLOWS and fast > FARTHEST and gone < NEAR * min(TURNS):
+    too_fast = fast > FARTHEST and gone < NEAR * min(TURNS)
+    if too_fast and (together > FOLLOWS or length is not None or degrees):
         turn, believed = min(TURNS), (True, believed[1])
     moved = _moved(record)
     slips: list[tuple[str, str, float]] = []
     if turn is not None and believed[0] and gone < NEAR * turn:
         said = " or ".join(TURNS[one] for one in TURNS if one == turn or one in alike)
-        degrees = turn == min(TURNS) and fast > FAST * RPM and gone * DEGREES < SIX**0.5
-        slips.append((SPEED, IN_DEGREES, DEGREES) if degrees else (SPEED, said, 1.0 / turn))
+        degrees = degrees or (fast > FAST * RPM and gone * DEGREES < SIX**0.5)
+        slips.append((SPEED, IN_DEGREES, DEGREES) if degrees and turn == min(TURNS) else (SPEED, said, 1.0 / turn))
     if (
         length is not None and believed[1] and gone < NEAR * length and not (slips and " and " in moved)
     ):  # two that agree are right

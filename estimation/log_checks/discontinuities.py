@@ -46,6 +46,9 @@ STOPS = 0.1
 SOFT_STOP = 1e-3
 """Share of a log's travel by which a stop yields [fraction]; judged."""
 
+SETS_OFF = 0.02, 0.5
+"""Shares of the log's highest speed between which a motor sets off from rest [fraction]; judged."""
+
 REST = 10
 """Rows that position repeats before it jumps if it was held by its logger [samples]."""
 
@@ -144,9 +147,22 @@ def _steps_of_pressure(record: Record) -> list[_Step]:
     """Return the steps of pressure that compression of the oil does not explain."""
     if PRESSURE not in record or SPEED not in record or record.sample_time > SLOWEST_PRESSURE:
         return []
-    rows = _places(pressure_strays(record, noisy=True), STEP_OF_PRESSURE)
-    strayed = pressure_strays(record) if rows else np.empty(0)
+    strayed = pressure_strays(record, noisy=True)
+    strayed[_setting_off(record[SPEED])] = 0.0
+    rows = _places(strayed, STEP_OF_PRESSURE)
+    strayed = pressure_strays(record) if rows else strayed
     return [_Step(PRESSURE, k, _size(strayed, k)) for k in rows]
+
+
+def _setting_off(speed: Array) -> slice:
+    """Return the rows in which a motor sets off from rest; none where it turns as the log begins.
+
+    Both chambers are at the accumulator's pressure then. Until one of them draws make-up, pressure rises twice as fast
+    as it ever does again.
+    """
+    size = np.nan_to_num(np.abs(speed))
+    turns, away = (int(np.argmax(size > share * np.max(size))) for share in SETS_OFF)
+    return slice(turns, away + APART if turns > 0 else 0)
 
 
 def _beside(row: int, places: list[int]) -> bool:

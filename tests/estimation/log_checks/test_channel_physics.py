@@ -307,9 +307,12 @@ def test_position_and_velocity_that_agree_are_not_accused_of_tens() -> None:
     assert (said.code, said.data["channel"]) == (ChannelCode.CHANNEL_UNIT, SPEED)
 
 
-@pytest.mark.parametrize(("times", "slip"), [(30.0 / np.pi, "rpm"), (180.0 / np.pi, "deg/s")])
-def test_a_speed_in_degrees_is_not_taken_for_revolutions(times: float, slip: str) -> None:
-    (said,) = channel_mistakes(scaled(SPEED, times)(run()), HEALTHY)
+@pytest.mark.parametrize(("times", "slip"), [(RPM, "rpm"), (180.0 / np.pi, "deg/s")])
+@pytest.mark.parametrize(("limit", "rod"), [(1.0, 0.0), (3.0, 0.0), (1.0, 0.33)])
+def test_a_speed_in_degrees_is_not_taken_for_revolutions(times: float, slip: str, limit: float, rod: float) -> None:
+    area, most = HEALTHY.piston_area / (1.0 - rod), limit * HEALTHY.motor_speed_limit
+    p = replace(HEALTHY, motor_speed_limit=most, piston_area=area, area_difference=rod)
+    (said,) = channel_mistakes(scaled(SPEED, times)(run()), p)
     assert (said.data["channel"], said.data["slip"]) == (SPEED, f"{slip} read as rad/s")
 
 

@@ -76,6 +76,18 @@ def test_a_motor_that_steps_within_a_row_sets_no_pressure_anew() -> None:
     assert without_discontinuities(given) == (given, ())
 
 
+@pytest.mark.parametrize(("first", "named"), [(0.0, False), (100.0, True)])
+def test_the_first_rise_of_pressure_from_rest_sets_none_anew(first: float, *, named: bool) -> None:
+    """Until one chamber draws make-up both give pressure: it rose twice as fast as it ever does again."""
+    record, rows = log("multisine"), np.arange(4000)
+    speed = np.where(rows < ROW, first, record[SPEED])
+    speed[ROW : ROW + 20] = np.linspace(first, record[SPEED][ROW + 20], 20)
+    pressure = np.where(rows < ROW, record[PRESSURE][ROW], record[PRESSURE]) + np.where(rows < ROW + 12, 0.0, 1e6)
+    position = np.where(rows < ROW, record[POSITION][ROW], record[POSITION])
+    given = record.replace(**{SPEED: speed, PRESSURE: pressure, POSITION: position, VELOCITY: None})
+    assert (SensorCode.PRESSURE_REZEROED in [note.code for note in without_discontinuities(given)[1]]) == named
+
+
 def test_a_piston_that_meets_a_stop_has_lost_no_rows_and_no_zero() -> None:
     """A load pulls it there; pump and pressure then change within a row. The part behind gave oil 17 % too soft."""
     time = 1e-3 * np.arange(3000)
