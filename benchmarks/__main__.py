@@ -39,6 +39,7 @@ NAMES = (
     "diagnosis.noisy_sensors",
     "diagnosis.random_rigs",
     "diagnosis.typed_rigs",
+    "diagnosis.strange_rigs",
     "diagnosis.open_benchmark",
     "many_logs.batch_scale",
     "many_logs.archive",

@@ -86,7 +86,24 @@ def row_of(log: Log, truth: dict[str, Any], *, pressure: bool) -> dict[str, Any]
     dict[str, Any]
         As of `scored`, without what it says of the rig.
     """
-    estimate, diagnosis = (_asked(log, verb, pressure) for verb in ("estimate", "diagnose"))
+    return row_of_answers(_asked(log, "estimate", pressure), _asked(log, "diagnose", pressure), truth)
+
+
+def row_of_answers(estimate: dict[str, Any], diagnosis: dict[str, Any], truth: dict[str, Any]) -> dict[str, Any]:
+    """Return what two answers are worth.
+
+    Parameters
+    ----------
+    estimate, diagnosis : dict
+        Entries of the JSON contract.
+    truth : dict
+        As of `row_of`.
+
+    Returns
+    -------
+    dict[str, Any]
+        As of `row_of`.
+    """
     modulus = truth["bulk_modulus"]
     judged = {"beta_lo": modulus, "beta_hi": modulus, "accept": truth["condition"], **truth}
     row: dict[str, Any] = {"z": None, **judge_bulk_modulus(estimate, judged), **judge_class(diagnosis, judged)}

@@ -2,7 +2,7 @@
 
 Sizes are drawn over the range that such actuators are built in, and what hangs together is drawn together: the pump
 goes with piston and velocity, the oil with the stroke, leakage with the pump's flow, friction with pressure, sensors
-with the ranges they see. A rig that nobody would build or run is drawn again (see `_drive` and `_sound`).
+with the ranges they see. A rig that nobody would build or run is drawn again (see `_drive` and `is_sound`).
 """
 
 from collections.abc import Mapping
@@ -102,7 +102,7 @@ def draw_bench(seed: int) -> Bench:
         true = draw_parameters(condition, rng, SPREAD, healthy)
         assert isinstance(true, CircuitParameters)  # noqa: S101 -- conditions change values, not the kind
         name, speed, sample_time = _drive(healthy, rng)
-        if len(speed) == 0 or not _sound(true):
+        if len(speed) == 0 or not is_sound(true):
             continue
         sensors = _sensors(healthy, sample_time, rng)
         try:
@@ -222,7 +222,7 @@ def _between(least: float, most: float, rng: np.random.Generator) -> float:
     return float(least * (most / least) ** rng.random())
 
 
-def _sound(p: CircuitParameters) -> bool:
+def is_sound(p: CircuitParameters) -> bool:
     """Return whether the actuator bears its own moves: its mass, stopped at once, takes half its pressure, no more."""
     velocity = p.pump_displacement * p.rated_speed / p.piston_area
     ringing = velocity * p.moving_mass * 2.0 * pi * natural_frequency(p)

@@ -1,0 +1,40 @@
+"""Strange logs of rigs that are not the paper's: what is strange has the size of the rig."""
+
+import numpy as np
+import pytest
+
+from benchmarks.diagnosis import strange_rigs
+from benchmarks.diagnosis.strange_rigs import AS_THEY_ARE, DIFFERENCE, NAMES, RIGS, SPEED, WRITTEN, made, rig_of, sized
+from experiments.open_benchmark.kinds import KINDS
+
+
+def test_every_kind_is_one_of_the_open_benchmark_or_made_of_a_written_log_and_none_comes_twice() -> None:
+    assert len(set(NAMES)) == len(NAMES)
+    assert set(NAMES) - set(WRITTEN) <= set(KINDS)
+    assert not set(AS_THEY_ARE) & set(sized(rig_of("laboratory")[0]))
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_every_rig_has_a_stroke_and_a_use(rig: str) -> None:
+    healthy, use = rig_of(rig)
+    assert healthy.stroke is not None
+    assert use.gas > 0.0
+
+
+@pytest.mark.parametrize("rig", ["laboratory", "random 1793"])
+def test_an_offset_is_a_share_of_the_rigs_own_relief_pressure(rig: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(strange_rigs, "DURATION", 0.5)
+    healthy, _ = rig_of(rig)
+    table, truth, setup = made(rig, "pressure_1_bar_off", 2)
+    assert 0.005 <= setup.logger.sensors[DIFFERENCE].offset / healthy.relief_pressure <= 0.03
+    assert truth["accept"] == truth["condition"] == setup.condition
+    again, *_ = made(rig, "pressure_1_bar_off", 2)
+    assert again.equals(table)
+
+
+def test_a_mistake_of_a_written_log_leaves_the_rest_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(strange_rigs, "DURATION", 0.5)
+    table, truth, _ = made("laboratory", "speed_freezes", 1)
+    assert np.count_nonzero(np.diff(table[SPEED]) == 0.0) >= 0.19 * len(table)
+    assert np.count_nonzero(np.diff(table[DIFFERENCE]) == 0.0) < 0.1 * len(table)
+    assert "unknown" in truth["accept"]
