@@ -3,7 +3,8 @@
 The rigs are typed ones and random ones; their files are right but where a kind says otherwise. What the open benchmark
 adds in units of the paper's rig, a bar or a kilonewton, is added here in parts of the rig's relief pressure, speed,
 stroke and force. Slips of units, frozen sensors and lost rows are made of a log that was written. Each rig takes the
-kinds in turn. A line a log, and what is right of all.
+kinds in turn. A line a log, and what is right of all. A relief valve that opens early is left out: it stays shut in
+most logs of these rigs.
 """
 
 import argparse
@@ -52,7 +53,7 @@ AS_THEY_ARE = (
     *("pressure_held", "pressure_averaged", "position_held", "position_zero_at_stop", "speed_held", "held_apart"),
     *("speed_sign_reversed", "speed_in_rpm", "pressure_reversed", "position_velocity_swapped"),
     *("rig_volume_25_percent_low", "rig_area_4_percent_high", "rig_mass_half_of_true", "pump_ripples"),
-    *("worn_pump", "makeup_check_stuck_shut", "relief_set_low", "intermittent_friction", "entrained_air"),
+    *("worn_pump", "makeup_check_stuck_shut", "intermittent_friction", "entrained_air"),
     *("air_midway", "oil_warms", "pressure_gauges_differ"),
 )
 """Kinds of the open benchmark whose draws hold for a rig of any size."""

@@ -247,10 +247,10 @@ def _unsigned(record: Record, middle: ChannelBlocks, balance: FlowBalance | None
 def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: FlowBalance | None) -> tuple[Note, ...]:
     """Compare how far the piston goes with what is pumped, leakage and compression counted where pressure is logged.
 
-    Where areas differ it goes farthest by the smaller one.
+    Where areas differ it goes farthest by the smaller one, which ``least`` counts.
     """
     together, ratio = gone_together(long.piston, long.pumped)
-    gone = min(piston_areas(p)) * ratio
+    gone, least = p.piston_area * ratio, min(piston_areas(p)) * ratio
     far = gone > FARTHEST
     turn = length = None
     believed, alike = (False, False), set[float]()
@@ -270,17 +270,17 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
         if length is not None and length < 100.0 and " and " in _moved(record):
             length = None  # two that agree: a piston that drifts as it sticks makes as much of a slip of the speed
     fast = _over_limit(record, p)
-    too_fast = fast > FARTHEST and gone < NEAR * min(TURNS)
+    too_fast = fast > FARTHEST and least < NEAR * min(TURNS)
     if too_fast and (together > FOLLOWS or length is not None or degrees):
         turn, believed = min(TURNS), (True, believed[1])
     moved = _moved(record)
     slips: list[tuple[str, str, float]] = []
-    if turn is not None and believed[0] and gone < NEAR * turn:
+    if turn is not None and believed[0] and least < NEAR * turn:
         said = " or ".join(TURNS[one] for one in TURNS if one == turn or one in alike)
-        degrees = degrees or (fast > FAST * RPM and gone * DEGREES < SIX**0.5)
+        degrees = degrees or (fast > FAST * RPM and least * DEGREES < SIX**0.5)
         slips.append((SPEED, IN_DEGREES, DEGREES) if degrees and turn == min(TURNS) else (SPEED, said, 1.0 / turn))
     if (
-        length is not None and believed[1] and gone < NEAR * length and not (slips and " and " in moved)
+        length is not None and believed[1] and least < NEAR * length and not (slips and " and " in moved)
     ):  # two that agree are right
         slips.append((moved, LENGTHS[length], length))
     unlike = not slips and far and together > FOLLOWS and (balance is None or balance.swept * FARTHEST < 1.0)
