@@ -242,7 +242,8 @@ def main(arguments: list[str]) -> int:
         for place, rig in enumerate(rigs):
             rows.append(scored(rig, kinds[(seed * len(rigs) + place) % len(kinds)], seed))
             print(line_of(rows[-1]), flush=True)
-    checks = printed(summarised(rows, wrong=False))
+    judged = [{**row, "verdict": "right"} if row["right"] else row for row in rows]  # unknown is right of many kinds
+    checks = printed(summarised(judged, wrong=True))
     told = [row["named"] for row in rows if row["named"] is not None]
     print(f"causes named: {sum(told)} of {len(told)}")
     return sum(not check.met for check in checks)
