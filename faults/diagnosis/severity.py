@@ -198,22 +198,22 @@ def _under(
     """
     centre = max(among, key=lambda one: one.probability).coordinates
     draws = _normal_draws(len(centre))
-    drawn, forces, known = _centres(among) + draws @ np.linalg.cholesky(spread).T, None, None
+    circuits, forces = np.vstack([_centres(among) + draws @ np.linalg.cholesky(spread).T, centre]), None
     if rubbing is not None:
-        known = rubbing[0][None]
-        forces = known + draws[:, FORCES] @ np.linalg.cholesky(rubbing[1]).T
+        known, covariance = rubbing
+        forces = np.vstack([known + draws[:, FORCES] @ np.linalg.cholesky(covariance).T, known])
     with np.errstate(all="ignore"):  # friction that falls faster than leakage holds has no steady state
-        table = _of_circuits(drawn, actuator, forces)
-        best = {name: float(values[0]) for name, values in _of_circuits(centre[None], actuator, known).items()}
+        table = _of_circuits(circuits, actuator, forces)
     found: dict[str, Quantity] = {}
     unresolved = _unresolved(actuator)
-    for name, value in best.items():
+    for name, values in table.items():
         if name not in asked:
             continue
+        value, drawn = float(values[-1]), values[:-1]
         if not np.isfinite(value):
             found[name] = Quantity(None, UNITS[name])
             continue
-        finite = table[name][~np.isnan(table[name])]
+        finite = drawn[~np.isnan(drawn)]
         low, high = percentiles(finite, (2.5, 97.5)) if len(finite) else (np.nan, np.nan)
         of_forces = rubbing is not None and name in OF_FRICTION  # factors were fitted to errors of circuits
         stretch = 1.0 if of_forces else widths.get(name, 1.0)

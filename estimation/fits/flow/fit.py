@@ -180,11 +180,12 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
                 if len(asked) >= len(HYPOTHESES):
                     strange = likelier(strange, _strange(plain, (PRESSURE_SIDES,), traits))
                 plain, strange = offset_settled(plain, strange, asked, partial(_strange, traits=traits))
+                if asked and strange is None:
+                    plain = with_open_turns(logged, plain)
         except WorkSpentError:
             return Answered(plain, asked, open_ends, None, ended=True)
         elsewhere = strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))
         if elsewhere is None:
-            plain = plain if strange or not asked else with_open_turns(logged, plain)
             return Answered(plain, asked, open_ends, strange)
         start = elsewhere  # with the motor's course that was found
 

@@ -48,7 +48,7 @@ def by_course(logged: Logged, plain: PlainFits) -> PlainFits:
     """
     if plain.log.gaps.size or plain.unturned.sample_time >= SLOW or not plain.best.slopes.size:
         return plain
-    if plain.start.held or _held_gains(logged, plain) <= HELD_WORTH:
+    if plain.start.held or _gains_at_most(plain) <= HELD_WORTH or _held_gains(logged, plain) <= HELD_WORTH:
         return plain
     other = plain_fits(logged, replace(plain.start, held=True))
     return other if other.best.cost < plain.best.cost else plain
@@ -94,8 +94,24 @@ def _held_gains(logged: Logged, plain: PlainFits) -> float:
     return -float(change @ known.ravel()) - 0.5 * float(change @ change)
 
 
+def _gains_at_most(plain: PlainFits) -> float:
+    """Return the gain in log-likelihood if the motor's command is held in truth, and none of it leaks off.
+
+    What is added for bends adds up to a twelfth of what speed changes by in a sample (Euler and Maclaurin).
+    """
+    (speed, *_), deviation = plain.unturned.drives.T, plain.unturned.noise[0].variance ** 0.5
+    apart = _rise(plain) / 12.0 * np.diff(speed) / deviation
+    return 0.5 * float(apart @ apart)
+
+
 def _turns_felt(plain: PlainFits) -> bool:
     """Return whether what the largest turn of the motor leaves open is felt beside the pressure's noise."""
-    log, p = plain.unturned, plain.start.parameters
-    rise = log.sample_time * p.pump_displacement * plain.best.values["bulk_modulus"] / p.chamber_volume
-    return FIRST * rise * float(np.max(turns(log))) > FELT * log.noise[0].variance ** 0.5
+    log = plain.unturned
+    return FIRST * _rise(plain) * float(np.max(turns(log))) > FELT * log.noise[0].variance ** 0.5
+
+
+def _rise(plain: PlainFits) -> float:
+    """Return the pressure that a sample of motor speed adds to a shut chamber [Pa s/rad]."""
+    p = plain.start.parameters
+    stiffness = plain.best.values["bulk_modulus"] / p.chamber_volume
+    return plain.unturned.sample_time * p.pump_displacement * stiffness
