@@ -57,6 +57,9 @@ COMPLETED, TOO_FAR = 10.0, 150.0
 balance is then behind one that leaves noise alone to be given up [dimensionless]. Of 100 logs one gained 180, where the
 likeliest balance gained 43; beside likeliest ones that gained less than 10 they gained 86 at most."""
 
+NOWHERE: Mapping[str, float] = {}
+"""Where nothing has led."""
+
 SETTLING = 15
 """Evaluations with short model steps of a form that does not explain its log: it is asked what is strange [count]."""
 
@@ -137,7 +140,11 @@ def balanced(
     log = swept_evenly(carried(log, parameters, near.values, stiffest), parameters, near.values)
     first = rough[0] if rough[0] in likely else near  # whose kernel has fewer runs side by side
     steps = sparing_steps(first.problem.on(log), first.point.theta)
-    done = each(lambda one: _finished(one, log, steps, bent=bent), likely)
+    leader = min(likely, key=lambda one: one.point.cost)
+    lead = _finished(leader, log, steps, bent=bent)
+    led = lead[0].model.values(lead[1].theta) if explained(lead[0], lead[1]) and not _held(lead[0]) else {}
+    rivals = [one for one in likely if one is not leader]
+    done = [lead, *each(lambda one: _finished(one, log, steps, led=led, bent=bent), rivals)]
     best, here = min(done, key=_cost), log.stepped(steps)
     if not explained(best[0], best[1]):
         led = (nearest((one.problem.on(here), one.point, one.bounds), best, starts[0]) for one in behind)
@@ -179,12 +186,21 @@ def _shaken(one: Found) -> Array | None:
     return moved_by_drives(one[0], one[1].theta) if noisy and len(log.drives) <= SAMPLES_KEPT else None
 
 
-def _finished(one: RoughOptimum, log: GreyBoxLog, steps: IntArray, wanted: float = np.inf, *, bent: bool) -> Found:
+def _finished(
+    one: RoughOptimum,
+    log: GreyBoxLog,
+    steps: IntArray,
+    wanted: float = np.inf,
+    *,
+    led: Mapping[str, float] = NOWHERE,
+    bent: bool,
+) -> Found:
     """Return the optimum with short model steps; a form that needs them to explain its log is completed as well.
 
     Steps are short where the log says so (``steps``).
 
-    A search that will not come down to the cost ``wanted`` ends early. Make-up valves that must let in much are
+    A search that will not come down to the cost ``wanted`` ends early. One of a completed form begins where that of the
+    likeliest has led: what makes valves rough to search for is known there. Make-up valves that must let in much are
     orifices (``bent``).
     """
     one = replace(one, problem=one.problem.on(log.stepped(steps)))
@@ -195,7 +211,7 @@ def _finished(one: RoughOptimum, log: GreyBoxLog, steps: IntArray, wanted: float
         one = replace(one, point=settled)
         if not _plain(one):
             return one.problem, one.point, one.bounds
-    problem, theta, bounds = _completed(one, log, bent=bent)
+    problem, theta, bounds = _completed(one, log, led, bent=bent)
     problem.near = NEAR if steps is not log.steps else 0.0
     return problem, descend(problem.at, theta, FINISHING, bounds, wanted=wanted), bounds
 
@@ -260,12 +276,14 @@ def _plain(one: RoughOptimum) -> bool:
     return not _held(one.problem) and explained(one.problem, one.point)
 
 
-def _completed(one: RoughOptimum, log: GreyBoxLog, *, bent: bool) -> tuple[FreedProblem, Array, tuple[Array, Array]]:
+def _completed(
+    one: RoughOptimum, log: GreyBoxLog, led: Mapping[str, float], *, bent: bool
+) -> tuple[FreedProblem, Array, tuple[Array, Array]]:
     """Return the problem with what matters to the last digits alone, where its search begins, and its bounds."""
     problem = FreedProblem.of(completed_form(one.problem.model, bent=bent), one.problem.log)
     known, fresh = len(one.point.theta), {STIFFNESS: first_stiffness(log), BEND: 0.0, **dict.fromkeys(CRACKS, 0.0)}
-    begun = problem.model.theta({**fresh, **one.values})
+    begun = problem.model.theta({**fresh, **one.values, **led})
     theta = np.append(one.point.theta, begun[known:])
     lowest, highest = flow_bounds(problem.model, [theta], log)
     lowest[:known], highest[:known] = one.bounds
-    return problem, theta, (lowest, highest)
+    return problem, np.clip(begun, lowest, highest) if led else theta, (lowest, highest)
