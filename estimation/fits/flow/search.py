@@ -57,6 +57,9 @@ COMPLETED, TOO_FAR = 10.0, 150.0
 balance is then behind one that leaves noise alone to be given up [dimensionless]. Of 100 logs one gained 180, where the
 likeliest balance gained 43; beside likeliest ones that gained less than 10 they gained 86 at most."""
 
+VALVES = ("makeup_conductance", "makeup_opening", *CRACKS, BEND, STIFFNESS)
+"""What balances have in common to the last digits; oil and losses make up for what each is without."""
+
 NOWHERE: Mapping[str, float] = {}
 """Where nothing has led."""
 
@@ -142,7 +145,7 @@ def balanced(
     steps = sparing_steps(first.problem.on(log), first.point.theta)
     leader = min(likely, key=lambda one: one.point.cost)
     lead = _finished(leader, log, steps, bent=bent)
-    led = lead[0].model.values(lead[1].theta) if explained(lead[0], lead[1]) and not _held(lead[0]) else {}
+    led = _valves(lead)
     rivals = [one for one in likely if one is not leader]
     done = [lead, *each(lambda one: _finished(one, log, steps, led=led, bent=bent), rivals)]
     best, here = min(done, key=_cost), log.stepped(steps)
@@ -199,8 +202,8 @@ def _finished(
 
     Steps are short where the log says so (``steps``).
 
-    A search that will not come down to the cost ``wanted`` ends early. One of a completed form begins where that of the
-    likeliest has led: what makes valves rough to search for is known there. Make-up valves that must let in much are
+    A search that will not come down to the cost ``wanted`` ends early. One of a completed form begins with the valves
+    that the likeliest has found (``led``), for they are what makes it long. Make-up valves that must let in much are
     orifices (``bent``).
     """
     one = replace(one, problem=one.problem.on(log.stepped(steps)))
@@ -230,6 +233,14 @@ def _ended(one: Found, log: GreyBoxLog) -> Found:
     ending = with_steps(problem, log.steps)
     evaluations = FINISHING if explained(problem, point) else 1
     return ending, descend(ending.at, point.theta, evaluations, bounds), bounds
+
+
+def _valves(lead: Found) -> Mapping[str, float]:
+    """Return how valves and accumulator are where the likeliest form explains its log [SI]; none where it does not."""
+    if _held(lead[0]) or not explained(lead[0], lead[1]):
+        return NOWHERE
+    values = lead[0].model.values(lead[1].theta)
+    return {name: values[name] for name in VALVES if name in values}
 
 
 def _one_sided(log: GreyBoxLog) -> bool:
