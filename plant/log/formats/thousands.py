@@ -26,9 +26,7 @@ _PARTS = re.compile(rf"[{APART}]")
 
 _GROUPED = re.compile(r"[-+\u2212]?[1-9]\d{0,2}[.,]\d{3}")
 _SMALL = re.compile(r"[-+\u2212]?\d{1,3}")
-
-_LONGEST_SMALL = 4
-"""Characters of the longest number below a thousand, with its sign [count]."""
+_SMALL_OR_GROUPED = re.compile(rf"{_SMALL.pattern}|{_GROUPED.pattern}")
 
 LEAST = 30
 """Cells with a separator from which a column may be judged [count]: decimals of as many would not all be three."""
@@ -98,10 +96,9 @@ def groups_thousands(cells: Sequence[str]) -> bool:
     >>> groups_thousands(["998", "1,002"] * 40), groups_thousands(["0", "0,998", "1,002"] * 40)
     (True, False)
     """
-    if min(map(len, cells), default=0) > _LONGEST_SMALL:
+    if not all(map(_SMALL_OR_GROUPED.fullmatch, cells)):
         return False
-    parted = [cell for cell in cells if not _SMALL.fullmatch(cell)]
-    return LEAST <= len(parted) < len(cells) and all(map(is_grouped, parted))
+    return LEAST <= sum(map(is_grouped, cells)) < len(cells)
 
 
 def is_grouped(cell: str) -> bool:
