@@ -145,9 +145,8 @@ def balanced(
     steps = sparing_steps(first.problem.on(log), first.point.theta)
     leader = min(likely, key=lambda one: one.point.cost)
     lead = _finished(leader, log, steps, bent=bent)
-    led = _valves(lead)
-    rivals = [one for one in likely if one is not leader]
-    done = [lead, *each(lambda one: _finished(one, log, steps, led=led, bent=bent), rivals)]
+    valves = _valves(lead)
+    done = each(lambda one: lead if one is leader else _finished(one, log, steps, led=valves, bent=bent), likely)
     best, here = min(done, key=_cost), log.stepped(steps)
     if not explained(best[0], best[1]):
         led = (nearest((one.problem.on(here), one.point, one.bounds), best, starts[0]) for one in behind)
@@ -157,9 +156,9 @@ def balanced(
     done += each(lambda one: _finished(one, log, steps, best[1].cost, bent=bent), behind)
     if valley is not None:
         done = each(lambda one: min(one, from_minimum(one[0].model, log, valley, bent=bent), key=_cost), done)
-    done = _told_ended(done, log)
     if _one_sided(log):
-        done = _told_ended([found for minima in each(_with_less_drain, done) for found in minima], log)
+        done = [found for minima in each(_with_less_drain, done) for found in minima]
+    done = _told_ended(done, log)
     best, swinging = _told_of(done)
     least = best[1].cost
 
