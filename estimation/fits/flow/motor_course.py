@@ -50,8 +50,7 @@ def by_course(logged: Logged, plain: PlainFits) -> PlainFits:
         return plain
     if plain.start.held or _gains_at_most(plain) <= HELD_WORTH or _held_gains(logged, plain) <= HELD_WORTH:
         return plain
-    near = [plain.swinging.values] if plain.explains(plain.swinging) else []
-    other = plain_fits(logged, replace(plain.start, held=True), near)
+    other = plain_fits(logged, replace(plain.start, held=True))
     return other if other.best.cost < plain.best.cost else plain
 
 

@@ -196,7 +196,7 @@ class PlainFits:
         return play_untaken(shown, sensed, self.yields(sensed, self.swinging.values["bulk_modulus"]))
 
 
-def plain_fits(logged: Logged, start: FitStart, near: Sequence[Mapping[str, float]] = ()) -> PlainFits:
+def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
     """Fit the plain flow form to a log by every balance that counts.
 
     What the motor's course between samples leaves open, a pump's teeth, and an offset of speed are taken up on the way.
@@ -207,8 +207,6 @@ def plain_fits(logged: Logged, start: FitStart, near: Sequence[Mapping[str, floa
         The log.
     start : FitStart
         Where searches begin.
-    near : sequence of Mapping[str, float]
-        Where searches begin first, since a fit of nearly the same log has ended there [SI].
     """
     parameters = start.parameters
     log = logged.seen_at(parameters, held=start.held)
@@ -219,8 +217,7 @@ def plain_fits(logged: Logged, start: FitStart, near: Sequence[Mapping[str, floa
     starts = flow_starts(parameters, max(start.bulk_modulus, LEAST_GUESS * parameters.bulk_modulus))
     explains = partial(fit_explains, noisy=log.passes_on)
     largest, _ = limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))
-    begun = [*near, *starts]
-    fitted = partial(balanced, parameters=parameters, starts=begun, valley=start.valley, stiffest=start.stiffest)
+    fitted = partial(balanced, parameters=parameters, starts=starts, valley=start.valley, stiffest=start.stiffest)
     unturned = with_course(log, fitted, parameters, always=start.turns_open)
     log, fits, teeth, left = with_pump_ripple(unturned, fitted, explains, largest, start.speed_offset)
     turning = Turning(log.teeth, log.speed_offset)
