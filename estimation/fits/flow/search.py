@@ -143,7 +143,8 @@ def balanced(
     log = swept_evenly(carried(log, parameters, near.values, stiffest), parameters, near.values)
     first = rough[0] if rough[0] in likely else near  # whose kernel has fewer runs side by side
     steps = sparing_steps(first.problem.on(log), first.point.theta)
-    leader = min(likely, key=lambda one: one.point.cost)
+    # the balance by mass, which has had an accumulator from the first
+    leader = min(likely, key=lambda one: STIFFNESS not in one.problem.model.unknowns)
     lead = _finished(leader, log, steps, bent=bent)
     valves = _valves(lead)
     done = each(lambda one: lead if one is leader else _finished(one, log, steps, led=valves, bent=bent), likely)
@@ -201,9 +202,9 @@ def _finished(
 
     Steps are short where the log says so (``steps``).
 
-    A search that will not come down to the cost ``wanted`` ends early. One of a completed form begins with the valves
-    that the likeliest has found (``led``), for they are what makes it long. Make-up valves that must let in much are
-    orifices (``bent``).
+    A search that will not come down to the cost ``wanted`` ends early. One of a form that is completed begins with the
+    valves and the accumulator that another has found (``led``), which are what makes it long. Make-up valves that must
+    let in much are orifices (``bent``).
     """
     one = replace(one, problem=one.problem.on(log.stepped(steps)))
     if not _plain(one):
@@ -235,7 +236,7 @@ def _ended(one: Found, log: GreyBoxLog) -> Found:
 
 
 def _valves(lead: Found) -> Mapping[str, float]:
-    """Return how valves and accumulator are where the likeliest form explains its log [SI]; none where it does not."""
+    """Return valves and accumulator of a form that explains its log [SI]; none of one that does not."""
     if _held(lead[0]) or not explained(lead[0], lead[1]):
         return NOWHERE
     values = lead[0].model.values(lead[1].theta)

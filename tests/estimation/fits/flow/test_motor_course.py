@@ -71,6 +71,21 @@ def test_turns_are_left_open_in_a_log_that_nothing_else_explains(
     assert (found is plain) is not opened
 
 
+def test_a_log_in_which_bends_move_pressure_by_less_than_noise_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To ask took two runs of the model of every log, and chance had some of them fitted twice."""
+
+    def asked(*_: object) -> float:
+        raise AssertionError
+
+    monkeypatch.setattr(motor_course, "_held_gains", asked)
+    soft = Logged(*without_strays(log(2.0)))
+    plain = plain_fits(soft, FitStart(PAPER, PAPER.bulk_modulus))
+    assert by_course(soft, plain) is plain
+    stiff = logged(held=True)
+    with pytest.raises(AssertionError):
+        by_course(stiff, plain_fits(stiff, FitStart(STIFF, STIFF.bulk_modulus)))
+
+
 def test_a_fast_log_that_is_averaged_otherwise_under_a_held_command_has_no_course() -> None:
     """Corners of a speed decide over how many samples it is averaged: such a log ended in an internal error."""
     plain = plain_fits(Logged(*without_strays(log(0.3))), FitStart(PAPER, PAPER.bulk_modulus))

@@ -25,6 +25,7 @@ from experiments.open_benchmark.logger import PLAIN, Logger
 from experiments.open_benchmark.machine import Machine
 from experiments.open_benchmark.run import TICK, run
 from faults.conditions import CONDITIONS, parameters_for
+from plant.arrays import Array
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, LUMPED, simulate
@@ -75,6 +76,26 @@ def test_a_log_that_the_likeliest_guess_explains_is_fitted_as_by_a_search_from_e
         std = other.std["bulk_modulus"]
         assert one.values["bulk_modulus"] == pytest.approx(other.values["bulk_modulus"], abs=0.05 * std)
         assert one.std["bulk_modulus"] == pytest.approx(std, rel=0.01)
+
+
+def test_valves_of_the_balance_by_mass_spare_that_by_volume_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    log, runs = seen(recorded("normal")), list[Array]()
+
+    def counted(problem: Problem, theta: Array) -> Point:
+        runs.append(theta)
+        return evaluated(problem, theta)
+
+    evaluated = Problem.at
+    monkeypatch.setattr(Problem, "at", counted)
+    led = balanced(log, HEALTHY, STARTS)
+    spared = len(runs)
+    monkeypatch.setattr(flow_search, "VALVES", ())
+    alone = balanced(log, HEALTHY, STARTS)
+    assert spared < len(runs) - spared
+    for one, other in zip(led, alone, strict=True):
+        assert one.cost < other.cost + 0.02
+        std = other.std["bulk_modulus"]
+        assert one.values["bulk_modulus"] == pytest.approx(other.values["bulk_modulus"], abs=0.05 * std)
 
 
 def test_valves_that_crack_are_fitted_beside_missing_speeds() -> None:
