@@ -48,7 +48,10 @@ def by_course(logged: Logged, plain: PlainFits) -> PlainFits:
     """
     if plain.log.gaps.size or plain.unturned.sample_time >= SLOW or not plain.best.slopes.size:
         return plain
-    if plain.start.held or _gains_at_most(plain) <= HELD_WORTH or _held_gains(logged, plain) <= HELD_WORTH:
+    noise_alone = plain.explains(plain.best)  # else a course may also lead to another minimum
+    if plain.start.held or (noise_alone and _gains_at_most(plain) <= HELD_WORTH):
+        return plain
+    if _held_gains(logged, plain) <= HELD_WORTH:
         return plain
     other = plain_fits(logged, replace(plain.start, held=True))
     return other if other.best.cost < plain.best.cost else plain
