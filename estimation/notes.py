@@ -254,8 +254,7 @@ class RigCode(Code):
         "per bar as at a small drop; the fit includes this"
     )
     MAKEUP_UNSEEN = (
-        "the make-up valve of chamber {side} never opened, so this log does not show whether it is stuck shut: use a "
-        "drive that draws oil into chamber {side}"
+        "the make-up valve of chamber {side} never opened, so this log does not show whether it is stuck shut"
     )
     SPEED_OFFSET = (
         "motor_speed_rad_s reads {offset_rad_s:.3g|rpm} ± {half_width:.2g|rpm} rpm too much; the offset was subtracted"

@@ -80,6 +80,10 @@ class ClassCode(Code):
     )
     LEAKAGE_AND_BIAS_ALIKE = "the log does not separate leakage coefficient and flow bias (a constant loss of the pump)"
     VELOCITY_LOST_TOLD = "the velocity lost is known: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
+    STUCK_NOT_TOLD = (
+        "a make-up valve that is stuck shut and never had to open leaves no trace: it keeps a probability of "
+        "{percent:.0f} %, which is none of the nine conditions"
+    )
     OIL_STIFFER_CLASS = (
         "without pressure, the circuit that fits has {ratio:.2g} times the bulk modulus in the rig file (another oil, "
         "or a wrong rig file); the conditions were compared around that"
@@ -181,4 +185,5 @@ class AdviceCode(Code):
         "also log slower speeds: with {speeds} speeds, leakage and flow bias (a constant loss of the pump) still look "
         "alike"
     )
+    DRAW_OIL = "use a drive that draws oil into chamber {side}: this log does not show whether its make-up valve opens"
     NOTHING = "no further measurement is needed: this log is conclusive"

@@ -19,6 +19,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from estimation.finding import LARGE, NORMAL_95, Quantity
+from estimation.fits.flow.told_volume import is_told
 from estimation.fits.hypothesis_search.form_fit import FormFit
 from estimation.notes import EstimateCode, RigCode
 from plant.eha.doubts import PRESSURE_GAIN, Spread
@@ -48,13 +49,15 @@ def fitted_responses(fit: FormFit) -> Mapping[str, Responses]:
     Returns
     -------
     Mapping[str, Responses]
-        By quantity.
+        By quantity. Where the log tells the volume, bulk modulus hangs on the gain of the pressure alone: all flows may
+        grow with the chambers, and their ratio is in the interval given the rig (`ratio_doubt`).
     """
-    return {
+    told = {
         name: {entry: slopes[name] / value for entry, slopes in fit.rig_slopes.items() if value}
         | {PRESSURE_GAIN: GAIN.get(name, 0.0)}
         for name, (value, _) in fit.parameters.items()
     }
+    return told | ({"bulk_modulus": {PRESSURE_GAIN: GAIN["bulk_modulus"]}} if is_told(fit.explanation) else {})
 
 
 def scaled_responses(

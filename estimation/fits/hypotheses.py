@@ -105,7 +105,7 @@ DELIVERY = Hypothesis("delivery", ("pump_displacement",))
 ENCODER_ZERO = Hypothesis(
     "encoder_zero", ("position_zero",), ({"position_zero": -0.06}, {"position_zero": 0.06}), from_mid_travel=True
 )
-"""Asked of every log too: chambers that hold their volumes, or valves that crack, may pass for an encoder's zero."""
+"""Asked of every log too: chambers that hold their volumes, or valves that crack, may pass for it."""
 
 VOLUME = Hypothesis("volume", ("chamber_volume",))
 
@@ -115,8 +115,7 @@ BEGUN = replace(START_LOAD, from_first_sample=True, by_mass=True, beside=(STIFFN
 """The same of a log that begins under load or in motion."""
 
 LEAST_PLAY = 5e-6
-"""Least play that is one [m]; judged. With less it is valves and accumulator that explain a log, and something else is
-strange."""
+"""Least play that is one [m]; judged. With less it is valves and accumulator that explain a log."""
 
 PLAY = Hypothesis(
     "position_play",
@@ -155,9 +154,8 @@ LEAST_ROD = 0.02
 volumes alone differ look like an encoder that was homed elsewhere."""
 
 LATEST = 2e-2
-"""Longest delay that is sought, or told of [s]: no sensor, filter or bus is later, and what a slope tells of a shift
-holds for one that is short beside what moves. In a log of another actuator the misfit may fall with every millisecond
-more, and the search for a delay would have no end."""
+"""Longest delay that is sought, or told of [s]: no sensor, filter or bus is later. In a log of another actuator the
+misfit may fall with every millisecond more, and the search for a delay would have no end."""
 
 PRESSURE_LATE = Hypothesis("pressure_late", ("pressure_lag",), ({"pressure_lag": 1e-3},), LATE_TRIED)
 
@@ -232,10 +230,13 @@ PORTS_DRAIN = tuple(
 MAKEUP_HIDDEN = replace(MAKEUP_BLOCKED, far=False, beside=CRACKS)
 """The same beside a plain fit, where the drops at which valves open have taken it up: they are sought again."""
 
-MAY_HIDE = (MAKEUP_HIDDEN, *PORTS_DRAIN, LEAKAGE_RISE, OFFSET, PUMP_COMPRESSES)
+VOLUME_HIDDEN = replace(VOLUME, beside=(*CRACKS, STIFFNESS))
+"""The same beside a plain fit: valves, and an accumulator's level that follows the piston, have taken part of it up."""
+
+MAY_HIDE = (MAKEUP_HIDDEN, *PORTS_DRAIN, LEAKAGE_RISE, OFFSET, PUMP_COMPRESSES, VOLUME_HIDDEN)
 """What a log that the plain form explains is asked too: drops at which valves open, and leakage, may take it up. With
-`DELIVERY` and `ENCODER_ZERO` they are eight, of which one evaluation is made beside the fit. Slopes say what each
-promises, a stuck valve included, for it is near what the plain form found."""
+`DELIVERY` and `ENCODER_ZERO` they are nine, of which one evaluation is made beside the fit: slopes say what each
+promises, a stuck valve included."""
 
 CHECKS_CRACK = Hypothesis(
     "checks_crack", ("crack_pressure", "crack_difference"), ({"crack_pressure": 1e4},), known=("crack_pressure",)

@@ -92,6 +92,7 @@ def advice_for(
     tuple of Note
         The most useful first.
     """
+    not_told = tuple(not_told)
     doubts, unclear = list(against), {note.code for note in not_told}
     if doubts:
         return _mended(doubts)
@@ -100,6 +101,8 @@ def advice_for(
         found.append(AdviceCode.LOG_PRESSURE.note())
     if ClassCode.FRICTION_NOT_VISIBLE in unclear:
         found.append(AdviceCode.MOVE_PISTON.note())
+    unseen = [note for note in not_told if note.code is RigCode.MAKEUP_UNSEEN]
+    found.extend(AdviceCode.DRAW_OIL.note(side=note.data["side"]) for note in unseen)
     alike = ClassCode.LEAKAGE_AND_BIAS_ALIKE in unclear
     if alike or ClassCode.WEAR_NOT_TOLD in unclear:
         speeds = speeds_held(record)

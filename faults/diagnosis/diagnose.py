@@ -28,6 +28,7 @@ from faults.diagnosis.beyond_nine.accumulator import whatever_accumulator
 from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
 from faults.diagnosis.beyond_nine.balance_refused import class_without_balance
 from faults.diagnosis.beyond_nine.drift import over_drift
+from faults.diagnosis.beyond_nine.left_open import beside_unseen_valve
 from faults.diagnosis.beyond_nine.load import Loaded, under_load
 from faults.diagnosis.beyond_nine.near_enough import BESIDE
 from faults.diagnosis.beyond_nine.wear import whatever_the_pump_delivers
@@ -204,17 +205,19 @@ def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tupl
     known = case.estimate.gate.passed and not against
     oil = oil_advice(severity, diagnosis.healthy, diagnosis.limits, case.healthy.chamber_volume) if known else ()
     volume = volume_advice(case.strange, case.healthy, case.written)
-    further = advice_for(case.log.record, diagnosis.probabilities, against, diagnosis.not_told, found.channels)
+    unclear = (*diagnosis.not_told, *found.not_told)
+    further = advice_for(case.log.record, diagnosis.probabilities, against, unclear, found.channels)
+    probabilities, stuck = beside_unseen_valve(diagnosis.probabilities, found.not_told)
     return replace(
         found,
         notes=notes,
         condition=diagnosis.condition,
-        probabilities=diagnosis.probabilities,
+        probabilities=probabilities,
         unknown=bool(against),
         against=against,
         severities=severity,
         healthy=diagnosis.healthy,
-        not_told=not_told,
+        not_told=(*not_told, *stuck),
         since=board.onset,
         advice=(*oil, *volume, *sensor_advice(case.log.left_out), *further),
     )

@@ -25,6 +25,7 @@ from estimation.fits.flow.offset_beside import offset_settled
 from estimation.fits.flow.other_minimum import lower_minimum
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer, with_shorter_steps
 from estimation.fits.flow.search import MAKEUP_TRIED
+from estimation.fits.flow.told_volume import bound_told, ratio_doubt
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
 from estimation.fits.greybox.small_pump_ripple import with_small_ripple
 from estimation.fits.greybox.work_limit import Work, WorkSpentError
@@ -294,7 +295,7 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
     """Return the fit of a log with what is strange about it taken up."""
     strange = strange.in_detail
     one = strange.fit
-    modulus, bound = one.values["bulk_modulus"], one.std["bulk_modulus"] / one.values["bulk_modulus"]
+    modulus, bound = one.values["bulk_modulus"], bound_told(strange, plain.best)
     if PLAY.name in strange.names:
         moved = abs(modulus / plain.swinging.values["bulk_modulus"] - 1.0)
         left, open_play = play_structure(moved, plain.yields(sensed, modulus)), ()
@@ -306,6 +307,7 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
         left = float(np.hypot(left, UNEVEN_OIL))
     if {AIR.name, AIR_MIDWAY.name} & set(strange.names):
         left = float(np.hypot(left, BUBBLES))
+    left = float(np.hypot(left, ratio_doubt(strange)))
     most = share_lost(plain.log, one.values, plain.start.parameters.pump_displacement, strange.names)
     weights, p = weights_of(strange.fits), plain.start.parameters
     found, correlation = with_lumped(strange.values, strange.fits, weights, p, plain.log.measured_rms)

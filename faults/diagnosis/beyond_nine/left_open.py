@@ -12,6 +12,7 @@ import numpy as np
 
 from estimation.eha.rig_share import DELIVERY_ENTRY
 from estimation.fits.hypotheses import PRESUMED
+from estimation.notes import RigCode
 from faults.conditions import CONDITIONS
 from faults.notes import ClassCode
 from plant.arrays import Array
@@ -34,6 +35,10 @@ SO_WORN = math.log(0.5)
 WELL_WORN = 0.8
 """Share up to which a pump is a worn one whatever the rig file's displacement is worth [dimensionless]: an entry may be
 off by 5 %, and what is presumed of wear has a deviation of 15 %."""
+
+UNSEEN = 1.0 / (1.0 + len(CONDITIONS))
+"""Probability that a make-up valve which a log never opens is stuck shut [probability]: as likely as each of the nine,
+which are alike before a log is seen."""
 
 STAYS = 0.5
 """Probability of a condition, beside a fault, from which it is the same as without [probability]."""
@@ -175,6 +180,33 @@ def not_excluded(faults: Sequence[OpenFault], sound: Array) -> tuple[Note, ...]:
     beside = ", and ".join(f"with {name} it would be {_in_words(one)}" for name, one in others.items())
     condition = f"the condition would be the same, but {beside}" if beside else "the condition would be the same"
     return (ClassCode.NOT_EXCLUDED.note(faults=", ".join(named), condition=condition),)
+
+
+def beside_unseen_valve(
+    probabilities: Mapping[str, float], not_told: Sequence[Note]
+) -> tuple[Mapping[str, float], tuple[Note, ...]]:
+    """Return the classes of a log in which a make-up valve never opened: that it is stuck shut is none of the nine.
+
+    A stuck valve then has the likelihood of a sound one, and keeps what is presumed of it.
+
+    Parameters
+    ----------
+    probabilities : Mapping[str, float]
+        Of each condition with a sound valve [probability].
+    not_told : sequence of Note
+        What the log does not determine.
+
+    Returns
+    -------
+    Mapping[str, float]
+        They sum to the probability that the valve is sound [probability].
+    tuple of Note
+        What they lack; none where both valves opened.
+    """
+    if not probabilities or all(note.code is not RigCode.MAKEUP_UNSEEN for note in not_told):
+        return probabilities, ()
+    left = {name: (1.0 - UNSEEN) * share for name, share in probabilities.items()}
+    return left, (ClassCode.STUCK_NOT_TOLD.note(percent=100.0 * UNSEEN),)
 
 
 def _share(scores: Array, place: int) -> float:

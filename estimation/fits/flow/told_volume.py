@@ -1,0 +1,58 @@
+"""`volume_told(strange, plain)`: how well bulk modulus is known where the log tells the volume of the chambers.
+
+Volume over bulk modulus is all that a piston at rest tells. One that travels changes its chambers by a share that hangs
+on their volume, so that the log tells both. Then a scale of all flows alike, with chambers that grow along, leaves bulk
+modulus as it is, and what is not known of displacement over area is open as far as the log leaves it.
+"""
+
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.hypotheses import VOLUME
+from estimation.fits.hypothesis_search.explanation import Explanation
+
+RATIO_DOUBT = 0.036
+"""Deviation of displacement over area in a rig file that says nothing else, of the usual 3 and 2 % [fraction]."""
+
+
+def is_told(strange: Explanation | None) -> bool:
+    """Return whether an explanation of a log tells the volume of the chambers."""
+    return strange is not None and VOLUME.name in strange.names
+
+
+def bound_told(strange: Explanation, plain: GreyBoxFit) -> float:
+    """Return the relative Cramér-Rao bound of bulk modulus under an explanation.
+
+    Parameters
+    ----------
+    strange : Explanation
+        What explains the log.
+    plain : GreyBoxFit
+        The plain form's fit, with the rig file's volume.
+
+    Returns
+    -------
+    float
+        Where the explanation tells the volume, at most that with a known volume: a log that tells more is no less
+        observable for it [fraction].
+    """
+    bound, known = (one.std["bulk_modulus"] / one.values["bulk_modulus"] for one in (strange.fit, plain))
+    return min(bound, known) if is_told(strange) else bound
+
+
+def ratio_doubt(strange: Explanation) -> float:
+    """Return the deviation of bulk modulus from displacement over area, as far as the log leaves it open.
+
+    Parameters
+    ----------
+    strange : Explanation
+        What explains the log.
+
+    Returns
+    -------
+    float
+        Relative; none where the volume is not told, whose total interval holds all of it [fraction].
+    """
+    slopes = strange.fit.rig_slopes.get("pump_displacement")
+    if not is_told(strange) or slopes is None:
+        return 0.0
+    response = abs(slopes["bulk_modulus"] / strange.fit.values["bulk_modulus"])
+    return response * min(strange.delivery_open.deviation or 0.0, RATIO_DOUBT)
