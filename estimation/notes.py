@@ -253,6 +253,10 @@ class RigCode(Code):
         "the make-up valves act as orifices: at a pressure drop of {drop_pa:.2g|bar} bar they pass half as much flow "
         "per bar as at a small drop; the fit includes this"
     )
+    GAS_CONTRADICTED = (
+        "the accumulator holds {more} gas than the {gas:.3g} m^3 in the rig file, or its charge is another: the log asks "
+        "for {ratio:.2g} times that or {more}"
+    )
     MAKEUP_UNSEEN = (
         "the make-up valve of chamber {side} never opened, so this log does not show whether it is stuck shut"
     )

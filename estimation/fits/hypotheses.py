@@ -246,8 +246,7 @@ CHECKS_HIDDEN = replace(CHECKS_CRACK, beside=CRACKS)
 """The same beside a plain fit whose drops are far from what is presumed of them: they are sought again."""
 
 LARGE_CRACK = 3.0 * USUAL_CRACK
-"""Drop from which a plain fit's valve is asked for one that opens late: three deviations of what is presumed [Pa]. Held
-back by that, bulk modulus of a leaky actuator was 3 % off."""
+"""Drop from which a plain fit's valve is asked for one that opens late: three deviations of what is presumed [Pa]."""
 
 UNLIKE_CRACKS = 3.0 * 2.0**0.5 * USUAL_CRACK
 """Difference between the drops at which the two make-up valves open from which one may be stuck shut instead: three

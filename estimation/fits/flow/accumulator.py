@@ -10,11 +10,14 @@ rig, and in the total one. See decision 389.
 import math
 from collections.abc import Mapping
 
+from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.models.flow import STIFFNESS
+from estimation.notes import RigCode
 from plant.eha.model import EhaParameters
+from plant.notes import Note
 
-GAS = "accumulator_gas"
+GAS, CHARGE = "accumulator_gas", "accumulator_pressure"
 
 SLOWEST, QUICKEST = 1.0, 1.4
 """Exponents of nitrogen that is compressed slowly, at its wall's temperature, and quickly [dimensionless]."""
@@ -123,3 +126,41 @@ def is_far_stiffer(log: GreyBoxLog, values: Mapping[str, float]) -> bool:
         return False
     usual, std = log.presumed[STIFFNESS]
     return math.log(values[STIFFNESS] / usual) > FAR_STIFFER * std
+
+
+CONTRADICTS = 3.0
+"""Deviations of what a log may move a stated accumulator by, from which it contradicts the rig file [dimensionless]."""
+
+
+def gas_contradicted(log: GreyBoxLog, fit: GreyBoxFit, p: EhaParameters) -> tuple[Note, ...]:
+    """Return a note where a log contradicts the accumulator that a rig file states.
+
+    A log that tells nothing leaves the stiffness where it is presumed. What it moves it by has the variance that was
+    presumed less the one that is left, if the file is right; its charge is doubted too.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, with what is presumed.
+    fit : GreyBoxFit
+        The fit that explains it.
+    p : EhaParameters
+        The actuator, as its rig file has it.
+
+    Returns
+    -------
+    tuple of Note
+        One at most; none where the file states no gas.
+    """
+    found = fit.values.get(STIFFNESS, 0.0)
+    if p.accumulator_gas is None or found <= 0.0 or STIFFNESS not in log.presumed:
+        return ()
+    usual, spread = log.presumed[STIFFNESS]
+    left = fit.std.get(STIFFNESS, math.inf) / found
+    if not left < spread:
+        return ()
+    moved, told = math.log(usual / found), spread**2 + log.uncertainties.get(CHARGE, 0.0) ** 2 - left**2
+    if abs(moved) <= CONTRADICTS * math.sqrt(told):
+        return ()
+    more = "more" if moved > 0.0 else "less"
+    return (RigCode.GAS_CONTRADICTED.note(more=more, gas=p.accumulator_gas, ratio=math.exp(moved)),)

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from estimation.fits.flow.accumulator import is_far_stiffer
+from estimation.fits.flow.accumulator import gas_contradicted, is_far_stiffer
 from estimation.fits.flow.agreement import Answered, agreed, wanted_of
 from estimation.fits.flow.asked_hypotheses import (
     ALWAYS_ASKED,
@@ -338,14 +338,14 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     reasons = (*objections(best, plain.log.passes_on), *play_left(plain.swinging.play, sensed)) or plain.teeth_left
     if begun and not reasons and not told_by(plain, begun=begun)(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
-    value, std = found["bulk_modulus"]
+    (value, std), gas = found["bulk_modulus"], gas_contradicted(plain.log, plain.swinging, p)
     return FormFit(
         parameters=with_structure(found, float(np.hypot(left if sure else max(left, STRUCTURE), untaken))),
         bound=std / value,
         chi_square=best.chi_square[0],
         reasons=reasons,
         rig_slopes=with_lumped_slopes(best.rig_slopes),
-        remarks=(*plain.teeth, *open_ends, *unseen_valve_note(best), *open_play),
+        remarks=(*plain.teeth, *open_ends, *unseen_valve_note(best), *gas, *open_play),
         turning=plain.turning,
         correlation=correlation,
     )
