@@ -114,7 +114,7 @@ class EstimateCode(Code):
     )
     STIFFER_THAN_RIG = (
         "bulk modulus is {ratio:.2g} times that in the rig file: if the oil is stiffer, enter its bulk_modulus there, "
-        "else correct chamber_volume from {written:.3g} to {volume:.3g} m^3"
+        "else correct chamber_volume from {written:.3g} to {volume:.3g} m^3, or the unit of differential_pressure_pa"
     )
     SOFTER_THAN_RIG = (
         "bulk modulus is {ratio:.2g} times that in the rig file: there is air in the oil or a soft hose, or "

@@ -11,7 +11,8 @@ import numpy as np
 
 from estimation.eha.result import BulkModulusEstimate, is_vague, without_number
 from estimation.finding import Outcome
-from estimation.fits.flow.misread import KIN
+from estimation.fits.flow.misread import FOREIGN, KIN
+from estimation.fits.hypotheses import AIR, AIR_MIDWAY
 from estimation.log_checks.channel_names import POSITION, PRESSURE, VELOCITY
 from estimation.log_checks.channel_physics import PRESSURE_OFF
 from estimation.log_checks.standstill import travels
@@ -19,6 +20,10 @@ from estimation.notes import ChannelCode, EstimateCode
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
 from plant.notes import Note
+
+STIFFEST = 2.5e9
+"""Bulk modulus over which no oil is [Pa]: mineral oils have 1.4 to 2 GPa (Merritt, Hydraulic Control Systems, 1967,
+chapter 2), and a chamber of 15 % more than its rig file says reads as much more."""
 
 UNLIKE = 0.2
 """Logarithm of bulk modulus over the rig file's from which the units are doubted that no motion confirms
@@ -78,7 +83,7 @@ def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters)
     if found.value is None:
         return found
     ratio = found.value / p.bulk_modulus
-    if not 1.0 / PRESSURE_OFF < ratio < PRESSURE_OFF:
+    if not 1.0 / PRESSURE_OFF < ratio < PRESSURE_OFF or _is_none(found, ratio):
         return _without(found, Outcome.MISMATCH, ChannelCode.NO_SUCH_OIL.note(channel=PRESSURE, ratio=ratio))
     gone = travels(record, p)
     if gone is None or not gone.still:
@@ -90,6 +95,17 @@ def unless_foreign(found: BulkModulusEstimate, record: Record, p: EhaParameters)
     if unlike < most and not is_vague(found.value, found.std, VAGUE_STILL):
         return replace(found, remarks=(*found.remarks, *said))
     return _without(found, Outcome.NOT_OBSERVABLE, *said, EstimateCode.STILL_AND_FOREIGN.note(ratio=ratio))
+
+
+def _is_none(found: BulkModulusEstimate, ratio: float) -> bool:
+    """Return whether an oil without bubbles, told by pressure, is softer or stiffer than any.
+
+    Pressure in another unit scales bulk modulus and leakage, and the flow balance explains that as well.
+    """
+    names = () if found.explanation is None else found.explanation.names
+    if PRESSURE not in found.channels or found.value is None or {AIR.name, AIR_MIDWAY.name} & set(names):
+        return False
+    return ratio < 1.0 / FOREIGN or (ratio > FOREIGN and found.value > STIFFEST)
 
 
 def _without(found: BulkModulusEstimate, outcome: Outcome, *said: Note) -> BulkModulusEstimate:

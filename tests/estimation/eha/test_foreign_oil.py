@@ -90,3 +90,19 @@ def test_bulk_modulus_that_no_oil_has_is_a_mistake_of_a_channel() -> None:
         found = unless_foreign(replace(whole, value=times * RIG.bulk_modulus), seized(), RIG)
         assert (found.value, found.outcome) == (None, Outcome.MISMATCH)
         assert ChannelCode.NO_SUCH_OIL in [note.code for note in found.gate.reasons]
+
+
+@pytest.mark.parametrize(
+    ("modulus", "kept"), [(1.5e9, True), (1.8e9, True), (3.5e9, False), (4e7, True), (1.7e7, False)]
+)
+def test_oil_that_is_stiffer_or_softer_than_any_has_another_unit_of_pressure(modulus: float, kept: bool) -> None:
+    """Psi read as bar, and bar read as psi, passed with 3,570 and 17 MPa where a piston hardly moves."""
+    rng = np.random.default_rng(18814)
+    log = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, RIG, rng), 1e-3, RIG, sensors=BENCH, rng=rng)
+    told = replace(estimate_bulk_modulus(seized(), RIG), value=modulus, std=1e-3 * modulus)
+    found = unless_foreign(told, log, RIG)
+    assert (found.value is not None) is kept
+    assert (ChannelCode.NO_SUCH_OIL in [note.code for note in found.gate.reasons]) is not kept
+    assert (
+        unless_foreign(replace(told, channels=(POSITION,)), log, RIG).value == modulus
+    )  # without pressure a mass is off

@@ -122,6 +122,11 @@ def test_more_speeds_are_asked_for_where_a_worn_pump_is_not_told() -> None:
     assert codes(advice_for(staircase([100.0, -50.0, 20.0]), SURE, (), worn, ALL)) == [AdviceCode.NOTHING]
 
 
+def test_a_drive_that_draws_oil_is_asked_for_where_a_valve_never_opened() -> None:
+    unseen = (RigCode.MAKEUP_UNSEEN.note(side="B"),)
+    assert advice_for(staircase([100.0]), SURE, (), unseen, ALL) == (AdviceCode.DRAW_OIL.note(side="B"),)
+
+
 def test_a_log_that_decides_needs_nothing() -> None:
     assert codes(advice_for(staircase([100.0]), SURE, (), (), ALL)) == [AdviceCode.NOTHING]
 

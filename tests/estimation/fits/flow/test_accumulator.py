@@ -11,6 +11,7 @@ from estimation.fits.flow.accumulator import (
     FAR_STIFFER,
     LEAST_GAS,
     MOST_GAS,
+    gas_contradicted,
     is_far_stiffer,
     oil_taken,
     presumed_stiffness,
@@ -23,7 +24,7 @@ from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
-from tests.estimation.fits.short_logs import PAPER, log, seen
+from tests.estimation.fits.short_logs import PAPER, log, made_fit, seen
 
 SMALL = 1.2e-4
 """Gas of a compact actuator's accumulator: 1.7 times the oil that its chambers take up, an eighth of the paper's."""
@@ -63,6 +64,22 @@ def test_an_accumulator_far_stiffer_than_presumed_has_taken_up_something_else() 
         assert is_far_stiffer(plain, {STIFFNESS: usual * math.exp(deviations * std)}) is wanted
     assert not is_far_stiffer(plain, {STIFFNESS: 0.0})
     assert not is_far_stiffer(plain, {"bulk_modulus": 2e8})  # held volumes have none
+
+
+@pytest.mark.parametrize(
+    ("less", "left", "more"),
+    [(2.5, 0.1, "more"), (1.0, 0.1, None), (-2.5, 0.1, "less"), (2.5, 0.36, "more"), (0.9, 0.36, None)],
+)
+def test_gas_that_a_log_contradicts_is_named(less: float, left: float, more: str | None) -> None:
+    rig = replace(PAPER, accumulator_gas=SMALL)
+    usual, spread = presumed_stiffness(rig, {"accumulator_gas": 0.35})[STIFFNESS]
+    told = replace(seen(log(0.2)), presumed={STIFFNESS: (usual, spread)})
+    found = usual * math.exp(-less)
+    fit = replace(made_fit(100.0, 2e8, 1e6), values={STIFFNESS: found}, std={STIFFNESS: left * found})
+    said = gas_contradicted(told, fit, rig)
+    assert [note.data["more"] for note in said] == ([] if more is None else [more])
+    assert gas_contradicted(told, fit, PAPER) == ()  # it states none
+    assert gas_contradicted(told, replace(fit, std={STIFFNESS: np.inf}), rig) == ()  # the log tells nothing
 
 
 @pytest.mark.parametrize("stated", [None, SMALL, 2.0 * SMALL])

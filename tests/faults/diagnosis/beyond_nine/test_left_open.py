@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from faults.diagnosis.beyond_nine.left_open import DELIVERIES, odds_of_wear, presumed_of_wear
+from estimation.notes import RigCode
+from faults.diagnosis.beyond_nine.left_open import DELIVERIES, beside_unseen_valve, odds_of_wear, presumed_of_wear
+from faults.notes import ClassCode
 
 
 @pytest.mark.parametrize(
@@ -21,3 +23,15 @@ def test_what_is_presumed_of_wear_does_not_hang_on_how_many_pumps_are_tried() ->
     tenths = np.exp(-0.5 * (np.log([0.7, 0.8, 0.9]) / 0.15) ** 2)
     assert np.sum(np.exp(presumed_of_wear(DELIVERIES))) == pytest.approx(np.sum(tenths), rel=0.2)
     assert presumed_of_wear([1.0]) == 0.0
+
+
+def test_a_valve_that_never_opened_may_be_stuck_as_likely_as_each_of_the_nine() -> None:
+    sure = {"normal": 0.0, "major_friction": 1.0}
+    unseen = (RigCode.MAKEUP_UNSEEN.note(side="B"),)
+    left, said = beside_unseen_valve(sure, unseen)
+    assert left["normal"] == 0.0
+    assert left["major_friction"] == pytest.approx(0.9)
+    assert [note.code for note in said] == [ClassCode.STUCK_NOT_TOLD]
+    assert said[0].data["percent"] == pytest.approx(100.0 * (1.0 - left["major_friction"]))
+    assert beside_unseen_valve(sure, ()) == (sure, ())
+    assert beside_unseen_valve({}, unseen) == ({}, ())

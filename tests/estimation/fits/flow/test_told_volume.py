@@ -1,0 +1,41 @@
+"""Bulk modulus where the log tells the volume of the chambers."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from estimation.eha.rig_share import fitted_responses
+from estimation.fits.flow.told_volume import RATIO_DOUBT, bound_told, is_told, ratio_doubt
+from estimation.fits.hypotheses import VOLUME
+from plant.eha.doubts import DOUBTS, PRESSURE_GAIN
+
+SLOPES = {"pump_displacement": {"bulk_modulus": 4e9}, "chamber_volume": {"bulk_modulus": 2e8}}
+
+
+def explained(*names: str, deviation: float = 1e-3, std: float = 1e7, slopes: Any = SLOPES) -> Any:
+    fit = SimpleNamespace(values={"bulk_modulus": 2e8}, std={"bulk_modulus": std}, rig_slopes=slopes)
+    return SimpleNamespace(names=names, fit=fit, delivery_open=SimpleNamespace(deviation=deviation))
+
+
+def test_a_log_that_tells_more_is_no_less_observable_for_it() -> None:
+    known: Any = SimpleNamespace(values={"bulk_modulus": 2e8}, std={"bulk_modulus": 1e5})
+    assert bound_told(explained(VOLUME.name), known) == pytest.approx(5e-4)
+    assert bound_told(explained("encoder_zero"), known) == pytest.approx(0.05)
+    assert not is_told(None)
+
+
+def test_what_a_log_leaves_of_displacement_over_area_is_in_the_interval() -> None:
+    assert ratio_doubt(explained(VOLUME.name)) == pytest.approx(20.0 * 1e-3)
+    assert ratio_doubt(explained(VOLUME.name, deviation=1.0)) == pytest.approx(20.0 * RATIO_DOUBT)
+    assert ratio_doubt(explained("encoder_zero")) == ratio_doubt(explained(VOLUME.name, slopes={})) == 0.0
+    usual = [DOUBTS[name].usual.up for name in ("pump_displacement", "piston_area")]
+    assert sum(one**2 for one in usual) ** 0.5 == pytest.approx(RATIO_DOUBT, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("name", "entries"), [(VOLUME.name, {PRESSURE_GAIN}), ("encoder_zero", {PRESSURE_GAIN, *SLOPES})]
+)
+def test_where_the_volume_is_told_the_rest_of_the_rig_scales_without_bulk_modulus(name: str, entries: set[str]) -> None:
+    fit: Any = SimpleNamespace(parameters={"bulk_modulus": (2e8, 1e6)}, rig_slopes=SLOPES, explanation=explained(name))
+    assert set(fitted_responses(fit)["bulk_modulus"]) == entries
