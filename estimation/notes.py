@@ -229,7 +229,10 @@ class RigCode(Code):
         "pressure's offset drifts by {drift_pa:.4g|bar} ± {half_width_pa:.2g|bar} bar over the log; it was subtracted"
     )
     PRESSURE_SIDES = "chamber gauges differ by {percent:z.2f} ± {half_width:.2g} % in gain; the fit includes this"
-    ENCODER_ZERO = "position_m reads {zero_mm:.1f} ± {half_width_mm:.2g} mm at mid-stroke; it was shifted to zero there"
+    ENCODER_ZERO = (
+        "position_m reads {zero_mm:.1f} ± {half_width_mm:.2g} mm at mid-stroke, or chamber {side} holds {more:.2g} m^3 "
+        "more than the other (a hose); it was shifted to zero there"
+    )
     POSITION_PLAY = (
         "position_m follows the piston with about {play_um:.1g} um of play (backlash); the play was corrected"
     )
@@ -254,8 +257,8 @@ class RigCode(Code):
         "per bar as at a small drop; the fit includes this"
     )
     GAS_CONTRADICTED = (
-        "the accumulator holds {more} gas than the {gas:.3g} m^3 in the rig file, or its charge is another: the log asks "
-        "for {ratio:.2g} times that or {more}"
+        "the accumulator holds {more} gas than the {gas:.3g} m^3 in the rig file, or its charge is another: the log "
+        "asks for {ratio:.2g} times that or {more}"
     )
     MAKEUP_UNSEEN = (
         "the make-up valve of chamber {side} never opened, so this log does not show whether it is stuck shut"
@@ -319,6 +322,10 @@ class RigCode(Code):
     LEAKAGE_TURBULENT = (
         "{percent:.0f} ± {half_width:.2g} % of the leakage at {at_pa:.3g|bar} bar is turbulent (it grows with the "
         "square root of pressure), as at a worn edge or scratch; leakage is given at that pressure"
+    )
+    PRESSURE_TAPPED = (
+        "differential_pressure_pa rises with motor speed by more than the oil explains: it may be tapped at the pump, "
+        "with a hose to the cylinder; the fit includes this"
     )
     PUMP_COMPRESSES = (
         "the pump is filled at the pressure of its inlet and then compresses its oil, so it delivers less: by "

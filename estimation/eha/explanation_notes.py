@@ -126,9 +126,12 @@ def _sides(found: Explanation, _: EhaParameters) -> Note:
     return RigCode.PRESSURE_SIDES.note(percent=200.0 * value, half_width=200.0 * half_width)
 
 
-def _zero(found: Explanation, _: EhaParameters) -> Note:
-    value = found.values["position_zero"][0]
-    return RigCode.ENCODER_ZERO.note(zero_mm=1e3 * value, half_width_mm=1e3 * _half_width(found, "position_zero"))
+def _zero(found: Explanation, p: EhaParameters) -> Note:
+    """Chambers of unlike volume look as those of an encoder that reads zero elsewhere."""
+    value, half_width = found.values["position_zero"][0], 1e3 * _half_width(found, "position_zero")
+    more = 2.0 * p.piston_area * abs(value)
+    side = "A" if value < 0.0 else "B"
+    return RigCode.ENCODER_ZERO.note(zero_mm=1e3 * value, half_width_mm=half_width, side=side, more=more)
 
 
 def _play(found: Explanation, _: EhaParameters) -> Note:
@@ -185,6 +188,8 @@ def _turbulent(found: Explanation, _: EhaParameters) -> Note:
 
 def _compresses(found: Explanation, _: EhaParameters) -> Note:
     value, half_width = found.values["pump_compression"][0], _half_width(found, "pump_compression")
+    if value < 0.0:  # no pump does so, but pressure that rises with motor speed looks like it
+        return RigCode.PRESSURE_TAPPED.note()
     return RigCode.PUMP_COMPRESSES.note(share=value, half_width=half_width)
 
 

@@ -57,7 +57,22 @@ def test_delay_and_lag_add_up_and_an_offset_is_itself() -> None:
         "offset_pa": -1e5,
         "half_width_pa": 2e3 * NORMAL,
     }
-    assert data(told("encoder_zero", position_zero=(4e-3, 1e-4))) == {"zero_mm": 4.0, "half_width_mm": 0.1 * NORMAL}
+
+
+@pytest.mark.parametrize(("zero", "side"), [(4e-3, "B"), (-4e-3, "A")])
+def test_an_encoders_zero_may_be_a_hose_on_one_side(zero: float, side: str) -> None:
+    more = 2.0 * P.piston_area * 4e-3
+    assert data(told("encoder_zero", position_zero=(zero, 1e-4))) == {
+        "zero_mm": pytest.approx(1e3 * zero),
+        "half_width_mm": pytest.approx(0.1 * NORMAL, rel=1e-3),
+        "side": side,
+        "more": pytest.approx(more),
+    }
+
+
+def test_no_pump_loses_less_than_nothing_to_compression() -> None:
+    assert told("pump_compresses", pump_compression=(1.2, 0.1)).code is RigCode.PUMP_COMPRESSES
+    assert told("pump_compresses", pump_compression=(-2.1, 0.1)).code is RigCode.PRESSURE_TAPPED
 
 
 @pytest.mark.parametrize(("share", "code"), [(0.7, RigCode.PUMP_WORN), (0.95, RigCode.AREA_TO_DISPLACEMENT)])

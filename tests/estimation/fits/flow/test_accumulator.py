@@ -68,7 +68,7 @@ def test_an_accumulator_far_stiffer_than_presumed_has_taken_up_something_else() 
 
 @pytest.mark.parametrize(
     ("less", "left", "more"),
-    [(2.5, 0.1, "more"), (1.0, 0.1, None), (-2.5, 0.1, "less"), (2.5, 0.36, "more"), (0.9, 0.36, None)],
+    [(2.5, 0.1, "more"), (1.0, 0.1, None), (-2.5, 0.1, "less")],
 )
 def test_gas_that_a_log_contradicts_is_named(less: float, left: float, more: str | None) -> None:
     rig = replace(PAPER, accumulator_gas=SMALL)
