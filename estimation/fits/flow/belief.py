@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from estimation.fits.flow.accumulator import is_far_stiffer
 from estimation.fits.flow.plain import PlainFits
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.hypotheses import ENCODER_ZERO, HYPOTHESES, OFFSET, PLAY, PRESSURE_LATE, Hypothesis
@@ -103,7 +104,8 @@ def told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:
     """Return the test of whether a fit explains the log, stricter if its initial conditions are asked for.
 
     That has so many valleys that one is believed only where sensors' noise is all that it leaves. An offset of a log
-    that begins at rest is no such beginning.
+    that begins at rest is no such beginning. An encoder's zero explains nothing beside an accumulator far stiffer than
+    presumed: a make-up valve that was stuck shut passed for one of 0.85 m, in oil half as stiff as it was.
 
     Parameters
     ----------
@@ -113,7 +115,13 @@ def told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:
         Whether initial conditions are asked for.
     """
     strictly = partial(fit_explains_all, noisy=plain.log.passes_on) if begun else plain.explains
-    return lambda fit: (plain.explains if OFFSET.free[0] in fit.values else strictly)(fit)
+    zero = ENCODER_ZERO.free[0]
+
+    def told(fit: GreyBoxFit) -> bool:
+        explains = plain.explains if OFFSET.free[0] in fit.values else strictly
+        return explains(fit) and not (zero in fit.values and is_far_stiffer(plain.log, fit.values))
+
+    return told
 
 
 def likelier(one: Explanation | None, other: Explanation | None) -> Explanation | None:
