@@ -257,12 +257,9 @@ class RigCode(Code):
         "per bar as at a small drop; the fit includes this"
     )
     GAS_CONTRADICTED = (
-        "the accumulator holds {more} gas than the {gas:.3g} m^3 in the rig file, or its charge is another: the log "
-        "asks for {ratio:.2g} times that or {more}"
+        "the accumulator holds {ratio:.2g} times the gas in the rig file or {more}, or has another charge"
     )
-    MAKEUP_UNSEEN = (
-        "the make-up valve of chamber {side} never opened, so this log does not show whether it is stuck shut"
-    )
+    MAKEUP_UNSEEN = "the make-up valve of chamber {side} never opened: this log does not show whether it is stuck shut"
     SPEED_OFFSET = (
         "motor_speed_rad_s reads {offset_rad_s:.3g|rpm} ± {half_width:.2g|rpm} rpm too much; the offset was subtracted"
     )
@@ -324,8 +321,7 @@ class RigCode(Code):
         "square root of pressure), as at a worn edge or scratch; leakage is given at that pressure"
     )
     PRESSURE_TAPPED = (
-        "differential_pressure_pa rises with motor speed by more than the oil explains: it may be tapped at the pump, "
-        "with a hose to the cylinder; the fit includes this"
+        "pressure rises with motor speed: it may be tapped at the pump, before a hose; the fit includes it"
     )
     PUMP_COMPRESSES = (
         "the pump is filled at the pressure of its inlet and then compresses its oil, so it delivers less: by "

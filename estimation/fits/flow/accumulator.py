@@ -163,4 +163,4 @@ def gas_contradicted(log: GreyBoxLog, fit: GreyBoxFit, p: EhaParameters) -> tupl
     if abs(moved) <= CONTRADICTS * math.sqrt(told):
         return ()
     more = "more" if moved > 0.0 else "less"
-    return (RigCode.GAS_CONTRADICTED.note(more=more, gas=p.accumulator_gas, ratio=math.exp(moved)),)
+    return (RigCode.GAS_CONTRADICTED.note(more=more, ratio=math.exp(moved)),)
