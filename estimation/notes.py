@@ -256,9 +256,7 @@ class RigCode(Code):
         "the make-up valves act as orifices: at a pressure drop of {drop_pa:.2g|bar} bar they pass half as much flow "
         "per bar as at a small drop; the fit includes this"
     )
-    GAS_CONTRADICTED = (
-        "the accumulator holds {ratio:.2g} times the gas in the rig file or {more}, or has another charge"
-    )
+    GAS_CONTRADICTED = "the accumulator has {ratio:.2g} times the gas in the rig file or {more}, or another charge"
     MAKEUP_UNSEEN = "the make-up valve of chamber {side} never opened: this log does not show whether it is stuck shut"
     SPEED_OFFSET = (
         "motor_speed_rad_s reads {offset_rad_s:.3g|rpm} ± {half_width:.2g|rpm} rpm too much; the offset was subtracted"
@@ -320,9 +318,7 @@ class RigCode(Code):
         "{percent:.0f} ± {half_width:.2g} % of the leakage at {at_pa:.3g|bar} bar is turbulent (it grows with the "
         "square root of pressure), as at a worn edge or scratch; leakage is given at that pressure"
     )
-    PRESSURE_TAPPED = (
-        "pressure rises with motor speed: it may be tapped at the pump, before a hose; the fit includes it"
-    )
+    PRESSURE_TAPPED = "pressure rises with motor speed: it may be tapped at the pump, before a hose; this was corrected"
     PUMP_COMPRESSES = (
         "the pump is filled at the pressure of its inlet and then compresses its oil, so it delivers less: by "
         "{share:.2g} ± {half_width:.2g} times the compression of the oil; the fit includes this"
