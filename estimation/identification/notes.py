@@ -97,6 +97,10 @@ class IdentificationCode(Code):
         "{output!r} seems to be cut off at {limits} ({share:.0%} of the samples): the transfer function is that of the "
         "plant ahead of the limit; simulated outputs are limited too"
     )
+    OUTPUT_AT_END = (
+        "{output!r} stands at {limits} ({share:.0%} of the samples), and the log does not tell whether it is cut off "
+        "there: if so, the gain may be too low; check the sensor's range, or fit a log that stays within it"
+    )
     OUTPUT_STOPPED = (
         "{output!r} seems to be held by stops at {limits} ({share:.0%} of the samples): the transfer function is that "
         "of the plant between its stops; simulated outputs are limited too"
@@ -168,6 +172,7 @@ WARNED = (
     IdentificationCode.SIGN_NOT_MEASURED,
     IdentificationCode.OUTPUT_CUT_OFF,
     IdentificationCode.OUTPUT_STOPPED,
+    IdentificationCode.OUTPUT_AT_END,
     IdentificationCode.FEEDBACK,
     IdentificationCode.SWAPPED,
     IdentificationCode.INPUT_LOGGED_LATE,

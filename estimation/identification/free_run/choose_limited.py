@@ -7,21 +7,23 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.free_run.believable import BELIEVED
 from estimation.identification.free_run.choose_linear import criteria, slowest_pole, smallest
-from estimation.identification.free_run.data import FEWEST, Channels, blocks
+from estimation.identification.free_run.data import FEWEST, Channels, Scaling, blocks
 from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled, told_apart
 from estimation.identification.free_run.integrating import fit_integrating
 from estimation.identification.free_run.limited_output import LimitedProblem, Limits, at_limits, between, limits_of
 from estimation.identification.free_run.linear_comparison import LinearComparison
 from estimation.identification.free_run.linear_fit import COARSE, fit_linear
 from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
+from estimation.identification.notes import IdentificationCode
 from estimation.progress import tell
 from estimation.stretches import stretches
 
 ORDERS = 3
 """Order of the linear model at most."""
 
-MARGIN = 0.02
-"""Share by which limits must do better than none on what was held back, as a nonlinearity at the input must."""
+MARGIN, CUT_OFF = 0.02, 0.7
+"""Share by which stops must do better than none on what was held back, as a nonlinearity at the input must; and share
+of the error without a limit that a model which is cut off may leave, as a pole at 1 may."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +62,8 @@ class LimitedCandidate:
 def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
     """Return the best model between limits, where it is better than the linear one; None where there is none.
 
+    Where it explains more of the log and is not surely better, the comparison's notes say where the output stands.
+
     Parameters
     ----------
     one : LinearComparison
@@ -82,13 +86,33 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
     if not found:
         return None
     taken = smallest(found, min(each.held_back for each in found))
-    best = one.best
-    if not taken.held_back < (1.0 - MARGIN) * best.held_back:
-        return None
-    # a run between stops may drift as a pole at 1 does, and is believed where that is: not if it leaves most of it
-    if taken.limits.stops and not taken.held_back < BELIEVED:
-        return None
-    return taken if told_apart(taken.block_errors, best.block_errors) else None
+    # a run between stops may drift as a pole at 1 does, and is believed where that is: not if it leaves most of it;
+    # what is cut off leaves noise: an output that bends towards an end gains less, and goes beyond it in other logs
+    best, stops = one.best, taken.limits.stops
+    least = (1.0 - MARGIN if stops else CUT_OFF) * best.held_back
+    if taken.held_back < (min(least, BELIEVED) if stops else least) and told_apart(
+        taken.block_errors, best.block_errors
+    ):
+        return taken
+    if not stops and taken.bic < best.bic and taken.held_back < best.held_back:
+        shown, share = told_limits(data, one.task.by, limits)
+        one.notes.append(IdentificationCode.OUTPUT_AT_END.note(output=data.output, limits=shown, share=share))
+    return None
+
+
+def told_limits(data: Channels, by: Scaling, limits: Limits) -> tuple[str, float]:
+    """Return limits as words, and the share of samples that stand there.
+
+    Parameters
+    ----------
+    data, by : Channels, Scaling
+        Scaled, and how.
+    limits : Limits
+        Of the output.
+    """
+    ends = [by.y_mean + by.y_std * one for one in (limits.low, limits.high)]
+    at = np.count_nonzero(np.concatenate([at_limits(y, limits) for y in data.y]))
+    return " and ".join(f"{end:.4g}" for end in ends if np.isfinite(end)), at / data.n_samples
 
 
 def refitted_limited(taken: LimitedCandidate, data: Channels) -> LinearFit:

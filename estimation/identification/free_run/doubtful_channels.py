@@ -152,11 +152,8 @@ def follows(left: Array, drives: Array) -> bool:
     columns, known = np.column_stack([*late, np.ones(left.size)]), np.isfinite(left)
     if np.count_nonzero(known) < SAMPLES_EACH * columns.shape[1]:
         return False
-
-    def explained(by: Array) -> float:
-        basis = np.linalg.svd(by[known], full_matrices=False)[0]
-        return float(np.sum((basis.T @ left[known]) ** 2))
-
-    own = explained(columns)
-    shifts = np.linspace(0.0, left.size, OTHERS + 2)[1:-1].astype(int)
-    return all(own > explained(np.roll(columns, shift, axis=0)) for shift in shifts.tolist())
+    # what is missing says nothing at any shift; of shifted functions only what they meet is shifted
+    basis, there = np.linalg.svd(columns, full_matrices=False)[0], np.where(known, left, 0.0)
+    shifts = np.linspace(0.0, left.size, OTHERS + 2)[:-1].astype(int)
+    explained = [float(np.sum((basis.T @ np.roll(there, -shift)) ** 2)) for shift in shifts.tolist()]
+    return all(explained[0] > other for other in explained[1:])

@@ -16,7 +16,7 @@ from estimation.identification.free_run.choose_absolute import (
     from_zero,
     may_lack_sign,
 )
-from estimation.identification.free_run.choose_limited import LimitedCandidate, refitted_limited
+from estimation.identification.free_run.choose_limited import LimitedCandidate, refitted_limited, told_limits
 from estimation.identification.free_run.data import section
 from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.limited_dynamics import LimitedDynamics
@@ -104,10 +104,7 @@ def limited(taken: LimitedCandidate, linear: LinearComparison) -> Identified:
     named = data.inputs, data.output, data.sample_time, "output-error"
     model = FreeRunModel(*named, by, LimitedDynamics.within(fit, limits), transfer)
     found, notes = told(model, linear, taken.held_back), list[Note]()
-    ends = [by.y_mean + by.y_std * one for one in (limits.low, limits.high)]
-    shown = " and ".join(f"{end:.4g}" for end in ends if np.isfinite(end))
-    at = [at_limits(y, limits) for y in whole.y]
-    share = int(np.count_nonzero(np.concatenate(at))) / whole.n_samples
+    shown, share = told_limits(whole, by, limits)
     told_by = {"output": data.output, "limits": shown, "share": share}
     if limits.stops:
         notes.append(IdentificationCode.OUTPUT_STOPPED.note(**told_by))
@@ -117,7 +114,7 @@ def limited(taken: LimitedCandidate, linear: LinearComparison) -> Identified:
         notes.append(IdentificationCode.INTEGRATES.note(output=data.output))
     if len(data.inputs) == 1:
         k = int(np.argmax([y.size for y in data.y]))
-        left = np.where(at[k], np.nan, data.y[k] - model.simulate(data.u[k], data.y[k]))
+        left = np.where(at_limits(whole.y[k], limits), np.nan, data.y[k] - model.simulate(data.u[k], data.y[k]))
         said = feedback_note(left, data.u[k][:, 0], (data.inputs[0], data.output))
         notes += [] if said is None else [said]
     return replace(found, notes=(*notes, *found.notes))

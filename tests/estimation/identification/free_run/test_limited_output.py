@@ -73,6 +73,18 @@ def test_an_output_that_is_nowhere_cut_off_has_no_limits() -> None:
     assert not isinstance(found.model.dynamics, LimitedDynamics)
 
 
+def test_an_end_that_one_block_alone_reaches_is_told() -> None:
+    rng = np.random.default_rng(2)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 600), rng.integers(5, 40, 600))[:600]
+    u *= np.where(np.arange(600) // 120 == 2, 1.0, 0.2)
+    y = np.minimum(filtered(np.array([0.0, 0.2]), np.array([1.0, -0.9]), u), 0.5) + 0.01 * rng.normal(size=600)
+    with pytest.warns(LogWarning, match="does not tell whether it is cut off"):
+        found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"))
+    (said,) = (note for note in found.notes if note.code == IdentificationCode.OUTPUT_AT_END)
+    assert float(said.data["limits"]) == pytest.approx(0.5, abs=0.01)
+    assert not isinstance(found.model.dynamics, LimitedDynamics)
+
+
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
 def test_an_output_between_stops_leaves_them_at_once() -> None:
     u, y = between_stops(0)
