@@ -40,6 +40,8 @@ class GreyBoxModel:
     jump : tuple of float
         Change of the state in SI that stands for a unit of what a gap in the drives leaves open; none where the model
         bears no gaps.
+    stiff : bool
+        Whether rates turn stiff within a step, as where a valve of a small chamber opens: implicit steps follow that.
     """
 
     name: str
@@ -52,6 +54,7 @@ class GreyBoxModel:
     parameters: type[Parameters]
     linear: tuple[tuple[str, float], ...] = ()
     jump: tuple[float, ...] = ()
+    stiff: bool = False
 
     def theta(self, values: Mapping[str, float]) -> Array:
         """Return the fitted coordinates of the unknowns.

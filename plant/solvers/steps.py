@@ -1,7 +1,7 @@
 """Steps of fixed length, of any plant: schemes from its readable rates, and the parameters that these read.
 
-``ros2`` is a two-stage, second-order, L-stable Rosenbrock method with the analytic Jacobian; ``rk4`` the classical
-explicit one; a plant may bring a step of its own (the lumped plant's closed-form implicit one). Parameters are any
+``ros2`` is a two-stage, second-order, L-stable Rosenbrock method with the analytic Jacobian; ``sdirk2`` the implicit
+one of the same order, for rates that turn stiff within a step; ``rk4`` the classical explicit one; a plant may bring a step of its own (the lumped plant's closed-form implicit one). Parameters are any
 frozen dataclass whose fields are numbers: a row of them stands in the fields' order.
 """
 
@@ -31,6 +31,10 @@ StepFunction: TypeAlias = Callable[[Any, tuple[Scalar, Scalar], Any, Scalar], St
 
 GAMMA = 1.0 - 0.5**0.5
 """Diagonal coefficient of two-stage, second-order, L-stable schemes: ROS2, and SDIRK2 (Alexander 1977, theorem 5)."""
+
+NEWTON = 2
+"""Newton's iterations of a stage of SDIRK2 [count]. A check valve's flow is close to two straight lines, of which the
+first iteration finds the right one. Three change nothing: of eleven rigs at most 0.01 deviations of a log's noise."""
 
 
 class Parameters(Protocol):
@@ -168,6 +172,47 @@ def ros2_step(derivative: Derivative) -> StepFunction:
         return tuple(x + h * (1.5 * a + 0.5 * b) for x, a, b in zip(state, k1, k2, strict=True))
 
     return step
+
+
+@cache
+def sdirk2_step(derivative: Derivative) -> StepFunction:
+    """Build the two-stage, second-order, stiffly accurate implicit step of a derivative (Alexander 1977, theorem 5).
+
+    Where a valve opens within a step, ROS2 takes the flow of its stages from slopes of the shut valve, and comes out far
+    on the other side. Here each stage solves its equation, with the slopes at where it ends.
+
+    Parameters
+    ----------
+    derivative : callable
+        ``derivative(state, speed, parameters)``; it is differentiated, so the step takes symbols only.
+
+    Returns
+    -------
+    callable
+        ``step(state, speeds, parameters, h)``; its derivatives are those of what Newton's iterations return.
+    """
+
+    def step(state: State, speeds: tuple[Scalar, Scalar], p: object, h: Scalar) -> State:
+        start, end = speeds
+        inner = _solved(derivative, state, state, start + GAMMA * (end - start), p, GAMMA * h)
+        rates = [(y - x) / (GAMMA * h) for x, y in zip(state, inner, strict=True)]
+        base = tuple(x + (1.0 - GAMMA) * h * rate for x, rate in zip(state, rates, strict=True))
+        guess = tuple(x + h * rate for x, rate in zip(state, rates, strict=True))
+        return _solved(derivative, base, guess, end, p, GAMMA * h)
+
+    return step
+
+
+def _solved(derivative: Derivative, base: State, guess: State, speed: Scalar, p: object, h: Scalar) -> State:
+    """Return the solution of ``x = base + h f(x)`` by Newton's iterations from a guess."""
+    x = guess
+    for _ in range(NEWTON):
+        rates = derivative(x, speed, p)
+        slopes = jacobian(rates, x)
+        matrix = [[(ONE if i == j else ZERO) - h * slopes[i][j] for j in range(len(x))] for i in range(len(x))]
+        left = [start + h * rate - y for start, rate, y in zip(base, rates, x, strict=True)]
+        x = tuple(y + d for y, d in zip(x, solve_linear(matrix, left), strict=True))
+    return x
 
 
 @cache

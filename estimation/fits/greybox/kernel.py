@@ -19,7 +19,7 @@ from plant.compiled.hoist import hoisted
 from plant.compiled.native.load import load_native
 from plant.compiled.native.signature import signature_of
 from plant.compiled.paste import kernel_text, pasted
-from plant.solvers.steps import parameter_names, parameter_symbols, ros2_step
+from plant.solvers.steps import parameter_names, parameter_symbols, ros2_step, sdirk2_step
 
 Kernel: TypeAlias = Callable[..., tuple[float, Array, Array]]
 """See `estimation.fits.greybox.loops.run`, without its kernel."""
@@ -32,7 +32,8 @@ def compile_kernel(model: GreyBoxModel) -> Kernel:
     Returns
     -------
     callable
-        Takes what `estimation.fits.greybox.loops.run` does, and steps the model by ROS2, second order and L-stable.
+        Takes what `estimation.fits.greybox.loops.run` does, and steps the model by ROS2, a stiff one by SDIRK2: second
+        order and L-stable.
     """
     takes = signature_of(run, unknowns=len(model.unknowns), outputs=len(model.outputs), channels=len(model.drives))
     return load_native(f"fit_{model.name}", lambda: _source(model), {"run": takes}, model).run
@@ -96,7 +97,8 @@ def model_step(
     def rates(now: Any, share: Scalar, parameters: Any) -> tuple[Scalar, ...]:
         return tuple(as_expression(rate) for rate in model.rates(now, (*drives, h), parameters, share))
 
-    return [as_expression(value) for value in ros2_step(rates)(tuple(state), (symbol("share"), ONE), p, h)]
+    stepped = (sdirk2_step if model.stiff else ros2_step)(rates)
+    return [as_expression(value) for value in stepped(tuple(state), (symbol("share"), ONE), p, h)]
 
 
 def _between(drive: int) -> tuple[Expression, Expression]:

@@ -49,7 +49,7 @@ def compile_side_by_side(model: GreyBoxModel, lanes: int) -> ResidualsRun:
     Parameters
     ----------
     model : GreyBoxModel
-        The model; it is stepped by ROS2, second order and L-stable.
+        The model; stepped as in `model_step`.
     lanes : int
         Parameter sets side by side: `LANES` or `MANY`.
 

@@ -43,7 +43,7 @@ SHARPEST_RELIEF = 3e-3
 Valves need 0.05 to 0.2. At a sharper corner, which no sensor resolves, the model chatters from open to closed: slopes
 are then so steep that the deviation of bulk modulus comes out twenty times too small."""
 
-FASTEST_MAKEUP = 0.5 * LONGEST_STEP
+FASTEST_MAKEUP = 0.02 * LONGEST_STEP
 """Least time in which a wide open make-up valve fills a chamber [s]. At a fifth of a model step the model may chatter,
 as at a sharp relief valve: the deviation of bulk modulus came out nine times too small."""
 
