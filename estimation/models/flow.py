@@ -290,7 +290,6 @@ FLOW_FORM = GreyBoxModel(
     parameters=FlowParameters,
     linear=(("speed_lead", 1e-5),),
     jump=(0.5, -0.5),
-    stiff=True,
 )
 """The flow form with its unknowns, balanced by volume; friction is none of them."""
 

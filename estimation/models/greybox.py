@@ -41,7 +41,7 @@ class GreyBoxModel:
         Change of the state in SI that stands for a unit of what a gap in the drives leaves open; none where the model
         bears no gaps.
     stiff : bool
-        Whether rates turn stiff within a step, as where a valve of a small chamber opens: implicit steps follow that.
+        Whether steps are implicit, since rates turn stiff within one, as where a valve of a small chamber opens.
     """
 
     name: str

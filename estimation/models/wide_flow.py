@@ -295,7 +295,6 @@ WIDE_FLOW_FORM = GreyBoxModel(
     observe=_shown,
     parameters=WideFlowParameters,
     jump=(0.5, -0.5, 0.0, 0.0),
-    stiff=True,
 )
 """Without unknowns of its own: which of its parameters are free is a hypothesis, see `estimation.fits.hypotheses`."""
 

@@ -1,8 +1,9 @@
 """Steps of fixed length, of any plant: schemes from its readable rates, and the parameters that these read.
 
 ``ros2`` is a two-stage, second-order, L-stable Rosenbrock method with the analytic Jacobian; ``sdirk2`` the implicit
-one of the same order, for rates that turn stiff within a step; ``rk4`` the classical explicit one; a plant may bring a step of its own (the lumped plant's closed-form implicit one). Parameters are any
-frozen dataclass whose fields are numbers: a row of them stands in the fields' order.
+one of the same order, for rates that turn stiff within a step; ``rk4`` the classical explicit one; a plant may bring a
+step of its own (the lumped plant's closed-form implicit one). Parameters are any frozen dataclass whose fields are
+numbers: a row of them stands in the fields' order.
 """
 
 import re
@@ -178,8 +179,8 @@ def ros2_step(derivative: Derivative) -> StepFunction:
 def sdirk2_step(derivative: Derivative) -> StepFunction:
     """Build the two-stage, second-order, stiffly accurate implicit step of a derivative (Alexander 1977, theorem 5).
 
-    Where a valve opens within a step, ROS2 takes the flow of its stages from slopes of the shut valve, and comes out far
-    on the other side. Here each stage solves its equation, with the slopes at where it ends.
+    Where a valve opens within a step, ROS2 takes its flow from the slopes of the shut valve, and comes out far on the
+    other side. Here each stage solves its equation, with the slopes at where it ends.
 
     Parameters
     ----------

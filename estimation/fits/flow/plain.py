@@ -19,7 +19,9 @@ from estimation.fits.greybox.pump_ripple import Turning
 from estimation.fits.greybox.spared_steps import step_errors
 from estimation.fits.hypothesis_search.between_samples import with_course
 from estimation.fits.hypothesis_search.fit_objections import fit_explains, limits
+from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
 from estimation.fits.hypothesis_search.pump_ripple_fits import with_pump_ripple
+from estimation.fits.hypothesis_search.wide_problem import widest_makeup
 from estimation.models.flow import HELD_FLOW_FORM
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -33,13 +35,12 @@ TOO_LOUD = 2.0
 judged anew [dimensionless]: up to it gates of 1.1 to 1.44 times the noise still see a misfit, and searches of sound
 logs stay as they are."""
 
-FINER, STEPS_FELT = 4, 1.0
-"""How many times shorter model steps are tried [count], and error of a block's residual from which they are taken, in
-deviations of its noise [dimensionless]. Of 26 random rigs 18 err by less than 1 at the true values, the others by 2 to
-180."""
+STEPS_FELT = 1.0
+"""Error of a block's residual from which implicit steps are taken, in deviations of its noise [dimensionless]. Of 26
+random rigs 18 err by less than 1 at the true values, the others by 2 to 180."""
 
 LEAST_ERROR = 0.1
-"""Errors of steps over what a fit leaves of a log, root mean square, from which shorter ones may explain it [fraction]:
+"""Errors of steps over what a fit leaves of a log, root mean square, from which exact ones may explain it [fraction]:
 of those that they do explain it is 0.2 to 0.6, of one at 190 times the noise 0.02."""
 
 STEEP, BESIDE_STEEP = 3.0, 10
@@ -90,8 +91,8 @@ class FitStart:
         Bulk modulus that counts at most in what noise of motor speed leaves, see `quieter` [Pa].
     turns_read : bool
         Whether what a slow log's turns pump is read off the samples after them, see `with_turns_read`.
-    finer : int
-        How many times shorter than usual model steps are, see `with_shorter_steps` [count].
+    implicit : bool
+        Whether model steps are implicit, see `with_implicit_steps`.
     held, turns_open : bool
         Whether the motor's command is held between samples, and whether the course of its turns is open in a log that
         is not slow; see `estimation.fits.flow.motor_course`.
@@ -103,7 +104,7 @@ class FitStart:
     valley: Mapping[str, float] | None = None
     stiffest: float = np.inf
     turns_read: bool = False
-    finer: int = 1
+    implicit: bool = False
     held: bool = False
     turns_open: bool = False
 
@@ -212,8 +213,7 @@ def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
     log = logged.seen_at(parameters, held=start.held)
     if start.turns_read:
         log = with_turns_read(log, parameters)
-    if start.finer > 1:
-        log = replace(log, steps=start.finer * log.steps, long_steps=start.finer // 2 * int(np.max(log.steps)))
+    log = replace(log, stiff=start.implicit)
     starts = flow_starts(parameters, max(start.bulk_modulus, LEAST_GUESS * parameters.bulk_modulus))
     explains = partial(fit_explains, noisy=log.passes_on)
     largest, _ = limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))
@@ -226,12 +226,13 @@ def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
     return PlainFits(start, starts, fitted, unturned, log, fits, explains, teeth, left, turning)
 
 
-def with_shorter_steps(plain: PlainFits) -> FitStart | None:
-    """Return the start of a second fit with shorter model steps, if those of the first err by more than noise does.
+def with_implicit_steps(plain: PlainFits) -> FitStart | None:
+    """Return the start of a second fit with implicit model steps, if those of the first err by more than noise does.
 
-    Where both sides of a piston float at the inner circuit's pressure, make-up valves open and shut by turns, above all
-    those that a pilot of the other side holds open. With usual steps the model chatters there, by up to 180 deviations
-    of the noise at the true values, and no search finds a way.
+    Valves of small chambers fill them in less time than a step takes. Where both sides of a piston float at the inner
+    circuit's pressure, make-up valves open and shut by turns, above all those that a pilot of the other side holds
+    open. With usual steps the model chatters there, by up to 300 deviations of the noise at the true values, and no
+    search finds a way.
 
     Parameters
     ----------
@@ -241,25 +242,33 @@ def with_shorter_steps(plain: PlainFits) -> FitStart | None:
     Returns
     -------
     FitStart or None
-        None where steps are short enough, or were shortened already. Not asked of a log that is explained, but for that
-        of a single rod, whose chatter may pass for a bulk modulus that the log does not tell or end a search above its
-        minimum, and for one whose slopes leap: the deviation of bulk modulus came out 26 times too small.
+        None where steps are exact enough, or implicit already. Not asked of a log that is explained, but for that of a
+        single rod, whose chatter may pass for a bulk modulus that the log does not tell or end a search above its
+        minimum, and for one whose slopes leap: the deviation of bulk modulus came out 26 times too small. A valve that
+        fills a chamber within a step may be wider than usual steps resolve.
     """
     swinging = [fit for fit in plain.fits if fit.model.rates is not HELD_FLOW_FORM.rates]
     explained = plain.explains(plain.best)
     single = plain.start.parameters.area_difference != 0.0 or plain.start.parameters.pilot_share > 0.0
     asked = not explained or single or any(map(_leaps, swinging))
-    if not asked or plain.start.finer > 1:
+    if plain.start.implicit:
         return None
-    felt = any(_chatters(plain.log, fit, 0.0 if explained else LEAST_ERROR) for fit in swinging)
-    return replace(plain.start, finer=FINER) if felt else None
+    felt = asked and any(_chatters(plain.log, fit, 0.0 if explained else LEAST_ERROR) for fit in swinging)
+    fast = any(_fills_within_a_step(fit, plain.start.parameters) for fit in swinging)
+    return replace(plain.start, implicit=True) if felt or fast else None
 
 
 def _chatters(log: GreyBoxLog, fit: GreyBoxFit, least: float) -> bool:
     """Return whether steps err by more than noise at a fit, and by the least share of what it leaves of its log."""
-    errors = step_errors(FreedProblem.of(fit.model, log), fit.model.theta(fit.values), FINER)
+    errors = step_errors(FreedProblem.of(fit.model, log), fit.model.theta(fit.values))
     share = float(np.sqrt(np.mean(errors**2) / max(fit.chi_square[0], 1.0)))
     return share >= least and float(np.max(np.abs(errors))) > STEPS_FELT
+
+
+def _fills_within_a_step(fit: GreyBoxFit, p: EhaParameters) -> bool:
+    """Return whether a make-up valve, wide open, fills a chamber in less time than a model step takes."""
+    fast = widest_makeup(p.chamber_volume, fit.values["bulk_modulus"], LONGEST_STEP)
+    return fit.values["makeup_conductance"] > fast
 
 
 def _leaps(fit: GreyBoxFit) -> bool:

@@ -64,6 +64,7 @@ class FreedProblem(Problem):
         sizes = tuple((name, linear[name]) for name in free if name in linear)
         if not log.gaps.size:  # what a gap leaves open costs as much again to follow
             model = replace(model, jump=())
+        model = replace(model, stiff=log.stiff)
         super().__init__(replace(model, unknowns=tuple(free), linear=sizes), log, partial(_by_itself, model))
         self._bare, self._sizes, self._ridge = model, linear, ridge
         self._nudge = nudge_for(log, model, free)

@@ -142,8 +142,8 @@ class GreyBoxLog:
         Doubt about the motor's speed between the samples of a slow log [Pa].
     stands_for : float
         How many residuals of a longer log each one stands for, by `FreedProblem` [count].
-    long_steps : int
-        Model steps up to each sample where few will do [count]; more than one where a model chatters with that.
+    stiff : bool
+        Whether model steps are implicit, as where a valve opens that fills a chamber in less time than a step takes.
     """
 
     drives: Array
@@ -164,7 +164,7 @@ class GreyBoxLog:
     speed_offset: float = 0.0
     course: "IntersampleDoubt | None" = None
     stands_for: float = 1.0
-    long_steps: int = 1
+    stiff: bool = False
 
     def beginning(self, samples: int) -> "GreyBoxLog":
         """Return the log's first part.
@@ -197,14 +197,14 @@ class GreyBoxLog:
         return self if steps is None or steps is self.steps else replace(self, steps=steps)
 
     def coarsened(self) -> "GreyBoxLog":
-        """Return the log with one model step a sample, or `long_steps`: predicted faster and less exactly.
+        """Return the log with one model step a sample: predicted faster and less exactly.
 
         Returns
         -------
         GreyBoxLog
             The same log.
         """
-        return self.stepped(np.minimum(self.steps, self.long_steps))
+        return self.stepped(np.ones_like(self.steps))
 
     @property
     def passes_on(self) -> bool:

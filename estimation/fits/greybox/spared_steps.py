@@ -31,7 +31,7 @@ LAST = 4
 
 
 def sparing_steps(problem: Problem, theta: Array) -> IntArray:
-    """Return model steps up to each sample: one, or `long_steps`, where that is as exact as several, near a point.
+    """Return model steps up to each sample: one where that is as exact as several, near a point.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def sparing_steps(problem: Problem, theta: Array) -> IntArray:
         Those of the log where nothing is to be spared, or it has gaps [count].
     """
     log = problem.log
-    few = np.minimum(log.steps, log.long_steps)
+    few = np.ones_like(log.steps)
     if log.gaps.size or np.array_equal(few, log.steps):
         return log.steps
     errors = _long_step_errors(problem, theta)
@@ -94,8 +94,8 @@ def spared(problem: Problem, theta: Array) -> Problem:
     return with_steps(problem, sparing_steps(problem, theta))
 
 
-def step_errors(problem: Problem, theta: Array, finer: int) -> Array:
-    """Return the errors of a log's model steps, as shorter ones show them, near a point.
+def step_errors(problem: Problem, theta: Array) -> Array:
+    """Return the errors of a log's model steps, as implicit ones show them, near a point.
 
     Parameters
     ----------
@@ -103,16 +103,13 @@ def step_errors(problem: Problem, theta: Array, finer: int) -> Array:
         The problem.
     theta : ndarray, shape (unknowns,)
         The point [dimensionless].
-    finer : int
-        How many times shorter those are [count].
 
     Returns
     -------
     ndarray, shape (outputs, blocks)
         Of each block's residual, in standard deviations of its noise [dimensionless].
     """
-    log = problem.log
-    return _apart(problem, theta, log, log.stepped(finer * log.steps))
+    return _apart(problem, theta, problem.log, replace(problem.log, stiff=True))
 
 
 def _long_step_errors(problem: Problem, theta: Array) -> Array:

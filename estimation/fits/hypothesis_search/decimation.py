@@ -87,7 +87,7 @@ def decimated(log: GreyBoxLog, every: int) -> GreyBoxLog:
         drives=drives,
         measured=measured,
         sample_time=every * log.sample_time,
-        steps=np.full(len(drives), 1 if log.long_steps == 1 else every * log.long_steps, log.steps.dtype),
+        steps=np.ones(len(drives), log.steps.dtype),
         noise=tuple(one.scaled(1.0 / block) for one in log.noise),
         gaps=_gaps_at(log.gaps, first, every),
         stands_for=max(every / apart, 1.0) / block,

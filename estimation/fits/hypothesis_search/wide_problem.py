@@ -43,9 +43,10 @@ SHARPEST_RELIEF = 3e-3
 Valves need 0.05 to 0.2. At a sharper corner, which no sensor resolves, the model chatters from open to closed: slopes
 are then so steep that the deviation of bulk modulus comes out twenty times too small."""
 
-FASTEST_MAKEUP = 0.02 * LONGEST_STEP
-"""Least time in which a wide open make-up valve fills a chamber [s]. At a fifth of a model step the model may chatter,
-as at a sharp relief valve: the deviation of bulk modulus came out nine times too small."""
+FASTEST_MAKEUP, FASTEST_FOLLOWED = 0.5 * LONGEST_STEP, 0.02 * LONGEST_STEP
+"""Least time in which a wide open make-up valve fills a chamber, and the same with implicit steps [s]. At a fifth of a
+model step the model may chatter, as at a sharp relief valve: the deviation of bulk modulus came out nine times too
+small. Implicit steps do not; valves of random rigs need 0.03 ms and more."""
 
 MOST_VOLUME = 2.0
 """Factor by which a chamber's volume is sought above or below the rig file's [dimensionless]: 4.6 deviations of what is
@@ -197,7 +198,7 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
     return [{"relief_pressure": share * peak, "relief_conductance": RELIEF_START} for share in one.shares_of_peak]
 
 
-def widest_makeup(chamber_volume: float, bulk_modulus: float) -> float:
+def widest_makeup(chamber_volume: float, bulk_modulus: float, fastest: float = FASTEST_MAKEUP) -> float:
     """Return the largest conductance of a make-up valve that model steps resolve.
 
     Parameters
@@ -206,13 +207,15 @@ def widest_makeup(chamber_volume: float, bulk_modulus: float) -> float:
         Dead volume, half of a chamber's [m^3].
     bulk_modulus : float
         Of the oil [Pa].
+    fastest : float
+        Least time in which it fills a chamber [s].
 
     Returns
     -------
     float
         Conductance [m^3/(s Pa)].
     """
-    return 2.0 * chamber_volume / (FASTEST_MAKEUP * bulk_modulus)
+    return 2.0 * chamber_volume / (fastest * bulk_modulus)
 
 
 def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) -> tuple[Array, Array]:
@@ -245,7 +248,8 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     stiff = max(rig["bulk_modulus"], stiffest_guess)
     volume = rig["chamber_volume"]
     limits["chamber_volume"] = (volume / MOST_VOLUME, MOST_VOLUME * volume)
-    limits["makeup_conductance"] = (0.0, widest_makeup(rig["chamber_volume"], stiff))
+    fastest = FASTEST_FOLLOWED if log.stiff else FASTEST_MAKEUP
+    limits["makeup_conductance"] = (0.0, widest_makeup(volume, stiff, fastest))
     if log.passes_on:
         limits["bulk_modulus"] = (softest / MOST_BIASED, MOST_BIASED * stiffest_guess)
     return search_bounds(model, guesses, {**LIMITS, **limits})
