@@ -39,9 +39,9 @@ STEPS_FELT = 1.0
 """Error of a block's residual from which implicit steps are taken, in deviations of its noise [dimensionless]. Of 26
 random rigs 18 err by less than 1 at the true values, the others by 2 to 180."""
 
-LEAST_ERROR = 0.1
+LEAST_ERROR = 0.04
 """Errors of steps over what a fit leaves of a log, root mean square, from which exact ones may explain it [fraction]:
-of those that they do explain it is 0.2 to 0.6, of one at 190 times the noise 0.02."""
+of those that they do explain it is 0.09 to 0.6, of one at 190 times the noise 0.02."""
 
 STEEP, BESIDE_STEEP = 3.0, 10
 """How many times as steep as the last of so many blocks the steepest is, where steps are looked at of a log that is

@@ -10,7 +10,7 @@ import pytest
 from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import without_strays
-from estimation.fits.flow.plain import FINER, FitStart, Logged, plain_fits, quieter, with_shorter_steps
+from estimation.fits.flow.plain import FitStart, Logged, plain_fits, quieter, with_implicit_steps
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.drives import chirp
 from plant.eha.model import PARAMETER_NAMES, EhaParameters
@@ -53,7 +53,7 @@ SPEED = 175.0
 """Speed that its motor turns to [rad/s]."""
 
 
-def test_steps_that_chatter_are_shortened_and_the_log_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_steps_that_chatter_are_taken_implicitly_and_the_log_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
     """With usual steps such logs were refused: what the model left was its own error."""
     speed = chirp(1.5, 5e-4, SPEED, 0.5, 4.0)
     sensors, rng = replace(BENCH, pressure_noise=1500.0), np.random.default_rng(1)
@@ -61,15 +61,12 @@ def test_steps_that_chatter_are_shortened_and_the_log_is_explained(monkeypatch: 
     logged = Logged(*without_strays(simulate(CIRCUIT, speed, 5e-4, PILOTED, sensors=sensors, rng=rng)))
     plain = plain_fits(logged, FitStart(rod, rod.bulk_modulus))
     assert not plain.explains(plain.best)
-    start = with_shorter_steps(plain)
+    start = with_implicit_steps(plain)
     assert start is not None
-    assert start.finer == FINER
-    shorter = plain_fits(logged, start)
-    assert shorter.explains(shorter.best)
-    assert with_shorter_steps(shorter) is None
-    assert np.all(shorter.log.coarsened().steps > 1)
-    assert np.all(plain.log.coarsened().steps == 1)
-    monkeypatch.setattr(flow_fit, "plain_fits", lambda _, start: shorter if start.finer > 1 else plain)
+    followed = plain_fits(logged, start)
+    assert followed.explains(followed.best)
+    assert with_implicit_steps(followed) is None
+    monkeypatch.setattr(flow_fit, "plain_fits", lambda _, start: followed if start.implicit else plain)
     assert fit_flow(logged.record, rod, rod.bulk_modulus, {}, logged.variances).chi_square < 1.2
 
 

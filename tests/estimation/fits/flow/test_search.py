@@ -164,7 +164,7 @@ def test_what_is_told_has_short_steps_throughout_though_less_drain_was_found_wit
 
     def drained_less(one: Found) -> list[Found]:
         problem, point, bounds = one
-        long = problem.on(problem.log.stepped(np.minimum(log.steps, log.long_steps)))
+        long = problem.on(problem.log.coarsened())
         return [one, (long, replace(point, cost=point.cost - 1.0), bounds)]
 
     def recording(problem: Problem, point: Point, *, asked: bool, **given: Any) -> GreyBoxFit:

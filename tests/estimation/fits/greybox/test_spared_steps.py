@@ -50,14 +50,6 @@ def test_few_samples_need_short_steps_and_the_misfit_stays(log: GreyBoxLog) -> N
     assert moved(spared.gradient) < LEAST_GAIN < moved(long.gradient)
 
 
-def test_where_one_step_chatters_no_sample_has_fewer_than_long_steps(log: GreyBoxLog) -> None:
-    """What is spared was judged by these, and one step a sample was taken."""
-    fine = replace(log, steps=4 * log.steps, long_steps=2 * int(np.max(log.steps)))
-    fit = balanced(log, HEALTHY, STARTS)[0]
-    steps = sparing_steps(FreedProblem.of(fit.model, fine), fit.theta)
-    assert set(steps.tolist()) == {fine.long_steps, int(np.max(fine.steps))}
-
-
 def test_a_fit_that_is_told_ends_with_all_short_steps(
     log: GreyBoxLog, steps_taken: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
