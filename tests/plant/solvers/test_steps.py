@@ -1,7 +1,8 @@
 """The schemes converge at their order, and agree with each other and with scipy's LSODA."""
 
 from collections.abc import Callable
-from dataclasses import asdict, make_dataclass
+from dataclasses import asdict, dataclass, make_dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,10 +13,19 @@ from hypothesis.extra.numpy import arrays
 from benchmarks.peers.stiff_solvers import reference_trajectory
 from faults.conditions import CONDITIONS, Condition, parameters_for
 from plant.arrays import Array
+from plant.components.check_valve import check_valve_flow
 from plant.eha.model import PARAMETER_NAMES, EhaParameters, lumped_step, reduced_derivative
 from plant.eha.simulate import LUMPED, REDUCED
 from plant.errors import HydrostateError
-from plant.solvers.steps import parameter_names, parameter_row, parameter_symbols, rk4_step, ros2_step, solve_linear
+from plant.solvers.steps import (
+    parameter_names,
+    parameter_row,
+    parameter_symbols,
+    rk4_step,
+    ros2_step,
+    sdirk2_step,
+    solve_linear,
+)
 from plant.solvers.trajectory import Trajectory, compile_trajectory
 from tests.plant.solvers.compiled_rates import rates_and_slopes
 
@@ -100,6 +110,41 @@ def test_ros2_agrees_with_lsoda_while_nothing_reverses(reduced: Trajectory, cond
     size = np.array([1e-2, 1e-2, 1.0])
     wanted = reference_trajectory(reduced_derivative, sliding, swaying(p), p, MILLISECOND, scale=size)
     assert np.all(relative_rms(reduced(sliding, swaying(p), row, MILLISECOND, 80), wanted) < 1e-4)
+
+
+def test_sdirk2_is_of_second_order() -> None:
+    p = parameters_for(CONDITIONS["minor_friction"])
+    row, start, drive = parameter_row(p)[None], np.array([0.0, 0.01, 0.0]), swaying(p)
+    implicit = compile_trajectory("reduced_sdirk2", sdirk2_step(reduced_derivative), 3, EhaParameters)
+    ratios = halving_ratios(lambda n: implicit(start, drive, row, MILLISECOND, n), 2_048, first=16)
+    np.testing.assert_allclose(ratios, 4.0, rtol=0.08)
+
+
+@dataclass(frozen=True)
+class _Fed:
+    """A chamber that a pump empties and fills, and a check valve feeds, in units of the pumped flow [s, Pa]."""
+
+    filled_in: float = 1e-4
+    rated_drop: float = 5e4
+    opening: float = 4e3
+
+
+def _fed(state: Any, flow: Any, p: Any) -> Any:
+    fed = check_valve_flow(-state[0], 1.0 / p.rated_drop, p.opening)
+    return (p.rated_drop * (flow + fed) / p.filled_in,)
+
+
+def test_an_implicit_step_follows_a_valve_that_fills_a_chamber_within_it() -> None:
+    """ROS2 takes the valve for shut in the step in which it opens, and makes up oil that the chamber keeps."""
+    drive, row = np.sin(2.0 * np.pi * 5.0 * MILLISECOND * np.arange(401)), parameter_row(_Fed())[None]
+
+    def run(scheme: Callable[..., Any], substeps: int) -> Array:
+        step = compile_trajectory(f"fed_{scheme.__name__}", scheme(_fed), 1, _Fed)
+        return step(np.zeros(1), drive, row, MILLISECOND, substeps)[:, 0]
+
+    wanted = run(ros2_step, 1_000)
+    implicit, explicit = (np.max(np.abs(run(scheme, 4) - wanted)) for scheme in (sdirk2_step, ros2_step))
+    assert implicit < 0.01 * explicit
 
 
 def test_l_stability_damps_what_explicit_steps_blow_up(reduced: Trajectory, explicit: Trajectory) -> None:

@@ -28,6 +28,7 @@ def _numbers(address: int, count: int) -> "ctypes.Array[ctypes.c_double]":
     "model",
     [
         pytest.param(FLOW_FORM, id="flow"),
+        pytest.param(replace(FLOW_FORM, jump=(), stiff=True), id="flow in implicit steps"),
         pytest.param(replace(MASS_FLOW_FORM, jump=()), id="mass flow without gaps"),
         pytest.param(MASS_FLOW_FORM, id="mass flow", marks=pytest.mark.slow),
     ],

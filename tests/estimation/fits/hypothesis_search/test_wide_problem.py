@@ -85,12 +85,13 @@ def test_what_the_flow_bias_holds_beyond_a_healthy_one_is_first_taken_for_wear()
     assert worn_start(still, lost_in_bias()) == []
 
 
+@pytest.mark.parametrize("implicit", [False, True])
 @pytest.mark.parametrize("opening", [1e2, 1e4])
 @pytest.mark.parametrize("modulus", [5e7, 2e8, 1.5e9])
 def test_slopes_of_the_widest_make_up_valve_are_those_of_the_model_and_no_chatter(
-    modulus: float, opening: float, monkeypatch: pytest.MonkeyPatch
+    modulus: float, opening: float, implicit: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    log = wide()
+    log = replace(wide(), stiff=implicit)
     problem = freed(log, (BEGUN,))
     values = {**usual_values(log), "bulk_modulus": modulus, "makeup_opening": opening, "case_leakage": 1e-13}
     theta = problem.model.theta({**values, "leakage_coefficient": 2e-11, "speed_lead": 1e-5})
