@@ -135,7 +135,7 @@ def hypotheses_asked(
     asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > worth)
     asked += tuple(one for one in _late_valves(swinging) if one not in asked)
     remarks = open_wear_note(delivery, share_lost(log, swinging.values, parameters.pump_displacement))
-    if at_widest(swinging, parameters):
+    if at_widest(swinging, parameters, log):
         return (BEGUN,) if moving else all_strange, remarks
     if not moving:
         return HYPOTHESES if not log.passes_on and doubted(swinging) else asked, remarks
@@ -146,7 +146,7 @@ def hypotheses_asked(
     return (BEGUN, *asked) if lost or _possible([begun], swinging)[0].gain > WORTH else asked, remarks
 
 
-def at_widest(fit: GreyBoxFit, parameters: EhaParameters) -> bool:
+def at_widest(fit: GreyBoxFit, parameters: EhaParameters, log: GreyBoxLog) -> bool:
     """Return whether the make-up valves of a plain fit are as wide as may be: no valve is, so they took something up.
 
     Parameters
@@ -155,9 +155,11 @@ def at_widest(fit: GreyBoxFit, parameters: EhaParameters) -> bool:
         The plain form's.
     parameters : EhaParameters
         The actuator.
+    log : GreyBoxLog
+        Its log.
     """
     stiff = max(parameters.bulk_modulus, fit.values["bulk_modulus"])
-    return fit.values.get("makeup_conductance", 0.0) > WIDEST * widest_makeup(parameters.chamber_volume, stiff)
+    return fit.values.get("makeup_conductance", 0.0) > WIDEST * widest_makeup(parameters.chamber_volume, stiff, log)
 
 
 def is_astray(log: GreyBoxLog, fit: GreyBoxFit, parameters: EhaParameters) -> bool:
@@ -172,7 +174,7 @@ def is_astray(log: GreyBoxLog, fit: GreyBoxFit, parameters: EhaParameters) -> bo
     parameters : EhaParameters
         The actuator.
     """
-    return at_widest(fit, parameters) or is_far_stiffer(log, fit.values)
+    return at_widest(fit, parameters, log) or is_far_stiffer(log, fit.values)
 
 
 def _late_valves(fit: GreyBoxFit) -> tuple[Hypothesis, ...]:

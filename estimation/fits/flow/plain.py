@@ -7,6 +7,7 @@ from operator import attrgetter
 
 import numpy as np
 
+from estimation.fits.flow.asked_hypotheses import at_widest
 from estimation.fits.flow.log import carried, flow_log
 from estimation.fits.flow.search import balanced, flow_starts
 from estimation.fits.flow.swept import swept_evenly
@@ -19,9 +20,7 @@ from estimation.fits.greybox.pump_ripple import Turning
 from estimation.fits.greybox.spared_steps import step_errors
 from estimation.fits.hypothesis_search.between_samples import with_course
 from estimation.fits.hypothesis_search.fit_objections import fit_explains, limits
-from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
 from estimation.fits.hypothesis_search.pump_ripple_fits import with_pump_ripple
-from estimation.fits.hypothesis_search.wide_problem import widest_makeup
 from estimation.models.flow import HELD_FLOW_FORM
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -244,8 +243,8 @@ def with_implicit_steps(plain: PlainFits) -> FitStart | None:
     FitStart or None
         None where steps are exact enough, or implicit already. Not asked of a log that is explained, but for that of a
         single rod, whose chatter may pass for a bulk modulus that the log does not tell or end a search above its
-        minimum, and for one whose slopes leap: the deviation of bulk modulus came out 26 times too small. A valve that
-        fills a chamber within a step may be wider than usual steps resolve.
+        minimum, and for one whose slopes leap: the deviation of bulk modulus came out 26 times too small. Valves as
+        wide as usual steps resolve may be wider.
     """
     swinging = [fit for fit in plain.fits if fit.model.rates is not HELD_FLOW_FORM.rates]
     explained = plain.explains(plain.best)
@@ -254,8 +253,8 @@ def with_implicit_steps(plain: PlainFits) -> FitStart | None:
     if plain.start.implicit:
         return None
     felt = asked and any(_chatters(plain.log, fit, 0.0 if explained else LEAST_ERROR) for fit in swinging)
-    fast = any(_fills_within_a_step(fit, plain.start.parameters) for fit in swinging)
-    return replace(plain.start, implicit=True) if felt or fast else None
+    wide = any(at_widest(fit, plain.start.parameters, plain.log) for fit in swinging)
+    return replace(plain.start, implicit=True) if felt or wide else None
 
 
 def _chatters(log: GreyBoxLog, fit: GreyBoxFit, least: float) -> bool:
@@ -263,12 +262,6 @@ def _chatters(log: GreyBoxLog, fit: GreyBoxFit, least: float) -> bool:
     errors = step_errors(FreedProblem.of(fit.model, log), fit.model.theta(fit.values))
     share = float(np.sqrt(np.mean(errors**2) / max(fit.chi_square[0], 1.0)))
     return share >= least and float(np.max(np.abs(errors))) > STEPS_FELT
-
-
-def _fills_within_a_step(fit: GreyBoxFit, p: EhaParameters) -> bool:
-    """Return whether a make-up valve, wide open, fills a chamber in less time than a model step takes."""
-    fast = widest_makeup(p.chamber_volume, fit.values["bulk_modulus"], LONGEST_STEP)
-    return fit.values["makeup_conductance"] > fast
 
 
 def _leaps(fit: GreyBoxFit) -> bool:

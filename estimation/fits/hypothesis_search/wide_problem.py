@@ -198,7 +198,7 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
     return [{"relief_pressure": share * peak, "relief_conductance": RELIEF_START} for share in one.shares_of_peak]
 
 
-def widest_makeup(chamber_volume: float, bulk_modulus: float, fastest: float = FASTEST_MAKEUP) -> float:
+def widest_makeup(chamber_volume: float, bulk_modulus: float, log: GreyBoxLog) -> float:
     """Return the largest conductance of a make-up valve that model steps resolve.
 
     Parameters
@@ -207,15 +207,15 @@ def widest_makeup(chamber_volume: float, bulk_modulus: float, fastest: float = F
         Dead volume, half of a chamber's [m^3].
     bulk_modulus : float
         Of the oil [Pa].
-    fastest : float
-        Least time in which it fills a chamber [s].
+    log : GreyBoxLog
+        The log, whose steps may be implicit.
 
     Returns
     -------
     float
         Conductance [m^3/(s Pa)].
     """
-    return 2.0 * chamber_volume / (fastest * bulk_modulus)
+    return 2.0 * chamber_volume / ((FASTEST_FOLLOWED if log.stiff else FASTEST_MAKEUP) * bulk_modulus)
 
 
 def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) -> tuple[Array, Array]:
@@ -248,8 +248,7 @@ def flow_bounds(model: GreyBoxModel, guesses: Sequence[Array], log: GreyBoxLog) 
     stiff = max(rig["bulk_modulus"], stiffest_guess)
     volume = rig["chamber_volume"]
     limits["chamber_volume"] = (volume / MOST_VOLUME, MOST_VOLUME * volume)
-    fastest = FASTEST_FOLLOWED if log.stiff else FASTEST_MAKEUP
-    limits["makeup_conductance"] = (0.0, widest_makeup(volume, stiff, fastest))
+    limits["makeup_conductance"] = (0.0, widest_makeup(volume, stiff, log))
     if log.passes_on:
         limits["bulk_modulus"] = (softest / MOST_BIASED, MOST_BIASED * stiffest_guess)
     return search_bounds(model, guesses, {**LIMITS, **limits})

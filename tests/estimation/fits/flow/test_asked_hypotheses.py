@@ -60,7 +60,7 @@ def test_a_fit_that_leaves_far_less_than_the_noise_of_position_is_asked_for_noth
 def test_valves_as_wide_as_a_model_resolves_are_asked_what_they_took_up() -> None:
     """A pressure that lags by 2 ms was told as plain, bulk modulus six deviations too low."""
     plain, sound = seen(log(0.2)), made_fit(400.0, 2e8, 1e5)
-    widest = widest_makeup(PAPER.chamber_volume, PAPER.bulk_modulus)
+    widest = widest_makeup(PAPER.chamber_volume, PAPER.bulk_modulus, plain)
     for share, wanted in ((0.42, ()), (1.0, HYPOTHESES)):  # of sound logs 0.42 at most
         wide = replace(sound, values={**sound.values, "makeup_conductance": share * widest})
         with all_promise(PredictedGain(0.0, 0.0, 2.0 * OPEN_DELIVERY)):
