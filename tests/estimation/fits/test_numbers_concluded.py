@@ -75,7 +75,7 @@ def concluded(
             explain=explained,
             varying_loss=lambda *_: None,
             lower_minimum=lambda *_: None,
-            with_shorter_steps=lambda _: None,
+            with_implicit_steps=lambda _: None,
             contradicted=lambda *_: (),
             sensed_play=lambda _: sensed or ShownPlay(0.0, 0.0),
         ),

@@ -88,7 +88,7 @@ def test_a_log_that_is_fitted_anew_is_asked_for_slips_anew(monkeypatch: pytest.M
     nothing: Any = None
     monkeypatch.setattr(flow_fit, "plain_fits", lambda *_: plains.pop(0))
     monkeypatch.setattr(flow_fit, "stiffer", lambda *_: None)
-    monkeypatch.setattr(flow_fit, "with_shorter_steps", lambda *_: None)
+    monkeypatch.setattr(flow_fit, "with_implicit_steps", lambda *_: None)
     monkeypatch.setattr(flow_fit, "by_course", lambda _, plain: plain)
     monkeypatch.setattr(flow_fit, "with_open_turns", lambda _, plain: plain)
     monkeypatch.setattr(flow_fit, "offset_settled", lambda plain, strange, *_: (plain, strange))
@@ -115,7 +115,7 @@ def test_slips_are_tried_of_what_nothing_explains_unless_an_offset_of_pressure_d
     nothing: Any = None
     monkeypatch.setattr(flow_fit, "plain_fits", lambda *_: plain)
     monkeypatch.setattr(flow_fit, "stiffer", lambda *_: None)
-    monkeypatch.setattr(flow_fit, "with_shorter_steps", lambda *_: None)
+    monkeypatch.setattr(flow_fit, "with_implicit_steps", lambda *_: None)
     monkeypatch.setattr(flow_fit, "by_course", lambda _, plain: plain)
     monkeypatch.setattr(flow_fit, "with_open_turns", lambda _, plain: plain)
     monkeypatch.setattr(flow_fit, "offset_settled", lambda plain, strange, *_: (plain, strange))

@@ -210,7 +210,7 @@ def test_teeth_that_are_left_shut_the_gate_where_nothing_else_does(
 ) -> None:
     shows = replace(fit(500.0, shown(12, 50.0), shown(13, 40.0)), chi_square=(chi,))
     monkeypatch.setattr(plain_flow, "balanced", lambda *_, **__: [shows])
-    monkeypatch.setattr(flow_fit, "with_shorter_steps", lambda _: None)
+    monkeypatch.setattr(flow_fit, "with_implicit_steps", lambda _: None)
     wear = (RigCode.WEAR_NOT_EXCLUDED.note(percent=3.0),)
     monkeypatch.setattr(flow_fit, "hypotheses_asked", lambda *_, **__: ((), wear))
     found = fit_flow(log(0.2), PAPER, PAPER.bulk_modulus)
