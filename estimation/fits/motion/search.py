@@ -57,9 +57,10 @@ FINALISTS = 3
 ROUGHLY = 2
 """By how many times model steps are longer while a start is only brought near."""
 
-MOST_WORK = 12_000_000
-"""Steps of eight runs side by side from which on no other start is tried; one that was begun is ended. A count, no
-clock, so that every machine finds the same."""
+MOST_WORK = 10_000_000
+"""Steps of eight runs side by side from which on no start is tried but the likeliest one of each structure of friction;
+the structure that is tried first has half of them. A start that was begun is ended. A count, no clock, so that every
+machine finds the same."""
 
 EXPLAINED = 1.1
 """Mean squared normalised residual up to which a form explains the log [dimensionless]."""
@@ -163,7 +164,7 @@ class MotionSearch:
         part, short = (whole.on(log.beginning(samples)) for samples in lengths)
         return cls(whole, part, short, guesses, bounds, near)
 
-    def brought_near(self, rank: int, begun: Begun) -> Iterator[Array]:
+    def brought_near(self, rank: int, begun: Begun, most: int) -> Iterator[Array]:
         """Yield where the starts of a rank lead on the short beginning under larger noise.
 
         One whose misfit is over what explains the log with the larger noise too is left out, and one that comes to
@@ -175,6 +176,8 @@ class MotionSearch:
             0 for the likeliest start of each way.
         begun : Begun
             What was screened so far, and the work; filled in here.
+        most : int
+            Work from which on none is brought near but the very first [steps].
 
         Yields
         ------
@@ -183,6 +186,8 @@ class MotionSearch:
         """
         reached: list[Point] = []
         for way, (first, second) in enumerate(WAYS):
+            if rank + way > 0 and begun.work > most:
+                return
             if way not in begun.screened:
                 screen = begun.at_each(rough(self.short, first))
                 points = descend_together(screen, self.guesses, SCREENING, self.near, NEAR_ENOUGH)
@@ -232,10 +237,8 @@ def likeliest(searches: Sequence[MotionSearch]) -> list[Ended]:
     begun = Begun()
     tries = [_Tries(search, begun) for search in searches]
     for rank in range(FINALISTS):
-        for one in tries:
-            for near in one.search.brought_near(rank, begun):
-                if rank > 0 and begun.work > MOST_WORK:
-                    break
+        for place, one in enumerate(tries, start=1):
+            for near in one.search.brought_near(rank, begun, MOST_WORK * place // len(tries)):
                 if (found := one.carried_on(near)) is not None:
                     return [Ended(each.search, found if each is one else each.best, each is one) for each in tries]
         if begun.work > MOST_WORK or all(one.best.cost > HOPELESS * explained(one.search.short) for one in tries):

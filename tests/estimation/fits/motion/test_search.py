@@ -46,9 +46,11 @@ class Search:
     def same_pit(self, one: Point, other: Point) -> bool:
         return bool(one.theta[0] == other.theta[0])
 
-    def brought_near(self, rank: int, begun: Begun) -> Sequence[np.ndarray]:
-        assert isinstance(begun, Begun)
+    def brought_near(self, rank: int, begun: Begun, most: int) -> Sequence[np.ndarray]:
+        assert most == {"a": MOST_WORK // 2, "b": MOST_WORK}[self._name]
         self._asked.append(f"{self._name}{rank}")
+        if rank > 0 and begun.work > most:
+            return []
         return [np.array([float(len(WAYS) * rank + way)]) for way in range(len(WAYS))]
 
 
