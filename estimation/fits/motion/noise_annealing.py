@@ -31,6 +31,7 @@ def annealed(
     promising: float,
     deeper: float,
     at: Callable[[FreedProblem], Callable[[Array], Point]] = lambda problem: problem.at,
+    least_share: float = 0.0,
 ) -> Point:
     """Return the lowest minimum that is found.
 
@@ -48,6 +49,8 @@ def annealed(
         Fall of the cost from which an end is left in its turn [dimensionless].
     at : callable, optional
         Returns a problem's misfit as a function of the coordinates; `FreedProblem.at` by default.
+    least_share : float
+        Share of the cost that a further step must promise on the way back [fraction].
 
     Returns
     -------
@@ -57,7 +60,7 @@ def annealed(
     softened = problem.on(problem.log.softened(1.0, LARGER_WALK))
     for _ in range(TIMES):
         near = descend(at(softened), point.theta, LEAVING, bounds, LEFT_BY)
-        back = descend(at(problem), near.theta, RETURNING, bounds, promising)
+        back = descend(at(problem), near.theta, RETURNING, bounds, promising, least_share=least_share)
         gained = point.cost - back.cost
         point = back if gained > 0.0 else point
         if gained < deeper:

@@ -59,8 +59,8 @@ ROUGHLY = 2
 
 MOST_WORK = 10_000_000
 """Steps of eight runs side by side from which on no start is tried but the likeliest one of each structure of friction;
-the structure that is tried first has half of them. A start that was begun is ended. A count, no clock, so that every
-machine finds the same."""
+the structure that is tried first has half of them, unless it explains the beginning. A start that was begun is ended. A
+count, no clock, so that every machine finds the same."""
 
 EXPLAINED = 1.1
 """Mean squared normalised residual up to which a form explains the log [dimensionless]."""
@@ -164,7 +164,7 @@ class MotionSearch:
         part, short = (whole.on(log.beginning(samples)) for samples in lengths)
         return cls(whole, part, short, guesses, bounds, near)
 
-    def brought_near(self, rank: int, begun: Begun, most: int) -> Iterator[Array]:
+    def brought_near(self, rank: int, begun: Begun, worth: Callable[[], bool]) -> Iterator[Array]:
         """Yield where the starts of a rank lead on the short beginning under larger noise.
 
         One whose misfit is over what explains the log with the larger noise too is left out, and one that comes to
@@ -176,8 +176,8 @@ class MotionSearch:
             0 for the likeliest start of each way.
         begun : Begun
             What was screened so far, and the work; filled in here.
-        most : int
-            Work from which on none is brought near but the very first [steps].
+        worth : callable
+            Whether another start than the very first is brought near, asked before each.
 
         Yields
         ------
@@ -186,7 +186,7 @@ class MotionSearch:
         """
         reached: list[Point] = []
         for way, (first, second) in enumerate(WAYS):
-            if rank + way > 0 and begun.work > most:
+            if rank + way > 0 and not worth():
                 return
             if way not in begun.screened:
                 screen = begun.at_each(rough(self.short, first))
@@ -238,7 +238,8 @@ def likeliest(searches: Sequence[MotionSearch]) -> list[Ended]:
     tries = [_Tries(search, begun) for search in searches]
     for rank in range(FINALISTS):
         for place, one in enumerate(tries, start=1):
-            for near in one.search.brought_near(rank, begun, MOST_WORK * place // len(tries)):
+            share = place / len(tries)
+            for near in one.search.brought_near(rank, begun, partial(one.may_go_on, share)):
                 if (found := one.carried_on(near)) is not None:
                     return [Ended(each.search, found if each is one else each.best, each is one) for each in tries]
         if begun.work > MOST_WORK or all(one.best.cost > HOPELESS * explained(one.search.short) for one in tries):
@@ -264,6 +265,11 @@ class _Tries:
         self.search, self._begun = search, begun
         self.best = search.short.at(search.guesses[0])
         self._followed: list[tuple[Point, Point]] = []
+
+    def may_go_on(self, share: float) -> bool:
+        """Return whether another start may be tried: within a share of `MOST_WORK`, or all where one is promising."""
+        promising = self.best.cost < explained(self.search.short)
+        return self._begun.work <= MOST_WORK * (1.0 if promising else share)
 
     def carried_on(self, near: Array) -> Point | None:
         """Return the optimum from a start on the first `SEARCHED` samples if it explains them.
@@ -296,7 +302,7 @@ class _Tries:
         promising, share = SLIGHT * wanted, SLIGHT_SHARE if self._begun.work > MOST_WORK else 0.0
         point = descend(at(short), self.best.theta, RETURNING, bounds, promising, least_share=share)
         if point.cost < HOPELESS * wanted:
-            point = annealed(short, point, bounds, promising, SAME_COST * wanted, at)
+            point = annealed(short, point, bounds, promising, SAME_COST * wanted, at, share)
         found = self.carried_on(point.theta) if point.cost < wanted else None
         return (point, False) if found is None else (found, True)
 

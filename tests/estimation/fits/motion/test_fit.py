@@ -131,7 +131,7 @@ def test_starts_that_larger_noise_does_not_explain_or_that_end_alike_are_left_ou
     search, begun = searches_of(seen(short_log(0.2)))[0], Begun()
     lower, upper = search.bounds
     for rank in range(2):
-        near = list(search.brought_near(rank, begun, 10**9))
+        near = list(search.brought_near(rank, begun, lambda: True))
         assert len(near) == brought
         assert all(np.all((lower <= theta) & (theta <= upper)) for theta in near)
         best = min(search.short.at(theta).cost for theta in near)
@@ -142,9 +142,9 @@ def test_starts_that_larger_noise_does_not_explain_or_that_end_alike_are_left_ou
 
 def test_where_the_work_is_done_the_likeliest_start_alone_is_brought_near() -> None:
     search, begun = searches_of(seen(short_log(0.2)))[0], Begun()
-    assert len(list(search.brought_near(0, begun, 0))) == 1
+    assert len(list(search.brought_near(0, begun, lambda: False))) == 1
     assert set(begun.screened) == {0}
-    assert list(search.brought_near(1, begun, 0)) == []
+    assert list(search.brought_near(1, begun, lambda: False)) == []
 
 
 @pytest.mark.slow

@@ -46,3 +46,12 @@ def test_a_pit_is_left_for_the_bottom_and_that_is_not_left_again() -> None:
 def test_an_end_is_kept_that_no_way_back_comes_below() -> None:
     low = Point(np.array([3.0]), 4.0, np.zeros(1), np.eye(1))
     assert annealed(problem([]), low, BOUNDS, 1e-3, 1.0) is low
+
+
+def test_the_way_back_ends_where_a_step_promises_too_small_a_share() -> None:
+    asked: list[float] = []
+    annealed(problem(asked), PIT, BOUNDS, 1e-3, 1.0, least_share=np.inf)
+    back = len(asked)
+    asked.clear()
+    annealed(problem(asked), PIT, BOUNDS, 1e-3, 1.0)
+    assert back < len(asked)

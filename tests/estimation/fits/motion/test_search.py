@@ -1,6 +1,6 @@
 """Searches of two structures of friction take turns, and end where one explains the log or none can."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -46,12 +46,13 @@ class Search:
     def same_pit(self, one: Point, other: Point) -> bool:
         return bool(one.theta[0] == other.theta[0])
 
-    def brought_near(self, rank: int, begun: Begun, most: int) -> Sequence[np.ndarray]:
-        assert most == {"a": MOST_WORK // 2, "b": MOST_WORK}[self._name]
+    def brought_near(self, rank: int, begun: Begun, worth: Callable[[], bool]) -> Iterator[np.ndarray]:
+        assert isinstance(begun, Begun)
         self._asked.append(f"{self._name}{rank}")
-        if rank > 0 and begun.work > most:
-            return []
-        return [np.array([float(len(WAYS) * rank + way)]) for way in range(len(WAYS))]
+        for way in range(len(WAYS)):
+            if rank + way > 0 and not worth():
+                return
+            yield np.array([float(len(WAYS) * rank + way)])
 
 
 def ended(*misfits: Misfit, steps: int = 1) -> tuple[list[motion_search.Ended], list[str]]:
@@ -94,6 +95,33 @@ def test_no_other_start_is_tried_once_the_work_is_done() -> None:
         found, asked = ended(lambda _: 1.2, lambda _: 1.3, steps=steps)
         assert len(asked) == 2 * ranks
         assert not any(one.explains for one in found)
+
+
+@pytest.mark.parametrize(("share", "first", "later"), [(0.1, 3, 3), (0.3, 2, 2), (0.6, 1, 1)])
+def test_a_structure_that_explains_no_beginning_leaves_work_to_the_other(share: float, first: int, later: int) -> None:
+    tried: list[str] = []
+
+    def noted(name: str) -> Misfit:
+        def misfit(at: float) -> float:
+            tried.append(f"{name}{at:g}")
+            return 1.2 * HOPELESS
+
+        return misfit
+
+    ended(noted("a"), noted("b"), steps=int(share * MOST_WORK) // 2)  # two evaluations a start
+    assert len({one for one in tried if one[0] == "a"}) == first
+    assert len({one for one in tried if one[0] == "b"}) == later
+
+
+def test_a_structure_that_explains_the_beginning_goes_on_while_any_work_is_left() -> None:
+    tried: list[float] = []
+
+    def first(at: float) -> float:
+        tried.append(at)
+        return 1.0 if len(tried) < 4 else 9.0  # the beginning, and no more
+
+    ended(first, lambda _: 9.0, steps=MOST_WORK // 4)  # three quarters are spent on the first start
+    assert set(tried) == {0.0, 1.0}
 
 
 def test_where_the_work_is_done_the_end_is_searched_on_while_that_gains_a_share(
