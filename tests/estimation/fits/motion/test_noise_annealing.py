@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.greybox.descent import Point
+from estimation.fits.motion import noise_annealing
 from estimation.fits.motion.noise_annealing import LARGER_WALK, annealed
 from plant.arrays import Array
 
@@ -48,10 +49,14 @@ def test_an_end_is_kept_that_no_way_back_comes_below() -> None:
     assert annealed(problem([]), low, BOUNDS, 1e-3, 1.0) is low
 
 
-def test_the_way_back_ends_where_a_step_promises_too_small_a_share() -> None:
-    asked: list[float] = []
-    annealed(problem(asked), PIT, BOUNDS, 1e-3, 1.0, least_share=np.inf)
-    back = len(asked)
-    asked.clear()
-    annealed(problem(asked), PIT, BOUNDS, 1e-3, 1.0)
-    assert back < len(asked)
+def test_a_share_is_asked_of_steps_on_the_way_back_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    shares: list[float] = []
+    descended = noise_annealing.descend
+
+    def noted(*given: Any, least_share: float = 0.0) -> Point:
+        shares.append(least_share)
+        return descended(*given, least_share=least_share)
+
+    monkeypatch.setattr(noise_annealing, "descend", noted)
+    annealed(problem([]), PIT, BOUNDS, 1e-3, 1.0, least_share=0.01)
+    assert shares == [0.0, 0.01] * (len(shares) // 2)
