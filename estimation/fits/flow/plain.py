@@ -7,7 +7,6 @@ from operator import attrgetter
 
 import numpy as np
 
-from estimation.fits.flow.asked_hypotheses import at_widest
 from estimation.fits.flow.log import carried, flow_log
 from estimation.fits.flow.search import balanced, flow_starts
 from estimation.fits.flow.swept import swept_evenly
@@ -243,17 +242,15 @@ def with_implicit_steps(plain: PlainFits) -> FitStart | None:
     FitStart or None
         None where steps are exact enough, or implicit already. Not asked of a log that is explained, but for that of a
         single rod, whose chatter may pass for a bulk modulus that the log does not tell or end a search above its
-        minimum, and for one whose slopes leap: the deviation of bulk modulus came out 26 times too small. Valves of a
-        log that is not, as wide as usual steps resolve, may be wider.
+        minimum, and for one whose slopes leap: the deviation of bulk modulus came out 26 times too small.
     """
     if plain.start.implicit:
         return None
     swinging, p = [fit for fit in plain.fits if fit.model.rates is not HELD_FLOW_FORM.rates], plain.start.parameters
     explained = plain.explains(plain.best)
-    wide = not explained and any(at_widest(fit, p, plain.log) for fit in swinging)
     asked = not explained or p.area_difference != 0.0 or p.pilot_share > 0.0 or any(map(_leaps, swinging))
     felt = asked and any(_chatters(plain.log, fit, 0.0 if explained else LEAST_ERROR) for fit in swinging)
-    return replace(plain.start, implicit=True) if wide or felt else None
+    return replace(plain.start, implicit=True) if felt else None
 
 
 def _chatters(log: GreyBoxLog, fit: GreyBoxFit, least: float) -> bool:
