@@ -230,8 +230,8 @@ class RigCode(Code):
     )
     PRESSURE_SIDES = "chamber gauges differ by {percent:z.2f} ± {half_width:.2g} % in gain; the fit includes this"
     ENCODER_ZERO = (
-        "position_m reads {zero_mm:.1f} ± {half_width_mm:.2g} mm at mid-stroke, or chamber {side} holds {more:.2g} m^3 "
-        "more than the other (a hose); it was shifted to zero there"
+        "position_m reads {zero_mm:.1f} ± {half_width_mm:.2g} mm at mid-stroke; it was shifted to zero there. If its "
+        "zero is right, chamber {side} holds {more:.2g|L} L more than the other (a hose)"
     )
     POSITION_PLAY = (
         "position_m follows the piston with about {play_um:.1g} um of play (backlash); the play was corrected"
@@ -248,15 +248,14 @@ class RigCode(Code):
         "the pump delivers {percent:.1f} ± {half_width:.2g} % of its displacement: it is worn, or displacement or "
         "piston area in the rig file is wrong"
     )
-    PUMP_RIPPLES = (
-        "the pump's teeth ({teeth} per turn) make its flow ripple by {percent:.1f} ± {half_width:.2g} %; the fit "
-        "includes this"
-    )
+    PUMP_RIPPLES = "the pump's {teeth} teeth make its flow ripple by {percent:.1f} ± {half_width:.2g} % (in the fit)"
     MAKEUP_BENDS = (
-        "the make-up valves act as orifices: at a pressure drop of {drop_pa:.2g|bar} bar they pass half as much flow "
-        "per bar as at a small drop; the fit includes this"
+        "the make-up valves act as orifices: at {drop_pa:.2g|bar} bar they pass half as much flow per bar as at a "
+        "small drop; the fit includes this"
     )
-    GAS_CONTRADICTED = "the accumulator has {ratio:.2g} times the gas in the rig file or {more}, or another charge"
+    GAS_CONTRADICTED = (
+        "the accumulator holds at {limit} {ratio:.2g} times the gas that the rig file states, or its charge differs"
+    )
     MAKEUP_UNSEEN = "the make-up valve of chamber {side} never opened: this log does not show whether it is stuck shut"
     SPEED_OFFSET = (
         "motor_speed_rad_s reads {offset_rad_s:.3g|rpm} ± {half_width:.2g|rpm} rpm too much; the offset was subtracted"

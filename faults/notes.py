@@ -81,8 +81,8 @@ class ClassCode(Code):
     LEAKAGE_AND_BIAS_ALIKE = "the log does not separate leakage coefficient and flow bias (a constant loss of the pump)"
     VELOCITY_LOST_TOLD = "the velocity lost is known: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
     STUCK_NOT_TOLD = (
-        "a make-up valve that is stuck shut and never had to open leaves no trace: it keeps a probability of "
-        "{percent:.0f} %, which is none of the nine conditions"
+        "a make-up valve that is stuck shut but never had to open leaves no trace; this fault, which is not one of "
+        "the nine conditions, keeps a probability of {percent:.0f} %"
     )
     OIL_STIFFER_CLASS = (
         "without pressure, the circuit that fits has {ratio:.2g} times the bulk modulus in the rig file (another oil, "

@@ -5,6 +5,7 @@ Programs decide by code and data alone; no sentence is read back.
 """
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -16,6 +17,7 @@ WORKSHOP: Mapping[str, float] = {
     "MPa": 1e-6,
     "mm": 1e3,
     "mm/s": 1e3,
+    "L": 1e3,
     "rpm": 30.0 / math.pi,
     "L/(min bar)": 6e9,
 }
@@ -24,6 +26,9 @@ WORKSHOP: Mapping[str, float] = {
 WRITTEN_OUT = 1e7
 """Size below which a reader is spared a power of ten."""
 
+
+MOST_DECIMALS = 6
+"""Decimals that a value with a half-width has at most [count]."""
 
 UNTOLD = " ± inf"
 """What a half width reads that no log bounds."""
@@ -66,6 +71,23 @@ class _Sentence(Formatter):
 
 
 _SENTENCE = _Sentence()
+
+_WITH_HALF_WIDTH = re.compile(r"(\{\w+:z?\.\d)[fg](\|[^}]+)?\} ± \{(\w+):\.2g(\|[^}]+)?\}")
+"""A value and its half-width, which has two significant digits."""
+
+
+def _in_step(template: str, data: Mapping[str, Any]) -> str:
+    """Return a template whose values have as many decimals as their half-widths."""
+
+    def decimals(found: re.Match[str]) -> str:
+        value, unit, half_width, _ = found.groups("")
+        size = abs(data[half_width]) * WORKSHOP.get(unit[1:], 1.0)
+        if not (math.isfinite(size) and size > 0.0):
+            return found.group()
+        digits = min(max(0, 1 - math.floor(math.log10(size))), MOST_DECIMALS)
+        return f"{value[:-1]}{digits}f{unit}}} ± {{{half_width}:.{digits}f{unit}}}"
+
+    return _WITH_HALF_WIDTH.sub(decimals, template)
 
 
 class Code(Enum):
@@ -126,7 +148,7 @@ class Note:
     data: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def __str__(self) -> str:
-        said = _SENTENCE.format(self.code.template, **self.data)
+        said = _SENTENCE.format(_in_step(self.code.template, self.data), **self.data)
         return (
             said if UNTOLD not in said else f"{said.replace(UNTOLD, '')}; the log does not tell how far off this may be"
         )

@@ -240,7 +240,7 @@ def main(arguments: list[str]) -> int:
     rows: list[dict[str, Any]] = []
     for seed in range(int(first), int(last or first) + 1):
         for place, rig in enumerate(rigs):
-            rows.append(scored(rig, kinds[(seed * len(rigs) + place) % len(kinds)], seed))
+            rows.append(scored(rig, kinds[(seed + place) % len(kinds)], seed))
             print(line_of(rows[-1]), flush=True)
     judged = [{**row, "verdict": "right"} if row["right"] else row for row in rows]  # unknown is right of many kinds
     checks = printed(summarised(judged, wrong=True))

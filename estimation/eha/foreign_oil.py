@@ -25,6 +25,10 @@ STIFFEST = 2.5e9
 """Bulk modulus over which no oil is [Pa]: mineral oils have 1.4 to 2 GPa (Merritt, Hydraulic Control Systems, 1967,
 chapter 2), and a chamber of 15 % more than its rig file says reads as much more."""
 
+SOFTEST = 3e7
+"""Bulk modulus below which no oil is that holds no bubbles [Pa]; judged. The softest oil of the open benchmark has
+40 MPa, and the paper's in psi read as bar 14 MPa."""
+
 UNLIKE = 0.2
 """Logarithm of bulk modulus over the rig file's from which the units are doubted that no motion confirms
 [dimensionless]; judged."""
@@ -105,7 +109,8 @@ def _is_none(found: BulkModulusEstimate, ratio: float) -> bool:
     names = () if found.explanation is None else found.explanation.names
     if PRESSURE not in found.channels or found.value is None or {AIR.name, AIR_MIDWAY.name} & set(names):
         return False
-    return ratio < 1.0 / FOREIGN or (ratio > FOREIGN and found.value > STIFFEST)
+    softer, stiffer = ratio < 1.0 / FOREIGN, ratio > FOREIGN
+    return (softer and found.value < SOFTEST) or (stiffer and found.value > STIFFEST)
 
 
 def _without(found: BulkModulusEstimate, outcome: Outcome, *said: Note) -> BulkModulusEstimate:

@@ -49,6 +49,9 @@ SOFT_STOP = 1e-3
 SETS_OFF = 0.02, 0.5
 """Shares of the log's highest speed between which a motor sets off from rest [fraction]; judged."""
 
+SETTING_OFF = 0.1
+"""Longest time for which a motor sets off [s]: one that turns slowly at first may have its pressure zeroed then."""
+
 REST = 10
 """Rows that position repeats before it jumps if it was held by its logger [samples]."""
 
@@ -148,13 +151,13 @@ def _steps_of_pressure(record: Record) -> list[_Step]:
     if PRESSURE not in record or SPEED not in record or record.sample_time > SLOWEST_PRESSURE:
         return []
     strayed = pressure_strays(record, noisy=True)
-    strayed[_setting_off(record[SPEED])] = 0.0
+    strayed[_setting_off(record[SPEED], record.sample_time)] = 0.0
     rows = _places(strayed, STEP_OF_PRESSURE)
     strayed = pressure_strays(record) if rows else strayed
     return [_Step(PRESSURE, k, _size(strayed, k)) for k in rows]
 
 
-def _setting_off(speed: Array) -> slice:
+def _setting_off(speed: Array, sample_time: float) -> slice:
     """Return the rows in which a motor sets off from rest; none where it turns as the log begins.
 
     Both chambers are at the accumulator's pressure then. Until one of them draws make-up, pressure rises twice as fast
@@ -162,6 +165,7 @@ def _setting_off(speed: Array) -> slice:
     """
     size = np.nan_to_num(np.abs(speed))
     turns, away = (int(np.argmax(size > share * np.max(size))) for share in SETS_OFF)
+    away = min(away, turns + round(SETTING_OFF / sample_time))
     return slice(turns, away + APART if turns > 0 else 0)
 
 

@@ -44,7 +44,7 @@ def with_even_steps(record: Record) -> tuple[Record, tuple[Note, ...]]:
     notes: list[Note] = []
     for channel in (POSITION, PRESSURE):
         if channel in record and (digits := written_digits(record[channel])):
-            step = 10.0 ** (_power(np.nanmax(np.abs(record[channel]))) - digits + 1)
+            step = 10.0 ** (_largest_power(record[channel]) - digits + 1)
             rounded[channel] = step * np.rint(record[channel] / step)
             notes.append(LoggerCode.FEW_DIGITS.note(channel=channel, digits=digits))
     return (record.replace(**rounded), tuple(notes)) if rounded else (record, ())
@@ -69,7 +69,7 @@ def written_digits(values: Array) -> int:
     >>> written_digits(np.array([float(f"{value:.3g}") for value in course])), written_digits(course.round(4))
     (3, 0)
     """
-    there = np.abs(values[np.isfinite(values) & (values != 0.0)])
+    there = _sizes(values)
     if len(there) < FEWEST or not _has_digits(there[:: 1 + len(there) // LOOKED_AT], MOST_DIGITS):
         return 0
     digits = next((count for count in range(1, MOST_DIGITS + 1) if _has_digits(there, count)), 0)
@@ -79,6 +79,16 @@ def written_digits(values: Array) -> int:
     last_used = np.rint(there * 10.0 ** (digits - 1 - powers)) % 10.0 != 0.0
     told = [last_used[powers == power] for power in np.unique(powers)]
     return digits if sum(len(one) >= FEWEST and bool(np.mean(one) > USED) for one in told) > 1 else 0
+
+
+def _largest_power(values: Array) -> float:
+    """Return the largest power of ten that enough samples have: a spike must not coarsen the whole log."""
+    powers, counts = np.unique(_power(_sizes(values)), return_counts=True)
+    return float(powers[counts >= FEWEST][-1])
+
+
+def _sizes(values: Array) -> Array:
+    return np.abs(values[np.isfinite(values) & (values != 0.0)])
 
 
 def _has_digits(sizes: Array, digits: int) -> bool:

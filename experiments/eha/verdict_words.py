@@ -84,6 +84,7 @@ def headline(result: Mapping[str, Any]) -> str:
     ranked = sorted(result["probabilities"].items(), key=lambda item: -item[1])
     (best, first), (second, other) = ranked[:2]
     if result["unknown"]:
+        first, other = (share / sum(result["probabilities"].values()) for share in (first, other))
         nearest = f"{in_words(best)} ({percent_text(first)} % if it had to be one of them)"
         return f"{NEAREST}{nearest}, then {in_words(second)} ({percent_text(other)} %)"
     if len(as_likely := equally_likely(result)) > 1:

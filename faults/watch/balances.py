@@ -12,11 +12,11 @@ from plant.arrays import Array
 FEATURES = 8
 """Regressors of a balance."""
 
-GAINS = 4
+GAINS = 5
 """Sums of a block from which gains follow."""
 
-GAIN_QP, GAIN_WP, GAIN_PV, GAIN_VV = range(GAINS)
-"""Places in them: of q p, w p, p v and v v."""
+GAIN_QP, GAIN_WP, GAIN_PV, GAIN_VV, GAIN_PP = range(GAINS)
+"""Places in them: of q p, w p, p v, v v and p p."""
 
 V1, V2, W1, P1, P2, Q1, Q2 = range(7)
 """Places in what the last intervals were: velocity, pressure and lost speed of the last two, speed of the last one."""
@@ -68,6 +68,7 @@ def count_gains(w: float, v: float, p: float, place: int, gains: Array) -> None:
     gains[place, GAIN_WP] += w * p
     gains[place, GAIN_PV] += p * v
     gains[place, GAIN_VV] += v * v
+    gains[place, GAIN_PP] += p * p
 
 
 def solve(information: Array, moment: Array, found: Array, factor: Array) -> None:

@@ -17,7 +17,7 @@ from math import exp, isfinite
 
 import numpy as np
 
-from faults.watch.balances import GAIN_PV, GAIN_QP, GAIN_VV, GAIN_WP
+from faults.watch.balances import GAIN_PP, GAIN_PV, GAIN_QP, GAIN_VV, GAIN_WP
 from faults.watch.cusum import SUM, THRESHOLD
 from faults.watch.events import SLOW, Alarm, Change, Event, Ready, change_time
 from faults.watch.growth import growth_time
@@ -310,8 +310,7 @@ class Watch:
     def _told(self) -> list[Event]:
         if self._open is None:
             return []
-        alarm, changed, now = self._open
-        self._open = None
+        (alarm, changed, now), self._open = self._open, None
         span = RECENT - 1 - (now - changed)
         gains = self._memory.gains
         before = gains[np.arange(changed - min(span, changed), changed) % RECENT].sum(axis=0)
@@ -319,10 +318,11 @@ class Watch:
         if not self.pressure or min(*before[[GAIN_WP, GAIN_VV]], *after[[GAIN_WP, GAIN_VV]]) <= 0.0:
             return [Change(self.time, alarm, None, None)]
         lost = float(before[GAIN_QP] / before[GAIN_WP]), float(after[GAIN_QP] / after[GAIN_WP])
-        if lost[1] - lost[0] > oil_allows(lost[0]):  # told here, so the loss must not tell it again
-            learn_loss_again(self._known)
         resistance = before[GAIN_PV] / before[GAIN_VV], after[GAIN_PV] / after[GAIN_VV]
         resisted = float(resistance[1] / resistance[0] - 1.0)
+        over_pressure = after[GAIN_QP] / after[GAIN_PP] * before[GAIN_PP] / before[GAIN_WP]  # as under the load before
+        if min(lost[1], over_pressure) - lost[0] > oil_allows(lost[0]):  # told here: the loss must not tell it again
+            learn_loss_again(self._known)
         return [Change(self.time, alarm, lost, resisted)]
 
 

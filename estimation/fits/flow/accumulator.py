@@ -162,5 +162,5 @@ def gas_contradicted(log: GreyBoxLog, fit: GreyBoxFit, p: EhaParameters) -> tupl
     moved, told = math.log(usual / found), spread**2 + log.uncertainties.get(CHARGE, 0.0) ** 2 - left**2
     if abs(moved) <= CONTRADICTS * math.sqrt(told):
         return ()
-    more = "more" if moved > 0.0 else "less"
-    return (RigCode.GAS_CONTRADICTED.note(more=more, ratio=math.exp(moved)),)
+    limit = "least" if moved > 0.0 else "most"
+    return (RigCode.GAS_CONTRADICTED.note(limit=limit, ratio=math.exp(moved)),)

@@ -35,6 +35,7 @@ from estimation.fits.hypotheses import (
     BEGUN,
     CHECKS_HIDDEN,
     HYPOTHESES,
+    MAKEUP_BLOCKED,
     PLAY,
     PRESSURE_LATE,
     PRESSURE_SIDES,
@@ -96,13 +97,12 @@ def fit_flow(
     """Fit the flow form to a log, balanced by volume, by mass, and by volume in held chambers, and weigh the three.
 
     The pump's flow ripple is taken up first (`estimation.fits.hypothesis_search.pump_ripple_fits`). A log that the
-    plain form does not explain is tested for effects of rig, oil and logger (`explain`).
-    Gross outliers are taken out, and what the pump delivered while its speed is missing is read off the pressure after.
-    Where oil is so much stiffer than the rig file's that noise of position counts, a log is fitted anew from there. So
-    it is where what is strange leads to a lower valley of the plain form, or is an offset of speed. A slow log that
-    looks strange is asked with its turns read off the next samples too (`agreed`). A log that is none of the rig's
-    is asked for wrong signs and units (`CorrectedLogs`). A fit is not to be believed if the search for what is strange
-    did more than it may (`estimation.fits.greybox.work_limit`).
+    plain form does not explain is tested for effects of rig, oil and logger (`explain`). Gross outliers are taken out,
+    and what the pump delivered while its speed is missing is read off the pressure after. Where oil is so much stiffer
+    than the rig file's that noise of position counts, a log is fitted anew from there; so it is where what is strange
+    leads to a lower valley, or is an offset of speed. A slow log that looks strange is asked with its turns read off
+    later samples too (`agreed`), one that is none of the rig's for wrong signs and units (`CorrectedLogs`). A fit is
+    not believed if the search did more than it may (`greybox.work_limit`).
 
     Parameters
     ----------
@@ -262,12 +262,11 @@ def _losing_fit(plain: PlainFits, loss: VaryingLoss, sensed: ShownPlay) -> FormF
     """Return the result of a log that a varying loss explains."""
     one = loss.fit
     untaken, open_play = plain.play_untaken(one.play, sensed)
-    value, std = one.values["bulk_modulus"], one.std["bulk_modulus"]
     found = {name: (each, one.std[name]) for name, each in one.values.items()}
     found, correlation = with_lumped(found, [one], np.ones(1), plain.start.parameters, plain.log.measured_rms)
     return FormFit(
         parameters=with_structure(found, float(np.linalg.norm([UNEVEN, untaken, loss.opened]))),
-        bound=std / value,
+        bound=one.std["bulk_modulus"] / one.values["bulk_modulus"],
         chi_square=one.chi_square[0],
         reasons=play_left(one.play, sensed),
         rig_slopes=with_lumped_slopes(one.rig_slopes),
@@ -303,11 +302,11 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
     else:
         untaken, open_play = plain.play_untaken(one.play, sensed)
         left, shown = float(np.hypot(FILTERED if traits.filtered else STRUCTURE, untaken)), play_left(one.play, sensed)
-    if is_single(strange.values, plain.start.parameters):
-        left = float(np.hypot(left, UNEVEN_OIL))
-    if {AIR.name, AIR_MIDWAY.name} & set(strange.names):
-        left = float(np.hypot(left, BUBBLES))
-    left = float(np.hypot(left, ratio_doubt(strange)))
+    doubts = [left, ratio_doubt(strange, plain.log.uncertainties)]
+    doubts += [UNEVEN_OIL] if is_single(strange.values, plain.start.parameters) else []
+    doubts += [BUBBLES] if {AIR.name, AIR_MIDWAY.name} & set(strange.names) else []
+    left = float(np.linalg.norm(doubts))
+    unseen = () if MAKEUP_BLOCKED.name in strange.names else unseen_valve_note(one)
     most = share_lost(plain.log, one.values, plain.start.parameters.pump_displacement, strange.names)
     weights, p = weights_of(strange.fits), plain.start.parameters
     found, correlation = with_lumped(strange.values, strange.fits, weights, p, plain.log.measured_rms)
@@ -318,7 +317,7 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
         reasons=(*shown, *contradicted(strange, plain.start.parameters)),
         rig_slopes=with_lumped_slopes(one.rig_slopes),
         explanation=strange,
-        remarks=(*plain.teeth, *open_wear_note(strange.delivery_open, most), *open_play),
+        remarks=(*plain.teeth, *open_wear_note(strange.delivery_open, most), *unseen, *open_play),
         turning=plain.turning,
         correlation=correlation,
     )

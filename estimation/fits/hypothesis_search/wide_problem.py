@@ -46,7 +46,7 @@ are then so steep that the deviation of bulk modulus comes out twenty times too 
 FASTEST_MAKEUP, FASTEST_FOLLOWED = 0.5 * LONGEST_STEP, 0.02 * LONGEST_STEP
 """Least time in which a wide open make-up valve fills a chamber, and the same with implicit steps [s]. At a fifth of a
 model step the model may chatter, as at a sharp relief valve: the deviation of bulk modulus came out nine times too
-small. Implicit steps do not; valves of random rigs need 0.03 ms and more."""
+small. Implicit steps do not; valves of random rigs need 0.013 ms and more."""
 
 MOST_VOLUME = 2.0
 """Factor by which a chamber's volume is sought above or below the rig file's [dimensionless]: 4.6 deviations of what is

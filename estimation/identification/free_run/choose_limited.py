@@ -25,6 +25,10 @@ MARGIN, CUT_OFF = 0.02, 0.7
 """Share by which stops must do better than none on what was held back, as a nonlinearity at the input must; and share
 of the error without a limit that a model which is cut off may leave, as a pole at 1 may."""
 
+ONE_LEVEL, NEARLY = 0.05, 0.9
+"""How far an input may be from its median, over its deviation in the whole log, to have one value, and share of the
+samples that must have it [fraction]; judged. A sample or two behind each change of the input have the other one."""
+
 
 @dataclass(frozen=True, eq=False)
 class LimitedCandidate:
@@ -90,14 +94,22 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
     # what is cut off leaves noise: an output that bends towards an end gains less, and goes beyond it in other logs
     best, stops = one.best, taken.limits.stops
     least = (1.0 - MARGIN if stops else CUT_OFF) * best.held_back
-    if taken.held_back < (min(least, BELIEVED) if stops else least) and told_apart(
-        taken.block_errors, best.block_errors
-    ):
+    least = min(least, BELIEVED) if stops else 0.0 if _at_one_level(data, limits) else least
+    if taken.held_back < least and told_apart(taken.block_errors, best.block_errors):
         return taken
     if not stops and taken.bic < best.bic and taken.held_back < best.held_back:
         shown, share = told_limits(data, one.task.by, limits)
         one.notes.append(IdentificationCode.OUTPUT_AT_END.note(output=data.output, limits=shown, share=share))
     return None
+
+
+def _at_one_level(data: Channels, limits: Limits) -> bool:
+    """Return whether inputs have one value nearly wherever the output stands at an end: it may have settled there."""
+    u, y = np.concatenate(data.u), np.concatenate(data.y)
+    at, middle = at_limits(y, limits), 0.5 * (limits.low + limits.high)  # infinite where one end alone is finite
+    ends = [at & end for end in (y > middle, y < middle) if np.any(at & end)]
+    apart = [np.abs(u[end] - np.median(u[end], axis=0)) / np.std(u, axis=0) for end in ends]
+    return all(np.mean(np.all(one < ONE_LEVEL, axis=1)) > NEARLY for one in apart)
 
 
 def told_limits(data: Channels, by: Scaling, limits: Limits) -> tuple[str, float]:
@@ -109,6 +121,11 @@ def told_limits(data: Channels, by: Scaling, limits: Limits) -> tuple[str, float
         Scaled, and how.
     limits : Limits
         Of the output.
+
+    Returns
+    -------
+    tuple of str and float
+        Ends in the output's unit; share of the samples [fraction].
     """
     ends = [by.y_mean + by.y_std * one for one in (limits.low, limits.high)]
     at = np.count_nonzero(np.concatenate([at_limits(y, limits) for y in data.y]))

@@ -206,7 +206,7 @@ def beside_unseen_valve(
     if not probabilities or all(note.code is not RigCode.MAKEUP_UNSEEN for note in not_told):
         return probabilities, ()
     left = {name: (1.0 - UNSEEN) * share for name, share in probabilities.items()}
-    return left, (ClassCode.STUCK_NOT_TOLD.note(percent=100.0 * UNSEEN),)
+    return left, (ClassCode.STUCK_NOT_TOLD.note(percent=100.0 * UNSEEN * sum(probabilities.values())),)
 
 
 def _share(scores: Array, place: int) -> float:

@@ -92,6 +92,14 @@ def test_bulk_modulus_that_no_oil_has_is_a_mistake_of_a_channel() -> None:
         assert ChannelCode.NO_SUCH_OIL in [note.code for note in found.gate.reasons]
 
 
+def test_oil_is_not_judged_by_a_rig_file_with_a_catalogue_value() -> None:
+    """A file with 1.7 GPa, as mineral oil has without air, had right numbers of 200 MPa refused."""
+    rng = np.random.default_rng(3)
+    log = simulate(CIRCUIT, make_drive("prbs", 2.0, 1e-3, RIG, rng), 1e-3, RIG, sensors=BENCH, rng=rng)
+    found = estimate_bulk_modulus(log, replace(RIG, bulk_modulus=1.7e9))
+    assert found.value == pytest.approx(RIG.bulk_modulus, rel=0.02)
+
+
 @pytest.mark.parametrize(
     ("modulus", "kept"), [(1.5e9, True), (1.8e9, True), (3.5e9, False), (4e7, True), (1.7e7, False)]
 )

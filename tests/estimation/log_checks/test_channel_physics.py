@@ -195,7 +195,7 @@ def test_a_pump_that_would_deliver_what_none_can_is_a_speed_in_another_unit(
     share: float, named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     delivered = {"pump_displacement": (share * HEALTHY.pump_displacement, 1e-9), "bulk_modulus": (2e8, 1e5)}
-    explanation = SimpleNamespace(values=delivered)
+    explanation = SimpleNamespace(values=delivered, names=())
     fit = FormFit(delivered, 5e-4, 1.0, (), {}, explanation)
     monkeypatch.setattr(bulk_modulus, "_fit", lambda *_, **__: fit)
     found = bulk_modulus.estimate_bulk_modulus(run(), HEALTHY)

@@ -88,6 +88,15 @@ def test_the_first_rise_of_pressure_from_rest_sets_none_anew(first: float, *, na
     assert (SensorCode.PRESSURE_REZEROED in [note.code for note in without_discontinuities(given)[1]]) == named
 
 
+def test_a_pressure_that_is_zeroed_while_the_motor_turns_slowly_is_named() -> None:
+    """All that came before the motor was at half its highest speed was taken for its setting off."""
+    record, rows = log("multisine"), np.arange(4000)
+    slow = np.where(rows < 500, 0.0, np.where(rows < 3500, 0.2 * record[SPEED], 5.0 * record[SPEED]))
+    pressure = record[PRESSURE] + np.where(rows < ROW, 0.0, 1e6)
+    given = record.replace(**{SPEED: slow, PRESSURE: pressure, VELOCITY: None})
+    assert SensorCode.PRESSURE_REZEROED in [note.code for note in without_discontinuities(given)[1]]
+
+
 def test_a_piston_that_meets_a_stop_has_lost_no_rows_and_no_zero() -> None:
     """A load pulls it there; pump and pressure then change within a row. The part behind gave oil 17 % too soft."""
     time = 1e-3 * np.arange(3000)

@@ -63,6 +63,17 @@ def test_steps_become_the_largest() -> None:
     assert np.array_equal(even["motor_speed_rad_s"], values)
 
 
+@pytest.mark.parametrize("spike", [1.0, -9999.0])
+def test_a_spike_does_not_coarsen_the_log(spike: float) -> None:
+    """One sample of 9999 rounded all positions to 0."""
+    values = printed(0.04 * np.sin(0.01 * np.arange(3000.0)), 4)
+    whole, _ = with_even_steps(Record(1e-3, {"motor_speed_rad_s": values, POSITION: values}))
+    struck = np.where(np.arange(3000) == 700, spike, values)
+    even, (note,) = with_even_steps(Record(1e-3, {"motor_speed_rad_s": values, POSITION: struck}))
+    assert note.data["digits"] == 4
+    assert np.array_equal(np.delete(even[POSITION], 700), np.delete(whole[POSITION], 700))
+
+
 def test_position_of_four_digits_costs_no_number() -> None:
     """A plain log was refused after a search of 20 s."""
     record = log()

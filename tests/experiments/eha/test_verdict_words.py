@@ -170,6 +170,13 @@ def test_an_unknown_verdict_gives_no_plain_probability_and_nothing_to_repair() -
     assert not any("pump and piston seal" in line for line in said)
 
 
+def test_the_nearest_condition_of_an_unknown_verdict_is_one_of_the_nine() -> None:
+    """A valve that never opened had its share of "if it had to be one of them": 90 % in place of 99.9 %."""
+    shares = {"normal": 0.9, "minor_friction": 0.0005}
+    said = headline({"probabilities": shares, "unknown": True, "condition": "unknown", "since_s": None})
+    assert "99.9 % if it had to be" in said
+
+
 def test_the_numbers_of_an_unknown_log_are_preceded_by_a_warning() -> None:
     warned = "  numbers   do not rely on them: they are those of the nearest model, which does not fit the log"
     for against, there in ((AGAINST, True), ((), False)):

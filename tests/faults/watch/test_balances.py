@@ -82,6 +82,6 @@ def test_gains_weigh_lost_flow_with_pressure_and_pressure_with_velocity() -> Non
     for w, v, p in zip(speed, velocity, pressure, strict=True):
         count_gains(w, v, p, 1, gains)
     assert gains[1] == pytest.approx(
-        [0.3 * pressure @ pressure, speed @ pressure, pressure @ velocity, velocity @ velocity]
+        [0.3 * pressure @ pressure, speed @ pressure, pressure @ velocity, velocity @ velocity, pressure @ pressure]
     )
     assert not gains[[0, 2]].any()

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from estimation.eha.bulk_modulus import LEAST_SQUARES, estimate_bulk_modulus
+from estimation.fits.flow import fit as flow_fit
 from estimation.fits.flow.belief import told_by
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import speed_gaps
@@ -130,13 +131,15 @@ def test_an_offset_of_speed_does_not_pass_for_one_of_pressure() -> None:
 
 
 @pytest.mark.slow
-def test_an_offset_of_pressure_does_not_pass_for_one_of_speed() -> None:
-    record = worn_log()
+def test_an_offset_of_pressure_does_not_pass_for_one_of_speed(monkeypatch: pytest.MonkeyPatch) -> None:
+    record, unseen = worn_log(), RigCode.MAKEUP_UNSEEN.note(side="A")
+    monkeypatch.setattr(flow_fit, "unseen_valve_note", lambda _: (unseen,))
     high = record.replace(differential_pressure_pa=record["differential_pressure_pa"] + 2e4)
     fit = fit_flow(high, HEALTHY, 2e8)
     assert fit.turning.offset == 0.0
     assert fit.explanation is not None
     assert fit.explanation.values["pressure_offset"][0] == pytest.approx(2e4, rel=0.05)
+    assert unseen in fit.remarks  # what an explained log does not show is told as well
 
 
 def test_a_log_without_pressure_is_refused_with_what_it_lacks() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from estimation.eha.rig_share import fitted_responses
-from estimation.fits.flow.told_volume import RATIO_DOUBT, bound_told, is_told, ratio_doubt
+from estimation.fits.flow.told_volume import RATIO, bound_told, is_told, ratio_doubt
 from estimation.fits.hypotheses import VOLUME
 from plant.eha.doubts import DOUBTS, PRESSURE_GAIN
 
@@ -26,11 +26,18 @@ def test_a_log_that_tells_more_is_no_less_observable_for_it() -> None:
 
 
 def test_what_a_log_leaves_of_displacement_over_area_is_in_the_interval() -> None:
-    assert ratio_doubt(explained(VOLUME.name)) == pytest.approx(20.0 * 1e-3)
-    assert ratio_doubt(explained(VOLUME.name, deviation=1.0)) == pytest.approx(20.0 * RATIO_DOUBT)
-    assert ratio_doubt(explained("encoder_zero")) == ratio_doubt(explained(VOLUME.name, slopes={})) == 0.0
-    usual = [DOUBTS[name].usual.up for name in ("pump_displacement", "piston_area")]
-    assert sum(one**2 for one in usual) ** 0.5 == pytest.approx(RATIO_DOUBT, rel=0.01)
+    usual = {name: DOUBTS[name].usual.up for name in RATIO}
+    assert ratio_doubt(explained(VOLUME.name), usual) == pytest.approx(20.0 * 1e-3)
+    for file in (usual, {"pump_displacement": 0.1}, {"piston_area": 0.02}):
+        doubt = sum(one**2 for one in file.values()) ** 0.5
+        assert ratio_doubt(explained(VOLUME.name, deviation=1.0), file) == pytest.approx(20.0 * doubt)
+    assert ratio_doubt(explained("encoder_zero"), usual) == ratio_doubt(explained(VOLUME.name, slopes={}), usual) == 0.0
+
+
+def test_the_area_answers_for_the_ratio_where_displacement_was_measured() -> None:
+    slopes = {"piston_area": {"bulk_modulus": -4e9}}
+    doubt = ratio_doubt(explained(VOLUME.name, deviation=1.0, slopes=slopes), {"piston_area": 0.02})
+    assert doubt == pytest.approx(20.0 * 0.02)
 
 
 @pytest.mark.parametrize(

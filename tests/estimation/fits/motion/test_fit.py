@@ -140,13 +140,6 @@ def test_starts_that_larger_noise_does_not_explain_or_that_end_alike_are_left_ou
     assert begun.work > 0
 
 
-def test_where_the_work_is_done_the_likeliest_start_alone_is_brought_near() -> None:
-    search, begun = searches_of(seen(short_log(0.2)))[0], Begun()
-    assert len(list(search.brought_near(0, begun, lambda: False))) == 1
-    assert set(begun.screened) == {0}
-    assert list(search.brought_near(1, begun, lambda: False)) == []
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("condition", ["major_leakage_minor_friction", "minor_leakage_major_friction"])
 def test_a_log_that_does_not_hold_the_scale_of_forces_says_so(condition: str) -> None:

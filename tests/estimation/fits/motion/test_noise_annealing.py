@@ -59,4 +59,5 @@ def test_a_share_is_asked_of_steps_on_the_way_back_alone(monkeypatch: pytest.Mon
 
     monkeypatch.setattr(noise_annealing, "descend", noted)
     annealed(problem([]), PIT, BOUNDS, 1e-3, 1.0, least_share=0.01)
+    assert shares
     assert shares == [0.0, 0.01] * (len(shares) // 2)

@@ -21,6 +21,7 @@ from estimation.fits.motion.search import (
     explained,
     likeliest,
 )
+from tests.estimation.fits.motion.test_fit import searches_of, seen, short_log
 
 SHORT, PART = 100, 400
 Misfit = Callable[[float], float]
@@ -163,3 +164,10 @@ def test_what_explains_the_first_seconds_alone_is_not_taken(monkeypatch: pytest.
 def test_the_less_a_log_holds_the_farther_an_unseen_misfit_may_move_it() -> None:
     assert unseen(0.9, 20_000) == pytest.approx((1.0 + 200.0) ** 0.5)
     assert unseen(1.05, 20_000) == pytest.approx((1.0 + 200.0 + 1000.0) ** 0.5)
+
+
+def test_where_the_work_is_done_the_likeliest_start_alone_is_brought_near() -> None:
+    search, begun = searches_of(seen(short_log(0.2)))[0], Begun()
+    assert len(list(search.brought_near(0, begun, lambda: False))) == 1
+    assert set(begun.screened) == {0}
+    assert list(search.brought_near(1, begun, lambda: False)) == []

@@ -85,6 +85,19 @@ def test_an_end_that_one_block_alone_reaches_is_told() -> None:
     assert not isinstance(found.model.dynamics, LimitedDynamics)
 
 
+def test_an_output_that_settles_at_the_level_of_its_input_is_not_cut_off() -> None:
+    """A plant that rises faster than it falls was told as cut off, with a gain of 1.37 for 1."""
+    rng = np.random.default_rng(2)
+    u, y = np.repeat(rng.integers(0, 2, 1500).astype(float), rng.integers(20, 120, 1500))[:1500], np.zeros(1500)
+    for t in range(1, 1500):
+        y[t] = y[t - 1] + (0.12 if u[t - 1] > y[t - 1] else 0.04) * (u[t - 1] - y[t - 1])
+    y += 0.005 * rng.normal(size=1500)
+    with pytest.warns(LogWarning, match="does not tell whether it is cut off"):
+        found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"))
+    assert found.model.linear is not None
+    assert found.model.linear.dc_gain == pytest.approx(1.0, abs=0.1)
+
+
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
 def test_an_output_between_stops_leaves_them_at_once() -> None:
     u, y = between_stops(0)

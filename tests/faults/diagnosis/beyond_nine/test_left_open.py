@@ -34,4 +34,6 @@ def test_a_valve_that_never_opened_may_be_stuck_as_likely_as_each_of_the_nine() 
     assert [note.code for note in said] == [ClassCode.STUCK_NOT_TOLD]
     assert said[0].data["percent"] == pytest.approx(100.0 * (1.0 - left["major_friction"]))
     assert beside_unseen_valve(sure, ()) == (sure, ())
+    worn, (beside,) = beside_unseen_valve({"normal": 0.0, "major_friction": 0.7}, unseen)  # a worn pump has 0.3
+    assert sum(worn.values()) + 0.01 * beside.data["percent"] == pytest.approx(0.7)
     assert beside_unseen_valve({}, unseen) == ({}, ())
