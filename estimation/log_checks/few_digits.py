@@ -77,14 +77,19 @@ def written_digits(values: Array) -> int:
         return 0
     powers = _power(there)
     last_used = np.rint(there * 10.0 ** (digits - 1 - powers)) % 10.0 != 0.0
-    told = [last_used[powers == power] for power in np.unique(powers)]
-    return digits if sum(len(one) >= FEWEST and bool(np.mean(one) > USED) for one in told) > 1 else 0
+    told = [np.mean(last_used[powers == power]) > USED for power in _common(powers)]
+    return digits if sum(told) > 1 else 0
 
 
 def _largest_power(values: Array) -> float:
     """Return the largest power of ten that enough samples have: a spike must not coarsen the whole log."""
-    powers, counts = np.unique(_power(_sizes(values)), return_counts=True)
-    return float(powers[counts >= FEWEST][-1])
+    return float(_common(_power(_sizes(values)))[-1])
+
+
+def _common(powers: Array) -> Array:
+    """Return the powers that enough samples have, in order."""
+    found, counts = np.unique(powers, return_counts=True)  # without counts NumPy imports its masked arrays
+    return found[counts >= FEWEST]
 
 
 def _sizes(values: Array) -> Array:
