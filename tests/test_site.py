@@ -14,11 +14,15 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 sys.path.insert(0, str(DOCS))
 site_pages = importlib.import_module("site_pages")
-anchor_of = importlib.import_module("decisions_index").anchor_of
 sys.path.remove(str(DOCS))
 
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.glob("*.md")), *sorted(DOCS.glob("tutorials/*.md"))]
 LINK = re.compile(r"\]\(([^)\s]+)\)")
+
+
+def anchor_of(heading: str) -> str:
+    """Return the anchor that a heading of Markdown gets: small letters, hyphens for spaces, nothing else but digits."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
 def prose(page: Path) -> str:
