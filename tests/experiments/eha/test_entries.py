@@ -274,7 +274,7 @@ def test_a_wrong_volume_in_the_rig_file_is_mended_before_another_drive_is_tried(
         notes=(*found.notes, differs),
     )
     message = estimate_entries(unseen)["message"]
-    assert "53.0 ± 5 % of that in the rig file; correct chamber_volume" in message
+    assert "53.0 ± 5.0 % of that in the rig file; correct chamber_volume" in message
     assert "slower steps" not in message
 
 

@@ -67,17 +67,17 @@ def test_an_accumulator_far_stiffer_than_presumed_has_taken_up_something_else() 
 
 
 @pytest.mark.parametrize(
-    ("less", "left", "more"),
-    [(2.5, 0.1, "more"), (1.0, 0.1, None), (-2.5, 0.1, "less")],
+    ("less", "left", "limit"),
+    [(2.5, 0.1, "least"), (1.0, 0.1, None), (-2.5, 0.1, "most")],
 )
-def test_gas_that_a_log_contradicts_is_named(less: float, left: float, more: str | None) -> None:
+def test_gas_that_a_log_contradicts_is_named(less: float, left: float, limit: str | None) -> None:
     rig = replace(PAPER, accumulator_gas=SMALL)
     usual, spread = presumed_stiffness(rig, {"accumulator_gas": 0.35})[STIFFNESS]
     told = replace(seen(log(0.2)), presumed={STIFFNESS: (usual, spread)})
     found = usual * math.exp(-less)
     fit = replace(made_fit(100.0, 2e8, 1e6), values={STIFFNESS: found}, std={STIFFNESS: left * found})
     said = gas_contradicted(told, fit, rig)
-    assert [note.data["more"] for note in said] == ([] if more is None else [more])
+    assert [note.data["limit"] for note in said] == ([] if limit is None else [limit])
     assert gas_contradicted(told, fit, PAPER) == ()  # it states none
     assert gas_contradicted(told, replace(fit, std={STIFFNESS: np.inf}), rig) == ()  # the log tells nothing
 

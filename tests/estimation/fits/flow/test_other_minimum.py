@@ -97,7 +97,7 @@ def test_a_search_that_is_told_of_a_lower_valley_ends_there(monkeypatch: pytest.
     assert min(fit.cost for fit in led) == pytest.approx(sound.cost, abs=0.5)  # without valves that crack
 
 
-def unmoved(one: Any, log: GreyBoxLog, wanted: float = np.inf, *, bent: bool) -> Any:  # noqa: ARG001 -- as it is called
+def unmoved(one: Any, log: GreyBoxLog, wanted: float = np.inf, **_: Any) -> Any:  # noqa: ARG001 -- as it is called
     """Return a form as it stands a percent off its bulk modulus, as if there were a valley."""
     problem, theta = one.problem.on(log), one.point.theta.copy()
     theta[0] += 0.05
