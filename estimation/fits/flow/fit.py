@@ -337,7 +337,7 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     reasons = (*objections(best, plain.log.passes_on), *play_left(plain.swinging.play, sensed)) or plain.teeth_left
     if begun and not reasons and not told_by(plain, begun=begun)(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
-    (value, std), gas = found["bulk_modulus"], gas_contradicted(plain.log, plain.swinging, p)
+    (value, std), gas = found["bulk_modulus"], () if reasons else gas_contradicted(plain.log, plain.swinging, p)
     return FormFit(
         parameters=with_structure(found, float(np.hypot(left if sure else max(left, STRUCTURE), untaken))),
         bound=std / value,

@@ -71,12 +71,15 @@ def test_what_a_log_begins_with_must_leave_noise_alone_and_an_offset_no_more_tha
 
 
 @pytest.mark.slow
-def test_a_wandering_pressure_sensor_is_objected_to() -> None:
-    record = log("normal", 12, duration=2.0)
+def test_a_wandering_pressure_sensor_is_objected_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And a fit that does not explain its log contradicts no gas of the rig file."""
+    gas, record = RigCode.GAS_CONTRADICTED.note(limit="least", ratio=4.0), log("normal", 12, duration=2.0)
+    monkeypatch.setattr(flow_fit, "gas_contradicted", lambda *_: (gas,))
     drift = 2e5 * np.sin(np.linspace(0.0, 6.0, len(record)))  # an even drift would be found and taken off
     fit = fit_flow(record.replace(differential_pressure_pa=record["differential_pressure_pa"] + drift), HEALTHY, 2e8)
     (ratio,) = (note.data["ratio"] for note in fit.reasons if note.code == EstimateCode.PRESSURE_RESIDUALS_LARGE)
     assert ratio > 3.0
+    assert gas not in fit.remarks
 
 
 @pytest.mark.parametrize("offset", [0.0, 2e5], ids=["at rest", "under load"])
