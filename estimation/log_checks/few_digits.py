@@ -70,12 +70,13 @@ def written_digits(values: Array) -> int:
     (3, 0)
     """
     there = _sizes(values)
-    if len(there) < FEWEST or not _has_digits(there[:: 1 + len(there) // LOOKED_AT], MOST_DIGITS):
-        return 0
-    digits = next((count for count in range(1, MOST_DIGITS + 1) if _has_digits(there, count)), 0)
-    if not digits:
+    few = there[:: 1 + len(there) // LOOKED_AT]
+    if len(there) < FEWEST or not _has_digits(few, _power(few), MOST_DIGITS):
         return 0
     powers = _power(there)
+    digits = next((count for count in range(1, MOST_DIGITS + 1) if _has_digits(there, powers, count)), 0)
+    if not digits:
+        return 0
     last_used = np.rint(there * 10.0 ** (digits - 1 - powers)) % 10.0 != 0.0
     told = [np.mean(last_used[powers == power]) > USED for power in _common(powers)]
     return digits if sum(told) > 1 else 0
@@ -96,10 +97,10 @@ def _sizes(values: Array) -> Array:
     return np.abs(values[np.isfinite(values) & (values != 0.0)])
 
 
-def _has_digits(sizes: Array, digits: int) -> bool:
-    """Return whether so many significant digits are all that positive values have."""
-    scale = 10.0 ** (digits - 1 - _power(sizes))
-    return bool(np.all(np.abs(np.rint(sizes * scale) - sizes * scale) <= EXACT * sizes * scale))
+def _has_digits(sizes: Array, powers: Array, digits: int) -> bool:
+    """Return whether so many significant digits are all that positive values of these powers of ten have."""
+    scaled = sizes * 10.0 ** (digits - 1 - powers)
+    return bool(np.all(np.abs(np.rint(scaled) - scaled) <= EXACT * scaled))
 
 
 def _power(sizes: Array) -> Array:

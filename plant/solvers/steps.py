@@ -143,6 +143,12 @@ def solve_linear(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]) ->
     return b
 
 
+def _ahead(slopes: list[list[Scalar]], h: Scalar) -> list[list[Scalar]]:
+    """Return ``I - h J``, from a row of slopes a state; slopes by anything but states come last, and are left out."""
+    states = range(len(slopes))
+    return [[(ONE if i == j else ZERO) - h * slopes[i][j] for j in states] for i in states]
+
+
 @cache
 def ros2_step(derivative: Derivative) -> StepFunction:
     """Build the ROS2 step of a derivative (Verwer et al. 1999, SIAM J. Sci. Comput. 20, 1456, equation 2.1).
@@ -163,9 +169,7 @@ def ros2_step(derivative: Derivative) -> StepFunction:
         rates = derivative(state, start, p)
         slopes = jacobian(rates, [*state, start])
         drift = [GAMMA * row[-1] * (end - start) for row in slopes]
-        matrix = [
-            [(ONE if i == j else ZERO) - GAMMA * h * slopes[i][j] for j in range(len(state))] for i in range(len(state))
-        ]
+        matrix = _ahead(slopes, GAMMA * h)
         k1 = solve_linear(matrix, [f + d for f, d in zip(rates, drift, strict=True)])
         inner = tuple(x + h * k for x, k in zip(state, k1, strict=True))
         later = derivative(inner, end, p)
@@ -210,9 +214,8 @@ def _solved(derivative: Derivative, base: State, guess: State, speed: Scalar, p:
     for _ in range(NEWTON):
         rates = derivative(x, speed, p)
         slopes = jacobian(rates, x)
-        matrix = [[(ONE if i == j else ZERO) - h * slopes[i][j] for j in range(len(x))] for i in range(len(x))]
         left = [start + h * rate - y for start, rate, y in zip(base, rates, x, strict=True)]
-        x = tuple(y + d for y, d in zip(x, solve_linear(matrix, left), strict=True))
+        x = tuple(y + d for y, d in zip(x, solve_linear(_ahead(slopes, h), left), strict=True))
     return x
 
 
