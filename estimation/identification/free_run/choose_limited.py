@@ -93,8 +93,10 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
     # a run between stops may drift as a pole at 1 does, and is believed where that is: not if it leaves most of it;
     # what is cut off leaves noise: an output that bends towards an end gains less, and goes beyond it in other logs
     best, stops = one.best, taken.limits.stops
-    least = (1.0 - MARGIN if stops else CUT_OFF) * best.held_back
-    least = min(least, BELIEVED) if stops else 0.0 if _at_one_level(data, limits) else least
+    if stops:
+        least = min((1.0 - MARGIN) * best.held_back, BELIEVED)
+    else:
+        least = 0.0 if _at_one_level(data, limits) else CUT_OFF * best.held_back
     if taken.held_back < least and told_apart(taken.block_errors, best.block_errors):
         return taken
     if not stops and taken.bic < best.bic and taken.held_back < best.held_back:
@@ -108,8 +110,8 @@ def _at_one_level(data: Channels, limits: Limits) -> bool:
     u, y = np.concatenate(data.u), np.concatenate(data.y)
     at, middle = at_limits(y, limits), 0.5 * (limits.low + limits.high)  # infinite where one end alone is finite
     ends = [at & end for end in (y > middle, y < middle) if np.any(at & end)]
-    apart = [np.abs(u[end] - np.median(u[end], axis=0)) / np.std(u, axis=0) for end in ends]
-    return all(np.mean(np.all(one < ONE_LEVEL, axis=1)) > NEARLY for one in apart)
+    apart, most = [np.abs(u[end] - np.median(u[end], axis=0)) for end in ends], ONE_LEVEL * np.std(u, axis=0)
+    return all(np.mean(np.all(one <= most, axis=1)) > NEARLY for one in apart)  # a constant input has one value too
 
 
 def told_limits(data: Channels, by: Scaling, limits: Limits) -> tuple[str, float]:
