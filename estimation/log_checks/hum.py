@@ -1,6 +1,7 @@
 """Hum: tones of the mains that a cable picks up into a pressure channel, taken off before anything is fitted.
 
-A tone is told by its line in the spectrum. One that motor speed or position has as well is motion, and stays.
+A tone is told by its line in the spectrum. One that motor speed or position has as well is motion, and stays; so does
+one that is gone while the motor turns at other speeds: teeth of the pump, where a drive stays at its limit of speed.
 """
 
 from functools import lru_cache
@@ -43,6 +44,16 @@ NEARBY = 100
 MOST_TONES = 8
 """Tones that are taken off at most: the mains and its harmonics."""
 
+TEETH = range(5, 31)
+"""Tones in a turn of the motor that a pump may have [count]: pistons of an axial pump to two a tooth of a gear pump."""
+
+AT_TEETH = 0.02
+"""Distance of a tone from a number of tones a turn within which the motor may make it [fraction]; judged."""
+
+UNSEEN, GONE = 10.0, 0.1
+"""Power of a line over the usual one that is none, and the most that it may be of what a hum would have left
+[dimensionless]: of teeth at a limit of speed up to 3 was left while the motor turned otherwise, of hums 15 and more."""
+
 STRETCH = 25.0
 """Periods over which a tone keeps amplitude and phase [periods]: the mains wander by some hundredths of a hertz."""
 
@@ -58,17 +69,22 @@ def without_hum(record: Record) -> tuple[Record, tuple[Note, ...]]:
     if PRESSURE not in record or not np.any(np.isfinite(record[PRESSURE])):
         return record, ()
     motion = [_lines(record[name]) for name in MOVING if name in record and np.any(np.isfinite(record[name]))]
-    pressure, notes = record[PRESSURE], list[Note]()
+    pressure, notes, of_teeth = record[PRESSURE], list[Note](), list[float]()
     for _ in range(MOST_TONES):
         lines = _lines(pressure)
         frequencies = np.arange(len(lines)) / (2 * (len(lines) - 1) * record.sample_time)
         moved = np.max(motion, axis=0, initial=0.0) if motion else np.zeros(len(lines))
         within = (frequencies > LOWEST) & (frequencies < HIGHEST / record.sample_time)
+        for known in of_teeth:
+            within &= np.abs(frequencies - known) > WIDTH
         hums = np.where(within & (moved < SHARED * lines), lines, 0.0)
         place = int(np.argmax(hums))
         if hums[place] < STANDS_OUT or not _alone(frequencies, lines, place):
             break
         frequency = _between(frequencies, lines, place)
+        if _is_of_teeth(record, pressure, frequency, lines, place):
+            of_teeth.append(frequency)
+            continue
         tone = _tone(pressure, frequency * record.sample_time)
         pressure = pressure - tone
         amplitude = float(np.sqrt(2.0 * np.mean(tone**2)))
@@ -76,9 +92,31 @@ def without_hum(record: Record) -> tuple[Record, tuple[Note, ...]]:
     return (record.replace(**{PRESSURE: pressure}), tuple(notes)) if notes else (record, ())
 
 
-def _lines(values: Array) -> Array:
-    """Return the power of each line of a channel's second differences over what is usual near it."""
+def _is_of_teeth(record: Record, pressure: Array, frequency: float, lines: Array, place: int) -> bool:
+    """Return whether a line is gone from the rows in which the motor does not turn at its frequency over that of teeth.
+
+    Hum goes on whatever the motor does. Where it does hardly anything else, nothing tells them apart, and it is hum.
+    """
+    if SPEED not in record or not np.any(np.isfinite(record[SPEED])):
+        return False
+    turns = np.abs(bridged(record[SPEED])) / (2.0 * np.pi)
+    others = min((np.abs(count * turns - frequency) > AT_TEETH * frequency for count in TEETH), key=np.count_nonzero)
+    left = np.max(_lines(pressure, others)[max(place - 1, 0) : place + 2])
+    return bool(left < UNSEEN < GONE * np.mean(others) * lines[place])
+
+
+def _lines(values: Array, rows: Array | None = None) -> Array:
+    """Return the power of each line of a channel's second differences over what is usual near it, of all or some rows.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        The channel.
+    rows : ndarray of bool, shape (n,), optional
+        Those that count.
+    """
     bends = np.diff(bridged(values), n=2)
+    bends = bends if rows is None else bends * rows[1:-1]
     length = smooth_length(len(bends), (2, 3, 5))
     length += length % 2
     power = np.abs(np.fft.rfft(bends * _window(len(bends)), length)) ** 2

@@ -117,3 +117,14 @@ def test_a_stretch_in_which_the_pressure_is_missing_has_no_tone() -> None:
     np.testing.assert_allclose(hum._fitted(waves, values), values)
     values[3:] = np.nan
     assert not hum._fitted(waves, values).any()
+
+
+@pytest.mark.parametrize("goes_on", [False, True])
+def test_a_tone_of_a_motor_at_its_limit_of_speed_is_of_its_pump_unless_it_goes_on_without(goes_on: bool) -> None:
+    record = log("steps")
+    time = record.sample_time * np.arange(len(record))
+    turning = time > 1.5
+    speed = np.where(turning, 130.0, 20.0) + 0.05 * np.random.default_rng(1).standard_normal(len(time))
+    tone = 2e4 * np.sin(9.0 * 130.0 * time) * (turning | goes_on)
+    given = record.replace(motor_speed_rad_s=speed, **{PRESSURE: record[PRESSURE] + tone})
+    assert len(without_hum(given)[1]) == goes_on
