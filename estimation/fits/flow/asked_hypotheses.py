@@ -24,6 +24,7 @@ from estimation.fits.hypotheses import (
     MAY_HIDE,
     OFFSET_AT_REST,
     PLAY,
+    PRESSURE_LATE,
     SPEED_LATE,
     START_LOAD,
     UNLIKE_CRACKS,
@@ -129,8 +130,9 @@ def hypotheses_asked(
     worn = delivery.gain > worth and abs(delivery.size) > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and abs(zero.size) > LEAST_ZERO
     plays = play_shows(swinging.play, sensed)
-    behind = swinging.values.get("speed_lead", 0.0) > FARTHEST_LEAD * log.sample_time
-    tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays), (SPEED_LATE, behind)
+    lead = swinging.values.get("speed_lead", 0.0) / log.sample_time
+    behind, ahead = lead > FARTHEST_LEAD, lead < -FARTHEST_LEAD
+    tried = (DELIVERY, worn), (ENCODER_ZERO, shifted), (PLAY, plays), (SPEED_LATE, behind), (PRESSURE_LATE, ahead)
     asked = tuple(one for one, worthwhile in tried if worthwhile)
     asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > worth)
     asked += tuple(one for one in _late_valves(swinging) if one not in asked)

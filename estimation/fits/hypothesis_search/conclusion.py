@@ -12,6 +12,7 @@ from estimation.fits.hypothesis_search.final_fits import with_details
 from estimation.fits.hypothesis_search.form_fit import weighed
 from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, PredictedGain, predicted_gain_beside
 from estimation.fits.hypothesis_search.wide_log import balanced_by, delayed, usual_pressure
+from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import STIFFNESS
 from estimation.models.wide_flow import GROWTH, grown_leakage
 from plant.eha.model import EhaParameters
@@ -66,10 +67,9 @@ def _detailed(
 
 
 def _delivery_open(log: GreyBoxLog, best: Trial) -> PredictedGain:
-    """Return the predicted gain of another pump delivery beside an explanation of a log, in its balance."""
+    """Return the predicted gain of another pump delivery beside an explanation of a log, where its fit ended."""
     if DELIVERY.free[0] in best.values:
         return NO_GAIN
-    row, more = delayed(log, best.delays), (STIFFNESS,) if STIFFNESS in best.values else ()
-    if not any(STIFFNESS in one.beside for one in best.together):  # else it is freed in either balance
-        row = balanced_by(row, float(bool(more)))
+    row = balanced_by(delayed(log, best.delays), float(best.by_mass))
+    more = [name for name in (STIFFNESS, *CRACKS) if name in best.values]
     return predicted_gain_beside(row, best.together, best.values, DELIVERY, *more)

@@ -33,6 +33,8 @@ class Trial:
         Whether what was found is not what the hypotheses say.
     coarse : Mapping[str, float]
         Once it is finished: its values where its search with long model steps ended [SI].
+    by_mass : bool
+        Once it is finished: whether its likelier balance is by mass.
     """
 
     together: tuple[Hypothesis, ...]
@@ -43,6 +45,7 @@ class Trial:
     fits: tuple[GreyBoxFit, ...] = ()
     void: bool = False
     coarse: Mapping[str, float] = field(default_factory=dict[str, float])
+    by_mass: bool = False
 
     @property
     def cost(self) -> float:

@@ -91,7 +91,7 @@ def final_fit(log: GreyBoxLog, tried: Trial, useful: float = np.inf, *details: s
         done.append((_to_its_end(problem, begun, start, *more, useful=useful), problem))
         useful = min(useful, done[-1][0].cost + ALIKE)
     done.sort(key=lambda one: one[0].cost)
-    best = replace(done[0][0], coarse=tried.values)
+    best = replace(done[0][0], coarse=tried.values, by_mass=balances_mass(done[0][1].log))
     count = [one for one in done if one[0].cost <= best.cost + ALIKE]
     first, *rivals = (_concluded(problem, one.point, log) for one, problem in count)
     if best.meant and all(one.told(best.values, first.std) for one in best.together):
