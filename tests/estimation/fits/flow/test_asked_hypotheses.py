@@ -20,7 +20,10 @@ from estimation.fits.hypotheses import (
     LARGE_CRACK,
     LEAST_ZERO,
     MAKEUP_HIDDEN,
+    PRESSURE_LATE,
+    SPEED_LATE,
     UNLIKE_CRACKS,
+    Hypothesis,
 )
 from estimation.fits.hypothesis_search.fit_objections import DOUBTED, QUIET
 from estimation.fits.hypothesis_search.not_excluded import OPEN_DELIVERY
@@ -67,6 +70,17 @@ def test_valves_as_wide_as_a_model_resolves_are_asked_what_they_took_up() -> Non
             asked, remarks = hypotheses_asked(plain, PAPER, wide, wide, loaded=False, moving=False)
         assert asked == wanted
         assert [note.code for note in remarks] == [RigCode.WEAR_NOT_EXCLUDED]  # what is left open stays so
+
+
+@pytest.mark.parametrize(("lead", "wanted"), [(-0.5, ()), (-1.0, (PRESSURE_LATE,)), (1.0, (SPEED_LATE,))])
+def test_a_lead_of_the_motor_at_its_bounds_is_asked_which_channel_is_late(
+    lead: float, wanted: tuple[Hypothesis, ...]
+) -> None:
+    """A pressure 2.5 ms late went into it at 500 Hz, with bulk modulus 5.6 % too high and a worn pump called sound."""
+    plain, sound = seen(log(0.2)), made_fit(400.0, 2e8, 1e5)
+    early = replace(sound, values={**sound.values, "speed_lead": lead * plain.sample_time})
+    with all_promise(NO_GAIN):
+        assert hypotheses_asked(plain, PAPER, early, early, loaded=False, moving=False)[0] == wanted
 
 
 def test_a_minute_at_1_khz_is_asked_and_two_are_not() -> None:

@@ -12,6 +12,7 @@ from estimation.fits.hypothesis_search import conclusion, explain, predicted_gai
 from estimation.fits.hypothesis_search.predicted_gains import by_predicted_gain, predicted_gain, predicted_gain_beside
 from estimation.fits.hypothesis_search.wide_log import balances_mass
 from estimation.fits.hypothesis_search.wide_problem import freed
+from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import STIFFNESS
 from estimation.models.wide_flow import QUICK_FLOW_FORM, QUICKNESS
 from tests.estimation.fits.short_logs import PAPER, at_one_speed, log, lost_in_bias, seen, wide
@@ -58,11 +59,11 @@ def test_what_is_promised_beside_air_is_promised_with_bubbles_as_they_were_found
     assert all(QUICKNESS in one.model.unknowns for one in asked)  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("by_mass", [True, False])
-def test_what_another_delivery_promises_is_asked_in_the_balance_of_the_fit(
-    by_mass: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("by_mass", "freed_last"), [(True, (STIFFNESS,)), (False, ()), (False, (STIFFNESS, *CRACKS))])
+def test_what_another_delivery_promises_is_asked_where_the_fit_ended(
+    by_mass: bool, freed_last: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Asked in the other one, a sound pump promised a gain of 30,000 where a fit left the sensors' noise."""
+    """Asked in the other balance, or without drops of valves that were freed, a sound pump promised 30,000 and 208."""
     asked = list[tuple[bool, tuple[object, ...]]]()
 
     def noted(row: GreyBoxLog, *given: object) -> object:
@@ -70,11 +71,11 @@ def test_what_another_delivery_promises_is_asked_in_the_balance_of_the_fit(
         return predicted_gains.NO_GAIN
 
     monkeypatch.setattr(conclusion, "predicted_gain_beside", noted)
-    values = {**FOUND, "air_softness": 2e3}
-    if not by_mass:
-        values = {name: value for name, value in values.items() if name != STIFFNESS}
-    conclusion._delivery_open(wide(), SimpleNamespace(together=(AIR,), values=values, delays={}))  # type: ignore[arg-type]
-    assert asked == [(by_mass, (STIFFNESS,) if by_mass else ())]
+    values = {**FOUND, "air_softness": 2e3, **dict.fromkeys(CRACKS, 1e3)}
+    values = {name: one for name, one in values.items() if name not in (STIFFNESS, *CRACKS) or name in freed_last}
+    best = SimpleNamespace(together=(AIR,), values=values, delays={}, by_mass=by_mass)
+    conclusion._delivery_open(wide(), best)  # type: ignore[arg-type]
+    assert asked == [(by_mass, freed_last)]
 
 
 def test_air_is_tried_whatever_its_slopes_promise() -> None:
