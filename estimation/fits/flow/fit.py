@@ -232,6 +232,7 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
         paired=any(one not in (*ALWAYS_ASKED, CHECKS_HIDDEN, PLAY, PRESSURE_SIDES) for one in asked),
         hopeless=hopeless_cost(plain.swinging, asked),
         by_mass=balances_mass(plain.swinging.model),
+        homed=homed_at_stop(plain.log),
         useful=_wanted((asked[0].name,), plain, traits, 0.0) if alone else np.inf,
     )
     if strange is None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, START_LOAD, VOLUME, Hypothesis
+from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO, HYPOTHESES, START_LOAD, VOLUME, Hypothesis
 from estimation.fits.hypothesis_search.coarse_search import coarsened, vanished_values
 from estimation.fits.hypothesis_search.compatible_hypotheses import compatible_hypotheses
 from estimation.fits.hypothesis_search.conclusion import Accepted, conclude, is_explained
@@ -19,10 +19,7 @@ from estimation.fits.hypothesis_search.decimation import FEW, Decimation, cost_o
 from estimation.fits.hypothesis_search.decimation_limit import decimation_limit
 from estimation.fits.hypothesis_search.explanation import Explanation, Trial
 from estimation.fits.hypothesis_search.final_fits import ALIKE, REACHED, behind_filter, with_less_lag
-from estimation.fits.hypothesis_search.predicted_gains import (
-    by_predicted_gain,
-    predicted_gain_beside,
-)
+from estimation.fits.hypothesis_search.predicted_gains import by_predicted_gain, predicted_gain_beside
 from estimation.fits.hypothesis_search.ranking import (
     NEARLY_AS_GOOD,
     ended_apart,
@@ -75,6 +72,7 @@ def explain(
     paired: bool = True,
     hopeless: float = np.inf,
     by_mass: bool = False,
+    homed: bool = False,
     useful: float = np.inf,
 ) -> Explanation | None:
     """Return the hypotheses that explain a log best, alone or two together.
@@ -98,6 +96,8 @@ def explain(
     by_mass : bool
         Whether mass is balanced while hypotheses are compared, as where the likelier plain fit does; else volume. At
         high pressure the two differ by more than what is strange.
+    homed : bool
+        Whether the log shows that its encoder was homed at a stop.
     useful : float
         Cost above which what is tried alone is of no use [dimensionless].
 
@@ -118,6 +118,8 @@ def explain(
     if paired and delivers and not is_explained(finished[0], accepted):
         finished = ranked([*finished, *likeliest(wide, [[*screen(wide, (DELIVERY,), starts)]], spared=spared)])
     finished = _distinct([behind_filter(wide, finished[0]), *finished])
+    if paired and homed:
+        finished = _distinct([*finished, *_with_zero(wide, finished[0], spared, accepted)])
     if paired and finished[0].cost < hopeless and not _by_itself(wide, finished[0], accepted):
         first, second = finished[0], finished[1] if len(finished) > 1 else None
         pairs = _paired(wide, first, starts[0], accepted)
@@ -255,6 +257,20 @@ def _paired(
         if more:
             pairs = ranked([*pairs, *likeliest(late, more, known, spared, useful)])
     return _better(first, pairs, least)
+
+
+def _with_zero(log: GreyBoxLog, first: Trial, spared: Decimation, accepted: Accepted) -> list[Trial]:
+    """Return what is likeliest alone together with an encoder's zero, of a log that shows one, if both explain it.
+
+    Both are sought from where the first one was: alone it has taken up part of the zero. An offset of the pressure was
+    found a third too large, and no zero beside it.
+    """
+    if ENCODER_ZERO in first.together or is_explained(first, accepted):
+        return []
+    late = delayed(log, first.delays)
+    tried = [*screen(late, (*first.together, ENCODER_ZERO), spared.starts, every=spared.every)]
+    ended = (one for one in likeliest(late, [tried], spared=spared) if is_explained(one, accepted))
+    return [replace(one, delays={**first.delays, **one.delays}) for one in ended]
 
 
 def _rig_and_load(
