@@ -11,8 +11,9 @@ import numpy as np
 
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO, HYPOTHESES, START_LOAD, VOLUME, Hypothesis
+from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, START_LOAD, VOLUME, Hypothesis
 from estimation.fits.hypothesis_search.coarse_search import coarsened, vanished_values
+from estimation.fits.hypothesis_search.commonly_hidden import delivery_followed, with_zero
 from estimation.fits.hypothesis_search.compatible_hypotheses import compatible_hypotheses
 from estimation.fits.hypothesis_search.conclusion import Accepted, conclude, is_explained
 from estimation.fits.hypothesis_search.decimation import FEW, Decimation, cost_over_noise, decimation_for
@@ -52,11 +53,6 @@ NOISE = 1.05
 BESIDE = 50.0
 """Gain in log-likelihood that slopes promise another volume beside a pump that delivers less, from which the two are
 sought together [dimensionless]; judged."""
-
-PROMISES_AS_WELL = 0.5
-"""Share of the largest gain that slopes promise, from which a pump that delivers another share is followed to its end
-where nothing explains a log alone [fraction]; judged. An area 5 % low promises more as a leakage that changes, in four
-ways, and came nearest as a relief valve that opens early."""
 
 WORTH = 10.0
 """Gain in log-likelihood below which a hypothesis is not accepted [dimensionless]."""
@@ -114,12 +110,11 @@ def explain(
     finished = _alone(wide, plain.cost, (likely, others, gains), spared, accepted, useful)
     if finished[0].fits and not is_explained(finished[0], accepted):
         finished = ranked([*finished, *filter(None, [with_less_lag(wide, finished[0])])])
-    delivers = gains.get(DELIVERY.name, 0.0) >= PROMISES_AS_WELL * max(gains.values())
-    if paired and delivers and not is_explained(finished[0], accepted):
-        finished = ranked([*finished, *likeliest(wide, [[*screen(wide, (DELIVERY,), starts)]], spared=spared)])
+    if paired:
+        finished = ranked([*finished, *delivery_followed(wide, finished, gains, spared, accepted)])
     finished = _distinct([behind_filter(wide, finished[0]), *finished])
     if paired and homed:
-        finished = _distinct([*finished, *_with_zero(wide, finished[0], spared, accepted)])
+        finished = _distinct([*finished, *with_zero(wide, finished[0], spared, accepted)])
     if paired and finished[0].cost < hopeless and not _by_itself(wide, finished[0], accepted):
         first, second = finished[0], finished[1] if len(finished) > 1 else None
         pairs = _paired(wide, first, starts[0], accepted)
@@ -257,20 +252,6 @@ def _paired(
         if more:
             pairs = ranked([*pairs, *likeliest(late, more, known, spared, useful)])
     return _better(first, pairs, least)
-
-
-def _with_zero(log: GreyBoxLog, first: Trial, spared: Decimation, accepted: Accepted) -> list[Trial]:
-    """Return what is likeliest alone together with an encoder's zero, of a log that shows one, if both explain it.
-
-    Both are sought from where the first one was: alone it has taken up part of the zero. An offset of the pressure was
-    found a third too large, and no zero beside it.
-    """
-    if ENCODER_ZERO in first.together or is_explained(first, accepted):
-        return []
-    late = delayed(log, first.delays)
-    tried = [*screen(late, (*first.together, ENCODER_ZERO), spared.starts, every=spared.every)]
-    ended = (one for one in likeliest(late, [tried], spared=spared) if is_explained(one, accepted))
-    return [replace(one, delays={**first.delays, **one.delays}) for one in ended]
 
 
 def _rig_and_load(

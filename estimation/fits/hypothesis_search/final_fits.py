@@ -88,10 +88,11 @@ def final_fit(log: GreyBoxLog, tried: Trial, useful: float = np.inf, *details: s
         own, more = balanced_by(row, share), (STIFFNESS, *last) if share else last
         problem, begun = freed(own, tried.together, *more), done[-1][0] if done else tried
         start = problem.model.theta({**usual_values(own), **begun.values})
-        done.append((_to_its_end(problem, begun, start, *more, useful=useful), problem))
+        ended = _to_its_end(problem, begun, start, *more, useful=useful)
+        done.append((replace(ended, by_mass=bool(share)), problem))
         useful = min(useful, done[-1][0].cost + ALIKE)
     done.sort(key=lambda one: one[0].cost)
-    best = replace(done[0][0], coarse=tried.values, by_mass=balances_mass(done[0][1].log))
+    best = replace(done[0][0], coarse=tried.values)
     count = [one for one in done if one[0].cost <= best.cost + ALIKE]
     first, *rivals = (_concluded(problem, one.point, log) for one, problem in count)
     if best.meant and all(one.told(best.values, first.std) for one in best.together):

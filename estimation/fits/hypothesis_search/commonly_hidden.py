@@ -1,0 +1,73 @@
+"""Common mistakes that a search by slopes leaves out: a pump's delivery behind leaks, a zero behind an offset."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO
+from estimation.fits.hypothesis_search.conclusion import Accepted, is_explained
+from estimation.fits.hypothesis_search.decimation import Decimation
+from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.ranking import likeliest
+from estimation.fits.hypothesis_search.screening import screen
+from estimation.fits.hypothesis_search.wide_log import delayed
+
+AS_WELL = 0.5
+"""Share of the largest gain that slopes promise, from which another delivery is followed to its end where nothing
+explains a log alone [fraction]; judged. An area 5 % low promised more as a leakage that changes, in four ways, and came
+nearest as a relief valve that opens early."""
+
+
+def delivery_followed(
+    log: GreyBoxLog, finished: Sequence[Trial], gains: Mapping[str, float], spared: Decimation, accepted: Accepted
+) -> list[Trial]:
+    """Return the end of a search for another pump delivery, where slopes promise it nearly as much as any.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    finished : sequence of Trial
+        What was tried alone, the best first.
+    gains : Mapping[str, float]
+        What slopes promise each hypothesis [dimensionless].
+    spared : Decimation
+        Samples and starts of the search.
+    accepted : callable
+        ``accepted(fit)``: whether a fit explains the log.
+
+    Returns
+    -------
+    list of Trial
+        None where it has been followed already, or something explains the log.
+    """
+    promises = DELIVERY.name in gains and gains[DELIVERY.name] >= AS_WELL * max(gains.values())
+    followed = any(one.together == (DELIVERY,) and one.fits for one in finished)
+    if not promises or followed or is_explained(finished[0], accepted):
+        return []
+    return likeliest(log, [[*screen(log, (DELIVERY,), spared.starts)]], spared=spared)
+
+
+def with_zero(log: GreyBoxLog, first: Trial, spared: Decimation, accepted: Accepted) -> list[Trial]:
+    """Return what is likeliest alone together with an encoder's zero, of a log that shows one, if both explain it.
+
+    Both are sought from where the first one was: alone it has taken up part of the zero. An offset of the pressure was
+    found a third too large, and no zero beside it.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    first : Trial
+        What is likeliest alone.
+    spared : Decimation
+        Samples and starts of the search.
+    accepted : callable
+        ``accepted(fit)``: whether a fit explains the log.
+    """
+    if ENCODER_ZERO in first.together or is_explained(first, accepted):
+        return []
+    late = delayed(log, first.delays)
+    tried = [*screen(late, (*first.together, ENCODER_ZERO), spared.starts, every=spared.every)]
+    ended = (one for one in likeliest(late, [tried], spared=spared) if is_explained(one, accepted))
+    return [replace(one, delays={**first.delays, **one.delays}) for one in ended]

@@ -1,0 +1,65 @@
+"""A pump's delivery that slopes put behind leaks, and a zero beside what took part of it up, are sought on."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO, OFFSET
+from estimation.fits.hypothesis_search import commonly_hidden
+from estimation.fits.hypothesis_search.commonly_hidden import delivery_followed, with_zero
+from estimation.fits.hypothesis_search.explanation import Trial
+
+LOG: Any = None
+SPARED: Any = SimpleNamespace(starts=[{}], every=1)
+
+
+def tried(cost: float, *together: Any, delays: Any = None) -> Trial:
+    of_this: Any = SimpleNamespace(cost=cost)
+    values = {name: 1.0 for one in together for name in one.free}
+    return Trial(together, of_this, values, delays or {}, {}, (of_this,))
+
+
+def explains(fit: Any) -> bool:
+    return fit.cost < 50.0
+
+
+@pytest.fixture(autouse=True)
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    found = list[Any]()
+
+    def screened(_: Any, together: Any, *__: Any, **___: Any) -> Any:
+        found.append(together)
+        return [tried(40.0, *together)]
+
+    monkeypatch.setattr(commonly_hidden, "screen", screened)
+    monkeypatch.setattr(commonly_hidden, "likeliest", lambda _, ways, **__: ways[0])
+    monkeypatch.setattr(commonly_hidden, "delayed", lambda log, _: log)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("first", "promised", "sought"),
+    [
+        (tried(90.0, OFFSET), 6.0, True),
+        (tried(90.0, OFFSET), 4.0, False),  # slopes promise another far more
+        (tried(40.0, OFFSET), 6.0, False),  # it explains the log
+        (tried(90.0, DELIVERY), 6.0, False),  # it was sought
+    ],
+)
+def test_another_delivery_that_slopes_promise_nearly_as_much_is_followed_where_nothing_explains_a_log(
+    first: Trial, promised: float, sought: bool, asked: list[Any]
+) -> None:
+    gains = {"leakage_growth": 10.0, DELIVERY.name: promised}
+    assert bool(delivery_followed(LOG, [first], gains, SPARED, explains)) == bool(asked) == sought
+    assert delivery_followed(LOG, [tried(90.0, OFFSET)], {"leakage_growth": 10.0}, SPARED, explains) == []
+
+
+def test_a_zero_is_sought_together_with_what_is_likeliest_alone_unless_that_explains_the_log(asked: list[Any]) -> None:
+    (both,) = with_zero(LOG, tried(90.0, OFFSET, delays={"position_m": 1e-3}), SPARED, explains)
+    assert both.together == (OFFSET, ENCODER_ZERO)
+    assert both.delays == {"position_m": 1e-3}
+    for first in (tried(40.0, OFFSET), tried(90.0, ENCODER_ZERO)):
+        assert with_zero(LOG, first, SPARED, explains) == []
+    assert with_zero(LOG, tried(90.0, OFFSET), SPARED, lambda fit: fit.cost < 1.0) == []  # both leave too much
+    assert len(asked) == 2
