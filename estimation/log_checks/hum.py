@@ -7,6 +7,7 @@ one that is gone while the motor turns at other speeds: teeth of the pump, where
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.fits.convolution import smooth_length
 from estimation.log_checks.bridging import bridged
@@ -105,7 +106,7 @@ def _is_of_teeth(record: Record, pressure: Array, frequency: float, lines: Array
     return bool(left < UNSEEN < GONE * np.mean(others) * lines[place])
 
 
-def _lines(values: Array, rows: Array | None = None) -> Array:
+def _lines(values: Array, rows: NDArray[np.bool_] | None = None) -> Array:
     """Return the power of each line of a channel's second differences over what is usual near it, of all or some rows.
 
     Parameters
