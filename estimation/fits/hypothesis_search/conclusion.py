@@ -48,7 +48,7 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
         fits=fits,
         rivals=len(counted) - 1,
         stated_pressure=usual_pressure(log, parameters),
-        opening=partial(_delivery_open, log, best),
+        opening=partial(delivery_beside, log, best),
         detailing=partial(_detailed, log, parameters, counted, accepted),
     )
 
@@ -66,8 +66,16 @@ def _detailed(
     return conclude(log, parameters, (best, *rivals), accepted) if is_explained(best, accepted) else None
 
 
-def _delivery_open(log: GreyBoxLog, best: Trial) -> PredictedGain:
-    """Return the predicted gain of another pump delivery beside an explanation of a log, where its fit ended."""
+def delivery_beside(log: GreyBoxLog, best: Trial) -> PredictedGain:
+    """Return the predicted gain of another pump delivery beside an explanation of a log, where its fit ended.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    best : Trial
+        The explanation, fitted to the end.
+    """
     if DELIVERY.free[0] in best.values:
         return NO_GAIN
     row = balanced_by(delayed(log, best.delays), float(best.by_mass))

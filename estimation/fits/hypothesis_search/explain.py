@@ -13,7 +13,7 @@ from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, START_LOAD, VOLUME, Hypothesis
 from estimation.fits.hypothesis_search.coarse_search import coarsened, vanished_values
-from estimation.fits.hypothesis_search.commonly_hidden import delivery_followed, with_zero
+from estimation.fits.hypothesis_search.commonly_hidden import delivery_followed, with_delivery, with_zero
 from estimation.fits.hypothesis_search.compatible_hypotheses import compatible_hypotheses
 from estimation.fits.hypothesis_search.conclusion import Accepted, conclude, is_explained
 from estimation.fits.hypothesis_search.decimation import FEW, Decimation, cost_over_noise, decimation_for
@@ -130,6 +130,9 @@ def explain(
     if is_explained(finished[0], accepted):
         stuck = [one for one in stuck_instead(wide, finished[0], spared, WORTH) if is_explained(one, accepted)]
         finished = [*stuck, *finished[len(stuck) :]]
+    if paired:
+        worn = with_delivery(wide, finished[0], spared, accepted)
+        finished = _distinct([*_better(finished[0], worn, finished[0].cost), *finished])
     best = finished[0]
     if not best.fits:
         return None

@@ -7,8 +7,9 @@ import pytest
 
 from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO, OFFSET
 from estimation.fits.hypothesis_search import commonly_hidden
-from estimation.fits.hypothesis_search.commonly_hidden import delivery_followed, with_zero
+from estimation.fits.hypothesis_search.commonly_hidden import delivery_followed, with_delivery, with_zero
 from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.predicted_gains import PredictedGain
 
 LOG: Any = None
 SPARED: Any = SimpleNamespace(starts=[{}], every=1)
@@ -63,3 +64,21 @@ def test_a_zero_is_sought_together_with_what_is_likeliest_alone_unless_that_expl
         assert with_zero(LOG, first, SPARED, explains) == []
     assert with_zero(LOG, tried(90.0, OFFSET), SPARED, lambda fit: fit.cost < 1.0) == []  # both leave too much
     assert len(asked) == 2
+
+
+@pytest.mark.parametrize(
+    ("first", "gain", "size", "sought"),
+    [
+        (tried(45.0, OFFSET), 27.0, -0.08, True),
+        (tried(45.0, OFFSET), 12.0, -0.08, False),
+        (tried(45.0, OFFSET), 27.0, -0.005, False),  # no rig file is as sure
+        (tried(90.0, OFFSET), 27.0, -0.08, False),  # it explains nothing
+        (tried(45.0, OFFSET, DELIVERY), 27.0, -0.08, False),
+    ],
+)
+def test_another_delivery_is_sought_beside_an_explanation_where_slopes_promise_it_much(
+    first: Trial, gain: float, size: float, sought: bool, asked: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(commonly_hidden, "delivery_beside", lambda *_: PredictedGain(gain, size, 0.01))
+    found = with_delivery(LOG, first, SPARED, explains)
+    assert [one.together for one in found] == asked == [(OFFSET, DELIVERY)] * sought

@@ -206,9 +206,10 @@ def test_pairs_are_tried_with_what_explains_a_log_about_as_well_too(
     monkeypatch.setattr(explain, "decimation_for", lambda *_: 1)
     monkeypatch.setattr(explain, "cost_over_noise", lambda *_: chi)
     monkeypatch.setattr(explain, "_paired", paired)
+    monkeypatch.setattr(explain, "with_delivery", lambda *_: [])
     monkeypatch.setattr(conclusion, "weighed", lambda _: {})
     monkeypatch.setattr(conclusion, "usual_pressure", lambda *_: 0.0)
-    monkeypatch.setattr(conclusion, "_delivery_open", lambda *_: NO_GAIN)
+    monkeypatch.setattr(conclusion, "delivery_beside", lambda *_: NO_GAIN)
     monkeypatch.setattr(explain, "ALIKE", 4.0)
     nothing: Any = None
     found = explain.explain(nothing, nothing, [{}], lambda fit: fit.cost < least, hopeless=hopeless)

@@ -74,7 +74,7 @@ def test_what_another_delivery_promises_is_asked_where_the_fit_ended(
     values = {**FOUND, "air_softness": 2e3, **dict.fromkeys(CRACKS, 1e3)}
     values = {name: one for name, one in values.items() if name not in (STIFFNESS, *CRACKS) or name in freed_last}
     best = SimpleNamespace(together=(AIR,), values=values, delays={}, by_mass=by_mass)
-    conclusion._delivery_open(wide(), best)  # type: ignore[arg-type]
+    conclusion.delivery_beside(wide(), best)  # type: ignore[arg-type]
     assert asked == [(by_mass, freed_last)]
 
 
