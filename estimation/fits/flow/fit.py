@@ -217,9 +217,8 @@ def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequ
 def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> Explanation | None:
     """Return the explanation of a log by hypotheses, if it is believed rather than the plain form."""
     explains = told_by(plain, begun=BEGUN in asked)
-    in_motion = traits.loaded or traits.moving
-    astray = is_astray(plain.log, plain.swinging, plain.start.parameters)
-    near = near_starts(plain.swinging, plain.starts, explains, in_motion=in_motion, astray=astray)
+    moving, astray = traits.loaded or traits.moving, is_astray(plain.log, plain.swinging, plain.start.parameters)
+    near = near_starts(plain.swinging, plain.starts, explains, in_motion=moving, astray=astray)
     if plain.best is not plain.swinging and explains(plain.best):
         near = [plain.best.values, *near]
     alone = len(asked) == 1 and asked[0] in ALWAYS_ASKED  # it has no rival
