@@ -53,7 +53,7 @@ def by_course(logged: Logged, plain: PlainFits) -> PlainFits:
         return plain
     if _held_gains(logged, plain) <= HELD_WORTH:
         return plain
-    other = plain_fits(logged, replace(plain.start, held=True))
+    other = plain_fits(logged, replace(plain.start, held=True), plain.fits if noise_alone else ())
     return other if other.best.cost < plain.best.cost else plain
 
 

@@ -8,7 +8,7 @@ from operator import attrgetter
 import numpy as np
 
 from estimation.fits.flow.log import carried, flow_log
-from estimation.fits.flow.search import balanced, flow_starts
+from estimation.fits.flow.search import balanced, flow_starts, followed
 from estimation.fits.flow.swept import swept_evenly
 from estimation.fits.flow.turns_read import with_turns_read
 from estimation.fits.greybox.fit import GreyBoxFit
@@ -195,7 +195,7 @@ class PlainFits:
         return play_untaken(shown, sensed, self.yields(sensed, self.swinging.values["bulk_modulus"]))
 
 
-def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
+def plain_fits(logged: Logged, start: FitStart, near: Sequence[GreyBoxFit] = ()) -> PlainFits:
     """Fit the plain flow form to a log by every balance that counts.
 
     What the motor's course between samples leaves open, a pump's teeth, and an offset of speed are taken up on the way.
@@ -206,6 +206,8 @@ def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
         The log.
     start : FitStart
         Where searches begin.
+    near : sequence of GreyBoxFit
+        Fits of the same log that are nearly its own: searches go on from there.
     """
     parameters = start.parameters
     log = logged.seen_at(parameters, held=start.held)
@@ -216,8 +218,9 @@ def plain_fits(logged: Logged, start: FitStart) -> PlainFits:
     explains = partial(fit_explains, noisy=log.passes_on)
     largest, _ = limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))
     fitted = partial(balanced, parameters=parameters, starts=starts, valley=start.valley, stiffest=start.stiffest)
-    unturned = with_course(log, fitted, parameters, always=start.turns_open)
-    log, fits, teeth, left = with_pump_ripple(unturned, fitted, explains, largest, start.speed_offset)
+    led = partial(followed, parameters=parameters, fits=near, stiffest=start.stiffest) if near else fitted
+    unturned = with_course(log, led, parameters, always=start.turns_open)
+    log, fits, teeth, left = with_pump_ripple(unturned, led, explains, largest, start.speed_offset)
     turning = Turning(log.teeth, log.speed_offset)
     found = _swinging(fits).values
     log = swept_evenly(carried(log, parameters, found, start.stiffest), parameters, found)

@@ -159,6 +159,38 @@ def balanced(
         done = each(lambda one: min(one, from_minimum(one[0].model, log, valley, bent=bent), key=_cost), done)
     if _one_sided(log):
         done = [found for minima in each(_with_less_drain, done) for found in minima]
+    return _told(done, log, steps)
+
+
+def followed(
+    log: GreyBoxLog, parameters: EhaParameters, fits: Sequence[GreyBoxFit], stiffest: float = np.inf
+) -> Sequence[GreyBoxFit]:
+    """Return the fits of a log that differs little from the one that others fit, from where these ended.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    fits : sequence of GreyBoxFit
+        The fits of the other, as of `balanced`.
+    stiffest : float
+        Bulk modulus that counts at most in what noise of motor speed leaves [Pa].
+    """
+    near = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=lambda fit: fit.cost)
+    log = swept_evenly(carried(log, parameters, near.values, stiffest), parameters, near.values)
+    steps = log.steps if near.steps is None else near.steps
+
+    def led(fit: GreyBoxFit) -> Found:
+        problem, bounds = FreedProblem.of(fit.model, log.stepped(steps)), flow_bounds(fit.model, [fit.theta], log)
+        return problem, descend(problem.at, fit.theta, FINISHING, bounds), bounds
+
+    return _told(each(led, fits), log, steps)
+
+
+def _told(done: Sequence[Found], log: GreyBoxLog, steps: IntArray) -> Sequence[GreyBoxFit]:
+    """Return the fits at minima of the balances; those that are told get short model steps throughout."""
     done = _told_ended(done, log)
     best, swinging = _told_of(done)
     least = best[1].cost
@@ -256,7 +288,8 @@ def _with_less_drain(one: Found) -> list[Found]:
     and likelihood has a minimum for each hold in which it may: one was 11 deviations of leakage off.
     """
     problem, point, bounds = one
-    if CRACKS[0] not in problem.model.unknowns:
+    values = problem.model.values(point.theta)
+    if CRACKS[0] not in values or values["makeup_conductance"] < LESS_DRAINED * values["case_leakage"]:
         return [one]
     place = problem.model.unknowns.index("case_leakage")  # fitted as a logarithm
     start = point.theta + np.log(LESS_DRAINED) * (np.arange(len(point.theta)) == place)

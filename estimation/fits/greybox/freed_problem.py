@@ -268,7 +268,9 @@ class FreedProblem(Problem):
                 return here, columns
         for away, here, columns in last[::-1]:
             if self.near > 0.0 and np.linalg.norm(moved := columns @ away) < self.near:
-                return here + moved, columns
+                bent = np.linalg.norm(columns, axis=(0, 1)) @ away**2  # a logarithm's effect, and none cancels
+                if bent < self.near:
+                    return here + moved, columns
         return None, None
 
     def _nudged(self, theta: Array) -> Array:
