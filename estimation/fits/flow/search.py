@@ -13,7 +13,7 @@ from estimation.fits.flow.rough_search import RIVAL, UNLIKELY, RoughOptimum, rou
 from estimation.fits.flow.swept import swept_evenly
 from estimation.fits.flow.wide_valves import opens_wide
 from estimation.fits.greybox.chance import largest_chi_square
-from estimation.fits.greybox.descent import descend
+from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.drive_noise import SAMPLES_KEPT, moved_by_drives
 from estimation.fits.greybox.fit import GreyBoxFit, concluded, explained
 from estimation.fits.greybox.freed_problem import FreedProblem
@@ -59,6 +59,9 @@ likeliest balance gained 43; beside likeliest ones that gained less than 10 they
 
 VALVES = ("makeup_conductance", "makeup_opening", *CRACKS, BEND, STIFFNESS)
 """What balances have in common to the last digits; oil and losses make up for what each is without."""
+
+NO_SLOPES = np.zeros(0), np.zeros((0, 0))
+"""Of the misfit at a point whose cost alone is known."""
 
 NOWHERE: Mapping[str, float] = {}
 """Where nothing has led."""
@@ -182,9 +185,11 @@ def followed(
     log = swept_evenly(carried(log, parameters, near.values, stiffest), parameters, near.values)
     steps = log.steps if near.steps is None else near.steps
 
+    bent = opens_wide(log, parameters)
+
     def led(fit: GreyBoxFit) -> Found:
-        problem, bounds = FreedProblem.of(fit.model, log.stepped(steps)), flow_bounds(fit.model, [fit.theta], log)
-        return problem, descend(problem.at, fit.theta, FINISHING, bounds), bounds
+        ended, bounds = Point(fit.theta, fit.cost, *NO_SLOPES), flow_bounds(fit.model, [fit.theta], log)
+        return _finished(RoughOptimum(FreedProblem.of(fit.model, log), ended, bounds), log, steps, bent=bent)
 
     return _told(each(led, fits), log, steps)
 

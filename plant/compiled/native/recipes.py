@@ -48,6 +48,7 @@ def recipe(name: str, made_of: object, machine: str) -> str | None:
 
 @cache
 def _sources() -> str:
+    """Return a hash of when each source was last written and changed, and its size: to read them all takes 20 ms."""
     import hashlib
 
     digest = hashlib.sha256()
@@ -56,8 +57,9 @@ def _sources() -> str:
             folders.sort()
             for file in sorted(files):
                 if file.endswith(".py"):
-                    content = Path(folder, file).read_bytes()
-                    digest.update(f"{folder}/{file} {len(content)}\n".encode() + content)
+                    path = Path(folder, file)
+                    found = path.stat()
+                    digest.update(f"{path} {found.st_size} {found.st_mtime_ns} {found.st_ctime_ns}\n".encode())
     return digest.hexdigest()
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.fits.flow import motor_course
+from estimation.fits.flow import motor_course, search
 from estimation.fits.flow.log import without_strays
 from estimation.fits.flow.motor_course import NEARLY, by_course, with_open_turns
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits
@@ -34,10 +34,19 @@ def logged(*, held: bool) -> Logged:
 
 
 @pytest.mark.parametrize("held", [False, True])
-def test_a_log_says_whether_its_motors_command_was_held(held: bool) -> None:
+def test_a_log_says_whether_its_motors_command_was_held(held: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     log = logged(held=held)
     plain = plain_fits(log, FitStart(STIFF, STIFF.bulk_modulus))
+    whole = plain_fits(log, replace(plain.start, held=True))
+    monkeypatch.setattr(search, "rough_optima", lambda *_: pytest.fail("the fit did not go on from the smooth one's"))
     found = by_course(log, plain)
+    if held:
+        assert plain.explains(plain.best)
+        known = {fit.model.name: fit for fit in found.fits}  # one that is far behind, too
+        for fit in whole.fits:
+            assert known[fit.model.name].cost < fit.cost + 0.05
+            for name in ("bulk_modulus", "leakage_coefficient"):
+                assert known[fit.model.name].values[name] == pytest.approx(fit.values[name], abs=0.05 * fit.std[name])
     assert found.start.held is held
     error = found.swinging.values["bulk_modulus"] / STIFF.bulk_modulus - 1.0
     assert abs(error) < 2e-3

@@ -14,10 +14,12 @@ from estimation.fits.flow.search import balanced, flow_starts
 from estimation.fits.flow.wide_valves import outruns_pump
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.fit import GreyBoxFit, concluded, roughly
+from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO
 from estimation.fits.hypothesis_search.predicted_gains import predicted_gain, predicted_gains
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import MASS_FLOW_FORM
@@ -179,6 +181,25 @@ def test_what_is_told_has_short_steps_throughout_though_less_drain_was_found_wit
         monkeypatch.setattr(flow_search, name, stand_in)
     balanced(log, HEALTHY, STARTS)
     assert set(told) == {int(log.steps.sum())}
+
+
+@pytest.mark.parametrize(("valve", "asked"), [(0.04, False), (0.06, True)])
+def test_less_drain_is_looked_for_beside_a_make_up_valve_alone(
+    monkeypatch: pytest.MonkeyPatch, valve: float, asked: bool
+) -> None:
+    """Half of the search of a lumped plant's log, which has none, was such a way and back."""
+    fit = by_mass(balanced(seen(recorded("normal")), HEALTHY, STARTS))
+    problem, ways = FreedProblem.of(fit.model, seen(recorded("normal"))), list[Array]()
+    values = {**fit.values, "makeup_conductance": valve * fit.values["case_leakage"]}
+    point = problem.at(fit.model.theta(values))
+
+    def went(_: object, start: Array, *__: object, **___: object) -> Point:
+        ways.append(start)
+        return point
+
+    monkeypatch.setattr(flow_search, "descend", went)
+    assert len(flow_search._with_less_drain((problem, point, flow_bounds(fit.model, [point.theta], problem.log)))) == 1
+    assert bool(ways) is asked
 
 
 def by_mass(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:

@@ -179,6 +179,18 @@ def test_a_point_near_a_known_one_lies_along_its_slopes_where_that_is_asked_for(
         own.at(far)
 
 
+def test_a_point_is_run_where_effects_cancel_that_bend(problem: FreedProblem, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A drain in place of a leakage seemed to move nothing: a balance was told 160 above the cost that it gave."""
+    own, (theta,) = problem.on(problem.log), points(problem, 1)
+    own.near, slopes = 0.2, own.slopes(theta)
+    _, sizes, along = np.linalg.svd(slopes, full_matrices=False)
+    away = (along * (0.19 / sizes)[:, None])[sizes > 0.05][-1]
+    assert np.linalg.norm(slopes, axis=0) @ away**2 > own.near > np.linalg.norm(slopes @ away)
+    monkeypatch.setattr(own, "_side_by_side", lambda *_: pytest.fail("this point was run"))
+    with pytest.raises(pytest.fail.Exception, match="this point was run"):
+        own.at(theta + away)
+
+
 def test_residuals_under_several_rigs_are_those_of_each(problem: FreedProblem) -> None:
     (theta,) = points(problem, 1)
     wider = problem.log.parameters.copy()
