@@ -7,7 +7,7 @@ the command line says so, tests and notebooks do not.
 
 import os
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -48,19 +48,24 @@ def recipe(name: str, made_of: object, machine: str) -> str | None:
 
 @cache
 def _sources() -> str:
-    """Return a hash of when each source was last written and changed, and its size: to read them all takes 20 ms."""
     import hashlib
 
-    digest = hashlib.sha256()
-    for package in PACKAGES:
-        for folder, folders, files in os.walk(_ROOT / package):
-            folders.sort()
-            for file in sorted(files):
-                if file.endswith(".py"):
-                    path = Path(folder, file)
-                    found = path.stat()
-                    digest.update(f"{path} {found.st_size} {found.st_mtime_ns} {found.st_ctime_ns}\n".encode())
-    return digest.hexdigest()
+    stamps = (stamp for package in PACKAGES for stamp in _stamps(str(_ROOT / package)))
+    return hashlib.sha256("".join(stamps).encode()).hexdigest()
+
+
+def _stamps(folder: str) -> Iterator[str]:
+    """Yield place, size and times of each source below a folder; to read them takes 20 ms.
+
+    The time of its last change is that of its installation, whatever a package says that it was written at.
+    """
+    with os.scandir(folder) as found:
+        for one in sorted(found, key=lambda one: one.name):
+            if one.name.endswith(".py"):
+                seen = one.stat()
+                yield f"{one.path} {seen.st_size} {seen.st_mtime_ns} {seen.st_ctime_ns}\n"
+            elif one.is_dir():
+                yield from _stamps(one.path)
 
 
 def identity(thing: object) -> str | None:

@@ -1,5 +1,7 @@
 """A text is not written again where all that it follows from is as it was."""
 
+import os
+import time
 from pathlib import Path
 
 import pytest
@@ -46,6 +48,20 @@ def test_it_is_written_again_where_a_source_has_changed(written: list[str], monk
     monkeypatch.setattr(recipes, "_sources", lambda: "changed")
     scale(written, 1)
     assert len(written) == 2
+
+
+def test_a_source_written_anew_is_seen_though_its_size_and_time_are_what_they_were(tmp_path: Path) -> None:
+    source = tmp_path / "package" / "one.py"
+    source.parent.mkdir()
+    source.write_text("A = 1")
+    os.utime(source, (1.0, 1.0))
+    before = [*recipes._stamps(str(tmp_path))]
+    assert before == [*recipes._stamps(str(tmp_path))]
+    time.sleep(0.02)  # a file system's clock may tick so slowly
+    source.write_text("A = 2")
+    os.utime(source, (1.0, 1.0))
+    assert before != [*recipes._stamps(str(tmp_path))]
+    assert len(before) == 1
 
 
 def test_it_is_always_written_where_sources_are_not_trusted(written: list[str]) -> None:
