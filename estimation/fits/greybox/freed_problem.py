@@ -268,7 +268,8 @@ class FreedProblem(Problem):
                 return here, columns
         for away, here, columns in last[::-1]:
             if self.near > 0.0 and np.linalg.norm(moved := columns @ away) < self.near:
-                bent = np.linalg.norm(columns, axis=(0, 1)) @ away**2  # a logarithm's effect, and none cancels
+                felt = np.linalg.norm(columns[..., self._logarithmic], axis=(0, 1))
+                bent = 0.5 * felt @ away[self._logarithmic] ** 2  # to second order, and nothing cancels
                 if bent < self.near:
                     return here + moved, columns
         return None, None
