@@ -8,36 +8,46 @@ from estimation.identification.free_run.choose_absolute import AbsoluteCandidate
 from estimation.identification.free_run.choose_hammerstein import HammersteinCandidate
 from estimation.identification.free_run.choose_linear import Candidate
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate
+from estimation.identification.free_run.held_back import Compared
+from estimation.identification.free_run.linear_problem import Form
+
+
+def form_row(structure: str, one: Compared, form: Form, doubt: str = "", **beside: Any) -> dict[str, Any]:
+    """Return the row of a candidate with a linear part.
+
+    Parameters
+    ----------
+    structure : str
+        What the command line calls it.
+    one : Compared
+        The candidate.
+    form : Form
+        Of its linear part.
+    doubt : str
+        Why it may not be taken; empty where it may.
+    **beside : object
+        What else is told of it.
+    """
+    return {
+        "structure": structure,
+        **beside,
+        "order": form.order,
+        "numerator": list(form.sizes),
+        "delay": list(form.delays),
+        "held_back_percent": 100.0 * (1.0 - one.held_back),
+        "bic": one.bic,
+        "doubt": doubt or None,
+    }
 
 
 def linear_row(one: Candidate) -> dict[str, Any]:
     """Return the row of a linear candidate."""
-    form = one.form
-    return {
-        "structure": "output-error",
-        "order": form.order,
-        "numerator": list(form.sizes),
-        "delay": list(form.delays),
-        "held_back_percent": 100.0 * (1.0 - one.held_back),
-        "bic": one.bic,
-        "aic": one.aic,
-        "doubt": one.doubt or None,
-    }
+    return form_row("output-error", one, one.form, one.doubt, aic=one.aic)
 
 
 def hammerstein_row(one: HammersteinCandidate) -> dict[str, Any]:
     """Return the row of a candidate with a nonlinearity at its input."""
-    form = one.fit.linear.form
-    return {
-        "structure": "hammerstein",
-        "nonlinearity": one.fit.kind,
-        "order": form.order,
-        "numerator": list(form.sizes),
-        "delay": list(form.delays),
-        "held_back_percent": 100.0 * (1.0 - one.held_back),
-        "bic": one.bic,
-        "doubt": one.doubt or None,
-    }
+    return form_row("hammerstein", one, one.fit.linear.form, one.doubt, nonlinearity=one.fit.kind)
 
 
 def polynomial_row(one: PolynomialCandidate) -> dict[str, Any]:
@@ -56,14 +66,4 @@ def polynomial_row(one: PolynomialCandidate) -> dict[str, Any]:
 
 def absolute_row(one: AbsoluteCandidate) -> dict[str, Any]:
     """Return the row of a candidate whose output is measured without its sign."""
-    form = one.fit.linear.form
-    return {
-        "structure": "wiener",
-        "nonlinearity": "absolute-value",
-        "order": form.order,
-        "numerator": list(form.sizes),
-        "delay": list(form.delays),
-        "held_back_percent": 100.0 * (1.0 - one.held_back),
-        "bic": one.bic,
-        "doubt": None,
-    }
+    return form_row("wiener", one, one.fit.linear.form, nonlinearity="absolute-value")

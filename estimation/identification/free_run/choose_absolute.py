@@ -16,7 +16,7 @@ from estimation.identification.free_run.absolute_output import (
 from estimation.identification.free_run.choose_linear import criteria, slowest_pole, smallest
 from estimation.identification.free_run.data import Channels, Scaling, blocks
 from estimation.identification.free_run.dense_polynomial import Asked
-from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled
+from estimation.identification.free_run.held_back import BLOCKS, Compared, block_error
 from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.linear_problem import Form
 from estimation.progress import tell
@@ -30,28 +30,17 @@ in its deviation: noise, and what a lag leaves of a change of sign [dimensionles
 
 
 @dataclass(frozen=True, eq=False)
-class AbsoluteCandidate:
+class AbsoluteCandidate(Compared):
     """A fit with its held-back error.
 
     Parameters
     ----------
-    block_errors : tuple of float
-        Root-mean-square free-run error of each block held back, over the output's deviation [dimensionless].
-    bic : float
-        Information criterion of the free run [dimensionless].
     zero : float
         The sensor's zero, in the data's scale [dimensionless].
     """
 
     fit: AbsoluteFit
-    block_errors: tuple[float, ...]
-    bic: float
     zero: float
-
-    @property
-    def held_back(self) -> float:
-        """Root mean square over the blocks [dimensionless]."""
-        return pooled(self.block_errors)
 
 
 def may_lack_sign(data: Channels, by: Scaling) -> bool:
@@ -134,4 +123,5 @@ def _judged(fit: AbsoluteFit, data: Channels, zero: float) -> AbsoluteCandidate:
         part: AbsoluteFit = refitted_absolute(fit, data.without(masks), COARSE)
         output: Array = problem.jacobian(part.theta)[0]
         errors.append(block_error(output - target, np.concatenate(masks) & np.isfinite(target)))
-    return AbsoluteCandidate(fit, tuple(errors), criteria(fit.cost, fit.theta.size, data.n_samples)[0], zero)
+    bic = criteria(fit.cost, fit.theta.size, data.n_samples)[0]
+    return AbsoluteCandidate(fit, zero, block_errors=tuple(errors), bic=bic)

@@ -14,7 +14,7 @@ from estimation.identification.free_run.hammerstein_fit import (
     fit_hammerstein,
     refitted,
 )
-from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled, told_apart
+from estimation.identification.free_run.held_back import BLOCKS, Compared, block_error, told_apart
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.transfer_function import linear_model
@@ -31,28 +31,17 @@ UNSCALED = Scaling(np.zeros(1), np.ones(1), 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class HammersteinCandidate:
+class HammersteinCandidate(Compared):
     """A fit with its held-back error.
 
     Parameters
     ----------
-    block_errors : tuple of float
-        Root-mean-square free-run error of each block held back, over the output's deviation [dimensionless].
-    bic : float
-        Information criterion of the free run [dimensionless].
     doubt : str
         ``cancelling`` where a pole of the linear part, slower than a block, is not told from a zero; empty otherwise.
     """
 
     fit: HammersteinFit
-    block_errors: tuple[float, ...]
-    bic: float
     doubt: str = ""
-
-    @property
-    def held_back(self) -> float:
-        """Root mean square over the blocks [dimensionless]."""
-        return pooled(self.block_errors)
 
 
 def hammerstein_candidates(linear: Sequence[Candidate], data: Channels) -> list[HammersteinCandidate]:
@@ -83,7 +72,7 @@ def hammerstein_candidates(linear: Sequence[Candidate], data: Channels) -> list[
             if fit is not None and (order not in best or _bic(fit, data) < best[order][0]):
                 best[order] = _bic(fit, data), fit
         found += [
-            HammersteinCandidate(fit, _held_back(fit, data), bic, _doubt(fit, data))
+            HammersteinCandidate(fit, _doubt(fit, data), block_errors=_held_back(fit, data), bic=bic)
             for bic, fit in best.values()
             if np.sqrt(fit.cost / data.n_samples) < bar
         ]

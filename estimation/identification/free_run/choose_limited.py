@@ -8,7 +8,7 @@ from estimation.arrays import Array
 from estimation.identification.free_run.believable import BELIEVED
 from estimation.identification.free_run.choose_linear import criteria, slowest_pole, smallest
 from estimation.identification.free_run.data import FEWEST, Channels, Scaling, blocks
-from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled, told_apart
+from estimation.identification.free_run.held_back import BLOCKS, Compared, block_error, told_apart
 from estimation.identification.free_run.integrating import fit_integrating
 from estimation.identification.free_run.limited_output import LimitedProblem, Limits, at_limits, between, limits_of
 from estimation.identification.free_run.linear_comparison import LinearComparison
@@ -31,26 +31,11 @@ samples that must have it [fraction]; judged. A sample or two behind each change
 
 
 @dataclass(frozen=True, eq=False)
-class LimitedCandidate:
-    """A fit between limits with its held-back error.
-
-    Parameters
-    ----------
-    block_errors : tuple of float
-        Root-mean-square free-run error of each block held back, over the output's deviation [dimensionless].
-    bic : float
-        Information criterion of the free run [dimensionless].
-    """
+class LimitedCandidate(Compared):
+    """A fit between limits with its held-back error."""
 
     fit: LinearFit
     limits: Limits
-    block_errors: tuple[float, ...]
-    bic: float
-
-    @property
-    def held_back(self) -> float:
-        """Root mean square over the blocks [dimensionless]."""
-        return pooled(self.block_errors)
 
     def outlasts(self, length: float) -> bool:
         """Return whether a time constant is longer than a time.
@@ -202,4 +187,5 @@ def _judged(fit: LinearFit, data: Channels, limits: Limits) -> LimitedCandidate:
         output = whole.jacobian(part.theta)[0]
         errors.append(block_error(output - target, np.concatenate(masks) & np.isfinite(target)))
     values = fit.theta.size + limits.count
-    return LimitedCandidate(fit, limits, tuple(errors), criteria(fit.cost, values, data.n_samples)[0])
+    bic = criteria(fit.cost, values, data.n_samples)[0]
+    return LimitedCandidate(fit, limits, block_errors=tuple(errors), bic=bic)

@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.dead_times import estimate_delays
-from estimation.identification.free_run.held_back import BLOCKS, NEAR, held_back_blocks, pooled
+from estimation.identification.free_run.held_back import BLOCKS, NEAR, Compared, held_back_blocks
 from estimation.identification.free_run.integrating import fit_integrating
 from estimation.identification.free_run.linear_fit import extended, fit_linear
 from estimation.identification.free_run.linear_problem import Form, LinearFit
@@ -28,25 +28,18 @@ PATIENCE = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class Candidate(Compared):
     """A form with what speaks for it.
 
     Parameters
     ----------
-    held_back : float
-        Root-mean-square free-run error of the blocks held back, over the output's deviation [dimensionless].
-    block_errors : tuple of float
-        The same of each block; NaN where one holds nothing [dimensionless].
-    bic, aic : float
-        Information criteria of the free run [dimensionless].
+    aic : float
+        Information criterion of the free run [dimensionless].
     doubt : str
         Why it may not be taken; empty where it may.
     """
 
     fit: LinearFit
-    held_back: float
-    block_errors: tuple[float, ...]
-    bic: float
     aic: float
     doubt: str
 
@@ -94,8 +87,8 @@ def candidate(fit: LinearFit, data: Channels) -> Candidate:
     """Return a fit with its held-back error, criteria, and what is doubtful in it."""
     # a dead time that was searched is one more value
     values = fit.theta.size + sum(delay > 1 for delay in fit.form.delays) - fit.integrates
-    errors = held_back_blocks(fit, data)
-    return Candidate(fit, pooled(errors), errors, *criteria(fit.cost, values, data.n_samples), doubt_of(fit, data))
+    bic, aic = criteria(fit.cost, values, data.n_samples)
+    return Candidate(fit, aic, doubt_of(fit, data), block_errors=held_back_blocks(fit, data), bic=bic)
 
 
 def criteria(cost: float, values: int, samples: int) -> tuple[float, float]:
@@ -223,21 +216,7 @@ def chosen(candidates: Sequence[Candidate]) -> Candidate:
     return smallest(sound, min(one.price for one in sound))
 
 
-class Judged(Protocol):
-    """A model that was judged on blocks held back."""
-
-    @property
-    def held_back(self) -> float:
-        """Root mean square error over the blocks [dimensionless]."""
-        ...
-
-    @property
-    def bic(self) -> float:
-        """Information criterion of the free run [dimensionless]."""
-        ...
-
-
-Some = TypeVar("Some", bound=Judged)
+Some = TypeVar("Some", bound=Compared)
 
 
 def smallest(candidates: Sequence[Some], least: float) -> Some:
@@ -245,7 +224,7 @@ def smallest(candidates: Sequence[Some], least: float) -> Some:
 
     Parameters
     ----------
-    candidates : sequence of Judged
+    candidates : sequence of Compared
         One at least that does.
     least : float
         Held-back error of the best one [dimensionless].

@@ -12,8 +12,8 @@ import numpy as np
 
 from estimation.identification.free_run.choose_linear import Candidate, criteria
 from estimation.identification.free_run.data import Channels, blocks
-from estimation.identification.free_run.dense_polynomial import Asked, Judged, Recipe, forms_tried, judged_recipes
-from estimation.identification.free_run.held_back import BLOCKS, block_error, pooled
+from estimation.identification.free_run.dense_polynomial import Asked, JudgedRecipe, Recipe, forms_tried, judged_recipes
+from estimation.identification.free_run.held_back import BLOCKS, Compared, block_error, pooled
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import LinearFit
 from estimation.identification.free_run.other_orders import disagreement, is_wild
@@ -51,7 +51,7 @@ SELECTIONS = 5
 
 
 @dataclass(frozen=True, eq=False)
-class PolynomialCandidate:
+class PolynomialCandidate(Compared):
     """A polynomial fit with its held-back error.
 
     Parameters
@@ -60,24 +60,15 @@ class PolynomialCandidate:
         Of all data that structures are compared on.
     refit : callable
         Fits the same to other data of as many logs; None where that runs away.
-    held_back : float
-        Root-mean-square free-run error of the blocks held back, over the output's deviation [dimensionless].
-    block_errors : tuple of float
-        The same of each block; NaN where one holds nothing [dimensionless].
     spread : float
         How far fits without one block each run from it on inputs in other orders [dimensionless].
-    bic : float
-        Information criterion of the free run [dimensionless].
     parts : tuple of PolynomialFit
         Fits that left out one block each.
     """
 
     fit: PolynomialFit
     refit: Callable[[Channels], PolynomialFit | None]
-    held_back: float
-    block_errors: tuple[float, ...]
     spread: float
-    bic: float
     parts: tuple[PolynomialFit, ...] = ()
 
     @property
@@ -168,7 +159,7 @@ def _selected(
 
 
 def _kept(
-    judged: Sequence[Judged[Recipe]] | Sequence[Judged[Selection]], data: Channels, bar: float
+    judged: Sequence[JudgedRecipe[Recipe]] | Sequence[JudgedRecipe[Selection]], data: Channels, bar: float
 ) -> list[PolynomialCandidate]:
     """Return models of all data that were judged without a block each, but for those that leave their range.
 
@@ -201,13 +192,12 @@ def _fitted(recipe: Recipe, data: Channels, known: dict[Recipe, PolynomialFit | 
 def _candidate(
     fit: PolynomialFit,
     refit: Callable[[Channels], PolynomialFit | None],
-    judged: Judged[Recipe] | Judged[Selection],
+    judged: JudgedRecipe[Recipe] | JudgedRecipe[Selection],
     data: Channels,
 ) -> PolynomialCandidate:
     spread = disagreement(judged.fits, fit, data)
-    return PolynomialCandidate(
-        fit, refit, judged.held_back, judged.block_errors, spread, _bic(fit, data), tuple(judged.fits)
-    )
+    errors, bic = judged.block_errors, _bic(fit, data)
+    return PolynomialCandidate(fit, refit, spread, judged.fits, block_errors=errors, bic=bic)
 
 
 def _bic(fit: PolynomialFit, data: Channels) -> float:
@@ -270,8 +260,8 @@ class _Growth:
         fit = Runs(fit.variables, fit.terms, self.data).fit(fit.theta, FINAL_STEPS) or fit
         parts = [part for part in self.history[count] if part is not None]
         spread = disagreement(parts, fit, self.data)
-        told = (errors[count], self.block_errors[count], spread, _bic(fit, self.data), tuple(parts))
-        return PolynomialCandidate(fit, partial(continued, fit), *told)
+        refit, own, bic = partial(continued, fit), self.block_errors[count], _bic(fit, self.data)
+        return PolynomialCandidate(fit, refit, spread, tuple(parts), block_errors=own, bic=bic)
 
     def _held_back(self) -> tuple[float, ...]:
         target, errors = np.concatenate(self.data.y), list[float]()

@@ -14,7 +14,7 @@ import numpy as np
 from estimation.arrays import IntArray
 from estimation.identification.free_run.choose_linear import CLEARLY
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.held_back import block_error, pooled
+from estimation.identification.free_run.held_back import Judged, block_error
 from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.linear_problem import Form, LinearFit
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, variables_of
@@ -122,7 +122,7 @@ Kind = TypeVar("Kind")
 
 
 @dataclass(frozen=True, eq=False)
-class Judged(Generic[Kind]):
+class JudgedRecipe(Judged, Generic[Kind]):
     """A recipe with its fits to all blocks but one, and their errors there.
 
     Parameters
@@ -131,18 +131,10 @@ class Judged(Generic[Kind]):
         Whose ``fit`` takes data.
     fits : tuple of PolynomialFit
         One a block.
-    block_errors : tuple of float
-        Of the free run on the block that each left out [dimensionless].
     """
 
     recipe: Kind
     fits: tuple[PolynomialFit, ...]
-    block_errors: tuple[float, ...]
-
-    @property
-    def held_back(self) -> float:
-        """Root mean square over the blocks [dimensionless]."""
-        return pooled(self.block_errors)
 
 
 def every_term(n_variables: int, degree: int) -> IntArray:
@@ -210,7 +202,7 @@ def late_by(delays: tuple[int, ...], asked: Asked) -> list[tuple[int, ...]]:
 
 def judged_recipes(
     data: Channels, parts: Sequence[Channels], forms: Sequence[Form], asked: Asked | None = None
-) -> list[Judged[Recipe]]:
+) -> list[JudgedRecipe[Recipe]]:
     """Return models of every product, each judged on blocks that its fits left out.
 
     The free run is descended for the sizes that do best by one least squares, and for larger ones beside the best of
@@ -229,10 +221,10 @@ def judged_recipes(
 
     Returns
     -------
-    list of Judged
+    list of JudgedRecipe
         Only those that run; none where every size has too many terms.
     """
-    found: list[Judged[Recipe]] = []
+    found: list[JudgedRecipe[Recipe]] = []
     best: dict[tuple[Form, int], float] = {}
     sizes = [(form, degree) for form in forms for degree in (2, 3)]
     for form, degree in sizes:
@@ -254,9 +246,9 @@ def judged_recipes(
     return [*found, *descended, *_climbed(descended, data, parts, asked or Asked())]
 
 
-def _descended(form: Form, degree: int, data: Channels, parts: Sequence[Channels]) -> list[Judged[Recipe]]:
+def _descended(form: Form, degree: int, data: Channels, parts: Sequence[Channels]) -> list[JudgedRecipe[Recipe]]:
     """Return models of one size whose free run is descended under one penalty after the other."""
-    found: list[Judged[Recipe]] = []
+    found: list[JudgedRecipe[Recipe]] = []
     for k in range(len(FREE_RUN)):
         one = _judged(Recipe(form, degree, BEGUN, FREE_RUN[: k + 1]), data, parts, found[-1] if found else None)
         if one is None:
@@ -266,10 +258,10 @@ def _descended(form: Form, degree: int, data: Channels, parts: Sequence[Channels
 
 
 def _climbed(
-    found: Sequence[Judged[Recipe]], data: Channels, parts: Sequence[Channels], asked: Asked
-) -> list[Judged[Recipe]]:
+    found: Sequence[JudgedRecipe[Recipe]], data: Channels, parts: Sequence[Channels], asked: Asked
+) -> list[JudgedRecipe[Recipe]]:
     """Return models of a lag more than the best, and of more lags as long as each does clearly better."""
-    more: list[Judged[Recipe]] = []
+    more: list[JudgedRecipe[Recipe]] = []
     best = min(found, key=lambda one: one.held_back, default=None)
     while best is not None:
         recipe = best.recipe
@@ -306,9 +298,9 @@ def _judged(
     recipe: Recipe,
     data: Channels,
     parts: Sequence[Channels],
-    before: Judged[Recipe] | None = None,
+    before: JudgedRecipe[Recipe] | None = None,
     known: Sequence[Moments] | None = None,
-) -> Judged[Recipe] | None:
+) -> JudgedRecipe[Recipe] | None:
     """Return a recipe's fits to all blocks but one, begun at those before; None where one of them runs away."""
     target, fits, errors = np.concatenate(data.y), list[PolynomialFit](), list[float]()
     for index, part in enumerate(parts):
@@ -319,7 +311,7 @@ def _judged(
             return None
         fits.append(fit)
         errors.append(block_error(ran - target, np.isnan(np.concatenate(part.y)) & np.isfinite(target)))
-    return Judged(recipe, tuple(fits), tuple(errors))
+    return JudgedRecipe(recipe, tuple(fits), block_errors=tuple(errors))
 
 
 def _size(form: Form, degree: int, data: Channels) -> tuple[Variables, IntArray]:

@@ -1,6 +1,7 @@
 """Errors of free runs on what was held back: blocks between outputs that are fitted, and halves."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,6 +24,38 @@ TINY = 1e-300
 NEAR = 1e-6
 """Share of the cost that two steps of a descent in a row must gain each while forms are compared: the chosen one is
 fitted on."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Judged:
+    """A model that was judged on blocks held back.
+
+    Parameters
+    ----------
+    block_errors : tuple of float
+        Root-mean-square free-run error of each block, simulated by a fit to the others, over the output's deviation;
+        NaN where one holds nothing [dimensionless].
+    """
+
+    block_errors: tuple[float, ...]
+
+    @property
+    def held_back(self) -> float:
+        """Root mean square over the blocks [dimensionless]."""
+        return pooled(self.block_errors)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Compared(Judged):
+    """The same, with what speaks for a smaller model.
+
+    Parameters
+    ----------
+    bic : float
+        Information criterion of the free run [dimensionless].
+    """
+
+    bic: float
 
 
 def held_back_blocks(fit: LinearFit, data: Channels) -> tuple[float, ...]:

@@ -1,14 +1,13 @@
 """Outputs that are a nonlinear function of what a linear model gives: without its sign, cut off, or held by stops."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from estimation.identification.fit.feedback import feedback_note
 from estimation.identification.free_run.absolute_dynamics import AbsoluteDynamics
 from estimation.identification.free_run.absolute_output import refitted_absolute
-from estimation.identification.free_run.candidate_rows import absolute_row
+from estimation.identification.free_run.candidate_rows import absolute_row, form_row
 from estimation.identification.free_run.choose_absolute import (
     AbsoluteCandidate,
     absolute_candidates,
@@ -98,7 +97,8 @@ def limited(taken: LimitedCandidate, linear: LinearComparison) -> Identified:
     """
     data, whole, by, limits = linear.task.data, linear.task.whole, linear.task.by, taken.limits
     fit = refitted_limited(taken, whole)
-    linear.rows.append(_limited_row(taken))
+    kind = "stops" if limits.stops else "cut-off"
+    linear.rows.append(form_row("output-error", taken, fit.form, nonlinearity=kind))
     # behind a stop nothing is left of the transfer function's own run, so that it has no covariance from one
     transfer = None if limits.stops or len(data.inputs) > 1 else linear_model(fit, between(whole, limits), by)
     named = data.inputs, data.output, data.sample_time, "output-error"
@@ -137,18 +137,3 @@ def told(model: FreeRunModel, linear: LinearComparison, held_back: float) -> Ide
     sound = quality.fit_percent > 0.0 and held_back < 1.0
     notes = () if sound else (IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent),)
     return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(linear.rows), notes, sound)
-
-
-def _limited_row(one: LimitedCandidate) -> dict[str, Any]:
-    """Return the row of a candidate whose output has limits."""
-    form = one.fit.form
-    return {
-        "structure": "output-error",
-        "nonlinearity": "stops" if one.limits.stops else "cut-off",
-        "order": form.order,
-        "numerator": list(form.sizes),
-        "delay": list(form.delays),
-        "held_back_percent": 100.0 * (1.0 - one.held_back),
-        "bic": one.bic,
-        "doubt": None,
-    }

@@ -13,7 +13,7 @@ import numpy as np
 
 from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.dense_polynomial import STEPS, Asked, Judged, every_term, late_by
+from estimation.identification.free_run.dense_polynomial import STEPS, Asked, JudgedRecipe, every_term, late_by
 from estimation.identification.free_run.held_back import block_error
 from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.linear_problem import Form, LinearFit
@@ -89,7 +89,9 @@ def forms_selected(delays: tuple[int, ...], asked: Asked) -> list[Form]:
     return list(dict.fromkeys(found))
 
 
-def judged_selections(data: Channels, parts: Sequence[Channels], forms: Sequence[Form]) -> list[Judged[Selection]]:
+def judged_selections(
+    data: Channels, parts: Sequence[Channels], forms: Sequence[Form]
+) -> list[JudgedRecipe[Selection]]:
     """Return models of few products, each judged on blocks that neither its terms nor its values have seen.
 
     Parameters
@@ -101,7 +103,7 @@ def judged_selections(data: Channels, parts: Sequence[Channels], forms: Sequence
     forms : sequence of Form
         Lags that terms are taken from.
     """
-    found: list[Judged[Selection]] = []
+    found: list[JudgedRecipe[Selection]] = []
     for form in forms:
         ordered = [_ordered(form, part) for part in parts]
         for count in COUNTS:
@@ -115,7 +117,7 @@ def judged_selections(data: Channels, parts: Sequence[Channels], forms: Sequence
 
 def _judged(
     recipe: Selection, fits: Sequence[PolynomialFit | None], data: Channels, parts: Sequence[Channels]
-) -> list[Judged[Selection]]:
+) -> list[JudgedRecipe[Selection]]:
     """Return the selection with its errors, or nothing where a fit runs away."""
     target, kept, errors = np.concatenate(data.y), list[PolynomialFit](), list[float]()
     for fit, part in zip(fits, parts, strict=True):
@@ -124,7 +126,7 @@ def _judged(
             return []
         kept.append(fit)
         errors.append(block_error(ran - target, np.isnan(np.concatenate(part.y)) & np.isfinite(target)))
-    return [Judged(recipe, tuple(kept), tuple(errors))]
+    return [JudgedRecipe(recipe, tuple(kept), block_errors=tuple(errors))]
 
 
 @dataclass(frozen=True, eq=False)

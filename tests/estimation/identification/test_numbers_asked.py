@@ -246,7 +246,9 @@ def choices() -> dict[str, Any]:
     told["dead times tried"] = [len(asked), asked[-1]]
     base = Form(1, (1,), (1,))
     linear = [
-        choose_hammerstein.Candidate(LinearFit(Form(k, (1,), (1,)), np.zeros(k + 2), 1.0), 1.0, (), 0.0, 0.0, "")
+        choose_hammerstein.Candidate(
+            LinearFit(Form(k, (1,), (1,)), np.zeros(k + 2), 1.0), 0.0, "", block_errors=(1.0,), bic=0.0
+        )
         for k in (1, 2, 3, 4, 5)
     ]
     with (

@@ -21,7 +21,7 @@ NONE: Any = None
 
 
 def candidate(held_back: float, bic: float, doubt: str = "") -> HammersteinCandidate:
-    return HammersteinCandidate(NONE, (held_back,), bic, doubt)
+    return HammersteinCandidate(NONE, doubt, block_errors=(held_back,), bic=bic)
 
 
 def test_the_smallest_of_those_that_do_nearly_as_well_as_the_best_is_chosen() -> None:
@@ -72,7 +72,7 @@ def test_what_is_told_of_a_candidate_is_in_percent_and_by_its_sizes() -> None:
         "doubt": None,
     }
     bent: Any = SimpleNamespace(linear=SimpleNamespace(form=form), kind="backlash")
-    told = hammerstein_row(HammersteinCandidate(bent, (0.1,), -3.0, "cancelling"))
+    told = hammerstein_row(HammersteinCandidate(bent, "cancelling", block_errors=(0.1,), bic=-3.0))
     assert (told["held_back_percent"], told["nonlinearity"], told["doubt"]) == (90.0, "backlash", "cancelling")
     assert (told["order"], told["numerator"], told["delay"]) == (3, [2, 1], [1, 4])
     terms = np.array([[0, -1, -1], [0, 0, -1], [0, 1, 1]])

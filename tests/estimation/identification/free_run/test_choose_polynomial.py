@@ -93,7 +93,7 @@ def made_up(monkeypatch: pytest.MonkeyPatch, error: Callable[[int], float]) -> l
             return None if rank == 5 else fit
 
         return SimpleNamespace(
-            recipe=SimpleNamespace(form=form, fit=whole), held_back=error(rank), block_errors=(), fits=[]
+            recipe=SimpleNamespace(form=form, fit=whole), held_back=error(rank), block_errors=(error(rank),), fits=[]
         )
 
     every = [judged(rank, small if rank % 2 else large) for rank in range(60, 0, -1)]

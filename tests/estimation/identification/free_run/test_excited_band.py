@@ -23,8 +23,7 @@ def rings(one: Candidate, pole: float, errors: tuple[float, ...]) -> Candidate:
     b *= b.sum() ** -1 * f.sum() * one.fit.numerators[0].sum() / one.fit.f.sum()
     theta = np.concatenate([b, f[1:], [one.fit.theta[one.form.n_values - 1]], np.zeros(2)])
     fit = LinearFit(Form(2, (2,), (1,)), theta, one.fit.cost)
-    held_back = float(np.sqrt(np.mean(np.square(errors))))
-    return replace(one, fit=fit, held_back=held_back, block_errors=errors, bic=one.bic - 100.0)
+    return replace(one, fit=fit, block_errors=errors, bic=one.bic - 100.0)
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +35,7 @@ def slow() -> tuple[Channels, Scaling, Candidate]:
     y = y + 0.05 * y.std() * rng.normal(size=N)
     data, by = scaled(channels_from([u[:, None]], [y], 1.0, ["u"], "y"))
     plain = candidate(fit_linear(Form(1, (1,), (1,)), data), data)
-    return data, by, replace(plain, block_errors=(0.1,) * 4, held_back=0.1)
+    return data, by, replace(plain, block_errors=(0.1,) * 4)
 
 
 def test_a_band_ends_where_an_input_hardly_moves(slow: tuple[Channels, Scaling, Candidate]) -> None:

@@ -212,14 +212,17 @@ def test_a_pole_too_slow_for_a_block_that_a_zero_cancels_is_doubtful(pole: float
 
 def test_a_doubtful_bend_is_taken_only_where_every_one_is() -> None:
     fit: Any = None
-    good, better = HammersteinCandidate(fit, (0.3,), 2.0), HammersteinCandidate(fit, (0.2,), 1.0, "cancelling")
+    good, better = (
+        HammersteinCandidate(fit, doubt, block_errors=(error,), bic=bic)
+        for doubt, error, bic in (("", 0.3, 2.0), ("cancelling", 0.2, 1.0))
+    )
     assert chosen_hammerstein([good, better]) is good
     assert chosen_hammerstein([better]) is better
 
 
 def bent(blocks: tuple[float, ...]) -> HammersteinCandidate:
     fit: Any = None
-    return HammersteinCandidate(fit, blocks, 1.0)
+    return HammersteinCandidate(fit, block_errors=blocks, bic=1.0)
 
 
 def straight(blocks: tuple[float, ...]) -> Any:

@@ -175,10 +175,10 @@ def test_of_models_that_do_as_well_the_most_probable_is_taken_and_a_dead_time_co
     data = scaled(one_log(300))[0]
     one = candidate(fit_linear(Form(1, (1,), (1,)), data), data)
     tried = {
-        "small": replace(one, held_back=0.1005, bic=-900.0),
-        "probable": replace(one, held_back=0.1000, bic=-1000.0),
-        "worse": replace(one, held_back=0.1020, bic=-2000.0),
-        "beyond": replace(one, held_back=0.0500, bic=-3000.0, doubt="time_constant"),
+        "small": replace(one, block_errors=(0.1005,), bic=-900.0),
+        "probable": replace(one, block_errors=(0.1000,), bic=-1000.0),
+        "worse": replace(one, block_errors=(0.1020,), bic=-2000.0),
+        "beyond": replace(one, block_errors=(0.0500,), bic=-3000.0, doubt="time_constant"),
     }
     assert chosen(list(tried.values())) is tried["probable"]
     late, theta = fit_linear(Form(1, (1,), (3,)), data), one.fit.theta.size

@@ -117,7 +117,7 @@ def made(error: float, bic: float, doubt: str = "", late: int = 1, **changes: An
     """Return a candidate that could have been."""
     form = changes.pop("form", Form(1, (1,), (late,)))
     fit = changes.pop("fit", LinearFit(form, np.array([0.5, -0.5, 0.0, 0.0]), 1.0))
-    return Candidate(fit, error, (error,) * 4, bic, bic, doubt)
+    return Candidate(fit, bic, doubt, block_errors=(error,) * 4, bic=bic)
 
 
 @NUMBERS.case(relative=1e-5)

@@ -19,7 +19,7 @@ from estimation.identification.free_run.candidate_rows import hammerstein_row, l
 from estimation.identification.free_run.choose_linear import Candidate, linear_candidates
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate
 from estimation.identification.free_run.data import Channels, blocks, channels_from, scaled
-from estimation.identification.free_run.dense_polynomial import Asked, Judged, Recipe
+from estimation.identification.free_run.dense_polynomial import Asked, JudgedRecipe, Recipe
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.hammerstein_fit import HammersteinProblem, fit_hammerstein
 from estimation.identification.free_run.identify import identify_channels
@@ -201,7 +201,7 @@ def choices_of_polynomials() -> dict[str, Any]:
 
     def made(order: int, late: int, error: float, doubt: str = "") -> Candidate:
         fit = LinearFit(Form(order, (1,), (late,)), np.zeros(order + 2), 1.0)
-        return replace(base, fit=fit, held_back=error, doubt=doubt)
+        return replace(base, fit=fit, block_errors=(error,), doubt=doubt)
 
     rows = [made(k, late, 1.0 - 0.01 * k - 0.1 * late) for k in (1, 2, 3, 4, 5) for late in (1, 2)]
     told["bases of many"] = [[one.form.order, one.form.delays[0]] for one in choose_polynomial._bases(rows)]
@@ -219,21 +219,22 @@ def choices_of_polynomials() -> dict[str, Any]:
         Found(done.spread, 1e-2),
         Found(done.bic, 1.0),
     ]
-    told["price"] = PolynomialCandidate(done.fit, done.refit, 0.3, (0.3,), 0.4, 0.0).price
+    told["price"] = PolynomialCandidate(done.fit, done.refit, 0.4, block_errors=(0.3,), bic=0.0).price
     refit = done.refit(data(lost=True))
     told["refitted"] = ended(refit)
-    judged = Judged(Recipe(Form(1, (1,), (1,)), 2, 1e-3), (grown(0), grown(1)), (0.3, 0.4))
+    recipe = Recipe(Form(1, (1,), (1,)), 2, 1e-3)
+    judged = JudgedRecipe(recipe, (grown(0), grown(1)), block_errors=(0.3, 0.4))
     one = choose_polynomial._candidate(grown(1), done.refit, judged, data())
     told["candidate"] = [one.held_back, Found(one.spread, 1e-2), Found(one.bic, 1.0)]
     told["rows"] = [
         {key: value for key, value in row.items() if key in ("structure", "order", "terms", "delay", "doubt")}
         for row in (polynomial_row(one), linear_row(base))
     ]
-    shares = polynomial_row(replace(one, spread=0.02, held_back=0.1)), polynomial_row(replace(one, spread=np.inf))
+    shares = polynomial_row(replace(one, spread=0.02, block_errors=(0.1,))), polynomial_row(replace(one, spread=np.inf))
     told["shares"] = [[row["held_back_percent"], row["spread_percent"]] for row in shares[:1]] + [
         shares[1]["spread_percent"]
     ]
-    told["share of a line"] = linear_row(replace(base, held_back=0.25))["held_back_percent"]
+    told["share of a line"] = linear_row(replace(base, block_errors=(0.25,)))["held_back_percent"]
     return told
 
 
@@ -304,7 +305,9 @@ def bent_inputs() -> dict[str, Any]:
         again = hammerstein_fit.refitted(found, data(lost=True))
         told[f"{kind}, refitted"] = Roughly(again.cost, 1e-4)
         one = choose_hammerstein.HammersteinCandidate(
-            found, choose_hammerstein._held_back(found, data()), choose_hammerstein._bic(found, data())
+            found,
+            block_errors=choose_hammerstein._held_back(found, data()),
+            bic=choose_hammerstein._bic(found, data()),
         )
         told[f"{kind}, judged"] = [Found(one.held_back, 1e-3), Found(one.bic, 1.0), hammerstein_row(one)["order"]]
         body = HammersteinDynamics.of(found, spread)
@@ -321,7 +324,7 @@ def bent_inputs() -> dict[str, Any]:
     ranked = [(float(k), np.array([float(k // 2)]), np.ones(2)) for k in range(12)]
     told["apart"] = [one[0] for one in hammerstein_fit._apart(ranked)]
     told["bases"] = [one.form.order for one in choose_hammerstein._bases(linear())]
-    base = choose_hammerstein.HammersteinCandidate(found, (1.0,), 3.0)
+    base = choose_hammerstein.HammersteinCandidate(found, block_errors=(1.0,), bic=3.0)
     rows = [base, replace(base, block_errors=(1.009,), bic=2.0), replace(base, block_errors=(1.011,), bic=1.0)]
     told["chosen"] = choose_hammerstein.chosen_hammerstein(rows).bic
     return told

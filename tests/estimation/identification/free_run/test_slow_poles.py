@@ -47,7 +47,7 @@ def with_pole(one: Candidate, pole: float, errors: tuple[float, ...], doubt: str
     theta = one.fit.theta.copy()
     theta[0], theta[1] = one.fit.theta[0] * (1.0 - pole) / 0.3, -pole
     fit = LinearFit(one.fit.form, theta, one.fit.cost)
-    return replace(one, fit=fit, held_back=float(np.sqrt(np.mean(np.square(errors)))), block_errors=errors, doubt=doubt)
+    return replace(one, fit=fit, block_errors=errors, doubt=doubt)
 
 
 def test_a_block_ends_before_a_slow_pole_has_decayed(plain: tuple[Channels, Candidate]) -> None:
@@ -204,7 +204,7 @@ def test_a_pole_at_one_is_needless_where_a_settled_model_explains_the_record_bet
     data, one = plain
     monkeypatch.setattr(module, "wanders", lambda *_: False)
     # one block holds the only step of the inputs, and the fit without it knows nothing of the pole
-    settled = replace(one, held_back=0.1, block_errors=(0.02, 0.02, 0.02, 0.2))
+    settled = replace(one, block_errors=(0.02, 0.02, 0.02, 0.2))
     other = with_pole(one, 1.0, (0.02, 0.02, 0.02, 0.02), "time_constant")
     integrating = replace(other, fit=replace(other.fit, integrates=True), bic=one.bic + gained)
     best, _ = believable([settled, integrating], data, scaled(data)[1])
