@@ -9,7 +9,6 @@ from estimation.identification.free_run.choose_linear import INTEGRATING, Candid
 from estimation.identification.free_run.data import Channels, Scaling
 from estimation.identification.free_run.excited_band import band_end, rings_beyond
 from estimation.identification.free_run.held_back import halves_error, surely_better
-from estimation.identification.free_run.other_orders import wanders
 from estimation.identification.free_run.transfer_function import linear_model
 from estimation.identification.notes import IdentificationCode
 from plant.notes import Note
@@ -71,12 +70,7 @@ def _believed(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> t
     integrating += [one for one in beyond if one.form in alone]
     tempting = chosen(integrating) if integrating else None
     settled = [one for one in free if not one.doubt]
-    believed = tempting is not None and tempting.held_back < bar and not _needless(tempting, settled)
-    if tempting is not None and believed and not wanders(tempting.fit, data):
-        # a pole that is estimated beyond the record is believed beside one at 1 alone, and where it is surely better
-        leaky = chosen(beyond) if beyond else tempting
-        surely = surely_better(leaky.block_errors, tempting.block_errors) and not wanders(leaky.fit, data)
-        tempting = leaky if surely else tempting
+    if tempting is not None and tempting.held_back < bar and not _needless(tempting, settled):
         return replace(tempting, doubt=""), [_slow_note(tempting, data)]
     if best.doubt == "time_constant":
         told = {"time_constant_s": _time_constant(best, data), "duration_s": data.told * data.sample_time}
@@ -99,8 +93,8 @@ def _believed(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> t
             notes.append(IdentificationCode.SIMPLER_MODEL_TAKEN.note(order=best.form.order, taken=taken.form.order))
             best = taken
     # a block lies between outputs that pin a slower pole to the drift of this record: it has to win by more than
-    # chance, and halves of the record, which are pinned by nothing, and other orders of the inputs are judged beside
-    quick = [one for one in candidates if not (one.doubt or one.fit.bounded or one.outlasts_block(data))]
+    # chance, and halves of the record, which are pinned by nothing, are judged beside
+    quick = [one for one in candidates if not (one.doubt or one.outlasts_block(data))]
     if quick and best.outlasts_block(data):
         taken, said = _believed(quick, data, by)
         if not (surely_better(best.block_errors, taken.block_errors) and _carries_on(best, taken, data)):
@@ -134,9 +128,7 @@ def _slow_note(taken: Candidate, data: Channels) -> Note:
 
 
 def _carries_on(slow: Candidate, quick: Candidate, data: Channels) -> bool:
-    """Return whether a slow model has no larger error on blocks and halves than a quick one, and does not wander."""
-    if wanders(slow.fit, data):
-        return False
+    """Return whether a slow model has no larger error on blocks and halves than a quick one."""
     errors = [np.hypot(one.held_back, halves_error(one.fit, data)) for one in (slow, quick)]
     return not errors[0] > errors[1]
 

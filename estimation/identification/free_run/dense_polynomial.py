@@ -1,7 +1,7 @@
 """Polynomial models of every product of a few lags, kept small by a penalty instead of a choice of products.
 
-A greedy growth depends on its first products and differs from block to block. Here nothing is chosen but the size and
-the penalty: one least squares of the one-step error, then, of the sizes that do best, a descent of the free run.
+Nothing is chosen but the size and the penalty: one least squares of the one-step error, then, of the sizes that do
+best, a descent of the free run.
 """
 
 from collections.abc import Sequence
@@ -302,16 +302,40 @@ def _judged(
     known: Sequence[Moments] | None = None,
 ) -> JudgedRecipe[Recipe] | None:
     """Return a recipe's fits to all blocks but one, begun at those before; None where one of them runs away."""
-    target, fits, errors = np.concatenate(data.y), list[PolynomialFit](), list[float]()
+    fits = list[PolynomialFit | None]()
     for index, part in enumerate(parts):
         tell("polynomial models")
-        fit = recipe.fit(part, None if before is None else before.fits[index], None if known is None else known[index])
+        begun, moments_known = None if before is None else before.fits[index], None if known is None else known[index]
+        fits.append(recipe.fit(part, begun, moments_known))
+        if fits[-1] is None:
+            return None
+    return judged_fits(recipe, fits, data, parts)
+
+
+def judged_fits(
+    recipe: Kind, fits: Sequence[PolynomialFit | None], data: Channels, parts: Sequence[Channels]
+) -> JudgedRecipe[Kind] | None:
+    """Return fits to all blocks but one with their errors there; None where one of them runs away.
+
+    Parameters
+    ----------
+    recipe : object
+        What was fitted.
+    fits : sequence of PolynomialFit or None
+        One a block.
+    data : Channels
+        Scaled.
+    parts : sequence of Channels
+        The same without one block each.
+    """
+    target, kept, errors = np.concatenate(data.y), list[PolynomialFit](), list[float]()
+    for fit, part in zip(fits, parts, strict=True):
         ran = None if fit is None else Runs(fit.variables, fit.terms, data).outputs(fit.theta)
         if fit is None or ran is None:
             return None
-        fits.append(fit)
+        kept.append(fit)
         errors.append(block_error(ran - target, np.isnan(np.concatenate(part.y)) & np.isfinite(target)))
-    return JudgedRecipe(recipe, tuple(fits), block_errors=tuple(errors))
+    return JudgedRecipe(recipe, tuple(kept), block_errors=tuple(errors))
 
 
 def _size(form: Form, degree: int, data: Channels) -> tuple[Variables, IntArray]:

@@ -7,15 +7,10 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.linear_dynamics import LinearDynamics
-from estimation.identification.free_run.linear_problem import LinearFit
 from estimation.identification.free_run.polynomial_fit import FARTHEST, PolynomialFit, Runs
 
 WILD = 0.003
 """Share of samples that a model may be held there where its inputs come in another order; beyond, it is wild."""
-
-WANDERS = 10.0
-"""Deviation of a linear run there, over that of the measured output, from which on it wanders [dimensionless]."""
 
 REORDERED, PIECES = 10, (8, 25)
 """Other orders of the inputs that a model is tried on, and pieces that they are cut into, by turns."""
@@ -62,33 +57,6 @@ def is_wild(fit: PolynomialFit, data: Channels) -> bool:
             return True
         held, total = held + int(np.count_nonzero((ran <= low) | (ran >= high))), total + ran.size
     return held > WILD * total
-
-
-def wanders(fit: LinearFit, data: Channels) -> bool:
-    """Return whether a linear model runs far beyond the measured output under reordered inputs.
-
-    A slow pole with a large gain is held by the order that was measured, as by a sweep that rises, and by that alone.
-
-    Parameters
-    ----------
-    fit : LinearFit
-        Of these data.
-    data : Channels
-        Scaled.
-
-    Returns
-    -------
-    bool
-        By the median of the other orders.
-    """
-    dynamics = LinearDynamics.of(fit)
-    spreads = list[float]()
-    for other in reordered(data):
-        # a sample at the mean before each log, so that no run begins at the steady gain times its first input
-        begun = [np.concatenate([np.zeros((1, u.shape[1])), u]) for u in other.u]
-        runs = [dynamics.run(u, np.full(u.shape[0], np.nan))[1:] for u in begun]
-        spreads.append(float(np.concatenate(runs).std()))
-    return float(np.median(spreads)) > WANDERS
 
 
 def disagreement(fits: Sequence[PolynomialFit], whole: PolynomialFit, data: Channels) -> float:

@@ -1,9 +1,8 @@
 """Polynomial models of few products, chosen one by one by how much of the one-step error each explains.
 
 Orthogonal least squares on lagged signals (Chen, Billings and Luo 1989; the error reduction ratio), begun at nothing.
-A growth on the free run begins at a linear model and cannot leave where a linear model follows the output badly; a
-model of every product spends its samples on products that are not there. This one takes neither risk, and is judged
-like both: each block that is held back has a selection of its own, which never saw it.
+A model of every product spends its samples on products that are not there. Each block that is held back has a selection
+of its own, which never saw it.
 """
 
 from collections.abc import Sequence
@@ -13,8 +12,14 @@ import numpy as np
 
 from estimation.arrays import Array, IntArray
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.dense_polynomial import STEPS, Asked, JudgedRecipe, every_term, late_by
-from estimation.identification.free_run.held_back import block_error
+from estimation.identification.free_run.dense_polynomial import (
+    STEPS,
+    Asked,
+    JudgedRecipe,
+    every_term,
+    judged_fits,
+    late_by,
+)
 from estimation.identification.free_run.linear_fit import COARSE
 from estimation.identification.free_run.linear_problem import Form, LinearFit
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, variables_of
@@ -28,7 +33,7 @@ COUNTS = (6, 9, 13, 18, 25)
 """Terms that are kept."""
 
 MOST_POOL = 250
-"""Terms that are chosen from, at most; products of three are left out where there would be more."""
+"""Terms that are chosen from at most: where there would be more, those of three are left out, then the last of two."""
 
 INDEPENDENT = 1e-8
 """Share of a term's square that the terms before it must leave, or it is passed over."""
@@ -103,30 +108,19 @@ def judged_selections(
     forms : sequence of Form
         Lags that terms are taken from.
     """
-    found: list[JudgedRecipe[Selection]] = []
+    judged: list[JudgedRecipe[Selection] | None] = []
     for form in forms:
         ordered = [_ordered(form, part) for part in parts]
         for count in COUNTS:
             fits = [None if one is None else one.model(count, part) for one, part in zip(ordered, parts, strict=True)]
-            found += _judged(Selection(form, count), fits, data, parts)
+            judged.append(judged_fits(Selection(form, count), fits, data, parts))
+    found = [one for one in judged if one is not None]
     for one in sorted(found, key=lambda one: one.held_back)[:DESCENDED]:
         fits = [_descended(fit, part) for fit, part in zip(one.fits, parts, strict=True)]
-        found += _judged(Selection(one.recipe.form, len(one.fits[0].terms), descended=True), fits, data, parts)
+        recipe = Selection(one.recipe.form, len(one.fits[0].terms), descended=True)
+        more = judged_fits(recipe, fits, data, parts)
+        found += [] if more is None else [more]
     return found
-
-
-def _judged(
-    recipe: Selection, fits: Sequence[PolynomialFit | None], data: Channels, parts: Sequence[Channels]
-) -> list[JudgedRecipe[Selection]]:
-    """Return the selection with its errors, or nothing where a fit runs away."""
-    target, kept, errors = np.concatenate(data.y), list[PolynomialFit](), list[float]()
-    for fit, part in zip(fits, parts, strict=True):
-        ran = None if fit is None else Runs(fit.variables, fit.terms, data).outputs(fit.theta)
-        if fit is None or ran is None:
-            return []
-        kept.append(fit)
-        errors.append(block_error(ran - target, np.isnan(np.concatenate(part.y)) & np.isfinite(target)))
-    return [JudgedRecipe(recipe, tuple(kept), block_errors=tuple(errors))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,13 +149,11 @@ class _Ordered:
 
 
 def _ordered(form: Form, data: Channels) -> _Ordered | None:
-    """Return the terms of some lags, best first; None where there are too many or too few samples."""
+    """Return the terms of some lags, best first; None where there are too few samples."""
     variables = variables_of(LinearFit(form, np.zeros(form.n_values), 0.0), data)[0]
     pool = every_term(variables.lag.size, 3)
     if pool.shape[0] > MOST_POOL:
-        pool = every_term(variables.lag.size, 2)
-    if pool.shape[0] > MOST_POOL:
-        return None
+        pool = every_term(variables.lag.size, 2)[:MOST_POOL]
     gram, right, n = moments(variables, pool, data)
     if n < 2 * COUNTS[-1]:
         return None

@@ -1,4 +1,4 @@
-"""Which polynomial models are grown, compared and let go on, with the fits themselves made up."""
+"""Which polynomial models are compared and let go on, with the fits themselves made up."""
 
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation.identification.free_run import choose_polynomial
-from estimation.identification.free_run.choose_polynomial import _best_grown, _dense, _fitted, _with_friction
+from estimation.identification.free_run.choose_polynomial import _dense, _fitted, _with_friction
 from estimation.identification.free_run.dense_polynomial import Asked, Recipe
 from estimation.identification.free_run.linear_problem import Form
 
@@ -23,7 +23,7 @@ def linear(order: int, held_back: float) -> Any:
 def rubs(
     monkeypatch: pytest.MonkeyPatch, share: dict[tuple[int, str], float], models: list[Any]
 ) -> tuple[list[Any], list[Any]]:
-    """Return which models friction was tried on, and what grows where it leaves a share of their error."""
+    """Return which models friction was tried on, and which are judged where it leaves a share of their error."""
     asked: list[tuple[int, float, str]] = []
 
     def rubbing(fit: Any, friction: str, _: Any) -> Any:
@@ -32,8 +32,10 @@ def rubs(
         return None if left is None else SimpleNamespace(cost=left * fit.cost, theta=np.zeros(3), name=fit.name)
 
     monkeypatch.setattr(choose_polynomial, "fit_with_friction", rubbing)
-    monkeypatch.setattr(choose_polynomial, "_Growth", lambda whole, *_: whole)
-    return asked, _with_friction(models, DATA)
+    judged: list[Any] = []
+    monkeypatch.setattr(choose_polynomial, "judged_fits", lambda fit, *_: judged.append(fit))
+    assert _with_friction(models, DATA, []) == []
+    return asked, judged
 
 
 def test_friction_is_tried_on_two_models_of_each_order_to_the_third_and_holds_a_position_from_the_second(
@@ -58,26 +60,6 @@ def test_a_model_that_rubs_goes_on_where_friction_explains_a_tenth_of_the_error_
     assert [one.name for one in found] == [3.0, 1.0]
     every = {(order, "velocity"): 0.8 - 0.1 * order for order in (1, 2, 3)}
     assert [one.name for one in rubs(monkeypatch, every, models)[1]] == [3.0, 2.0]
-
-
-class Growing:
-    """Stands in for a growth, and remembers how far it was taken."""
-
-    def __init__(self, error: float, runs: bool = True) -> None:
-        self.errors, self.runs, self.most = [9.0, error, 5.0], runs, list[int]()
-
-    def advance(self, most: int) -> bool:
-        self.most.append(most)
-        return self.runs
-
-    def finished(self) -> float:
-        return self.errors[1]
-
-
-def test_growths_are_compared_after_three_products_and_the_best_are_taken_to_twenty() -> None:
-    growths: Any = [Growing(0.4), Growing(0.1, runs=False), Growing(0.3), Growing(0.2)]
-    assert _best_grown(growths, 2) == [0.2, 0.3]
-    assert [one.most for one in growths] == [[3], [3], [3, 20], [3, 20]]
 
 
 def made_up(monkeypatch: pytest.MonkeyPatch, error: Callable[[int], float]) -> list[int]:

@@ -20,7 +20,6 @@ from estimation.identification.free_run.data import Channels, channels_from, hal
 from estimation.identification.free_run.held_back import BLOCKS, halves_error
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form, LinearFit
-from estimation.identification.free_run.other_orders import wanders
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
 
@@ -102,24 +101,6 @@ def test_a_slow_pole_carries_on_where_nothing_pins_it(
     assert believable(list(models.values()), data, scaled(data)[1])[0] is models[taken]
 
 
-def test_a_slow_pole_that_only_the_measured_order_holds_is_not_taken(
-    plain: tuple[Channels, Candidate], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    data, one = plain
-    monkeypatch.setattr(module, "halves_error", lambda *_: 0.1)
-    quick, slow = with_pole(one, 0.7, (0.1,) * 4), with_pole(one, 0.998, (0.01,) * 4)
-    assert not wanders(slow.fit, data)
-    assert believable([quick, slow], data, scaled(data)[1])[0] is slow
-    # a sum of its input begins at rest, not at the steady gain of 500 times the first input
-    assert not wanders(LinearFit(one.fit.form, np.array([0.05, -0.9999, 0.0]), 1.0), data)
-    theta = slow.fit.theta.copy()
-    theta[0] *= 300.0
-    loud = replace(slow, fit=LinearFit(slow.fit.form, theta, slow.fit.cost))
-    assert wanders(loud.fit, data)
-    assert believable([quick, loud], data, scaled(data)[1])[0] is quick
-    assert believable([loud], data, scaled(data)[1])[0] is loud  # where nothing quicker may be taken
-
-
 def test_a_half_is_run_by_a_fit_to_the_other(plain: tuple[Channels, Candidate]) -> None:
     data, one = plain
     first, second = halves(replace(data, u=(*data.u, data.u[0][:101]), y=(*data.y, data.y[0][:101])))
@@ -199,10 +180,9 @@ def test_what_is_slower_than_its_inputs_repeat_themselves_does_not_integrate(
 
 @pytest.mark.parametrize(("gained", "taken"), [(10.0, "settled"), (-10.0, "integrates")])
 def test_a_pole_at_one_is_needless_where_a_settled_model_explains_the_record_better(
-    plain: tuple[Channels, Candidate], gained: float, taken: str, monkeypatch: pytest.MonkeyPatch
+    plain: tuple[Channels, Candidate], gained: float, taken: str
 ) -> None:
     data, one = plain
-    monkeypatch.setattr(module, "wanders", lambda *_: False)
     # one block holds the only step of the inputs, and the fit without it knows nothing of the pole
     settled = replace(one, block_errors=(0.02, 0.02, 0.02, 0.2))
     other = with_pole(one, 1.0, (0.02, 0.02, 0.02, 0.02), "time_constant")
