@@ -78,13 +78,14 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
     # a run between stops may drift as a pole at 1 does, and is believed where that is: not if it leaves most of it;
     # what is cut off leaves noise: an output that bends towards an end gains less, and goes beyond it in other logs
     best, stops = one.best, taken.limits.stops
-    if stops:
-        least = min((1.0 - MARGIN) * best.held_back, BELIEVED)
-    else:
-        least = 0.0 if _at_one_level(data, limits) else CUT_OFF * best.held_back
-    if taken.held_back < least and told_apart(taken.block_errors, best.block_errors):
+    least = min((1.0 - MARGIN) * best.held_back, BELIEVED) if stops else CUT_OFF * best.held_back
+    if (
+        taken.held_back < least
+        and not _at_one_level(data, limits)
+        and told_apart(taken.block_errors, best.block_errors)
+    ):
         return taken
-    if not stops and taken.bic < best.bic and taken.held_back < best.held_back:
+    if taken.bic < best.bic and taken.held_back < best.held_back:
         shown, share = told_limits(data, one.task.by, limits)
         one.notes.append(IdentificationCode.OUTPUT_AT_END.note(output=data.output, limits=shown, share=share))
     return None

@@ -21,7 +21,7 @@ from estimation.identification.free_run.dense_polynomial import (
     judged_recipes,
 )
 from estimation.identification.free_run.held_back import BLOCKS, Compared
-from estimation.identification.free_run.other_orders import disagreement, is_wild
+from estimation.identification.free_run.other_orders import disagreement
 from estimation.identification.free_run.output_friction import continued, fit_with_friction
 from estimation.identification.free_run.polynomial_fit import PolynomialFit
 from estimation.identification.free_run.selected_polynomial import Selection, forms_selected, judged_selections
@@ -114,7 +114,7 @@ def _with_friction(linear: Sequence[Candidate], data: Channels, parts: Sequence[
 def _dense(
     data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: Asked, bar: float
 ) -> list[PolynomialCandidate]:
-    """Return the models of every product that do best on what was held back, but for those that leave their range."""
+    """Return the models of every product that do best on what was held back."""
     forms = forms_tried(delays, asked)
     judged = sorted(judged_recipes(data, parts, forms, asked), key=lambda one: one.held_back)
     first = [one for one in judged if one.recipe.form in forms][:COMPARED]
@@ -124,7 +124,7 @@ def _dense(
 def _selected(
     data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: Asked, bar: float
 ) -> list[PolynomialCandidate]:
-    """Return the models of few products that do best on what was held back, but for those that leave their range."""
+    """Return the models of few products that do best on what was held back."""
     judged = judged_selections(data, parts, forms_selected(delays, asked))
     return _kept(sorted(judged, key=lambda one: one.held_back)[:SELECTIONS], data, bar)
 
@@ -132,7 +132,7 @@ def _selected(
 def _kept(
     judged: Sequence[JudgedRecipe[Recipe]] | Sequence[JudgedRecipe[Selection]], data: Channels, bar: float
 ) -> list[PolynomialCandidate]:
-    """Return models of all data that were judged without a block each, but for those that leave their range.
+    """Return models of all data that were judged without a block each.
 
     Passed over are those that leave more of what was held back than the price of the best one, or than the bar.
     """
@@ -144,7 +144,7 @@ def _kept(
         tell("polynomial models")
         recipe = one.recipe
         fit = _fitted(recipe, data, known) if isinstance(recipe, Recipe) else recipe.fit(data)
-        if fit is not None and not is_wild(fit, data):
+        if fit is not None:
             found.append(_candidate(fit, recipe.fit, one, data))
             bar = min(bar, found[-1].price)
     return found

@@ -14,7 +14,7 @@ from estimation.identification.free_run.choose_hammerstein import (
     hammerstein_candidates,
     worthwhile,
 )
-from estimation.identification.free_run.choose_limited import LimitedCandidate, limited_candidate
+from estimation.identification.free_run.choose_limited import limited_candidate
 from estimation.identification.free_run.choose_linear import Candidate
 from estimation.identification.free_run.choose_polynomial import PolynomialCandidate, polynomial_candidates
 from estimation.identification.free_run.data import (
@@ -147,46 +147,62 @@ def _identified(
     delays = None if delay is None else (delay,) * len(data.inputs)
     asked = Asked(order, delay, n_numerator)
     task = Task(data, whole, by, section(whole, MOST_CHOSEN), asked, orders, delays)
-    if structure in ("output-error", "auto"):
-        walk = wandering(whole, task.part, orders, delays, n_numerator)
-        found = None if walk is None else from_changes(walk, data, by)
-        # a controller that answers the output's noise bends a fit of changes more than one of levels
-        if found is not None and not fed_back(found.model, data, changes=True):
-            return found
+    given = structure in ("output-error", "auto")
+    other = _of_changes(task) if given else None
+    if other is not None and structure == "output-error":
+        return other
     linear = linear_comparison(task)
-    apart = levelled(data, orders, delays) if structure in ("output-error", "auto") else None
-    if apart is not None:
-        whole, by = scaled(apart.data)
-        own = linear_comparison(replace(task, data=apart.data, whole=whole, by=by, part=section(whole, MOST_CHOSEN)))
-        if believed(own, linear):
-            own.notes.append(apart.note)
-            return replace(own.identified(), above=tuple(apart.above.tolist()))
-    drift = detrended(linear, orders) if structure in ("output-error", "auto") else None
-    if drift is not None:
-        return replace(drift.linear.identified(), above=drift.trends)
+    if given and other is None:
+        other = _of_other_levels(task, linear)
+    if other is not None:
+        return _or_nonlinear(other, linear, structure)
     if structure in ADOPTED:
         return _adopted(structure, linear)
     if structure == "auto" and linear.best.held_back < ROUNDING:
         structure = "output-error"
     wanted = structure == "wiener"
-    if structure in ("output-error", "auto", "wiener"):
+    if given or wanted:
         signless, within = without_sign(linear, MOST_COMPARED, surely=not wanted), None
         if not wanted:
             within = limited_candidate(linear)
         if signless is not None and (within is None or signless.held_back < within.held_back):
             return absolute(signless, linear, MOST_FITTED, asked=wanted)
         if within is not None:
-            return _limited(within, linear, structure)
+            held = limited(within, linear)
+            if held.sound:
+                return _or_nonlinear(held, linear, structure)
     return linear.identified() if structure == "output-error" else _nonlinear_or_linear(structure, linear)
 
 
-def _limited(within: LimitedCandidate, linear: LinearComparison, structure: str) -> Identified:
-    """Return a linear model whose output has limits, or of ``auto`` a nonlinear one that leaves less held back."""
-    found = limited(within, linear)
-    if not found.sound:
-        return linear.identified() if structure == "output-error" else _nonlinear_or_linear(structure, linear)
-    other = _nonlinear_or_linear(structure, linear) if structure == "auto" else found
-    return other if other.held_back_percent > found.held_back_percent else found
+def _of_changes(task: Task) -> Identified | None:
+    """Return the linear model of an output that wanders; None where it does not."""
+    walk = wandering(task.whole, task.part, task.orders, task.delays, task.asked.n_numerator)
+    found = None if walk is None else from_changes(walk, task.data, task.by)
+    # a controller that answers the output's noise bends a fit of changes more than one of levels
+    return None if found is None or fed_back(found.model, task.data, changes=True) else found
+
+
+def _of_other_levels(task: Task, linear: LinearComparison) -> Identified | None:
+    """Return the linear model of logs that were brought to one offset, or without their trend; None where none is."""
+    data, orders, delays = task.data, task.orders, task.delays
+    apart = levelled(data, orders, delays)
+    if apart is not None:
+        whole, by = scaled(apart.data)
+        own = linear_comparison(replace(task, data=apart.data, whole=whole, by=by, part=section(whole, MOST_CHOSEN)))
+        if believed(own, linear):
+            own.notes.append(apart.note)
+            return replace(own.identified(), above=tuple(apart.above.tolist()))
+    drift = detrended(linear, orders)
+    return None if drift is None else replace(drift.linear.identified(), above=drift.trends)
+
+
+def _or_nonlinear(found: Identified, linear: LinearComparison, structure: str) -> Identified:
+    """Return what was found, or of ``auto`` a nonlinear model that leaves clearly less held back of the data."""
+    if structure != "auto":
+        return found
+    other = _nonlinear_or_linear(structure, linear)
+    left, own = (100.0 - one.held_back_percent for one in (other, found))
+    return other if other.model.structure != "output-error" and left < (1.0 - CLEAR_MARGIN) * own else found
 
 
 def _nonlinear_or_linear(structure: str, linear: LinearComparison) -> Identified:
@@ -234,9 +250,9 @@ def _taken_polynomial(
     if better is None and structure == "narx":
         output = linear.task.data.output
         raise HydrostateError(f"no polynomial model of {output!r} runs free without growing beyond bounds")
-    if better is None or structure == "narx" or not linear.sound or _clearly_better(better, straight):
+    if better is None or structure == "narx" or not linear.sound:
         return better
-    return None
+    return better if better.price < (1.0 - CLEAR_MARGIN) * straight.held_back else None
 
 
 def _polynomial(
@@ -284,17 +300,6 @@ def _adopted(structure: str, compared: LinearComparison) -> Identified:
     sound = quality.fit_percent > 0.0 and held_back < 1.0
     notes = said if sound else [*said, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
     return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(compared.rows), tuple(notes), sound and not said)
-
-
-def _clearly_better(nonlinear: PolynomialCandidate, linear: Candidate) -> bool:
-    """Return whether a nonlinear model wins by a margin over all blocks, and in half of them at least."""
-    pairs = [
-        (one, other)
-        for one, other in zip(nonlinear.block_errors, linear.block_errors, strict=True)
-        if not (np.isnan(one) or np.isnan(other))
-    ]
-    won = sum(one < other for one, other in pairs)
-    return nonlinear.price < (1.0 - CLEAR_MARGIN) * linear.held_back and 2 * won >= len(pairs)
 
 
 def _refitted(found: PolynomialCandidate, whole: Channels) -> PolynomialDynamics:

@@ -1,9 +1,7 @@
 """Linear models as they run free on small logs, and how they are chosen, kept in `numbers.json`."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +12,6 @@ from estimation.identification.free_run import (
     choose_linear,
     dead_times,
     held_back,
-    identify,
     linear_comparison,
     linear_fit,
 )
@@ -205,18 +202,6 @@ def believed() -> dict[str, Any]:
         best, notes = believable.believable(given, base, by)
         told[f"simpler, {name}"] = [best.form.order, [[str(one.code), dict(one.data)] for one in notes]]
     told["undetermined"] = [believable._undetermined(made(1.0, 0.0, fit=one), base, by) for one in (cancelled, clean)]
-    nonlinear: Callable[..., Any] = lambda price, errors: SimpleNamespace(price=price, block_errors=errors)  # noqa: E731
-    told["clearly better"] = [
-        identify._clearly_better(nonlinear(price, errors), made(1.0, 0.0))
-        for price, errors in (
-            (0.84, (0.5,) * 4),
-            (0.86, (0.5,) * 4),
-            (0.84, (0.5, 0.5, 2.0, 2.0)),
-            (0.84, (0.5, 2.0, 2.0, 2.0)),
-            (0.84, (0.5, 2.0, 2.0, np.nan)),
-            (0.84, (0.5, np.nan, np.nan, 2.0)),
-        )
-    ]
     return told
 
 

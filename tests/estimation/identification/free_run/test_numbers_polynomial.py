@@ -117,12 +117,6 @@ def products_that_are_chosen() -> dict[str, Any]:
     told: dict[str, Any] = {f"{count} products": ended(grown(count)) for count in (0, 1, 2)}
     told["criterion"] = choose_polynomial._bic(replace(one, cost=3.0), data(lost=True))
     told["criterion of what leaves nothing"] = choose_polynomial._bic(replace(one, cost=0.0), data())
-    told["wild"] = [
-        other_orders.is_wild(
-            replace(one, theta=one.theta * np.where(np.arange(one.theta.size) == 4, size, 1.0)), data()
-        )
-        for size in (1.0, 0.0, -1.0, -4.0)
-    ]
     told["disagreement"] = [
         other_orders.disagreement([grown(0)], one, data()),
         other_orders.disagreement([replace(one, theta=900.0 * one.theta)], one, data()),
