@@ -3,11 +3,13 @@
 import warnings
 from dataclasses import replace
 from functools import cache
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from estimation.arrays import Array
+from estimation.identification.free_run import identify
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.identify import Identified, identify_channels
 from estimation.identification.free_run.linear_fit import fit_linear
@@ -100,6 +102,22 @@ def test_an_automatic_choice_looks_for_no_bends_where_the_output_wanders() -> No
     found = identified(16801, structure="auto")
     assert [note.code for note in found.notes] == ["random_walk"]
     assert found.model.structure == "output-error"
+
+
+@pytest.mark.parametrize(
+    ("structure", "left", "taken"),
+    [("narx", 0.84, "other"), ("narx", 0.86, "walk"), ("output-error", 0.1, "walk"), ("narx", None, "walk")],
+)
+def test_auto_leaves_changes_where_a_nonlinear_model_of_levels_leaves_clearly_less(
+    structure: str, left: float | None, taken: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a bend leaves may look like a walk: a heat exchanger's polynomial leaves a tenth of it."""
+    walk = identified(16801)
+    share = (left or 0.1) * (100.0 - walk.held_back_percent)
+    other = replace(walk, model=replace(walk.model, structure=structure), held_back_percent=100.0 - share)
+    monkeypatch.setattr(identify, "_nonlinear_or_linear", lambda *_: other)
+    found = identify._or_nonlinear(walk, cast(Any, None), "output-error" if left is None else "auto")
+    assert found is {"other": other, "walk": walk}[taken]
 
 
 def test_logs_and_gaps_and_two_inputs() -> None:
