@@ -1,7 +1,7 @@
-"""Which polynomial model is offered: all products of a few lags kept small by a penalty, few of them, or friction.
+"""Which polynomial model is offered: products grown one by one, or all of a few lags kept small by a penalty.
 
-What is offered must run well on blocks that are held back, which its fits never saw, and its fits to different blocks
-must agree where the same inputs come in another order.
+How many products are grown is told by blocks that are held back: each has a growth of its own, which never saw it. What
+is offered must run well there, and its fits to different blocks must agree where the same inputs come in another order.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,24 +12,35 @@ import numpy as np
 
 from estimation.identification.free_run.choose_linear import Candidate, criteria
 from estimation.identification.free_run.data import Channels, blocks
-from estimation.identification.free_run.dense_polynomial import (
-    Asked,
-    JudgedRecipe,
-    Recipe,
-    forms_tried,
-    judged_fits,
-    judged_recipes,
-)
-from estimation.identification.free_run.held_back import BLOCKS, Compared
-from estimation.identification.free_run.other_orders import disagreement
+from estimation.identification.free_run.dense_polynomial import Asked, JudgedRecipe, Recipe, forms_tried, judged_recipes
+from estimation.identification.free_run.held_back import BLOCKS, Compared, block_error, pooled
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_problem import LinearFit
+from estimation.identification.free_run.other_orders import disagreement, is_wild
 from estimation.identification.free_run.output_friction import continued, fit_with_friction
-from estimation.identification.free_run.polynomial_fit import PolynomialFit
+from estimation.identification.free_run.polynomial_fit import FINAL_STEPS, PolynomialFit, Runs
+from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, one_more, without_term
 from estimation.identification.free_run.selected_polynomial import Selection, forms_selected, judged_selections
 from estimation.progress import tell
 
-HIGHEST_RUBBING, RUBBING_BASES, RUBS, RUBBING_JUDGED = 3, 2, 0.1, 2
-"""Order of a linear model whose output may rub, models of each order, share of the squared error that friction must
-explain, and how many of such models are judged."""
+MOST_TERMS = 20
+"""Products beside the linear terms."""
+
+PATIENCE = 4
+"""Products without gain on what was held back after which no more are added."""
+
+CLEARLY = 0.01
+"""Share by which further products must do better on what was held back."""
+
+HIGHEST_BASE = 4
+"""Order of the linear model that products are added to."""
+
+HIGHEST_RUBBING, RUBBING_BASES, RUBS = 3, 2, 0.1
+"""Order of a linear model whose output may rub, models of each order, and share of the squared error that friction must
+explain."""
+
+BASES, SCREENED, KEPT = 6, 3, 2
+"""Linear models that products are added to, how many products they are given first, and how many models go on."""
 
 COMPARED, LARGER = 16, 6
 """Models of every product, best on what was held back, that are fitted to all data and tried in other orders: of the
@@ -69,7 +80,7 @@ class PolynomialCandidate(Compared):
 def polynomial_candidates(
     linear: Sequence[Candidate], data: Channels, asked: Asked | None = None, bar: float = float("inf")
 ) -> list[PolynomialCandidate]:
-    """Return polynomial models: linear ones that rub, of every product, and of the few that explain most.
+    """Return polynomial models: grown from linear ones, of every product, and of the few that explain most.
 
     The latter two are fitted to all data only while they can still be the best one: a price is not less than the
     held-back error that it begins with.
@@ -87,14 +98,35 @@ def polynomial_candidates(
     """
     delays, wanted = min(linear, key=lambda one: one.held_back).form.delays, asked or Asked()
     parts = [data.without(mask) for mask in blocks(data, BLOCKS)]
-    found = _with_friction(linear, data, parts)
+    found = _grown(linear, data)
     for offered in (_dense, _selected):
         found += offered(data, parts, delays, wanted, min([bar, *(one.price for one in found)]))
     return found
 
 
-def _with_friction(linear: Sequence[Candidate], data: Channels, parts: Sequence[Channels]) -> list[PolynomialCandidate]:
-    """Return the best linear model whose output rubs, if friction explains much that linear models leave."""
+def _grown(linear: Sequence[Candidate], data: Channels) -> list[PolynomialCandidate]:
+    growths = [
+        _Growth(whole, _from_linear(base.fit), data)
+        for base in _bases(linear)
+        if (whole := begun(base.fit, data)) is not None
+    ]
+    return [*_best_grown(growths, KEPT), *_best_grown(_with_friction(linear, data), 1)]
+
+
+def _best_grown(growths: Sequence["_Growth"], count: int) -> list[PolynomialCandidate]:
+    screened = [growth for growth in growths if growth.advance(SCREENED)]
+    best = sorted(screened, key=lambda one: min(one.errors))[:count]
+    for growth in best:
+        growth.advance(MOST_TERMS)
+    return [growth.finished() for growth in best]
+
+
+def _from_linear(base: LinearFit) -> Callable[[Channels], PolynomialFit | None]:
+    return lambda part: begun(fit_linear(base.form, part, [base.f]), part)
+
+
+def _with_friction(linear: Sequence[Candidate], data: Channels) -> list["_Growth"]:
+    """Return growths from models whose output rubs, if friction explains much that linear models leave."""
     fits: list[PolynomialFit] = []
     for order in range(1, HIGHEST_RUBBING + 1):
         # what rubs may integrate: a time constant beyond the record is no doubt here
@@ -104,17 +136,14 @@ def _with_friction(linear: Sequence[Candidate], data: Channels, parts: Sequence[
                 fit = fit_with_friction(base.fit, friction, data)
                 if fit is not None and fit.cost < (1.0 - RUBS) * base.fit.cost:
                     fits.append(fit)
-    tell("outputs with friction")
-    best = sorted(fits, key=lambda one: _bic(one, data))[:RUBBING_JUDGED]
-    judged = [judged_fits(fit, [continued(fit, part) for part in parts], data, parts) for fit in best]
-    taken = min((one for one in judged if one is not None), key=lambda one: one.held_back, default=None)
-    return [] if taken is None else [_candidate(taken.recipe, partial(continued, taken.recipe), taken, data)]
+    best = sorted(fits, key=lambda one: _bic(one, data))[:KEPT]
+    return [_Growth(fit, partial(continued, fit), data) for fit in best]
 
 
 def _dense(
     data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: Asked, bar: float
 ) -> list[PolynomialCandidate]:
-    """Return the models of every product that do best on what was held back."""
+    """Return the models of every product that do best on what was held back, but for those that leave their range."""
     forms = forms_tried(delays, asked)
     judged = sorted(judged_recipes(data, parts, forms, asked), key=lambda one: one.held_back)
     first = [one for one in judged if one.recipe.form in forms][:COMPARED]
@@ -124,7 +153,7 @@ def _dense(
 def _selected(
     data: Channels, parts: Sequence[Channels], delays: tuple[int, ...], asked: Asked, bar: float
 ) -> list[PolynomialCandidate]:
-    """Return the models of few products that do best on what was held back."""
+    """Return the models of few products that do best on what was held back, but for those that leave their range."""
     judged = judged_selections(data, parts, forms_selected(delays, asked))
     return _kept(sorted(judged, key=lambda one: one.held_back)[:SELECTIONS], data, bar)
 
@@ -132,7 +161,7 @@ def _selected(
 def _kept(
     judged: Sequence[JudgedRecipe[Recipe]] | Sequence[JudgedRecipe[Selection]], data: Channels, bar: float
 ) -> list[PolynomialCandidate]:
-    """Return models of all data that were judged without a block each.
+    """Return models of all data that were judged without a block each, but for those that leave their range.
 
     Passed over are those that leave more of what was held back than the price of the best one, or than the bar.
     """
@@ -144,7 +173,7 @@ def _kept(
         tell("polynomial models")
         recipe = one.recipe
         fit = _fitted(recipe, data, known) if isinstance(recipe, Recipe) else recipe.fit(data)
-        if fit is not None:
+        if fit is not None and not is_wild(fit, data):
             found.append(_candidate(fit, recipe.fit, one, data))
             bar = min(bar, found[-1].price)
     return found
@@ -163,7 +192,7 @@ def _fitted(recipe: Recipe, data: Channels, known: dict[Recipe, PolynomialFit | 
 def _candidate(
     fit: PolynomialFit,
     refit: Callable[[Channels], PolynomialFit | None],
-    judged: JudgedRecipe[Recipe] | JudgedRecipe[Selection] | JudgedRecipe[PolynomialFit],
+    judged: JudgedRecipe[Recipe] | JudgedRecipe[Selection],
     data: Channels,
 ) -> PolynomialCandidate:
     spread = disagreement(judged.fits, fit, data)
@@ -173,3 +202,85 @@ def _candidate(
 
 def _bic(fit: PolynomialFit, data: Channels) -> float:
     return criteria(fit.cost, fit.theta.size, data.n_samples)[0]
+
+
+def _bases(linear: Sequence[Candidate]) -> list[Candidate]:
+    """Return the best linear models of each order, with dead time and without."""
+    best: dict[tuple[int, bool], Candidate] = {}
+    for one in linear:
+        kind = (one.form.order, max(one.form.delays) > 1)
+        if kind[0] <= HIGHEST_BASE and not one.doubt and (kind not in best or one.held_back < best[kind].held_back):
+            best[kind] = one
+    sound = list(best.values()) or list(linear)[:1]
+    return sorted(sound, key=lambda one: one.held_back)[:BASES]
+
+
+class _Growth:
+    """Polynomial models of one base that grow on each block's data side by side."""
+
+    def __init__(self, whole: PolynomialFit, begin: Callable[[Channels], PolynomialFit | None], data: Channels) -> None:
+        self.path, self.data = [whole], data
+        self.masks = blocks(data, BLOCKS)
+        self.parts = [data.without(mask) for mask in self.masks]
+        self.fits = [begin(part) for part in self.parts]
+        self.block_errors = [self._held_back()]
+        self.history = [list(self.fits)]
+
+    @property
+    def errors(self) -> list[float]:
+        """Held-back error by the number of products."""
+        return [pooled(one) for one in self.block_errors]
+
+    def advance(self, most: int) -> bool:
+        """Add products until there are as many as wanted, or more bring nothing; return whether it runs free at all."""
+        if not np.isfinite(self.errors[0]):
+            return False
+        pool = candidate_terms(self.path[0].variables)
+        while len(self.errors) <= most and len(self.errors) - 1 - int(np.argmin(self.errors)) < PATIENCE:
+            tell("products that grow")
+            self.fits = [
+                None if fit is None else one_more(fit, pool, part) or fit
+                for fit, part in zip(self.fits, self.parts, strict=True)
+            ]
+            more = one_more(self.path[-1], pool, self.data)
+            if more is None:
+                break
+            self.path.append(more)
+            self.history.append(list(self.fits))
+            wild = is_wild(more, self.data)
+            self.block_errors.append((float("inf"),) * len(self.masks) if wild else self._held_back())
+        return True
+
+    def finished(self) -> PolynomialCandidate:
+        """Return the model of all data with as many products as held-back blocks ask for, pruned."""
+        errors = self.errors
+        least = min(errors)
+        count = next(k for k, error in enumerate(errors) if error <= (1.0 + CLEARLY) * least)
+        fit = _pruned(self.path[count], self.data)
+        fit = Runs(fit.variables, fit.terms, self.data).fit(fit.theta, FINAL_STEPS) or fit
+        parts = [part for part in self.history[count] if part is not None]
+        spread = disagreement(parts, fit, self.data)
+        refit, own, bic = partial(continued, fit), self.block_errors[count], _bic(fit, self.data)
+        return PolynomialCandidate(fit, refit, spread, tuple(parts), block_errors=own, bic=bic)
+
+    def _held_back(self) -> tuple[float, ...]:
+        target, errors = np.concatenate(self.data.y), list[float]()
+        for fit, mask in zip(self.fits, self.masks, strict=True):
+            ran = None if fit is None else Runs(fit.variables, fit.terms, self.data).outputs(fit.theta)
+            if ran is None:
+                return (float("inf"),) * len(self.masks)
+            errors.append(block_error(ran - target, np.concatenate(mask) & np.isfinite(target)))
+        return tuple(errors)
+
+
+def _pruned(fit: PolynomialFit, data: Channels) -> PolynomialFit:
+    """Return a fit without the products that the free run's information criterion does not miss."""
+    price = float(np.log(data.n_samples)) / data.n_samples
+    index = fit.terms.shape[0] - 1
+    while index >= 0:
+        if fit.terms[index, 1] >= 0:
+            less = without_term(fit, index, data)
+            if less is not None and np.log(less.cost / fit.cost) < price and not is_wild(less, data):
+                fit = less
+        index -= 1
+    return fit

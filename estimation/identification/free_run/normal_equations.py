@@ -178,6 +178,30 @@ class NormalEquations:
             right += rows.T @ residual
         return gram, right
 
+    def sums_beside(self, left: Array, others: slice) -> tuple[Array, Array, Array]:
+        """Return the same where some values are only compared: their products with each other are not summed.
+
+        Parameters
+        ----------
+        left : ndarray, shape (n,)
+            As `sums` takes it.
+        others : slice
+            The values that are compared.
+
+        Returns
+        -------
+        tuple of ndarray, shapes (k, p), (p,) and (p,)
+            Products of the k remaining derivatives with all, squares of all, and products with the residuals.
+        """
+        p = self.n_values
+        kept = np.delete(np.arange(p), np.arange(p)[others])
+        gram, square, right = np.zeros((kept.size, p)), np.zeros(p), np.zeros(p)
+        for rows, residual in self._stretches(left):
+            gram += rows[:, kept].T @ rows
+            square += np.einsum("ij,ij->j", rows, rows)
+            right += rows.T @ residual
+        return gram, square, right
+
     def start_slopes(self) -> Array:
         """Return the last run's derivatives by the first outputs of its only log.
 

@@ -1,4 +1,4 @@
-"""Whether fits of a model agree where the same inputs come in another order."""
+"""Behaviour of models under reordered inputs: whether they stay within bounds, and agree."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -7,7 +7,10 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs
+from estimation.identification.free_run.polynomial_fit import FARTHEST, PolynomialFit, Runs
+
+WILD = 0.003
+"""Share of samples that a model may be held there where its inputs come in another order; beyond, it is wild."""
 
 REORDERED, PIECES = 10, (8, 25)
 """Other orders of the inputs that a model is tried on, and pieces that they are cut into, by turns."""
@@ -36,6 +39,24 @@ def reordered(data: Channels, count: int = REORDERED) -> Iterator[Channels]:
             turned = [pieces[p][::-1] if rng.random() < 0.5 else pieces[p] for p in rng.permutation(cuts)]
             inputs.append(np.ascontiguousarray(np.concatenate(turned)))
         yield replace(data, u=tuple(inputs))
+
+
+def is_wild(fit: PolynomialFit, data: Channels) -> bool:
+    """Return whether a model keeps leaving the range of its output under reordered inputs.
+
+    Parameters
+    ----------
+    data : Channels
+        Scaled.
+    """
+    low, high = fit.variables.around(FARTHEST)
+    held, total = 0, 0
+    for other in reordered(data):
+        ran = Runs(fit.variables, fit.terms, other).outputs(fit.theta)
+        if ran is None:
+            return True
+        held, total = held + int(np.count_nonzero((ran <= low) | (ran >= high))), total + ran.size
+    return held > WILD * total
 
 
 def disagreement(fits: Sequence[PolynomialFit], whole: PolynomialFit, data: Channels) -> float:

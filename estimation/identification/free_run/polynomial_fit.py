@@ -14,8 +14,8 @@ from estimation.identification.search.levenberg import levenberg
 FARTHEST = 0.2
 """Share of its range by which the output itself may leave it, where there are products [dimensionless]."""
 
-FINAL_STEPS = 40
-"""Evaluations of a descent at most."""
+STEPS, FINAL_STEPS = 8, 40
+"""Evaluations after each added term, and at the end."""
 
 TOLERANCE = 1e-8
 """Share of the cost that a further step may promise at the end."""

@@ -8,8 +8,11 @@ import pytest
 from estimation.arrays import Array
 from estimation.identification.free_run.data import channels_from, scaled
 from estimation.identification.free_run.input_nonlinearity import play
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_fit import Runs
+from estimation.identification.free_run.polynomial_terms import begun, candidate_terms, one_more
 from estimation.identification.search.criterion import Structure
 from estimation.identification.search.descent import descend
 from estimation.identification.search.one_step import prediction_errors
@@ -17,7 +20,6 @@ from estimation.identification.search.pole_search import banded_spectra, search_
 from estimation.identification.state_space.joint import joined
 from estimation.identification.state_space.problem import Problem, Size
 from plant.compiled.native.loops import Loop
-from tests.estimation.identification.free_run.made_polynomials import CUBE, beside, line
 
 RNG = np.random.default_rng(7)
 U = np.repeat(RNG.choice([-1.0, 1.0], 30), 4)
@@ -58,7 +60,10 @@ def poles() -> list[Array]:
 
 def polynomial() -> list[Array]:
     data, _ = scaled(channels_from([U[:, None]], [resonance()], 0.01, ["force"], "deflection"))
-    fit = beside(line(data), data, CUBE)
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    fit = one_more(start, candidate_terms(start.variables), data)
+    assert fit is not None
     runs = Runs(fit.variables, fit.terms, data)
     equations = NormalEquations(runs, runs.ends)
     ran = equations.outputs(fit.theta)

@@ -24,6 +24,7 @@ from estimation.identification.free_run import (
     linear_fit,
     linear_problem,
     polynomial_fit,
+    polynomial_terms,
 )
 from estimation.identification.free_run.data import Channels, channels_from, scaled
 from estimation.identification.free_run.linear_problem import Form, LinearFit
@@ -37,7 +38,6 @@ from estimation.identification.state_space import identify as identify_states
 from estimation.identification.state_space.joint import Joint
 from estimation.identification.state_space.problem import Problem, Size
 from plant.arrays import Array
-from tests.estimation.identification.free_run.made_polynomials import line
 from tests.numbers import Numbers, Roughly
 
 NUMBERS = Numbers(__file__)
@@ -198,8 +198,12 @@ def free_runs() -> dict[str, Any]:
     with watched(linear_fit, "least_squares", lambda *_: 0, lambda *_: (np.full(5, next(creeping)), 0.0)) as asked:
         linear_fit.steiglitz_mcbride(problem)
     told["passes that settle"] = len(asked)
-    begun = line(channels(), found.form)
+    begun = polynomial_terms.begun(found, channels())
+    assert begun is not None
     with watched(polynomial_fit, "levenberg", options) as asked:
+        polynomial_terms.begun(found, channels())
+        polynomial_terms.one_more(begun, polynomial_terms.candidate_terms(begun.variables), channels())
+        polynomial_terms.without_term(begun, 1, channels())
         dense_polynomial.Recipe(Form(1, (1,), (1,)), 2, 1e-3, (0.1, 0.01)).fit(channels())
     told["polynomial"] = asked
     with (

@@ -1,4 +1,4 @@
-"""Which polynomial models are compared and let go on, with the fits themselves made up."""
+"""Which polynomial models are grown, compared and let go on, with the fits themselves made up."""
 
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation.identification.free_run import choose_polynomial
-from estimation.identification.free_run.choose_polynomial import _dense, _fitted, _with_friction
+from estimation.identification.free_run.choose_polynomial import _best_grown, _dense, _fitted, _with_friction
 from estimation.identification.free_run.dense_polynomial import Asked, Recipe
 from estimation.identification.free_run.linear_problem import Form
 
@@ -23,7 +23,7 @@ def linear(order: int, held_back: float) -> Any:
 def rubs(
     monkeypatch: pytest.MonkeyPatch, share: dict[tuple[int, str], float], models: list[Any]
 ) -> tuple[list[Any], list[Any]]:
-    """Return which models friction was tried on, and which are judged where it leaves a share of their error."""
+    """Return which models friction was tried on, and what grows where it leaves a share of their error."""
     asked: list[tuple[int, float, str]] = []
 
     def rubbing(fit: Any, friction: str, _: Any) -> Any:
@@ -32,10 +32,8 @@ def rubs(
         return None if left is None else SimpleNamespace(cost=left * fit.cost, theta=np.zeros(3), name=fit.name)
 
     monkeypatch.setattr(choose_polynomial, "fit_with_friction", rubbing)
-    judged: list[Any] = []
-    monkeypatch.setattr(choose_polynomial, "judged_fits", lambda fit, *_: judged.append(fit))
-    assert _with_friction(models, DATA, []) == []
-    return asked, judged
+    monkeypatch.setattr(choose_polynomial, "_Growth", lambda whole, *_: whole)
+    return asked, _with_friction(models, DATA)
 
 
 def test_friction_is_tried_on_two_models_of_each_order_to_the_third_and_holds_a_position_from_the_second(
@@ -62,13 +60,33 @@ def test_a_model_that_rubs_goes_on_where_friction_explains_a_tenth_of_the_error_
     assert [one.name for one in rubs(monkeypatch, every, models)[1]] == [3.0, 2.0]
 
 
+class Growing:
+    """Stands in for a growth, and remembers how far it was taken."""
+
+    def __init__(self, error: float, runs: bool = True) -> None:
+        self.errors, self.runs, self.most = [9.0, error, 5.0], runs, list[int]()
+
+    def advance(self, most: int) -> bool:
+        self.most.append(most)
+        return self.runs
+
+    def finished(self) -> float:
+        return self.errors[1]
+
+
+def test_growths_are_compared_after_three_products_and_the_best_are_taken_to_twenty() -> None:
+    growths: Any = [Growing(0.4), Growing(0.1, runs=False), Growing(0.3), Growing(0.2)]
+    assert _best_grown(growths, 2) == [0.2, 0.3]
+    assert [one.most for one in growths] == [[3], [3], [3, 20], [3, 20]]
+
+
 def made_up(monkeypatch: pytest.MonkeyPatch, error: Callable[[int], float]) -> list[int]:
     """Judge sixty models of every product by an error of their rank; return which of them are fitted to all data."""
     small, large = "small", "large"
     fitted: list[int] = []
 
     def judged(rank: int, form: str) -> Any:
-        fit = SimpleNamespace(cost=1.0, theta=np.zeros(2))
+        fit = SimpleNamespace(wild=rank == 3, cost=1.0, theta=np.zeros(2))
 
         def whole(_: Any) -> Any:
             fitted.append(rank)
@@ -81,17 +99,18 @@ def made_up(monkeypatch: pytest.MonkeyPatch, error: Callable[[int], float]) -> l
     every = [judged(rank, small if rank % 2 else large) for rank in range(60, 0, -1)]
     monkeypatch.setattr(choose_polynomial, "forms_tried", lambda *_: [small])
     monkeypatch.setattr(choose_polynomial, "judged_recipes", lambda *_: every)
+    monkeypatch.setattr(choose_polynomial, "is_wild", lambda fit, _: fit.wild)
     monkeypatch.setattr(choose_polynomial, "disagreement", lambda *_: 0.25)
     return fitted
 
 
-def test_of_the_models_of_every_product_sixteen_and_six_larger_ones_are_fitted(
+def test_of_the_models_of_every_product_sixteen_and_six_larger_ones_are_fitted_but_for_wild_ones(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     made_up(monkeypatch, lambda rank: 1.0 + 1e-6 * rank)
     found = _dense(DATA, [], (1,), Asked(), np.inf)
     ranks = sorted((*range(1, 33, 2), *range(2, 14, 2)))
-    assert [one.held_back for one in found] == [1.0 + 1e-6 * rank for rank in ranks if rank != 5]
+    assert [one.held_back for one in found] == [1.0 + 1e-6 * rank for rank in ranks if rank not in (3, 5)]
     assert found[0].price == pytest.approx(np.hypot(1.0, 0.25), abs=1e-5)
 
 
@@ -100,7 +119,7 @@ def test_a_model_that_cannot_be_the_best_one_any_more_is_not_fitted_to_all_data(
 ) -> None:
     # the first one costs 1.031, a spread of 0.25 included: the fifth leaves more than that of what was held back
     fitted = made_up(monkeypatch, lambda rank: 0.99 + 0.01 * rank)
-    assert [one.held_back for one in _dense(DATA, [], (1,), Asked(), np.inf)] == pytest.approx([1.0, 1.01, 1.02, 1.03])
+    assert [one.held_back for one in _dense(DATA, [], (1,), Asked(), np.inf)] == pytest.approx([1.0, 1.01, 1.03])
     assert fitted == [1, 2, 3, 4]
     fitted.clear()
     assert [one.held_back for one in _dense(DATA, [], (1,), Asked(), 1.005)] == pytest.approx([1.0])

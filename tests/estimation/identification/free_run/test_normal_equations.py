@@ -103,6 +103,12 @@ def test_runs_and_sums_of_factored_terms_are_those_of_the_terms_themselves(
     gram, right = equations.sums(left)
     assert gram == pytest.approx(jacobian.T @ jacobian, rel=1e-6, abs=1e-6)
     assert right == pytest.approx(jacobian.T @ left[runs.used], rel=1e-6, abs=1e-6)
+    others = slice(6, len(TERMS))
+    beside, square, again = equations.sums_beside(left, others)
+    kept = np.delete(np.arange(theta.size), np.arange(theta.size)[others])
+    assert beside == pytest.approx(gram[kept], rel=1e-9, abs=1e-9)
+    assert square == pytest.approx(np.diag(gram), rel=1e-9, abs=1e-9)
+    assert again == pytest.approx(right, rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.usefixtures("way")

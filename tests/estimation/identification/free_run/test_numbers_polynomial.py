@@ -13,6 +13,7 @@ from estimation.identification.free_run import (
     dense_polynomial,
     hammerstein_fit,
     other_orders,
+    polynomial_terms,
 )
 from estimation.identification.free_run.candidate_rows import hammerstein_row, linear_row, polynomial_row
 from estimation.identification.free_run.choose_linear import Candidate, linear_candidates
@@ -24,14 +25,14 @@ from estimation.identification.free_run.hammerstein_fit import HammersteinProble
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES, _inner, _outer, _widths, play
 from estimation.identification.free_run.input_range import inputs_beyond
-from estimation.identification.free_run.linear_problem import Form
+from estimation.identification.free_run.linear_fit import fit_linear
+from estimation.identification.free_run.linear_problem import Form, LinearFit
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, first_values
 from estimation.identification.free_run.polynomial_variables import products
 from plant.arrays import Array
-from tests.estimation.identification.free_run.made_polynomials import CUBE, beside, line
 from tests.kernels import loops_in_python
 from tests.numbers import Found, Numbers, Roughly, some
 
@@ -58,7 +59,12 @@ def data(lost: bool = False) -> Channels:
 
 @cache
 def grown(count: int = 1) -> PolynomialFit:
-    return beside(line(data()), data(), *(CUBE, (0, 0, -1))[:count])
+    fit = polynomial_terms.begun(fit_linear(Form(2, (1,), (1,)), data()), data())
+    assert fit is not None
+    for _ in range(count):
+        fit = polynomial_terms.one_more(fit, polynomial_terms.candidate_terms(fit.variables), data())
+        assert fit is not None
+    return fit
 
 
 def ended(fit: PolynomialFit | None) -> dict[str, Any] | None:
@@ -115,8 +121,29 @@ def runs_of_products() -> dict[str, Any]:
 def products_that_are_chosen() -> dict[str, Any]:
     one = grown(1)
     told: dict[str, Any] = {f"{count} products": ended(grown(count)) for count in (0, 1, 2)}
+    pools = {
+        n: polynomial_terms.candidate_terms(
+            replace(one.variables, lag=np.arange(n), source=np.array([0] * (n // 2) + [1] * (n - n // 2)))
+        )
+        for n in (2, 8, 10, 22)
+    }
+    told["pools"] = {str(n): [len(pool), pool[-1], int((pool[:, 2] >= 0).sum())] for n, pool in pools.items()}
+    own = np.column_stack([U, np.roll(U, 1), np.zeros(N)])
+    every = np.column_stack([np.roll(U, 2), U + 1e-4 * NOISE, U + 1e-2 * NOISE, np.zeros(N), NOISE])
+    square = np.einsum("ij,ij->j", every, every)
+    both = own.T @ answer(), every.T @ answer()
+    told["gains"] = polynomial_terms._gains(own.T @ own, own.T @ every, square, *both)
+    told["without"] = ended(polynomial_terms.without_term(one, 4, data()))
+    told["nothing more"] = polynomial_terms.one_more(one, np.array([[0, 0, -1]]), data()) is None
+    told["pruned"] = len(choose_polynomial._pruned(grown(2), data()).terms)
     told["criterion"] = choose_polynomial._bic(replace(one, cost=3.0), data(lost=True))
     told["criterion of what leaves nothing"] = choose_polynomial._bic(replace(one, cost=0.0), data())
+    told["wild"] = [
+        other_orders.is_wild(
+            replace(one, theta=one.theta * np.where(np.arange(one.theta.size) == 4, size, 1.0)), data()
+        )
+        for size in (1.0, 0.0, -1.0, -4.0)
+    ]
     told["disagreement"] = [
         other_orders.disagreement([grown(0)], one, data()),
         other_orders.disagreement([replace(one, theta=900.0 * one.theta)], one, data()),
@@ -168,12 +195,36 @@ def linear() -> list[Candidate]:
 @NUMBERS.case()
 def choices_of_polynomials() -> dict[str, Any]:
     told: dict[str, Any] = {}
+    bases = choose_polynomial._bases(linear())
+    told["bases"] = [one.form.order for one in bases]
     base = linear()[0]
 
+    def made(order: int, late: int, error: float, doubt: str = "") -> Candidate:
+        fit = LinearFit(Form(order, (1,), (late,)), np.zeros(order + 2), 1.0)
+        return replace(base, fit=fit, block_errors=(error,), doubt=doubt)
+
+    rows = [made(k, late, 1.0 - 0.01 * k - 0.1 * late) for k in (1, 2, 3, 4, 5) for late in (1, 2)]
+    told["bases of many"] = [[one.form.order, one.form.delays[0]] for one in choose_polynomial._bases(rows)]
+    doubtful = [made(1, 1, 1.0, "no_fit"), made(2, 1, 0.5, "no_fit")]
+    told["bases of doubtful ones"] = len(choose_polynomial._bases(doubtful))
+    whole = polynomial_terms.begun(base.fit, data())
+    assert whole is not None
+    growth = choose_polynomial._Growth(whole, choose_polynomial._from_linear(base.fit), data())
+    told["grows"] = growth.advance(2)
+    told["growth"] = [Found(one, 1e-3) for one in growth.errors]
+    done = growth.finished()
+    told["finished"] = [
+        len(done.fit.terms),
+        Found(done.held_back, 1e-3),
+        Found(done.spread, 1e-2),
+        Found(done.bic, 1.0),
+    ]
+    told["price"] = PolynomialCandidate(done.fit, done.refit, 0.4, block_errors=(0.3,), bic=0.0).price
+    refit = done.refit(data(lost=True))
+    told["refitted"] = ended(refit)
     recipe = Recipe(Form(1, (1,), (1,)), 2, 1e-3)
-    told["price"] = PolynomialCandidate(grown(1), recipe.fit, 0.4, block_errors=(0.3,), bic=0.0).price
     judged = JudgedRecipe(recipe, (grown(0), grown(1)), block_errors=(0.3, 0.4))
-    one = choose_polynomial._candidate(grown(1), recipe.fit, judged, data())
+    one = choose_polynomial._candidate(grown(1), done.refit, judged, data())
     told["candidate"] = [one.held_back, Found(one.spread, 1e-2), Found(one.bic, 1.0)]
     told["rows"] = [
         {key: value for key, value in row.items() if key in ("structure", "order", "terms", "delay", "doubt")}

@@ -1,12 +1,12 @@
-"""Other orders of the inputs keep what was put in, and tell fits that agree from those that do not."""
+"""Other orders of the inputs keep what was put in, and tell a model that leaves its range from one that keeps it."""
 
 import numpy as np
 import pytest
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.other_orders import PIECES, REORDERED, disagreement, reordered
-from estimation.identification.free_run.polynomial_fit import PolynomialFit
+from estimation.identification.free_run.other_orders import PIECES, REORDERED, disagreement, is_wild, reordered
+from estimation.identification.free_run.polynomial_fit import FARTHEST, PolynomialFit
 from estimation.identification.free_run.polynomial_variables import Variables
 
 
@@ -34,6 +34,18 @@ def test_pieces_of_the_inputs_come_in_other_orders_some_of_them_backwards() -> N
         assert PIECES[k % 2] // 2 <= breaks < PIECES[k % 2]
         backwards.append(float(np.mean(steps == -1.0)))
     assert 0.3 < np.mean(backwards) < 0.7
+
+
+def test_a_model_is_wild_where_it_is_held_in_more_than_three_samples_of_a_thousand() -> None:
+    low, high = moves(1.0).variables.around(FARTHEST)
+    quiet = np.zeros(1000)
+    for end in (low, high):
+        for count, wild in ((0, False), (2, False), (5, True)):
+            u = np.where(np.arange(1000) % 199 == 7, 1.01 * end, quiet)
+            u[np.flatnonzero(u)[count:]] = 0.0
+            assert is_wild(moves(1.0, 1e-9), channels(u)) is wild
+            assert not is_wild(moves(0.98, 1e-9), channels(u))
+    assert not is_wild(moves(1.0), channels(np.zeros(20)))  # a short record as well
 
 
 def test_fits_disagree_by_the_root_mean_square_of_what_is_between_them() -> None:

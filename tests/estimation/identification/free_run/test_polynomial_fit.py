@@ -1,4 +1,4 @@
-"""Polynomial models: their free run, its sensitivities, and how they are saved."""
+"""Polynomial models: their free run, its sensitivities, and which products they are given."""
 
 import json
 from collections.abc import Callable
@@ -11,18 +11,26 @@ import pytest
 
 from estimation.arrays import Array
 from estimation.identification.free_run import identify
+from estimation.identification.free_run.choose_polynomial import _pruned
 from estimation.identification.free_run.data import Channels, channels_from, scaled, section
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.normal_equations import NormalEquations
+from estimation.identification.free_run.other_orders import is_wild
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_fit import Runs
+from estimation.identification.free_run.polynomial_terms import (
+    STEPS,
+    TRIED,
+    begun,
+    candidate_terms,
+    one_more,
+)
 from estimation.identification.free_run.polynomial_variables import products, write_products
 from estimation.identification.free_run.saved import load_models, save_models
 from plant.errors import HydrostateError
-from tests.estimation.identification.free_run.made_polynomials import CUBE, beside, line
 
 
 def duffing(n: int, seed: int, noise: float = 0.01) -> tuple[Array, Array]:
@@ -40,15 +48,20 @@ def log(n: int = 400, seed: int = 1) -> Channels:
     return channels_from([u[:, None]], [y], 0.01, ["force"], "deflection")
 
 
-def test_the_free_run_of_a_linear_model_is_that_model() -> None:
+def test_the_free_run_begins_as_the_linear_model_that_it_grows_from() -> None:
     data, _ = scaled(log())
     linear = fit_linear(Form(2, (1,), (1,)), data)
-    assert line(data).cost == pytest.approx(linear.cost, rel=1e-2)
+    start = begun(linear, data)
+    assert start is not None
+    assert start.cost == pytest.approx(linear.cost, rel=1e-2)
 
 
 def test_sensitivities_are_the_derivatives_of_the_free_run() -> None:
     data, _ = scaled(log(150))
-    fit = beside(line(data), data, CUBE)
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    fit = one_more(start, candidate_terms(start.variables), data)
+    assert fit is not None
     runs = Runs(fit.variables, fit.terms, data)
     equations = NormalEquations(runs, runs.ends)
     assert equations.outputs(fit.theta) is not None
@@ -61,10 +74,15 @@ def test_sensitivities_are_the_derivatives_of_the_free_run() -> None:
     assert right == pytest.approx(jacobian.T @ left[runs.used], rel=1e-5, abs=1e-4)
 
 
-def test_the_product_that_the_plant_has_explains_most_of_what_a_line_leaves() -> None:
+def test_the_product_that_the_plant_has_is_the_first_one_added() -> None:
     data, _ = scaled(log())
-    start = line(data)
-    assert beside(start, data, CUBE).cost < 0.2 * start.cost
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    fit = one_more(start, candidate_terms(start.variables), data)
+    assert fit is not None
+    lags = [(int(fit.variables.source[v]), int(fit.variables.lag[v])) for v in fit.terms[-1]]
+    assert {source for source, _ in lags} == {0}  # the cube of the output, at the lags that noise leaves apart
+    assert fit.cost < 0.2 * start.cost
 
 
 def test_auto_takes_the_polynomial_model_of_a_stiffening_spring_and_not_of_a_linear_one() -> None:
@@ -101,6 +119,18 @@ def test_a_saved_model_simulates_as_before(tmp_path: object) -> None:
         FreeRunModel.from_dict({**entries, "version": 2})
 
 
+def test_a_model_that_leaves_the_range_when_the_inputs_come_in_another_order_is_wild() -> None:
+    data, _ = scaled(log())
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    fit = one_more(start, candidate_terms(start.variables), data)
+    assert fit is not None
+    assert not is_wild(fit, data)
+    theta = fit.theta.copy()
+    theta[fit.terms.shape[0] - 1] *= -3.0  # the spring softens
+    assert is_wild(replace(fit, theta=theta), data)
+
+
 def test_a_run_beyond_what_was_seen_does_not_run_away() -> None:
     model = identify_channels(log(), structure="narx", order=2, delay=1).model
     assert np.isfinite(model.simulate(3.0 * duffing(400, 4)[0])).all()
@@ -108,12 +138,27 @@ def test_a_run_beyond_what_was_seen_does_not_run_away() -> None:
 
 def test_products_are_held_at_the_ends_of_what_was_seen_and_single_terms_are_not() -> None:
     data, _ = scaled(log())
-    start = line(data)
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
     far = 100.0 * np.ones((5, 1))
     terms = np.array([[2, -1, -1], [2, 2, -1]])
     single, square = products(start.variables, terms, far, np.zeros(5))[-1]
     assert single == 100.0
     assert square == pytest.approx(start.variables.limits[2, 1] ** 2)
+
+
+def test_pruning_takes_out_a_product_that_explains_nothing_and_keeps_the_plants_own() -> None:
+    data, _ = scaled(log())
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    own = one_more(start, candidate_terms(start.variables), data)
+    assert own is not None
+    assert np.array_equal(_pruned(own, data).terms, own.terms)
+    idle = next(term for term in candidate_terms(start.variables) if {start.variables.source[v] for v in term} == {1})
+    terms, k = np.vstack([own.terms, idle]), own.terms.shape[0]
+    both = Runs(own.variables, terms, data).fit(np.insert(own.theta, k, 0.0), 5)
+    assert both is not None
+    assert np.array_equal(_pruned(both, data).terms, own.terms)
 
 
 TERMS = np.array([[-1, -1, -1], [0, -1, -1], [1, -1, -1], [2, -1, -1], [0, 1, -1], [0, 2, -1], [0, 0, 1], [1, 2, 2]])
@@ -133,7 +178,8 @@ def test_products_are_of_single_signals_as_they_are_and_of_several_as_they_are_h
 
 def test_a_rejected_step_is_not_asked_for_its_slopes(monkeypatch: pytest.MonkeyPatch) -> None:
     data, _ = scaled(log(200))
-    start = line(data)
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
     runs, costs, asked = Runs(start.variables, start.terms, data), list[float](), list[int]()
     outputs, sums = NormalEquations.outputs, NormalEquations.sums
 
@@ -155,15 +201,31 @@ def test_a_rejected_step_is_not_asked_for_its_slopes(monkeypatch: pytest.MonkeyP
     assert len(asked) < len(costs)
 
 
-def test_a_fit_that_runs_away_predicts_nothing() -> None:
+def test_a_fit_that_runs_away_is_wild_takes_no_product_and_predicts_nothing() -> None:
     data, _ = scaled(log())
-    start = line(data)
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
     away = replace(start, theta=5.0 * start.theta)
     runs = Runs(away.variables, away.terms, data)
     assert runs.outputs(away.theta) is None
     assert runs.fit(away.theta, 10) is None
+    assert one_more(away, candidate_terms(away.variables), data) is None
+    assert is_wild(away, data)
     body = PolynomialDynamics.of(away)
     assert np.isnan(body.run(data.u[0], data.y[0])).all()
+
+
+def test_no_product_is_added_where_none_explains_anything_or_none_runs_free(monkeypatch: pytest.MonkeyPatch) -> None:
+    data, _ = scaled(log())
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    pool = candidate_terms(start.variables)
+    explained = replace(start, cost=1e9 * start.cost)
+    assert one_more(explained, pool, data) is None
+    tried: list[tuple[int, int]] = []
+    monkeypatch.setattr(Runs, "fit", lambda _, theta, steps: tried.append((theta.size, steps)))
+    assert one_more(start, pool, data) is None
+    assert tried == [(start.theta.size + 1, STEPS)] * TRIED
 
 
 def test_a_plant_that_no_polynomial_model_follows_freely_is_refused_one(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,54 @@
+"""What a product explains is what least squares beside the others takes off the residual; which products there are."""
+
+import numpy as np
+import pytest
+
+from estimation.arrays import Array
+from estimation.identification.free_run.polynomial_terms import MOST_CANDIDATES, _gains, candidate_terms
+from estimation.identification.free_run.polynomial_variables import Variables
+
+RNG = np.random.default_rng(2)
+
+
+def left(columns: Array, target: Array) -> float:
+    missed = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
+    return float(missed @ missed)
+
+
+def gains(own: Array, every: Array, residual: Array) -> Array:
+    """Return what candidates explain, from the products of sensitivities that a fit sums."""
+    with np.errstate(invalid="ignore"):
+        square = np.einsum("ij,ij->j", every, every)
+        return _gains(own.T @ own, own.T @ every, square, own.T @ residual, every.T @ residual)
+
+
+def test_a_product_explains_what_least_squares_gains_by_it() -> None:
+    own, every, residual = RNG.normal(size=(80, 3)), RNG.normal(size=(80, 5)), RNG.normal(size=80)
+    own[:, 2] *= 1e-6  # columns of any size
+    every[:, 3] *= 1e4
+    exact = [left(own, residual) - left(np.column_stack([own, one]), residual) for one in every.T]
+    assert gains(own, every, residual) == pytest.approx(exact, rel=1e-6)
+
+
+def test_what_others_sum_up_to_what_is_nothing_and_what_ran_away_explain_nothing() -> None:
+    own, residual = RNG.normal(size=(80, 3)), RNG.normal(size=80)
+    nearly = own[:, 0] + 1e-4 * RNG.normal(size=80)
+    barely = own[:, 0] + 1e-2 * RNG.normal(size=80)
+    every = np.column_stack([own @ [1.0, 2.0, 3.0], nearly, np.zeros(80), np.full(80, np.inf), barely])
+    assert (gains(own, every, residual) > 0.0).tolist() == [False, False, False, False, True]
+
+
+@pytest.mark.parametrize(("lags", "inputs"), [(1, 1), (2, 2), (9, 0), (5, 5)])
+def test_products_are_those_of_two_and_three_signals_until_there_are_too_many(lags: int, inputs: int) -> None:
+    source = np.array([0] * lags + [1] * inputs)
+    n = lags + inputs
+    variables = Variables(source, np.ones(n, dtype=np.int64), np.zeros((n, 2)))
+    found = candidate_terms(variables).tolist()
+    pairs, cubes = n * (n + 1) // 2, n * (n + 1) * (n + 2) // 6
+    assert len({tuple(one) for one in found}) == len(found)
+    assert sum(one[2] == -1 for one in found) == pairs
+    if pairs + cubes <= MOST_CANDIDATES:
+        assert len(found) == pairs + cubes
+    else:  # of many, the cubes of one channel's signals
+        assert all(len({int(source[v]) for v in one}) == 1 for one in found if one[2] >= 0)
+        assert len(found) == pairs + sum(k * (k + 1) * (k + 2) // 6 for k in (lags, inputs))
