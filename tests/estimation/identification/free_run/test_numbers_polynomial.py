@@ -304,11 +304,8 @@ def bent_inputs() -> dict[str, Any]:
         told[f"{kind}, deviations"] = [Roughly(float(one), 1e-2) for one in spread]
         again = hammerstein_fit.refitted(found, data(lost=True))
         told[f"{kind}, refitted"] = Roughly(again.cost, 1e-4)
-        one = choose_hammerstein.HammersteinCandidate(
-            found,
-            block_errors=choose_hammerstein._held_back(found, data()),
-            bic=choose_hammerstein._bic(found, data()),
-        )
+        left, bic = choose_hammerstein._held_back(found, data()), choose_hammerstein._bic(found, data())
+        one = choose_hammerstein.HammersteinCandidate(found, block_errors=left, bic=bic)
         told[f"{kind}, judged"] = [Found(one.held_back, 1e-3), Found(one.bic, 1.0), hammerstein_row(one)["order"]]
         body = HammersteinDynamics.of(found, spread)
         by = scaled(channels_from([U[:, None]], [answer()], 0.1, ("a",), "y"))[1]
