@@ -27,7 +27,7 @@ from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, 
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.flow.told_volume import bound_told, ratio_doubt
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
-from estimation.fits.greybox.small_pump_ripple import with_small_ripple
+from estimation.fits.greybox.small_pump_ripple import with_shifts
 from estimation.fits.greybox.work_limit import Work, WorkSpentError
 from estimation.fits.hypotheses import (
     AIR,
@@ -311,7 +311,7 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
     weights, p = weights_of(strange.fits), plain.start.parameters
     found, correlation = with_lumped(strange.values, strange.fits, weights, p, plain.log.measured_rms)
     return FormFit(
-        parameters=with_structure(with_small_ripple(with_small_ripple(found, one.small_teeth), one.noise_shift), left),
+        parameters=with_structure(with_shifts(found, one.small_teeth, one.noise_shift), left),
         bound=bound,
         chi_square=one.chi_square[0],
         reasons=(*shown, *contradicted(strange, plain.start.parameters)),
@@ -330,7 +330,7 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     weights = weights_of(plain.fits, SURER * plain.log.passes, beforehand)
     p = plain.start.parameters
     found, correlation = with_lumped(averaged(plain.fits, weights), plain.fits, weights, p, plain.log.measured_rms)
-    found = with_small_ripple(with_small_ripple(found, best.small_teeth), best.noise_shift)
+    found = with_shifts(found, best.small_teeth, best.noise_shift)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     left = UNEVEN_OIL if is_single({}, p) else DISCRETISED
     untaken, open_play = plain.play_untaken(plain.swinging.play, sensed)

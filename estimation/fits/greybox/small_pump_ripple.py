@@ -65,17 +65,17 @@ def small_pump_ripple(
     return dict(zip(names, moved.tolist(), strict=True)), dict(zip(names, variance.tolist(), strict=True))
 
 
-def with_small_ripple(
-    found: Mapping[str, tuple[float, float]], small: tuple[Mapping[str, float], Mapping[str, float]]
+def with_shifts(
+    found: Mapping[str, tuple[float, float]], *shifts: tuple[Mapping[str, float], Mapping[str, float]]
 ) -> dict[str, tuple[float, float]]:
-    """Return the result, shifted and widened by a small pump ripple; or by noise of motor speed, see `noise_shift`.
+    """Return the result, shifted and widened by what no fit was made for: small teeth, noise of motor speed.
 
     Parameters
     ----------
     found : Mapping[str, tuple of float]
         Value and deviation by parameter [SI].
-    small : tuple of Mapping[str, float]
-        As of `small_pump_ripple` or `noise_shift` [dimensionless].
+    *shifts : tuple of Mapping[str, float]
+        Each as of `small_pump_ripple` or `noise_shift` [dimensionless].
 
     Returns
     -------
@@ -84,13 +84,13 @@ def with_small_ripple(
 
     Examples
     --------
-    >>> with_small_ripple({"bulk_modulus": (2e8, 3e5)}, ({"bulk_modulus": 0.0}, {"bulk_modulus": 4e-6}))
+    >>> with_shifts({"bulk_modulus": (2e8, 3e5)}, ({"bulk_modulus": 0.0}, {"bulk_modulus": 4e-6}))
     {'bulk_modulus': (200000000.0, 500000.0)}
     """
-    moved, variance = small
     out = dict(found)
-    for name in (name for name in MOVED if name in moved and name in found):
-        value, std = found[name]
-        step = moved[name] if abs(moved[name]) <= MOST_MOVED else 0.0  # no fit is linear so far: it is only uncertain
-        out[name] = value * math.exp(step), math.hypot(std, value * variance[name] ** 0.5)
+    for moved, variance in shifts:
+        for name in (name for name in MOVED if name in moved and name in out):
+            value, std = out[name]
+            step = moved[name] if abs(moved[name]) <= MOST_MOVED else 0.0  # no fit is linear so far: only uncertain
+            out[name] = value * math.exp(step), math.hypot(std, value * variance[name] ** 0.5)
     return out

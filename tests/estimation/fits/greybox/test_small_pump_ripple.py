@@ -8,7 +8,7 @@ import pytest
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log, without_strays
 from estimation.fits.greybox.pump_ripple import LEAST_TEETH, Ripple, ShownRipple
-from estimation.fits.greybox.small_pump_ripple import SMALL_STD, small_pump_ripple, with_small_ripple
+from estimation.fits.greybox.small_pump_ripple import SMALL_STD, small_pump_ripple, with_shifts
 from estimation.fits.hypothesis_search.pump_ripple_fits import asked_for_ripple
 from experiments.open_benchmark.logger import PLAIN, Logger
 from experiments.open_benchmark.machine import Machine
@@ -54,15 +54,13 @@ def test_teeth_that_need_an_offset_of_speed_move_nothing() -> None:
 
 def test_what_is_told_is_moved_and_wider_and_the_rest_stays() -> None:
     found = {"bulk_modulus": (2e8, 3e5), "speed_lead": (1e-5, 1e-6)}
-    told = with_small_ripple(
-        found, ({"bulk_modulus": 0.01, "speed_lead": 1.0}, {"bulk_modulus": 4e-6, "speed_lead": 1})
-    )
+    told = with_shifts(found, ({"bulk_modulus": 0.01, "speed_lead": 1.0}, {"bulk_modulus": 4e-6, "speed_lead": 1}))
     assert told["bulk_modulus"] == pytest.approx((2e8 * np.exp(0.01), 5e5))
     assert told["speed_lead"] == found["speed_lead"]
 
 
 def test_a_move_beyond_what_is_linear_makes_a_number_uncertain_and_no_other_one() -> None:
-    found = with_small_ripple({"bulk_modulus": (2e8, 0.0)}, ({"bulk_modulus": 800.0}, {"bulk_modulus": 4.0}))
+    found = with_shifts({"bulk_modulus": (2e8, 0.0)}, ({"bulk_modulus": 800.0}, {"bulk_modulus": 4.0}))
     assert found == {"bulk_modulus": (2e8, 4e8)}
 
 
@@ -81,7 +79,7 @@ def logged(ripple: float) -> Record:
 def test_bulk_modulus_with_small_teeth_is_what_it_is_without(monkeypatch: pytest.MonkeyPatch) -> None:
     ripple = 0.8 * LEAST_TEETH
     (value, std), (found, _) = (fit_flow(logged(one), PAPER, 2e8).parameters["bulk_modulus"] for one in (0.0, ripple))
-    monkeypatch.setattr("estimation.fits.flow.fit.with_small_ripple", lambda given, _: given)
+    monkeypatch.setattr("estimation.fits.flow.fit.with_shifts", lambda given, *_: given)
     monkeypatch.setattr("estimation.fits.hypothesis_search.pump_ripple_fits.MOST_LINEAR", np.inf)
     left, _ = fit_flow(logged(ripple), PAPER, 2e8).parameters["bulk_modulus"]
     assert abs(found - value) < 0.5 * std < abs(left - value)
