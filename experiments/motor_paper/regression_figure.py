@@ -17,10 +17,10 @@ READING_WORDS = {"as_printed": "as printed", "anova": "as in Figure 12", "physic
 _MARKS = {"as_printed": (GREY, "x"), "anova": (BLUE, "o"), "physical": (VERMILION, "s")}
 
 
-def _marked(axis: Axes, rows: pd.DataFrame, across: str, up: str) -> None:
+def _marked(axis: Axes, rows: pd.DataFrame, across: str) -> None:
     for name, part in rows.groupby("reading", sort=False):
         colour, mark = _MARKS[str(name)]
-        axis.plot(part[across], part[up], mark, color=colour, markersize=5, label=READING_WORDS[str(name)])
+        axis.plot(part[across], part["residual"], mark, color=colour, markersize=5, label=READING_WORDS[str(name)])
 
 
 def _draw_residuals(tables: Tables) -> Figure:
@@ -31,7 +31,7 @@ def _draw_residuals(tables: Tables) -> Figure:
     words = ("deformation [as printed: mm]", "velocity [as printed: mm/s]", "predicted flow [mL/s]")
     heads = ("Figure 15", "Figure 10", "Figure 16")
     for axis, column, label, head in zip(axes, ("deformation", "velocity", "predicted"), words, heads, strict=True):
-        _marked(axis, rows, column, "residual")
+        _marked(axis, rows, column)
         axis.axhline(0.0, color=BLACK, linewidth=0.8)
         axis.set(xlabel=label, title=head)
     axes[0].set(ylabel="residual [mL/s]")

@@ -109,7 +109,7 @@ def aerated(base: CircuitParameters, air_fraction: float) -> CircuitParameters:
     HydrostateError
         If the fraction is out of range.
     """
-    _require("air fraction", air_fraction, 0.0, MOST_AIR)
+    _require("air fraction", air_fraction, MOST_AIR)
     return replace(base, air_fraction=air_fraction)
 
 
@@ -133,7 +133,7 @@ def drifted_relief(base: CircuitParameters, factor: float) -> CircuitParameters:
     """
     if factor == 0.0:
         raise HydrostateError("relief factor must be positive, got 0.0")
-    _require("relief factor", factor, 0.0, 2.0)
+    _require("relief factor", factor, 2.0)
     return replace(base, relief_pressure=factor * base.relief_pressure)
 
 
@@ -148,6 +148,6 @@ def _seals(load: float) -> tuple[float, float]:
     return linear, coulomb
 
 
-def _require(name: str, value: float, lowest: float, highest: float) -> None:
-    if not (isfinite(value) and lowest <= value <= highest):
-        raise HydrostateError(f"{name} must be between {lowest:g} and {highest:g}, got {value!r}")
+def _require(name: str, value: float, highest: float) -> None:
+    if not (isfinite(value) and 0.0 <= value <= highest):
+        raise HydrostateError(f"{name} must be between 0 and {highest:g}, got {value!r}")
