@@ -1,4 +1,4 @@
-"""Logs that are made in a millisecond: a piston's motion, the pressure that it takes, and the pump that feeds both."""
+"""Logs made in a millisecond, of a piston's motion, the pressure that it takes, and its pump; and of the circuit."""
 
 from typing import Any
 
@@ -6,8 +6,11 @@ import numpy as np
 
 from estimation.log_checks import sensor_check
 from plant.arrays import Array
+from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
+from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
+from plant.sensors.sensors import BENCH, Sensors
 from tests.edges import edge
 from tests.numbers import told
 
@@ -20,6 +23,13 @@ N = 1500
 
 def noise(size: float, count: int = N, seed: int = 5) -> Array:
     return size * np.random.default_rng(seed).standard_normal(count)
+
+
+def circuit_log(drive: str, sensors: Sensors = BENCH) -> Record:
+    """Return four seconds of the healthy circuit at 1 kHz."""
+    rng = np.random.default_rng(4)
+    signal = make_drive(drive, 4.0, 1e-3, HEALTHY, rng)
+    return simulate(CIRCUIT, signal, 1e-3, HEALTHY, sensors=sensors, rng=rng)
 
 
 def made_log(count: int = N, *, leakage: float = 1.0, size: float = 1.0, noisy: float = 1.0) -> Record:

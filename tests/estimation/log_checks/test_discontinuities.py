@@ -6,21 +6,14 @@ import pytest
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.discontinuities import pressure_strays, without_discontinuities
 from estimation.notes import ChannelCode, SensorCode
-from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
-from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, IDEAL, Sensors
+from tests.estimation.log_checks.made_logs import circuit_log
 
 SPEED, POSITION, VELOCITY = "motor_speed_rad_s", "position_m", "velocity_m_s"
 PRESSURE = "differential_pressure_pa"
 ROW = 1500
-
-
-def log(drive: str, sensors: Sensors = BENCH) -> Record:
-    rng = np.random.default_rng(4)
-    signal = make_drive(drive, 4.0, 1e-3, EhaParameters(), rng)
-    return simulate(CIRCUIT, signal, 1e-3, EhaParameters(), sensors=sensors, rng=rng)
 
 
 def stepped(record: Record, channel: str, size: float) -> Record:
@@ -30,7 +23,7 @@ def stepped(record: Record, channel: str, size: float) -> Record:
 @pytest.mark.parametrize("sensors", [BENCH, IDEAL])
 @pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "chirp", "sine"])
 def test_a_log_that_goes_on_throughout_is_what_it_was(drive: str, sensors: Sensors) -> None:
-    record = log(drive, sensors)
+    record = circuit_log(drive, sensors)
     assert without_discontinuities(record) == (record, ())
     still = record.replace(**{VELOCITY: None})
     assert without_discontinuities(still) == (still, ())
@@ -38,7 +31,7 @@ def test_a_log_that_goes_on_throughout_is_what_it_was(drive: str, sensors: Senso
 
 @pytest.mark.parametrize("drive", ["steps", "multisine", "sine"])
 def test_a_zero_of_position_that_is_set_anew_is_named_and_subtracted(drive: str) -> None:
-    record = log(drive)
+    record = circuit_log(drive)
     found, (note,) = without_discontinuities(stepped(record, POSITION, 0.004))
     assert note.code is SensorCode.POSITION_REZEROED
     assert note.data["step"] == pytest.approx(0.004, abs=1e-5)
@@ -48,7 +41,7 @@ def test_a_zero_of_position_that_is_set_anew_is_named_and_subtracted(drive: str)
 
 @pytest.mark.parametrize("drive", ["steps", "multisine", "sine"])
 def test_behind_a_zero_of_pressure_that_is_set_anew_the_longer_part_is_used(drive: str) -> None:
-    given = stepped(log(drive), PRESSURE, 1e6)
+    given = stepped(circuit_log(drive), PRESSURE, 1e6)
     found, (note,) = without_discontinuities(given)
     assert note.code is SensorCode.PRESSURE_REZEROED
     assert note.data["step"] == pytest.approx(1e6, rel=0.03)
@@ -58,7 +51,7 @@ def test_behind_a_zero_of_pressure_that_is_set_anew_the_longer_part_is_used(driv
 
 @pytest.mark.parametrize(("drive", "rows"), [("multisine", 120), ("multisine", 400), ("prbs", 400)])
 def test_lost_rows_are_named_and_the_longest_part_is_used(drive: str, rows: int) -> None:
-    record = log(drive)
+    record = circuit_log(drive)
     kept = np.delete(np.arange(len(record)), np.arange(ROW, ROW + rows))
     found, (note,) = without_discontinuities(Record(1e-3, {name: record[name][kept] for name in record}))
     assert note.code is SensorCode.ROWS_LOST
@@ -69,7 +62,7 @@ def test_lost_rows_are_named_and_the_longest_part_is_used(drive: str, rows: int)
 
 def test_a_motor_that_steps_within_a_row_sets_no_pressure_anew() -> None:
     """Of a run without noise nothing else jumps as far; a step of the motor was called lost rows."""
-    record = log("steps", IDEAL)
+    record = circuit_log("steps", IDEAL)
     pressure = record[PRESSURE] + np.where(np.arange(len(record)) < ROW, 0.0, 3e6)
     speed = record[SPEED] + np.where(np.arange(len(record)) < ROW, 0.0, 400.0)
     given = record.replace(**{PRESSURE: pressure, SPEED: speed})
@@ -79,7 +72,7 @@ def test_a_motor_that_steps_within_a_row_sets_no_pressure_anew() -> None:
 @pytest.mark.parametrize(("first", "named"), [(0.0, False), (100.0, True)])
 def test_the_first_rise_of_pressure_from_rest_sets_none_anew(first: float, *, named: bool) -> None:
     """Until one chamber draws make-up both give pressure: it rose twice as fast as it ever does again."""
-    record, rows = log("multisine"), np.arange(4000)
+    record, rows = circuit_log("multisine"), np.arange(4000)
     speed = np.where(rows < ROW, first, record[SPEED])
     speed[ROW : ROW + 20] = np.linspace(first, record[SPEED][ROW + 20], 20)
     pressure = np.where(rows < ROW, record[PRESSURE][ROW], record[PRESSURE]) + np.where(rows < ROW + 12, 0.0, 1e6)
@@ -90,7 +83,7 @@ def test_the_first_rise_of_pressure_from_rest_sets_none_anew(first: float, *, na
 
 def test_a_pressure_that_is_zeroed_while_the_motor_turns_slowly_is_named() -> None:
     """All that came before the motor was at half its highest speed was taken for its setting off."""
-    record, rows = log("multisine"), np.arange(4000)
+    record, rows = circuit_log("multisine"), np.arange(4000)
     slow = np.where(rows < 500, 0.0, np.where(rows < 3500, 0.2 * record[SPEED], 5.0 * record[SPEED]))
     pressure = record[PRESSURE] + np.where(rows < ROW, 0.0, 1e6)
     given = record.replace(**{SPEED: slow, PRESSURE: pressure, VELOCITY: None})
@@ -117,7 +110,7 @@ def test_a_piston_that_meets_a_stop_has_lost_no_rows_and_no_zero() -> None:
 
 
 def test_a_position_that_is_held_for_a_while_is_missing_there() -> None:
-    record = log("multisine")
+    record = circuit_log("multisine")
     held = record[POSITION].copy()
     held[ROW : ROW + 100] = held[ROW]
     clean = clean_log(record.replace(**{POSITION: held}), EhaParameters())
@@ -128,7 +121,7 @@ def test_a_position_that_is_held_for_a_while_is_missing_there() -> None:
 
 
 def test_a_spike_a_short_log_and_a_slow_one_have_no_steps() -> None:
-    record = log("multisine")
+    record = circuit_log("multisine")
     spike = record[POSITION].copy()
     spike[ROW] += 0.01
     for given in (record.replace(**{POSITION: spike}), stepped(record, POSITION, 0.01).slice(1300, 1700)):
@@ -138,7 +131,7 @@ def test_a_spike_a_short_log_and_a_slow_one_have_no_steps() -> None:
 
 
 def test_a_velocity_under_the_name_of_position_is_named_and_not_mended() -> None:
-    record = log("multisine")
+    record = circuit_log("multisine")
     jerky = record[VELOCITY] + np.where(np.arange(len(record)) < ROW, 0.0, 0.004)
     clean = clean_log(record.replace(**{POSITION: jerky, VELOCITY: record[POSITION]}), EhaParameters())
     assert [note.code for note in clean.mistakes] == [ChannelCode.CHANNELS_SWAPPED]
@@ -147,7 +140,7 @@ def test_a_velocity_under_the_name_of_position_is_named_and_not_mended() -> None
 
 @pytest.mark.parametrize("noisy", [False, True])
 def test_what_explains_a_change_of_pressure_is_least_squares_of_rows_that_do_not_stray(noisy: bool) -> None:
-    record = log("steps")
+    record = circuit_log("steps")
     pressure = record[PRESSURE].copy()
     pressure[700:720] = np.nan
     record = record.replace(**{PRESSURE: pressure})

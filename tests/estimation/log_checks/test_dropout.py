@@ -6,19 +6,13 @@ import pytest
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.dropout import FEWEST_ROWS, LONG_GAP, long_gaps, without_dropouts, without_pauses
 from estimation.notes import SensorCode
-from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
-from plant.eha.simulate import CIRCUIT, LUMPED, simulate
+from plant.eha.simulate import LUMPED, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, IDEAL, Sensors
+from tests.estimation.log_checks.made_logs import circuit_log
 
 SPEED, POSITION, PRESSURE = "motor_speed_rad_s", "position_m", "differential_pressure_pa"
-
-
-def log(drive: str, sensors: Sensors = BENCH) -> Record:
-    rng = np.random.default_rng(4)
-    signal = make_drive(drive, 4.0, 1e-3, EhaParameters(), rng)
-    return simulate(CIRCUIT, signal, 1e-3, EhaParameters(), sensors=sensors, rng=rng)
 
 
 def repeated(record: Record, first: int, behind: int, *names: str) -> Record:
@@ -31,12 +25,12 @@ def repeated(record: Record, first: int, behind: int, *names: str) -> Record:
 @pytest.mark.parametrize("sensors", [BENCH, IDEAL])
 @pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "sine"])
 def test_a_log_that_is_written_throughout_has_no_dropout(drive: str, sensors: Sensors) -> None:
-    record = log(drive, sensors)
+    record = circuit_log(drive, sensors)
     assert without_dropouts(record) == (record, ())
 
 
 def test_repeated_rows_are_left_out_of_all_channels_and_said() -> None:
-    record = log("multisine")
+    record = circuit_log("multisine")
     clean = clean_log(repeated(record, 1500, 1700), EhaParameters())
     assert {note.code for note in clean.left_out} == {SensorCode.DROPOUT}
     assert {note.data["rows"] for note in clean.left_out} == {200}
@@ -45,7 +39,7 @@ def test_repeated_rows_are_left_out_of_all_channels_and_said() -> None:
 
 
 def test_few_rows_and_a_channel_that_is_held_alone_are_no_dropout() -> None:
-    record = log("multisine")
+    record = circuit_log("multisine")
     assert without_dropouts(repeated(record, 1500, 1500 + FEWEST_ROWS - 1))[1] == ()
     assert without_dropouts(repeated(record, 1500, 1700, SPEED))[1] == ()
 
@@ -68,7 +62,7 @@ def test_a_motor_that_leaves_rest_from_one_row_to_the_next_is_no_dropout() -> No
 
 @pytest.mark.parametrize("channel", [SPEED, POSITION])
 def test_a_long_gap_of_speed_or_position_is_one_of_the_balance(channel: str) -> None:
-    record = log("multisine")
+    record = circuit_log("multisine")
     gone = record[channel].copy()
     gone[1000 : 1000 + LONG_GAP] = gone[2000 : 2000 + LONG_GAP - 1] = np.nan
     found = without_pauses(record.replace(**{channel: gone}))

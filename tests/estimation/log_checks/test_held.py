@@ -6,19 +6,12 @@ import pytest
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.held import held_rows, without_held
 from estimation.notes import SensorCode
-from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
-from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, IDEAL, Sensors
+from tests.estimation.log_checks.made_logs import circuit_log
 
 PRESSURE, POSITION = "differential_pressure_pa", "position_m"
-
-
-def log(drive: str, sensors: Sensors = BENCH) -> Record:
-    rng = np.random.default_rng(4)
-    signal = make_drive(drive, 4.0, 1e-3, EhaParameters(), rng)
-    return simulate(CIRCUIT, signal, 1e-3, EhaParameters(), sensors=sensors, rng=rng)
 
 
 def held(values: np.ndarray, rows: float) -> np.ndarray:
@@ -30,20 +23,20 @@ def held(values: np.ndarray, rows: float) -> np.ndarray:
 @pytest.mark.parametrize("sensors", [BENCH, IDEAL])
 @pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "chirp", "sine"])
 def test_nothing_is_left_out_of_a_log_that_is_sampled_in_every_row(drive: str, sensors: Sensors) -> None:
-    record = log(drive, sensors)
+    record = circuit_log(drive, sensors)
     assert without_held(record) == (record, ())
 
 
 @pytest.mark.parametrize("quantum", [1e-6, 1e-5, 1e-4])
 def test_a_coarse_encoder_is_not_held(quantum: float) -> None:
-    record = log("sine")
+    record = circuit_log("sine")
     assert held_rows(quantum * np.round(record[POSITION] / quantum)) == 1
 
 
 @pytest.mark.parametrize("rows", [2, 3, 5, 10, 10.0 / 3.0])
 @pytest.mark.parametrize("channel", [PRESSURE, POSITION])
 def test_a_held_channel_is_named_and_its_own_samples_stay(channel: str, rows: float) -> None:
-    record = log("multisine")
+    record = circuit_log("multisine")
     given = held(record[channel], rows)
     found, (note,) = without_held(record.replace(**{channel: given}))
     there = np.isfinite(found[channel])
@@ -56,7 +49,7 @@ def test_a_held_channel_is_named_and_its_own_samples_stay(channel: str, rows: fl
 
 
 def test_a_motor_that_is_driven_in_steps_is_not_held() -> None:
-    record = log("steps")
+    record = circuit_log("steps")
     stairs = held(100.0 * np.sin(3e-3 * np.arange(len(record))), 10)
     assert "motor_speed_rad_s" not in [
         n.data["channel"] for n in without_held(record.replace(motor_speed_rad_s=stairs))[1]
@@ -64,7 +57,7 @@ def test_a_motor_that_is_driven_in_steps_is_not_held() -> None:
 
 
 def test_a_clean_log_says_what_was_held() -> None:
-    record = log("multisine")
+    record = circuit_log("multisine")
     clean = clean_log(record.replace(**{PRESSURE: held(record[PRESSURE], 7)}), EhaParameters())
     assert [note.code for note in clean.left_out] == [SensorCode.HELD]
     assert np.mean(np.isfinite(clean.record[PRESSURE])) == pytest.approx(1.0 / 7.0, rel=0.1)
@@ -83,7 +76,7 @@ def bridged(values: np.ndarray, rows: int, first: int) -> np.ndarray:
 def test_a_slow_log_in_the_rows_of_a_fast_clock_gets_its_own_clock_back(
     code: SensorCode, first: int, rows: int
 ) -> None:
-    record = log("multisine")
+    record = circuit_log("multisine")
     names = ("motor_speed_rad_s", POSITION, "velocity_m_s", PRESSURE)
     late = np.maximum((np.arange(len(record)) - first) // rows * rows + first, 0)
     given = {
@@ -98,7 +91,7 @@ def test_a_slow_log_in_the_rows_of_a_fast_clock_gets_its_own_clock_back(
 
 
 def test_a_fast_speed_beside_slow_sensors_keeps_all_its_samples() -> None:
-    record = log("multisine")
+    record = circuit_log("multisine")
     slow = {name: held(record[name], 5) for name in (POSITION, "velocity_m_s", PRESSURE)}
     found, notes = without_held(record.replace(**slow))
     assert {note.data["channel"] for note in notes} == set(slow)
@@ -108,7 +101,7 @@ def test_a_fast_speed_beside_slow_sensors_keeps_all_its_samples() -> None:
 
 @pytest.mark.parametrize("channel", [PRESSURE, POSITION])
 def test_a_channel_that_was_bridged_alone_keeps_its_own_samples(channel: str) -> None:
-    record = log("multisine")
+    record = circuit_log("multisine")
     given = bridged(record[channel], 4, 0)
     found, (note,) = without_held(record.replace(**{channel: given}))
     assert note.code is SensorCode.BRIDGED
@@ -118,5 +111,5 @@ def test_a_channel_that_was_bridged_alone_keeps_its_own_samples(channel: str) ->
 
 @pytest.mark.parametrize("rows", [1, 2, 3, 50])
 def test_a_log_of_a_few_rows_is_neither(rows: int) -> None:
-    record = log("multisine").slice(0, rows)
+    record = circuit_log("multisine").slice(0, rows)
     assert without_held(record) == (record, ())

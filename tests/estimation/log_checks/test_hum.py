@@ -6,19 +6,13 @@ import pytest
 from estimation.log_checks import hum
 from estimation.log_checks.hum import without_hum
 from estimation.notes import SensorCode
-from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
+from tests.estimation.log_checks.made_logs import circuit_log
 
 PRESSURE = "differential_pressure_pa"
-
-
-def log(drive: str) -> Record:
-    rng = np.random.default_rng(4)
-    signal = make_drive(drive, 4.0, 1e-3, EhaParameters(), rng)
-    return simulate(CIRCUIT, signal, 1e-3, EhaParameters(), sensors=BENCH, rng=rng)
 
 
 def humming(record: Record, amplitude: float, frequency: float) -> Record:
@@ -28,13 +22,13 @@ def humming(record: Record, amplitude: float, frequency: float) -> Record:
 
 @pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "chirp", "sine"])
 def test_nothing_is_taken_off_a_log_without_hum(drive: str) -> None:
-    record = log(drive)
+    record = circuit_log(drive)
     assert without_hum(record) == (record, ())
 
 
 @pytest.mark.parametrize("frequency", [49.97, 60.0, 150.0])
 def test_a_hum_is_named_with_amplitude_and_frequency_and_taken_off(frequency: float) -> None:
-    record = log("steps")
+    record = circuit_log("steps")
     given = humming(record, 2.5e4, frequency)
     missing = given[PRESSURE].copy()
     missing[1000:1040] = np.nan
@@ -48,12 +42,12 @@ def test_a_hum_is_named_with_amplitude_and_frequency_and_taken_off(frequency: fl
 
 
 def test_the_mains_and_two_harmonics_are_three_tones() -> None:
-    record = humming(humming(humming(log("steps"), 3e4, 50.0), 1e4, 100.0), 2e4, 150.0)
+    record = humming(humming(humming(circuit_log("steps"), 3e4, 50.0), 1e4, 100.0), 2e4, 150.0)
     assert [round(note.data["frequency_hz"]) for note in without_hum(record)[1]] == [50, 150, 100]
 
 
 def test_a_tone_that_position_has_as_well_is_motion_and_stays() -> None:
-    record = humming(log("steps"), 2.5e4, 50.0)
+    record = humming(circuit_log("steps"), 2.5e4, 50.0)
     time = record.sample_time * np.arange(len(record))
     shaken = record.replace(position_m=record["position_m"] + 1e-4 * np.sin(2.0 * np.pi * 50.0 * time))
     assert without_hum(shaken)[1] == ()
@@ -61,14 +55,14 @@ def test_a_tone_that_position_has_as_well_is_motion_and_stays() -> None:
 
 @pytest.mark.parametrize("repeats", [4.9, 10.0, 20.0])
 def test_harmonics_of_a_drive_that_repeats_itself_are_no_hum(repeats: float) -> None:
-    record = log("steps")
+    record = circuit_log("steps")
     time = record.sample_time * np.arange(len(record))
     square = 1e5 * np.sign(np.sin(2.0 * np.pi * repeats * time + 0.3))
     assert without_hum(record.replace(**{PRESSURE: record[PRESSURE] + square}))[1] == ()
 
 
 def test_a_line_at_a_harmonic_of_a_fast_drive_may_be_the_drive() -> None:
-    driven = humming(humming(log("steps"), 1e6, 20.0), 2.5e4, 60.0)
+    driven = humming(humming(circuit_log("steps"), 1e6, 20.0), 2.5e4, 60.0)
     assert without_hum(driven)[1] == ()
 
 
@@ -83,24 +77,24 @@ def test_the_mains_are_no_harmonic_of_a_slow_drive_that_has_no_others_near_them(
 
 
 def test_a_line_of_every_other_sample_is_no_hum() -> None:
-    slow = log("steps").slice(step=5)
+    slow = circuit_log("steps").slice(step=5)
     assert without_hum(humming(slow, 2.5e4, 0.48 / slow.sample_time))[1] == ()
 
 
 def test_a_log_without_pressure_is_left_as_it_is() -> None:
-    record = log("steps").replace(**{PRESSURE: None})
+    record = circuit_log("steps").replace(**{PRESSURE: None})
     assert without_hum(record) == (record, ())
 
 
 def test_a_hum_beside_the_harmonics_of_a_drive_is_taken_off() -> None:
-    driven = humming(humming(log("steps"), 1e6, 10.0), 2.5e4, 53.0)
+    driven = humming(humming(circuit_log("steps"), 1e6, 10.0), 2.5e4, 53.0)
     (note,) = without_hum(driven)[1]
     assert note.data["frequency_hz"] == pytest.approx(53.0, abs=0.1)
 
 
 def test_no_more_tones_are_taken_off_than_a_mains_has(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hum, "MOST_TONES", 1)
-    record = humming(humming(log("steps"), 3e4, 50.0), 1e4, 150.0)
+    record = humming(humming(circuit_log("steps"), 3e4, 50.0), 1e4, 150.0)
     assert [round(note.data["frequency_hz"]) for note in without_hum(record)[1]] == [50]
 
 

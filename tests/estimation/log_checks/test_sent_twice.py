@@ -6,19 +6,12 @@ import pytest
 from estimation.log_checks.clean import clean_log
 from estimation.log_checks.sent_twice import FEWEST_ROWS, _widened, without_rows_sent_twice
 from estimation.notes import SensorCode
-from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
-from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH, IDEAL, Sensors
+from tests.estimation.log_checks.made_logs import circuit_log
 
 SPEED, POSITION, PRESSURE = "motor_speed_rad_s", "position_m", "differential_pressure_pa"
-
-
-def log(drive: str, sensors: Sensors = BENCH) -> Record:
-    rng = np.random.default_rng(4)
-    signal = make_drive(drive, 4.0, 1e-3, EhaParameters(), rng)
-    return simulate(CIRCUIT, signal, 1e-3, EhaParameters(), sensors=sensors, rng=rng)
 
 
 def at(record: Record, rows: np.ndarray) -> Record:
@@ -28,14 +21,14 @@ def at(record: Record, rows: np.ndarray) -> Record:
 @pytest.mark.parametrize("sensors", [BENCH, IDEAL])
 @pytest.mark.parametrize("drive", ["steps", "prbs", "multisine", "sine"])
 def test_a_log_that_is_written_once_has_no_copies(drive: str, sensors: Sensors) -> None:
-    record = log(drive, sensors)
+    record = circuit_log(drive, sensors)
     assert without_rows_sent_twice(record) == (record, ())
 
 
 @pytest.mark.parametrize("rows", [FEWEST_ROWS, 50, 300])
 @pytest.mark.parametrize("drive", ["steps", "multisine", "sine"])
 def test_a_packet_that_came_again_is_cut_out_and_said(drive: str, rows: int) -> None:
-    record = log(drive)
+    record = circuit_log(drive)
     order = np.arange(len(record))
     sent = np.concatenate([order[: 1500 + rows], order[1500 : 2500 + rows], order[2500:]])
     found, notes = without_rows_sent_twice(at(record, sent))
@@ -45,7 +38,7 @@ def test_a_packet_that_came_again_is_cut_out_and_said(drive: str, rows: int) -> 
 
 
 def test_a_copy_in_place_of_rows_that_were_lost_leaves_them_missing() -> None:
-    record = log("multisine")
+    record = circuit_log("multisine")
     order = np.arange(len(record))
     order[1600:1700] = order[1500:1600]
     clean = clean_log(at(record, order), EhaParameters())
