@@ -17,7 +17,6 @@ from estimation.engine.contract import FilterProblem
 from estimation.engine.kalman import Outputs, belief_names
 from estimation.engine.layout import layout
 from estimation.engine.parts import data_places, function_source
-from estimation.engine.rule import Rule
 from estimation.engine.runner import constant_row
 from estimation.filters.ekf import EKF
 from estimation.models.model import ProcessModel
@@ -148,10 +147,8 @@ class Sensitivity(NamedTuple):
         return moved.T @ moved + 0.5 * spread.T @ spread
 
 
-def innovation_sensitivity(
-    problem: FilterProblem, directions: Array, belief: Array | None = None, rule: Rule = EKF
-) -> Sensitivity:
-    """Filter a log, and carry along how the innovations move with what the filter assumes.
+def innovation_sensitivity(problem: FilterProblem, directions: Array, belief: Array | None = None) -> Sensitivity:
+    """Filter a log by an EKF, and carry along how the innovations move with what the filter assumes.
 
     Parameters
     ----------
@@ -160,11 +157,9 @@ def innovation_sensitivity(
         sensor variances, ...) along each direction [their units over the direction's].
     belief : ndarray, shape (n + n (n + 1) / 2, directions), optional
         Derivative of the prior's mean and upper triangle [dimensionless over the direction's unit]; 0 by default.
-    rule : Rule
-        The filter; one without settings and memory.
     """
     model, channels = problem.model, problem.channels
-    start = layout(rule, model, channels).start(problem.mean, problem.covariance)[: len(belief_names(model.width))]
+    start = layout(EKF, model, channels).start(problem.mean, problem.covariance)[: len(belief_names(model.width))]
     samples, width = problem.measured.shape
     count = directions.shape[1]
     slopes = np.zeros((len(start), count)) if belief is None else np.array(belief, dtype=np.float64)
@@ -172,7 +167,7 @@ def innovation_sensitivity(
     result = Sensitivity(*(np.empty(shape) for shape in shapes))
     rows, log = constant_row(problem, {}), (problem.drives, problem.measured, problem.substeps)
     along = np.ascontiguousarray(directions, dtype=np.float64)
-    _compile(rule, model, channels).run(start, slopes, rows, along, *log, result)
+    _compile(model, channels).run(start, slopes, rows, along, *log, result)
     return result
 
 
@@ -238,8 +233,8 @@ def run(
 
 
 @cache
-def _compile(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> NativeKernel:
-    names = layout(rule, model, channels).rows
+def _compile(model: ProcessModel, channels: tuple[str, ...]) -> NativeKernel:
+    names = layout(EKF, model, channels).rows
     carried = {name: i for i, name in enumerate(belief_names(model.width))}
     rates = {name: symbol(f"D{name}") for name in (*carried, *names) if name not in ("h", "share")}
     own = {name: f"belief[{i}]" for name, i in carried.items()}
@@ -252,13 +247,13 @@ def _compile(rule: Rule, model: ProcessModel, channels: tuple[str, ...]) -> Nati
     written |= {f"e{c}": f"moved[{c}, i]" for c in each} | {f"s{c}": f"spread[{c}, i]" for c in each}
     given = "belief, rows, before, after, sample, j"
     parts = [pasted(run)]
-    for name, outputs in (("predict", rule.predict(model)), ("update", rule.update(model, channels))):
+    for name, outputs in (("predict", EKF.predict(model)), ("update", EKF.update(model, channels))):
         fixed, moving = hoisted(directional(outputs, rates), {f"D{name}" for name in rates}, "c")
         places = {name: f"fixed[{i}]" for i, name in enumerate(fixed)}
         arguments = f"{given}, fixed, i, directions, slopes, moved, spread"
         parts.append(function_source(f"fix_{name}", given, reads, fixed))
         parts.append(function_source(f"vary_{name}", arguments, reads | along | places, moving, written))
         parts.append(function_source(name, f"{given}, residual, variance", reads, outputs, own | seen))
-    title = f"{rule.name} on the {model.name} form, with derivatives along directions"
-    name = f"sensitivity_{rule.name}_{model.name}"
+    title = f"{EKF.name} on the {model.name} form, with derivatives along directions"
+    name = f"sensitivity_{EKF.name}_{model.name}"
     return load_native(name, kernel_text(title, *parts), {"run": signature_of(run)})

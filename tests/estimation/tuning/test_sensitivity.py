@@ -125,7 +125,7 @@ def test_the_loop_run_as_python_gives_what_its_kernel_gives(
     directions = rng.normal(size=(len(constant_row(problem, {})), 2))
     compiled = innovation_sensitivity(problem, directions)
     compile_it = sensitivity._compile.__wrapped__
-    kernel = functions_of(text_of(monkeypatch, sensitivity, lambda: compile_it(EKF, linear, problem.channels)))
+    kernel = functions_of(text_of(monkeypatch, sensitivity, lambda: compile_it(linear, problem.channels)))
     monkeypatch.setattr(sensitivity, "_compile", lambda *_: kernel)
     plain = innovation_sensitivity(problem, directions)
     for name in ("residuals", "variances", "residual_slopes", "variance_slopes"):
