@@ -1,7 +1,6 @@
 """What a search for a user's parameters asks for, kept in `numbers_asked.json`."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +14,7 @@ from estimation.fits.greybox.descent import Point
 from plant.arrays import Array
 from plant.log.record import Record
 from tests.numbers import Numbers, refused
+from tests.watched import watched
 
 NUMBERS = Numbers(__file__)
 N = 320
@@ -44,23 +44,6 @@ def problem(**changes: Any) -> Problem:
     return replace(bare, parts=(replace(part, measured=way),), **changes)
 
 
-@contextmanager
-def watched(
-    name: str, told: Callable[..., Any], instead: Callable[..., Any] | None = None, place: Any = search
-) -> Iterator[list[Any]]:
-    """Note what a function of the search is called with, and call it, or another in its place."""
-    asked: list[Any] = []
-    real = getattr(place, name)
-
-    def spy(*args: Any, **kwargs: Any) -> Any:
-        asked.append(told(*args, **kwargs))
-        return (instead or real)(*args, **kwargs)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(place, name, spy)
-        yield asked
-
-
 def evaluations(_: Any, start: Array, most: int, __: Any, *promised: float) -> list[Any]:
     return [len(start), most, *promised]
 
@@ -70,7 +53,7 @@ def descents() -> dict[str, Any]:
     told: dict[str, Any] = {}
     one = problem()
     guesses = [THETA + 0.1 * k for k in range(5)]
-    with watched("descend", evaluations) as asked:
+    with watched(search, "descend", evaluations) as asked:
         search._descended(one, guesses[:1])
         search._descended(one, guesses)
     told["starts"] = asked
@@ -80,13 +63,13 @@ def descents() -> dict[str, Any]:
         lengths.append(len(at.__self__.parts[0].inputs))  # type: ignore[attr-defined]  # a problem's method
         return at(start)
 
-    with watched("descend", evaluations, stay):
+    with watched(search, "descend", evaluations, stay):
         search._lengthened(one, THETA)
     told["beginnings"] = lengths
-    with watched("descend", evaluations) as asked:
+    with watched(search, "descend", evaluations) as asked:
         point, left = search._finished(one, THETA + 0.2)
     told["finished"] = [asked, left, point.theta]
-    with watched("descend", evaluations, lambda at, start, most, *_: [at(start) for _ in range(most)].pop()):
+    with watched(search, "descend", evaluations, lambda at, start, most, *_: [at(start) for _ in range(most)].pop()):
         told["not finished"] = search._finished(one, THETA)[1]
     return told
 
@@ -95,7 +78,7 @@ def descents() -> dict[str, Any]:
 def threads() -> dict[str, Any]:
     """On how many threads matrices are multiplied: more make small ones slower."""
     record = Record(0.05, {"push": PUSH, "way": problem().parts[0].measured[0]})
-    with watched("threadpool_limits", lambda **given: given, place=fit) as asked:
+    with watched(fit, "threadpool_limits", lambda **given: given) as asked:
         fit.fit_equations(MODEL, [record])
     return {"fits": asked}
 
@@ -111,10 +94,10 @@ def rounds() -> dict[str, Any]:
         "do not quite": [0.05 * (1.0 + 0.011), *[0.05 * (1.0 + 0.011)] * 9],
     }.items():
         shown = iter(sizes)
-        with watched("_shown", lambda *_: 0, lambda *_: np.array([next(shown)])) as asked:  # noqa: B023  called at once
+        with watched(search, "_shown", lambda *_: 0, lambda *_: np.array([next(shown)])) as asked:  # noqa: B023
             search._refined(one, one.at(THETA), np.array([np.nan]), typical)
         told[f"noises that {name}"] = len(asked)
-    with watched("_shown", lambda *_: 0) as asked:
+    with watched(search, "_shown", lambda *_: 0) as asked:
         found = search._refined(one, one.at(THETA), np.array([0.07]), typical)
     told["noise that is given"] = [len(asked), found.problem.noise, found.moved, found.evaluations]
     return told
@@ -135,13 +118,15 @@ def whole_searches() -> dict[str, Any]:
         def refined(this: Problem, *_: Any, left: Iterator[float] = left) -> search.Solution:
             return search.Solution(this, end, moved=next(left))
 
-        with watched("_refined", lambda this, *_: this.substeps, refined) as asked:
+        with watched(search, "_refined", lambda this, *_: this.substeps, refined) as asked:
             found = search.searched(MODEL, one.parts, np.array([np.nan]), robust=False, starts=1, seed=0)
         told[name] = [asked, found.moved]
     for name, explained in (("explained", True), ("astray", False)):
         with (
-            watched("_explained", lambda *given: [given[0].noise, given[2]], lambda *_: explained) as noises,  # noqa: B023
-            watched("_lengthened", lambda this, _: this.noise) as longer,
+            watched(
+                search, "_explained", lambda this, _, noise: [this.noise, noise], lambda *_, to=explained: to
+            ) as noises,
+            watched(search, "_lengthened", lambda this, _: this.noise) as longer,
         ):
             found = search.searched(MODEL, one.parts, np.array([np.nan]), robust=True, starts=2, seed=1)
         told[name] = [noises, longer, len(found.others), found.problem.noise]

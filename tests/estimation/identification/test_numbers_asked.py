@@ -3,8 +3,7 @@
 Their economies change no result that a small record shows, but they are what a fit costs, and where it ends.
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -39,6 +38,7 @@ from estimation.identification.state_space.joint import Joint
 from estimation.identification.state_space.problem import Problem, Size
 from plant.arrays import Array
 from tests.numbers import Numbers, Roughly
+from tests.watched import watched
 
 NUMBERS = Numbers(__file__)
 RNG = np.random.default_rng(67)
@@ -60,23 +60,6 @@ def experiments() -> Experiments:
 
 def channels() -> Channels:
     return scaled(channels_from([U[:, None]], [answer()], 0.1, ("a",), "y"))[0]
-
-
-@contextmanager
-def watched(
-    place: Any, name: str, told: Callable[..., Any], instead: Callable[..., Any] | None = None
-) -> Iterator[list[Any]]:
-    """Note what a function is called with, and call it, or another in its place."""
-    asked: list[Any] = []
-    real = getattr(place, name)
-
-    def spy(*args: Any, **kwargs: Any) -> Any:
-        asked.append(told(*args, **kwargs))
-        return (instead or real)(*args, **kwargs)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(place, name, spy)
-        yield asked
 
 
 def options(
