@@ -19,7 +19,7 @@ from estimation.fits.hypothesis_search.conclusion import Accepted, conclude, is_
 from estimation.fits.hypothesis_search.decimation import FEW, Decimation, cost_over_noise, decimation_for
 from estimation.fits.hypothesis_search.decimation_limit import decimation_limit
 from estimation.fits.hypothesis_search.explanation import Explanation, Trial
-from estimation.fits.hypothesis_search.final_fits import ALIKE, REACHED, behind_filter, with_less_lag
+from estimation.fits.hypothesis_search.final_fits import ALIKE, REACHED, behind_filter
 from estimation.fits.hypothesis_search.predicted_gains import by_predicted_gain, predicted_gain_beside
 from estimation.fits.hypothesis_search.ranking import (
     NEARLY_AS_GOOD,
@@ -108,8 +108,6 @@ def explain(
     left = cost_over_noise(wide, plain.cost)
     spared = Decimation(decimation_limit(wide, starts[0], decimation_for(wide, left)), left, starts)
     finished = _alone(wide, plain.cost, (likely, others, gains), spared, accepted, useful)
-    if finished[0].fits and not is_explained(finished[0], accepted):
-        finished = ranked([*finished, *filter(None, [with_less_lag(wide, finished[0])])])
     if paired:
         finished = ranked([*finished, *delivery_followed(wide, finished, gains, spared, accepted)])
     finished = _distinct([behind_filter(wide, finished[0]), *finished])

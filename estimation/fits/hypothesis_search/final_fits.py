@@ -10,7 +10,7 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.spared_steps import LAST, spared
 from estimation.fits.hypotheses import CHECKS_CRACK, PRESSURE_FILTERED, PRESSURE_LATE
-from estimation.fits.hypothesis_search.coarse_search import FINEST_DELAY, NEAR, coarsened, descended
+from estimation.fits.hypothesis_search.coarse_search import NEAR, coarsened, descended
 from estimation.fits.hypothesis_search.decimation import FEW, cost_over_noise
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.wide_log import balanced_by, balances_mass, delayed, usual_values
@@ -127,35 +127,6 @@ def with_details(log: GreyBoxLog, tried: Trial) -> Trial:
         return tried
     known, before = (one.fit.std["bulk_modulus"] for one in (further, tried))
     return further if known >= NO_SURER * before else tried
-
-
-def with_less_lag(log: GreyBoxLog, tried: Trial) -> Trial | None:
-    """Return the final fit of a set of hypotheses in which one more step of delay replaces the lag.
-
-    With long model steps a lag and a delay that last alike leave nearly the same. In stiff oil short ones tell them
-    apart.
-
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log, widened.
-    tried : Trial
-        The set, fitted to the end.
-
-    Returns
-    -------
-    Trial or None
-        The set; none where its last hypothesis has no delays, or no lag to give.
-    """
-    last = tried.together[-1]
-    if len(last.delays) < 2 or min(last.delays) < 0.0:
-        return None
-    lag = last.free[0]
-    left = tried.values[lag] - FINEST_DELAY
-    if abs(left) > 0.5 * FINEST_DELAY:
-        return None
-    later = {**tried.delays, last.late: tried.delays.get(last.late, 0.0) + FINEST_DELAY}
-    return final_fit(log, replace(tried, delays=later, values={**tried.values, lag: max(left, 0.0)}), tried.cost)
 
 
 def behind_filter(log: GreyBoxLog, tried: Trial) -> Trial:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.greybox.descent import Point
-from estimation.fits.hypotheses import AIR_MIDWAY, CHECKS_CRACK, OFFSET, PRESSURE_LATE
+from estimation.fits.hypotheses import AIR_MIDWAY, CHECKS_CRACK, OFFSET
 from estimation.fits.hypothesis_search import final_fits
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.final_fits import ALIKE, CLOSE, FAR_BEHIND
@@ -40,30 +40,6 @@ def test_the_balance_in_which_a_set_was_sought_comes_first_and_the_other_must_co
     begun = Trial((), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {}, {}, {})
     assert final_fits.final_fit(nothing, begun).cost == 50.0
     assert led == [(order[0], np.inf), (order[1], 50.0 + ALIKE)]
-
-
-@pytest.mark.parametrize(
-    ("lag", "delay", "asked"),
-    [(1.02e-3, 1e-3, (2e-3, 2e-5)), (0.9e-3, 0.0, (1e-3, 0.0)), (0.3e-3, 1e-3, None), (3e-3, 1e-3, None)],
-)
-def test_a_lag_that_lasts_as_long_as_a_step_of_delay_is_tried_as_one(
-    lag: float, delay: float, asked: tuple[float, float] | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    led: list[tuple[Trial, float]] = []
-    monkeypatch.setattr(final_fits, "final_fit", lambda _, tried, useful: led.append((tried, useful)))
-    delays = {"differential_pressure_pa": delay} if delay else dict[str, float]()
-    late = Trial((PRESSURE_LATE,), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {"pressure_lag": lag}, delays, {})
-    nothing: Any = None
-    final_fits.with_less_lag(nothing, late)
-    told = [(one.delays["differential_pressure_pa"], one.values["pressure_lag"]) for one, _ in led]
-    assert told == ([] if asked is None else [pytest.approx(asked)])
-    assert [useful for _, useful in led] == [90.0] * len(told)
-
-
-def test_what_has_no_lag_is_not_tried_later() -> None:
-    nothing: Any = None
-    offset = Trial((OFFSET,), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {"pressure_offset": 1e-3}, {}, {})
-    assert final_fits.with_less_lag(nothing, offset) is None
 
 
 @pytest.mark.parametrize(("cost", "searches"), [(0.9, 2), (1.1, 1)])
