@@ -15,6 +15,8 @@ from estimation.fits.flow.wide_valves import opens_wide
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.drive_noise import SAMPLES_KEPT, moved_by_drives
+from estimation.fits.greybox.descent import descend
+from estimation.fits.greybox.drive_noise import moved_by_drives
 from estimation.fits.greybox.fit import GreyBoxFit, concluded, explained
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
@@ -223,7 +225,7 @@ def _shaken(one: Found) -> Array | None:
     """Return what noise of the drives does to the residuals of the likeliest, for the other balances too."""
     log = one[0].log
     noisy = any(spread > 0.0 for spread in log.drive_std) and not log.passes_on
-    return moved_by_drives(one[0], one[1].theta) if noisy and len(log.drives) <= SAMPLES_KEPT else None
+    return moved_by_drives(one[0], one[1].theta) if noisy else None
 
 
 def _finished(

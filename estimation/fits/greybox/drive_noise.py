@@ -48,25 +48,15 @@ def drive_covariance(
     ndarray, shape (felt, felt), or float
         The covariance [dimensionless]; zero where no driving channel is noisy.
     """
-    log = problem.log
-    if not any(spread > 0.0 for spread in log.drive_std):
+    if not any(spread > 0.0 for spread in problem.log.drive_std):
         return 0.0
-    if len(log.drives) <= SAMPLES_KEPT:
-        moved = moved_by_drives(problem, theta, undisturbed) if moved is None else moved
-        answers = bread @ (slopes.T @ moved)
-        return np.asarray(answers @ answers.T / DRAWS, dtype=np.float64)
-    rough, spread = problem.coarse, np.array(log.drive_std)
-    if undisturbed is None:
-        undisturbed = _undisturbed(problem, theta)
-    rng = np.random.default_rng(0)
-    draws = (log.drives + spread * rng.standard_normal(log.drives.shape) for _ in range(DRAWS))
-    each = ((errors - undisturbed).ravel() for errors in rough.disturbed(theta, draws))
-    answers = np.column_stack([bread @ (slopes.T @ moved) for moved in each])
+    moved = moved_by_drives(problem, theta, undisturbed) if moved is None else moved
+    answers = bread @ (slopes.T @ moved)
     return np.asarray(answers @ answers.T / DRAWS, dtype=np.float64)
 
 
 def moved_by_drives(problem: Problem, theta: Array, undisturbed: Array | None = None) -> Array:
-    """Return what draws of the driving channels' noise do to the residuals of a log of `SAMPLES_KEPT` at most.
+    """Return what draws of the driving channels' noise do to the residuals of a log.
 
     All balances of a log add up what is pumped, so that the draws of one serve the others.
 
@@ -84,10 +74,15 @@ def moved_by_drives(problem: Problem, theta: Array, undisturbed: Array | None = 
     ndarray, shape (outputs * blocks, draws)
         Changes of the normalised residuals [dimensionless].
     """
+    log, rough = problem.log, problem.coarse
     if undisturbed is None:
         undisturbed = _undisturbed(problem, theta)
-    moved = problem.coarse.disturbed_together(theta, _noisy_drives(problem.log)) - undisturbed[..., None]
-    return moved.reshape(-1, DRAWS)
+    if len(log.drives) <= SAMPLES_KEPT:
+        moved = rough.disturbed_together(theta, _noisy_drives(log)) - undisturbed[..., None]
+        return moved.reshape(-1, DRAWS)
+    rng, spread = np.random.default_rng(0), np.array(log.drive_std)
+    draws = (log.drives + spread * rng.standard_normal(log.drives.shape) for _ in range(DRAWS))
+    return np.column_stack([(errors - undisturbed).ravel() for errors in rough.disturbed(theta, draws)])
 
 
 def _undisturbed(problem: Problem, theta: Array) -> Array:
