@@ -120,7 +120,7 @@ class EstimateCode(Code):
         "bulk modulus is {ratio:.2g} times that in the rig file: there is air in the oil or a soft hose, or "
         "chamber_volume is {volume:.3g} m^3 and not {written:.3g} m^3"
     )
-    DIVERGED = "the estimate became infinite or no number: check units, the rig file and --form"
+    DIVERGED = "the estimate became infinite or not a number: check units, the rig file and --form"
     PRESSURE_RESIDUALS_LARGE = (
         "the flow balance does not explain the log: the pressure residuals are {ratio:.1f} times the sensor's noise"
     )
@@ -265,7 +265,7 @@ class RigCode(Code):
         "leakage, and bulk modulus would be too low by the same share"
     )
     SINGLE_ROD = (
-        "looks like a single rod, give two areas and volumes: side B has {percent:.1f} ± {half_width:.2g} % of the "
+        "looks like a single rod, so give two areas and volumes: side B has {percent:.1f} ± {half_width:.2g} % of the "
         "area of side A (rig file: {rig_percent:.1f} %) and {volume_percent:.0f} % of its volume (rig file: "
         "{rig_volume_percent:.0f} %), pilot_share is {pilot_share:.2g} (rig file: {rig_pilot_share:.2g})"
     )
@@ -304,7 +304,7 @@ class RigCode(Code):
     )
     PORTS_DRAIN_APART = (
         "no fault: chamber A loses {drain_a:.2g|L/(min bar)} and chamber B {drain_b:.2g|L/(min bar)} L/(min bar) to "
-        "the inner circuit, and the case of a sound pump drains up to {sound:.2g|L/(min bar)} L/(min bar)"
+        "the inner circuit; the case drain of a sound pump takes up to {sound:.2g|L/(min bar)} L/(min bar)"
     )
     OIL_STIFFER = (
         "bulk modulus is {ratio:.3g} times that in the rig file; the conditions were compared at the measured value"

@@ -27,7 +27,7 @@ Exit codes: 0 all done, not_observable included; 1 some logs failed or diverged 
 internal error; 2 nothing was done (wrong usage, or no log could be read); 130 interrupted.
 
 Outcome of a log: ok; not_observable: drive and sensors do not determine the value, so none is given; mismatch: the
-model does not describe the log, so no value is given; diverged: the result became infinite or no number; failed: the
+model does not describe the log, so no value is given; diverged: the result became infinite or not a number; failed: the
 message says why.
 
 Environment: HYDROSTATE_CACHE sets the folder of compiled kernels; HYDROSTATE_DEBUG=1 prints the traceback of an

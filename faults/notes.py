@@ -86,7 +86,7 @@ class ClassCode(Code):
     )
     OIL_STIFFER_CLASS = (
         "without pressure, the circuit that fits has {ratio:.2g} times the bulk modulus in the rig file (another oil, "
-        "or a wrong rig file); the conditions were compared around that"
+        "or a wrong rig file); the conditions were compared at that value"
     )
     NOT_EXCLUDED = (
         "without differential_pressure_pa, other faults are not excluded: {faults} would explain the log about as "
@@ -110,7 +110,7 @@ class ClassCode(Code):
     MODELS_ALIKE = "no class: the models of all conditions move alike under this drive; drive the actuator in steps"
     NO_CIRCUIT = "no circuit can be fitted with this rig file, so there are scores but no probabilities: {reason}"
     VOLUME_FOR_STROKE = (
-        "chamber_volume in the rig file has no room for the stroke: it must be {percent:.0f} % larger at least, and "
+        "chamber_volume in the rig file has no room for the stroke: it must be at least {percent:.0f} % larger, and "
         "the circuits were fitted with that; measure chamber_volume and stroke"
     )
     NO_PROBABILITIES = "no probabilities: {reason}"
@@ -164,6 +164,10 @@ class AdviceCode(Code):
     )
     CORRECT_VOLUME = (
         "correct chamber_volume in the rig file from {written:.3g} to {volume:.3g} m^3, then diagnose this log again"
+    )
+    GIVE_TWO_SIDES = (
+        "give two piston areas and two chamber volumes in the rig file, then diagnose this log again: the actuator "
+        "looks like a single rod"
     )
     CORRECT_VOLUME_OR_OIL = (
         "bulk modulus is {ratio:.2g} times that in the rig file: if the oil is stiffer, enter its bulk_modulus there, "

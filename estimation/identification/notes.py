@@ -21,8 +21,9 @@ class IdentificationCode(Code):
         "{input!r} from {output!r}, and --reference is needed with the column that drives the loop"
     )
     INPUT_LOGGED_LATE = (
-        "{input!r} seems to be logged late: moved ahead by {samples} samples, it leaves {ahead:.0%} of the deviation "
-        "of {output!r}, as it is {left:.0%}. Poles and gain are not the plant's: move the column"
+        "{input!r} seems to be logged late: the model leaves {left:.0%} of the deviation of {output!r}, but only "
+        "{ahead:.0%} if {input!r} is moved ahead by {samples} samples. Poles and gain are not the plant's: move the "
+        "column"
     )
     TWO_STAGES = (
         "only the part of input {input!r} that {reference} explains is used, {share:.0%} of its power: the rest may be "
@@ -80,18 +81,18 @@ class IdentificationCode(Code):
         "(--structure output-error) may do better"
     )
     LINEAR_STANDS_IN = (
-        "the linear model of {output!r} was simulated, because these inputs do not determine the nonlinear one: that "
-        "is uncertain by {undetermined:.0%} of the output's deviation in the fitted logs, and the linear one errs by "
-        "{linear:.0%}; fit a log with inputs like these, or see the nonlinear run with --structure {structure}"
+        "the linear model of {output!r} was simulated, because these inputs do not determine the nonlinear one. The "
+        "nonlinear one is uncertain by {undetermined:.0%} of the output's deviation in the fitted logs; the linear one "
+        "errs by {linear:.0%}. Fit a log with inputs like these, or see the nonlinear run with --structure {structure}"
     )
     NO_NONLINEARITY = (
         "neither dead zone nor saturation nor backlash at the input predicts {output!r} better on held-back data: the "
         "linear model was chosen"
     )
     SIGN_NOT_MEASURED = (
-        "{output!r} seems to be measured without its sign: a linear model of the signed output was taken, whose "
-        "absolute value leaves {left:.0%} of the error of a linear model of the column as it is (held-back data); log "
-        "the sign, and poles and gain are told too"
+        "{output!r} seems to be measured without its sign: the model is linear in the signed output. On held-back data "
+        "its absolute value has {left:.0%} of the error of a linear model of the column itself. Log the sign to learn "
+        "poles and gain too"
     )
     OUTPUT_CUT_OFF = (
         "{output!r} seems to be cut off at {limits} ({share:.0%} of the samples): the transfer function is that of the "
@@ -118,12 +119,12 @@ class IdentificationCode(Code):
         "on poles and gain; use --structure output-error, which is then fitted to changes"
     )
     OFFSETS_DIFFER = (
-        "the offset of {output!r} differs from log to log ({above} beside their mean): each log has its own, and the "
-        "model their mean, so its level does not hold for other logs"
+        "the offset of {output!r} differs from log to log ({above} from their mean): each log was fitted with its own, "
+        "and the model keeps their mean, so its level does not hold for other logs"
     )
     TREND = (
-        "{output!r} drifts by {slope:.3g} a second, which the inputs do not explain: the model was fitted beside this "
-        "trend, and does not have it"
+        "{output!r} drifts by {slope:.3g} per second, which the inputs do not explain: this trend was fitted too, but "
+        "is not part of the model"
     )
     OUTLIERS = (
         "{count} of {total} samples of {output!r} stand out from their neighbours and decide what is fitted: if the "
@@ -134,10 +135,10 @@ class IdentificationCode(Code):
         "leave one out, or log inputs that differ"
     )
     MORE_THAN_NOISE = (
-        "the model leaves {left:.0%} of the deviation of {output!r}, most of which is no noise from sample to sample "
-        "and goes with the inputs: the plant may be nonlinear, or something else that goes with them drives it, or "
-        "(less likely) sensor noise that is filtered or held looks so. Poles and gain may be those of an approximation "
-        "alone; --structure auto tries nonlinear models"
+        "the model leaves {left:.0%} of the deviation of {output!r}. Most of this is not white noise, and it follows "
+        "the inputs: the plant may be nonlinear, or something else that follows the inputs drives it (less likely: "
+        "filtered or held sensor noise). Poles and gain may be those of an approximation; --structure auto tries "
+        "nonlinear models"
     )
     ANSWERS_LATE = (
         "{output!r} seems to answer {input!r} after {dead_time_s:.4g} s, more than a fifth of the log, which is too "
@@ -145,8 +146,8 @@ class IdentificationCode(Code):
         "longer log"
     )
     NOTHING_ANSWERED = (
-        "there is no fit: {logs} has at most {longest} samples in one piece, and the model of {output!r} a dead time "
-        "of {dead_time}, so all outputs answer inputs from before the log"
+        "there is no fit: {logs} has at most {longest} samples in one piece, and the model of {output!r} has a dead "
+        "time of {dead_time} samples, so every output answers inputs from before the log"
     )
     NO_FIT = "the model of {output!r} explains no more of it than chance would (fit {fit:.1f} %): do not rely on it"
 

@@ -297,7 +297,7 @@ def _since(result: Mapping[str, Any]) -> str:
         low, high = result["since_ci95_s"]
         before = in_words(result["condition_before"])
         since = f"{result['since_s']:.2f} s into the log ({low:.2f} to {high:.2f} s)"
-        return f"The change came {since}; before, it was {before}."
+        return f"The condition changed {since}; until then it was {before}."
     named = set(_levels(result).values()) & {*LEAKS, *RUBS}
     return "" if not named else "The fault was there before the log began."
 

@@ -156,8 +156,8 @@ def sensor_advice(left_out: Iterable[Note]) -> tuple[Note, ...]:
     return tuple(AdviceCode.MEND_SENSOR.note(channel=note.data["channel"]) for note in wrong)
 
 
-def volume_advice(strange: Iterable[Note], healthy: EhaParameters, written: EhaParameters) -> tuple[Note, ...]:
-    """Return advice on the chamber volume of the rig file, if it contradicts the log.
+def rig_advice(strange: Iterable[Note], healthy: EhaParameters, written: EhaParameters) -> tuple[Note, ...]:
+    """Return advice on the sides of the cylinder or the chamber volume in the rig file, if they contradict the log.
 
     Parameters
     ----------
@@ -172,6 +172,8 @@ def volume_advice(strange: Iterable[Note], healthy: EhaParameters, written: EhaP
         None where the volume may be right: soft oil has its own advice.
     """
     for note in strange:
+        if note.code == RigCode.SINGLE_ROD:
+            return (AdviceCode.GIVE_TWO_SIDES.note(),)
         if note.code == RigCode.VOLUME_DIFFERS:
             return (AdviceCode.CORRECT_VOLUME.note(volume=healthy.chamber_volume, written=written.chamber_volume),)
         if note.code == RigCode.OIL_STIFFER:

@@ -23,7 +23,7 @@ from estimation.finding import Finding, Outcome, Quantity
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.notes import ChannelCode, RigCode
-from faults.diagnosis.advice import advice_for, oil_advice, sensor_advice, volume_advice
+from faults.diagnosis.advice import advice_for, oil_advice, rig_advice, sensor_advice
 from faults.diagnosis.beyond_nine.accumulator import whatever_accumulator
 from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
 from faults.diagnosis.beyond_nine.balance_refused import class_without_balance
@@ -204,7 +204,7 @@ def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tupl
     severity = without_undetermined(severity, [note.code for note in not_told])
     known = case.estimate.gate.passed and not against
     oil = oil_advice(severity, diagnosis.healthy, diagnosis.limits, case.healthy.chamber_volume) if known else ()
-    volume = volume_advice(case.strange, case.healthy, case.written)
+    entries = rig_advice(case.strange, case.healthy, case.written)
     unclear = (*diagnosis.not_told, *found.not_told)
     further = advice_for(case.log.record, diagnosis.probabilities, against, unclear, found.channels)
     probabilities, stuck = beside_unseen_valve(diagnosis.probabilities, found.not_told)
@@ -219,7 +219,7 @@ def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tupl
         healthy=diagnosis.healthy,
         not_told=(*not_told, *stuck),
         since=board.onset,
-        advice=(*oil, *volume, *sensor_advice(case.log.left_out), *further),
+        advice=(*oil, *entries, *sensor_advice(case.log.left_out), *further),
     )
 
 

@@ -71,7 +71,7 @@ class StackFaultCode(Code):
     AIR_IN_OIL = "air in the oil: {percent:.2f} %, {ratio:.3g} times the healthy share"
     CHAMBER_LEAKS = "the pump chamber leaks: {leakage:.2g|L/(min bar)} L/(min bar)"
     STACK_DEPOLARISED = "the stack is depolarised: {percent:.0f} % of its stroke is lost"
-    STROKE_LARGE = "the stack moves {percent:.0f} % more than by the rig file"
+    STROKE_LARGE = "the stack moves {percent:.0f} % more than the rig file says"
     REED_SOFT = "{reed} reed soft: {ratio:.3g} times the healthy stiffness"
     REED_STIFF = "{reed} reed stiff or jammed: {ratio:.3g} times the healthy stiffness"
     REED_OPEN = "{reed} reed does not shut: a gap of {gap_um:.0f} um"

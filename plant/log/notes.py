@@ -41,10 +41,10 @@ class LogCode(Code):
         "{channel} is logged only from {begin_s:.4g} s to {end_s:.4g} s; only this part of the log is used"
     )
     LINES_SKIPPED = "comments or repeated headers between the rows of data were skipped (lines: {count})"
-    ROWS_LEFT_OUT = "lines that are no rows of data were left out (lines: {count}, the first is {line}: {said!r})"
+    ROWS_LEFT_OUT = "lines that are not rows of data were left out (lines: {count}, the first is {line}: {said!r})"
     CELLS_NO_NUMBERS = (
-        "column {column!r} has cells that are no numbers; they were not used (cells: {count}, the first is {said!r} in "
-        "{where} {place})"
+        "column {column!r} has cells that are not numbers; these were left out (cells: {count}, the first is {said!r} "
+        "in {where} {place})"
     )
     CHANNEL_OF_TEXT = "{channel} is not used, because column {column!r} holds text, such as {text!r}"
     TIME_SET = (

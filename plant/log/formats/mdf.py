@@ -128,7 +128,7 @@ def _valid(signal: Any, formula: str | None, source: str) -> Any:
     if formula is not None:
         try:
             if samples.dtype.kind not in "fiub":
-                raise ValueError("its raw samples are no numbers")
+                raise ValueError("its raw samples are not numbers")
             samples = evaluated(formula, samples)
         except ValueError as error:
             name, said = _last(signal.name)[:80], str(error)

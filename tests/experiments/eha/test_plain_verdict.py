@@ -148,7 +148,7 @@ def test_a_fault_says_what_it_costs_and_since_when() -> None:
     assert "28 % slower" in sureness(said_of("minor_leakage"))
     assert "The fault was there before the log began." in sureness(said_of("minor_leakage"))
     changed = said_of("minor_leakage", since_s=2.5, since_ci95_s=[2.4, 2.6], condition_before="normal")
-    assert "The change came 2.50 s into the log (2.40 to 2.60 s); before, it was normal." in sureness(changed)
+    assert "The condition changed 2.50 s into the log (2.40 to 2.60 s); until then it was normal." in sureness(changed)
     assert "slower" not in sureness(said_of("normal"))
     open_friction = {"normal": 0.3, "minor_friction": 0.35, "major_friction": 0.35}
     assert "fault" not in sureness(said_of("major_friction", probabilities=open_friction))

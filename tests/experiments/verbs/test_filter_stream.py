@@ -85,7 +85,7 @@ def test_noise_of_another_log_is_taken_where_one_is_named(log: Path) -> None:
     spoilt.write_text("".join([*lines[:900], "overload\n", *lines[900:]]))
     code, told, said = run(log, "--like", spoilt, "--every", "10")
     assert (code, len(told)) == (0, 3)
-    assert f"{spoilt}: warning: lines that are no rows of data were left out (lines: 1" in said
+    assert f"{spoilt}: warning: lines that are not rows of data were left out (lines: 1" in said
 
 
 def test_a_state_of_another_filter_actuator_or_rate_is_refused(log: Path, tmp_path: Path) -> None:

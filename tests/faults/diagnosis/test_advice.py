@@ -8,7 +8,7 @@ import pytest
 from estimation.finding import Quantity
 from estimation.notes import EstimateCode, RigCode, SensorCode
 from faults.conditions import CONDITIONS
-from faults.diagnosis.advice import advice_for, oil_advice, speeds_held, volume_advice
+from faults.diagnosis.advice import advice_for, oil_advice, rig_advice, speeds_held
 from faults.notes import AdviceCode, AgainstCode, ClassCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -223,10 +223,11 @@ def test_soft_oil_is_to_be_bled_where_its_interval_lies_below_the_limit(
 
 def test_a_chamber_volume_that_contradicts_the_log_is_to_be_corrected_to_its_value() -> None:
     true, written = replace(HEALTHY, chamber_volume=5.4e-4), replace(HEALTHY, chamber_volume=1.08e-3)
-    (explained,) = volume_advice([RigCode.VOLUME_DIFFERS.note(percent=50.0, half_width=5.0)], true, written)
+    (explained,) = rig_advice([RigCode.VOLUME_DIFFERS.note(percent=50.0, half_width=5.0)], true, written)
     assert str(explained) == (
         "correct chamber_volume in the rig file from 0.00108 to 0.00054 m^3, then diagnose this log again"
     )
-    (stiff,) = volume_advice([RigCode.OIL_STIFFER.note(ratio=2.0)], written, written)
+    (stiff,) = rig_advice([RigCode.OIL_STIFFER.note(ratio=2.0)], written, written)
     assert "else correct chamber_volume from 0.00108 to 0.00054 m^3; then" in str(stiff)
-    assert volume_advice([RigCode.OIL_SOFTER.note(ratio=0.5)], written, written) == ()  # it may be air
+    assert rig_advice([RigCode.OIL_SOFTER.note(ratio=0.5)], written, written) == ()  # it may be air
+    assert codes(rig_advice([Note(RigCode.SINGLE_ROD, {})], written, written)) == [AdviceCode.GIVE_TWO_SIDES]

@@ -76,7 +76,7 @@ def test_a_drive_that_is_logged_too_small_shows_as_a_stroke_that_no_stack_has() 
     log = log_of(HEALTHY)
     found = diagnose_stack(log.replace(drive_voltage_v=0.93 * log["drive_voltage_v"]), HEALTHY)
     (fault,), (advice,) = found.faults, found.advice
-    assert str(fault) == "the stack moves 8 % more than by the rig file"
+    assert str(fault) == "the stack moves 8 % more than the rig file says"
     assert advice.code is StackAdviceCode.CHECK_SCALE
 
 
