@@ -32,6 +32,9 @@ FEW = 0.1
 HOURS, DAYS, PARTS = 2.0, 45.0, 730.0
 """Up to which time ahead a date is told with its hour, with its day, and with the part of its month [day]."""
 
+OUT_OF_SIGHT = "not within sight"
+"""What a forecast says of a limit that no future reaches."""
+
 LAST = datetime(9999, 1, 1, tzinfo=UTC)
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
@@ -125,7 +128,7 @@ def told_dates(places: Iterable[float], ahead: Iterable[float]) -> str:
     """
     (low, high), (first, last) = places, ahead
     if low == float("inf"):
-        return "not within sight"
+        return OUT_OF_SIGHT
     begin = told_date(low, max(first, min(last, HOURS)))  # an interval of days needs no hour
     if high == float("inf"):
         return f"not before {begin}"

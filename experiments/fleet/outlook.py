@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.fleet.dates import HOURS, told_date, told_dates
+from experiments.fleet.dates import HOURS, OUT_OF_SIGHT, told_date, told_dates
 from experiments.fleet.naming import place_of, table_rows
 from experiments.fleet.rows import LogRow
 from faults.trend.crossing import HORIZON
@@ -102,6 +102,8 @@ class Outlook:
         ends = [float(self.trend.crossing.quantiles[place]) for place in (low, high)]
         if ends[1] <= 0.0:
             return "reached"
+        if self.trend.growth[0] * (self.series.limit - self.series.healthy) < 0.0:
+            return OUT_OF_SIGHT  # futures may turn round, but no reader looks for that in a severity that recedes
         if self.days_apart is None:
             return f"{span_of(*ends)} logs" if low != high else f"{ends[0]:.0f} log{'' if round(ends[0]) == 1 else 's'}"
         hours = any(len(one.named.shown) > len(one.named.day) for one in self.logs)

@@ -12,7 +12,7 @@ from plant.log.columns import CHANNELS, TIME, UNITS, listed, unit_ending
 from plant.log.headings import Heading
 from plant.log.notes import LogCode
 from plant.notes import Note
-from plant.units import converts
+from plant.units import LOWER_CASE, converts
 
 NAMES: Mapping[str, tuple[tuple[str, float], ...]] = {
     TIME: (
@@ -126,7 +126,7 @@ def points_by_name(heading: Heading, channel: str) -> float | None:
     fits = unit is not None and converts(unit, UNITS[channel])
     if unit is not None and not fits:
         return None
-    name = heading.stem.removesuffix("_pa") if unit == "pa" else heading.stem  # a unit, not a chamber A
+    name = heading.stem.removesuffix("_pa") if unit == "Pa" else heading.stem  # a unit, not a chamber A
     own = channel.removesuffix(unit_ending(UNITS[channel]))
     if name == own or heading.name == channel:
         said = 6.0
@@ -150,13 +150,14 @@ def unit_of(heading: Heading) -> str | None:
 
     Examples
     --------
-    >>> unit_of(Heading("POS_MM")), unit_of(Heading("V_KOLBEN_MM_S")), unit_of(Heading("p_A"))
-    ('mm', 'mm/s', None)
+    >>> [unit_of(Heading(one)) for one in ("POS_MM", "V_KOLBEN_MM_S", "DP_MPA", "p_A")]
+    ['mm', 'mm/s', 'MPa', None]
     """
     if heading.unit is not None or heading.stamped:
         return heading.unit
     found = _SUFFIX.search(heading.stem)
-    return None if found is None else found[1].replace("_", "/")
+    unit = "" if found is None else found[1].replace("_", "/")
+    return LOWER_CASE.get(unit, unit) or None
 
 
 def guessed(points: Mapping[str, Mapping[int, float]], headings: Sequence[Heading]) -> tuple[Guess, ...]:

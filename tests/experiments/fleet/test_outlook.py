@@ -207,6 +207,15 @@ def test_logs_that_are_dated_without_an_hour_have_no_forecast_with_one() -> None
     assert row.outlook.when(0, 4) == "23 March 2026"
 
 
+def test_a_severity_that_recedes_from_its_limit_has_no_date_at_which_it_reaches_it() -> None:
+    """Futures in which it turns round gave a pressure that fell by 1 % a log a limit reached "2029 to 2038"."""
+    outlook = outlook_of(weekly(1.0 + 2.0 * np.exp(-np.arange(12) / 4.0), std=0.01).logs, "leakage_flow")
+    assert outlook is not None
+    assert outlook.trend.crossing is not None
+    assert np.isfinite(outlook.trend.crossing.quantiles[0])
+    assert (outlook.when(1, 3), outlook.when(0, 4)) == ("not within sight", "not within sight")
+
+
 def test_what_decides_is_read_first_and_logs_lead_to_their_pages() -> None:
     row = actuator(1.0 + 0.1 * np.arange(30))
     page = actuator_page(row, {"P-1_28.csv": "logs/28", "P-1_29.csv": "logs/29"})

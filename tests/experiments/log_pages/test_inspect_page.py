@@ -1,5 +1,6 @@
 """The page of `hydrostate inspect`: whether the log can be read, its clock, and columns drawn by time."""
 
+import re
 from base64 import b64decode
 from pathlib import Path
 
@@ -60,6 +61,15 @@ def test_a_file_without_units_has_no_column_for_them(tmp_path: Path) -> None:
     page = page_of(tmp_path, "time_s,motor_speed_rad_s,position_m", TIME, SPEED, WAY)
     assert ">unit<" not in page
     assert ">unit<" in page_of(tmp_path, "time [s],speed [rpm]", TIME, SPEED)
+
+
+def test_no_line_ends_within_an_option_and_all_can_be_copied(tmp_path: Path) -> None:
+    page = page_of(tmp_path, "time_s,MOTOR_RPM,position_m,DP_PA", TIME, SPEED, WAY, 1e4 * SPEED)
+    (said,) = re.findall(r"add these options to one command: <code>(.*?)</code>", page, re.DOTALL)
+    options = re.findall(r'<span class="option">(.*?)</span>', said)
+    assert "--columns motor_speed_rad_s=MOTOR_RPM:rpm" in options
+    assert "--columns differential_pressure_pa=DP_PA:Pa" in options  # the unit as it is written, not as names have it
+    assert re.sub(r"<.*?>|\s+", " ", said).split() == " ".join(options).split()
 
 
 def test_units_are_to_be_checked_where_the_file_gives_none_and_the_columns_are_named(tmp_path: Path) -> None:

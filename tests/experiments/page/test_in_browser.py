@@ -216,6 +216,9 @@ def test_without_scripts_the_verdict_and_a_still_picture_are_there(opened: Any) 
 @pytest.mark.parametrize("name", ["diagnosis", "identified"])
 def test_a_page_prints_on_two_sheets_and_names_no_folder(opened: Any, name: str) -> None:
     page = opened(name, scheme="dark")
+    if name == "diagnosis":  # a log of which there is more to say
+        noted = "'beforeend', '<p>What was noted of this log, in words that fill two lines of the sheet. '.repeat(2)"
+        page.evaluate(f"for (let i = 0; i < 3; i++) document.getElementById('condition').insertAdjacentHTML({noted})")
     edges = dict.fromkeys(("top", "bottom", "left", "right"), "12mm")
     sheets = len(re.findall(rb"/Type\s*/Page\b", page.pdf(format="A4", margin=edges)))
     assert sheets <= 2
