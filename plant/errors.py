@@ -103,6 +103,10 @@ class NoChannelError(LogError):
         return type(self), (self.bare, self.source, self.hint, self.columns)
 
 
+class ClockError(LogError):
+    """Times of a log do not increase."""
+
+
 class SparseLogError(LogError):
     """A log lacks too many samples to be estimated; models between its channels may still be identified."""
 

@@ -115,7 +115,8 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
             return question, question.read(tables, beside=beside)
         except NoChannelError as error:
             name = kind_meant(error, asked["plant"], asked["rig"])
-            note(f"{log}: read as a log of a {name} actuator, by its columns; --plant names another kind")
+            if name != question.about["plant"]:
+                note(f"{log}: read as a log of the kind {name}, by its columns; --plant names another kind")
             if name not in questions:
                 questions[name] = _Question.of(context, verb, asked, name)
             return questions[name], questions[name].read(tables, beside=beside)

@@ -73,7 +73,10 @@ Columns: TypeAlias = Annotated[
         "position_m=CH2:20 mm/V. Repeat the option, or separate several by commas.",
     ),
 ]
-SampleTime: TypeAlias = Annotated[float | None, option("S", "Time between rows [s], for a log without a time column.")]
+SampleTime: TypeAlias = Annotated[
+    float | None,
+    option("S", "Time between rows [s], for a log without a time column, or with times that do not increase."),
+]
 Beside: TypeAlias = Annotated[
     list[Path] | None,
     option(

@@ -144,9 +144,10 @@ def resolve_columns(
             strange.append((channel, error))
             continue
         if channel in found:
+            both = f"columns {found[channel].name[:80]!r} and {heading.name[:80]!r} both give {channel}, wanted one; "
+            told = found[channel].name != heading.name
             raise LogError(
-                f"columns {found[channel].name[:80]!r} and {heading.name[:80]!r} both give {channel}, wanted one; "
-                f"name the right one as {channel}=NAME:UNIT",
+                f"{both}{f'name the right one as {channel}=NAME:UNIT' if told else 'rename one of them in the file'}",
                 source,
             )
         found[channel] = column
@@ -221,7 +222,9 @@ def _foreign(headings: Sequence[Heading], channel: str, spec: str, source: str) 
         raise MissingColumnError(channel, name, listed(names), source)
     if len(positions) > 1:
         raise LogError(
-            f"column {name[:80]!r} is needed once for {channel}, the log has it {len(positions)} times", source
+            f"column {name[:80]!r} is needed once for {channel}, the log has it {len(positions)} times; "
+            "rename the others",
+            source,
         )
     heading = headings[positions[0]]
     if unit is None:

@@ -4,13 +4,14 @@ import json
 import math
 import warnings
 from collections.abc import Collection, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from plant.atomic import replacing
-from plant.errors import LogError, LogWarning
+from plant.errors import ClockError, LogError, LogWarning
 from plant.log.checks import REQUIRED, Clock, trusted
 from plant.log.clock.uniform import MOST_MISSING
 from plant.log.columns import TIME
@@ -49,7 +50,7 @@ def read_record(
     required : Collection[str]
         Channels that must be there beside time; ``"position_m or velocity_m_s"`` asks for one of the two.
     sample_time : float, optional
-        Time between rows [s] of a log that has no time.
+        Time between rows [s] of a log that has no time, or times that do not increase.
     beside : Sequence[str or Path]
         Files of other loggers of the same test, whose channels are put on one clock with these.
     most_missing : float
@@ -81,7 +82,15 @@ def read_record(
     found = gathered(tables, columns, required, source, sample_time)
     document, notes = _document(next((one.metadata for one in tables if one.metadata), None))
     clock = None if beside else _clock(document)
-    checked = trusted(found.columns, source=source, required=required, clock=clock, most_missing=most_missing)
+    trust = partial(trusted, source=source, required=required, most_missing=most_missing)
+    try:
+        checked = trust(found.columns, clock=clock)
+    except ClockError:
+        if sample_time is None or beside:
+            raise
+        rows = len(found.columns[TIME])
+        checked = trust({**found.columns, TIME: sample_time * np.arange(rows)}, clock=Clock(sample_time, 0.0))
+        notes = (*notes, LogCode.TIME_REPLACED.note(channel=TIME, sample_time_s=sample_time))
     for note in (*notes, *found.notes, *checked.notes):
         warnings.warn(LogWarning(note, source), stacklevel=2)
     began = {} if found.began is None else {"began": found.began}

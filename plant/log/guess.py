@@ -301,8 +301,12 @@ def hint_of(channels: Sequence[str], headings: Sequence[Heading], more: Sequence
     may = f"; perhaps --columns '{','.join(options)}'" if options else ""
     put = ", with the unit of each for UNIT" if any(one.endswith(":UNIT") for one in options) else ""
     timeless = "; to read a log without time, give --sample-time" if TIME in channels and TIME not in shown else ""
+    volts = not options and sum(one.unit is not None and converts(one.unit, "V") for one in headings) > 1  # one drives
+    scale = (
+        "; a column in V needs its sensor's scale: --columns 'position_m=NAME:20 mm/V', for example" if volts else ""
+    )
     other = "" if options or TIME in channels else "; if a second logger's file has it, add --with FILE"
-    return f"{may}{put}; {INSPECT}{other}{timeless}"
+    return f"{may}{put}; {INSPECT}{scale}{other}{timeless}"
 
 
 def in_order(channels: Iterable[str]) -> list[str]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.arrays import Array
-from plant.errors import LogError, SparseLogError
+from plant.errors import ClockError, LogError, SparseLogError
 from plant.log.clock.jitter import GAP, grid_of, resampled, rounded_clock, usual_step
 from plant.log.clock.jumps import without_jumps, without_overruns
 from plant.log.clock.stalls import stalled_clock, waited_in_a_queue
@@ -201,12 +201,12 @@ def _resampled(time: Array, channels: Channels, source: str, notes: list[Note]) 
     return Checked(grid.sample_time, float(time[0]), even)
 
 
-def _not_increasing(time: Array, source: str) -> LogError:
+def _not_increasing(time: Array, source: str) -> ClockError:
     row = int(np.argmax(np.diff(time) <= 0.0))
     got = f"{time[row + 1]:.12g} in row {row + 2} after {time[row]:.12g}"
-    return LogError(
+    return ClockError(
         f"{TIME} must increase, got {got}; if the clock was set there, or another test begins, keep one side of it; "
-        "if it counts rows or runs over, leave its column out and give --sample-time",
+        "if its steps are too coarse, or it runs over, --sample-time S takes the rows as evenly spaced by S seconds",
         source,
     )
 

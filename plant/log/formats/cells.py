@@ -196,14 +196,18 @@ def wrong_width(source: str, wanted: int, got: int, row: int) -> LogError:
     )
 
 
-def not_a_number(source: str, name: str, row: int, value: object) -> LogError:
-    """Return the error for a cell that is not a number.
+def not_a_number(source: str, name: str, row: int, value: object, *, stamped: bool = False) -> LogError:
+    """Return the error for a cell that is not a number, or not a date in a column of dates.
 
     Parameters
     ----------
     row : int
         The row from 0; the sentence counts from 1, without the header.
+    stamped : bool
+        Whether the column holds dates or times of the day.
     """
     text = str(value)[:40]
-    said = f"column {name[:80]!r} must hold numbers, got {text!r} in row {row + 1}; write 1234.5, or a time as {STAMP}"
+    wanted = f"dates or times in every row, such as {STAMP}" if stamped else "numbers"
+    wrote = "" if stamped else f"; write 1234.5, or a time as {STAMP}"
+    said = f"column {name[:80]!r} must hold {wanted}, got {text!r} in row {row + 1}{wrote}"
     return TextColumnError(said, source, name, text)

@@ -264,7 +264,8 @@ class _Body:
             if len(bad) - (spared and taken in bad) > allowed:
                 place = min(bad)
                 line, row = self.rows[place]
-                reasons.append((line, not_a_number(self.source, column.name, row, bad[place])))
+                stamped = column.position in self.layout.stamped
+                reasons.append((line, not_a_number(self.source, column.name, row, bad[place], stamped=stamped)))
         if reasons:
             raise min(reasons, key=lambda one: one[0])[1]
         if within and not self._may_leave_out():

@@ -22,7 +22,7 @@ from plant.log.formats.csv_loggers import (
 )
 from plant.log.formats.layouts_seen import remember, remembered
 from plant.log.formats.packed import opened
-from plant.log.formats.thousands import decimal_point_of, require_ungrouped
+from plant.log.formats.thousands import decimal_point_of, require_decimal_points, require_ungrouped
 from plant.log.headings import Heading, is_unit_row, names_and_units
 
 LOOKED_AT = 1 << 18
@@ -175,10 +175,8 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
         raise LogError("a header line is needed, but the file is empty", source)
     if lines[0].startswith(LABVIEW) and (found := _of_labview(lines, encoding, source)) is not None:
         return found
-    if any(line.startswith(TWINCAT_STEP) for line in lines):
-        found = _of_twincat(lines, encoding, source)
-        if found is not None:
-            return found
+    if (found := _of_twincat(lines, encoding, source)) is not None:
+        return found
     head = "\n".join(lines[:5])
     strange = sum(one == "\ufffd" or (ord(one) < 32 and one not in "\t\n\x0c\x0b") for one in head)
     if strange > 0.1 * len(head) or "\0" in head:
@@ -189,8 +187,10 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
     block = max((_block(lines, one) for one in tried), key=lambda one: one.score)
     if not block.score or _header_parts_at_commas(lines, block):
         return _by_header(lines, encoding, source)
-    made = block.layout(lines, encoding)
-    require_ungrouped([row for _, row in block.rows], [one.name for one in made.headings], source)
+    made, rows = block.layout(lines, encoding), [row for _, row in block.rows]
+    require_ungrouped(rows, [one.name for one in made.headings], source)
+    if block.delimiter == "," and block.rows[0][0]:
+        require_decimal_points(rows, cells_of(lines[block.rows[0][0] - 1], ","), source)
     return made
 
 

@@ -26,6 +26,7 @@ _PARTS = re.compile(rf"[{APART}]")
 
 _GROUPED = re.compile(r"[-+\u2212]?[1-9]\d{0,2}[.,]\d{3}")
 _SMALL = re.compile(r"[-+\u2212]?\d{1,3}")
+_WHOLE = re.compile(r"[-+\u2212]?\d+")
 _SMALL_OR_GROUPED = re.compile(rf"{_SMALL.pattern}|{_GROUPED.pattern}")
 
 LEAST = 30
@@ -189,3 +190,31 @@ def require_none_grouped(cells: Iterable[str], name: str, source: str) -> None:
     filled = [cell for cell in cells if cell]
     if groups_thousands(filled):
         raise thousands_error(name, next(cell for cell in filled if not _SMALL.fullmatch(cell)), source)
+
+
+def require_decimal_points(rows: Sequence[Sequence[str]], above: Sequence[str], source: str) -> None:
+    """Refuse rows at whose commas numbers are cut: two whole numbers below each name, such as ``0,5,1,2`` below two.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of str
+        Cells between commas.
+    above : sequence of str
+        Cells of the line above.
+    source : str
+        What messages call the log.
+
+    Raises
+    ------
+    LogError
+        If the rows are such.
+    """
+    wide = len(above)
+    if wide < 2 or any(len(row) != 2 * wide for row in rows) or any(_WHOLE.fullmatch(one.strip()) for one in above):
+        return
+    if all(_WHOLE.fullmatch(cell.strip()) for row in rows for cell in row):
+        raise LogError(
+            f"every row must have {wide} cells as the header has, got {2 * wide}: a comma is the decimal sign here, "
+            "and stands between cells too; export the log with semicolons between cells, or with decimal points",
+            source,
+        )

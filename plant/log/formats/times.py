@@ -53,7 +53,7 @@ def moments(values: "np.ndarray[Any, Any]", name: str, source: str) -> Any:
     if values.dtype.kind == "M":
         return values.astype("datetime64[ns]")
     texts = ["" if one is None else _said(one) for one in values]
-    return read_stamps(texts, lambda row, cell: not_a_number(source, name, row, cell))
+    return read_stamps(texts, lambda row, cell: not_a_number(source, name, row, cell, stamped=True))
 
 
 def _said(value: Any) -> str:

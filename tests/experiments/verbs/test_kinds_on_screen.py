@@ -46,7 +46,7 @@ def test_logs_of_two_kinds_of_actuator_are_told_apart_by_their_columns(
     for quantity in ("outlet reed stiffness", "gas fraction"):
         assert quantity in done.stdout
     for kind, log in logs.items():
-        assert f"{log}: read as a log of a {kind} actuator, by its columns" in " ".join(done.stderr.split())
+        assert f"{log}: read as a log of the kind {kind}, by its columns" in " ".join(done.stderr.split())
         assert f"`hydrostate rig init rig.toml --plant {kind}` writes a file" in " ".join(done.stderr.split())
     assert "`hydrostate rig init rig.toml`" not in done.stderr
     shown = " ".join(invoke("diagnose", logs["piezo-stack"]).stdout.split())

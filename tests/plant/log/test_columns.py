@@ -74,8 +74,8 @@ def test_a_setpoint_beside_its_channel_is_no_second_channel() -> None:
 def test_two_columns_for_one_channel_are_refused_and_a_mapping_settles_it() -> None:
     with pytest.raises(LogError, match="'position_m' and 'position_mm' both give position_m"):
         channels("position_m", "position_mm")
-    with pytest.raises(LogError, match="both give position_m"):
-        channels("position_m", "position_m")
+    with pytest.raises(LogError, match="both give position_m, wanted one; rename one of them in the file"):
+        channels("position_m", "position_m")  # no option could tell them apart
     assert channels("position_m", "position_mm", position_m="position_mm:mm") == {"position_m": "position_mm"}
 
 
@@ -94,7 +94,7 @@ def test_a_foreign_name_may_hold_a_colon() -> None:
     ("mapping", "message"),
     [
         ({"position_m": "POS:mm"}, "column 'POS' is needed for position_m; the log has 'X', 'X', 'Y'"),
-        ({"position_m": "X:mm"}, "needed once for position_m, the log has it 2 times"),
+        ({"position_m": "X:mm"}, "needed once for position_m, the log has it 2 times; rename the others"),
         ({"position_m": "Y:bar"}, "column 'Y' cannot become position_m: unit 'bar'"),
         ({"positon_m": "Y"}, "channel 'positon_m' is unknown, did you mean 'position_m'"),
         ({"position_m": 3}, "columns must be names by channel, such as 'POS_MM:mm', got 3"),

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from plant.errors import LogError, LogWarning
+from plant.errors import ClockError, LogError, LogWarning
 from plant.log.columns import CHANNELS
 from plant.log.files import read_record, sidecar, write_record
 from plant.log.notes import LogCode
@@ -281,6 +281,18 @@ def test_a_log_with_foreign_names_is_read_through_a_mapping(shared: Path) -> Non
     assert LogCode.TIME_JITTERS in [one.message.note.code for one in caught]
     assert len(record) == 24841
     assert np.ptp(record["position_m"]) == pytest.approx(0.2464, abs=1e-4)
+
+
+def test_stamps_of_whole_seconds_are_read_with_the_sample_time_that_the_refusal_asks_for(tmp_path: Path) -> None:
+    """The refusal named --sample-time, and the same refusal came again with it."""
+    rows = (f"2026-11-29 10:00:0{k // 20},{k}.5,0.{k:03d}" for k in range(60))
+    (tmp_path / "log.csv").write_text("\n".join(["time,motor_speed_rad_s,position_m", *rows]))
+    with pytest.raises(ClockError, match="--sample-time S takes the rows as evenly spaced by S seconds"):
+        read_record(tmp_path / "log.csv")
+    with pytest.warns(LogWarning, match=r"time_s does not increase; the rows were taken as evenly spaced by 0.05 s"):
+        record = read_record(tmp_path / "log.csv", sample_time=0.05)
+    assert (record.sample_time, len(record)) == (0.05, 60)
+    np.testing.assert_array_equal(record["motor_speed_rad_s"], np.arange(60) + 0.5)
 
 
 @pytest.mark.parametrize("sample_time", [0.0, -1e-3, np.inf, np.nan])

@@ -5,7 +5,7 @@ import pytest
 
 from plant.errors import LogError, LogWarning, MissingColumnError, NoChannelError
 from plant.log.files import read_record
-from plant.log.guess import guess_by_name
+from plant.log.guess import guess_by_name, hint_of
 from plant.log.headings import Heading
 from plant.log.notes import LogCode
 from plant.notes import Note
@@ -112,6 +112,15 @@ def test_a_log_of_one_logger_says_how_the_other_is_merged(tmp_path: Path) -> Non
     path.write_text("time_s,motor_speed_rpm,pressure_bar\n" + ROWS)
     with pytest.raises(LogError, match="if a second logger's file has it, add --with FILE"):
         read_record(path)
+
+
+def test_columns_in_volts_say_that_the_scale_of_the_sensor_is_needed() -> None:
+    volts, bars = (
+        hint_of(["position_m"], [Heading("Time", "s"), Heading("CH1", unit), Heading("CH2", "V")])
+        for unit in ("V", "bar")
+    )
+    assert "a column in V needs its sensor's scale: --columns 'position_m=NAME:20 mm/V'" in volts
+    assert "in V needs" not in bars
 
 
 def test_one_chamber_alone_is_not_offered_by_its_unit(tmp_path: Path) -> None:

@@ -184,6 +184,17 @@ def test_a_channel_of_text_that_nobody_asked_for_is_left_out(tmp_path: Path) -> 
         read_record(path, required=("differential_pressure_pa",))
 
 
+def test_a_number_in_a_column_of_dates_is_told_as_no_date(tmp_path: Path) -> None:
+    """The message asked for numbers, and named a number that it got."""
+    stamps = [f"2026-11-29 10:00:00.{k:03d}" if k < 30 else f"{0.001 * k:.3f}" for k in range(60)]
+    rows = [f"{stamp},{k}.5,0.{k:03d}" for k, stamp in enumerate(stamps)]
+    (tmp_path / "log.csv").write_text("\n".join(["time,motor_speed_rad_s,position_m", *rows]))
+    with pytest.raises(
+        LogError, match=r"'time' must hold dates or times in every row, such as 2026.*, got '0\.030' in"
+    ):
+        read_record(tmp_path / "log.csv")
+
+
 def test_cells_that_loggers_and_spreadsheets_leave_for_nothing_are_missing(tmp_path: Path) -> None:
     rows = list(ROWS)
     for k, cell in enumerate(("-", "---", "OL", "#DIV/0!", "1.#QNAN", "-1.#IND")):

@@ -95,6 +95,14 @@ def test_of_whole_numbers_one_beyond_a_million_says_what_its_signs_are(tmp_path:
     np.testing.assert_allclose(read, pressure)
 
 
+def test_decimal_commas_between_commas_are_refused_with_what_to_do(tmp_path: Path) -> None:
+    """Two cells below each name were read as columns without names."""
+    rows = [f"{0.001 * k:.3f},{k / 3.0:.4f},-{k / 7.0:.2f}".replace(".", ",") for k in range(40)]
+    (tmp_path / "log.csv").write_text("\n".join(["time_s,motor_speed_rad_s,position_m", *rows]))
+    with pytest.raises(LogError, match=r"must have 3 cells .* got 6: a comma is the decimal sign here.* semicolons"):
+        read_record(tmp_path / "log.csv")
+
+
 def test_a_column_of_text_with_another_decimal_sign_than_the_log_is_read_by_its_own(tmp_path: Path) -> None:
     cells = [f"{one / 7.0:.4f}".replace(".", ",") for one in SPEED]
     read = read_record(written(tmp_path, cells, "log.csv"))["motor_speed_rad_s"]
