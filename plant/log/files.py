@@ -89,7 +89,9 @@ def read_record(
         if sample_time is None or beside:
             raise
         rows = len(found.columns[TIME])
-        checked = trust({**found.columns, TIME: sample_time * np.arange(rows)}, clock=Clock(sample_time, 0.0))
+        checked = trust(
+            {**found.columns, TIME: sample_time * np.arange(rows, dtype=np.float64)}, clock=Clock(sample_time, 0.0)
+        )
         notes = (*notes, LogCode.TIME_REPLACED.note(channel=TIME, sample_time_s=sample_time))
     for note in (*notes, *found.notes, *checked.notes):
         warnings.warn(LogWarning(note, source), stacklevel=2)
