@@ -119,6 +119,8 @@ class Quantity:
     --------
     >>> print(Quantity(2.068e8, "Pa", (2.061e8, 2.076e8)))
     2.068e+08 (2.061e+08 to 2.076e+08) Pa
+    >>> {"flow": Quantity(6.04, "L/min", (6.02, 6.06))}
+    {'flow': <6.04 (6.02 to 6.06) L/min>}
     """
 
     value: float | None
@@ -133,6 +135,10 @@ class Quantity:
             return "not determined"
         within = "" if self.ci95 is None else f" ({self.ci95[0]:.4g} to {self.ci95[1]:.4g})"
         return f"{self.value:.4g}{within} {self.unit}"
+
+    def __repr__(self) -> str:
+        """Return the same in brackets, since mappings of quantities are read at a prompt."""
+        return f"<{self}>"
 
     @staticmethod
     def normal(value: float, std: float, unit: str) -> "Quantity":

@@ -153,6 +153,10 @@ class Note:
             said if UNTOLD not in said else f"{said.replace(UNTOLD, '')}; the log does not tell how far off this may be"
         )
 
+    def __repr__(self) -> str:
+        """Return code and sentence, since lists of notes are read at a prompt."""
+        return f"<{self.code}: {self}>"
+
     def to_dict(self) -> dict[str, Any]:
         """Return the note for JSON.
 

@@ -24,3 +24,10 @@ def test_a_half_width_that_nothing_bounds_is_no_number() -> None:
 
     said = str(Offset.READS.note(offset_pa=1e5, half_width_pa=float("inf")))
     assert said == "pressure reads 1 bar too much; the log does not tell how far off this may be"
+
+
+def test_notes_at_a_prompt_are_sentences() -> None:
+    """A tuple of notes showed templates with empty fields, and the numbers apart."""
+    note = LogCode.CLOCK_ASSUMED.note(sample_time_s=0.5)
+    assert repr((note,)) == f"(<clock_assumed: {note}>,)"
+    assert "{" not in repr(note)
