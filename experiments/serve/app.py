@@ -161,7 +161,10 @@ def _answer_errors(app: FastAPI) -> None:
 
     async def invalid(request: Request, error: Exception) -> Response:
         found: Any = error.errors()[0] if isinstance(error, RequestValidationError) else {"loc": (), "msg": str(error)}
-        return answered(request, 422, f"{' '.join(map(str, found['loc']))}: {found['msg']}")
+        where, *names = map(str, found["loc"]) if found["loc"] else ("request",)
+        if found.get("type") == "missing":
+            return answered(request, 422, f"the {where} has no {' '.join(names)!r}; it must give one")
+        return answered(request, 422, f"{' '.join((where, *names))}: {found['msg']}")
 
     async def strange(_: Request, error: Exception) -> Response:
         said = unexpected(error)

@@ -144,7 +144,7 @@ class Service:
         """
         log, found = self.known(identity), self.store.result(identity)
         if found is None:
-            raise RefusedError(409, f"{log.name} is not finished yet")
+            raise RefusedError(409, f"the work on {log.name} is not finished yet")
         return found
 
     def page(self, identity: str) -> Path:
@@ -157,9 +157,9 @@ class Service:
         """
         log, path = self.known(identity), page_file(self.settings, identity)
         if log.state == UNFINISHED:
-            raise RefusedError(409, f"{log.name} is not finished yet")
+            raise RefusedError(409, f"the work on {log.name} is not finished yet")
         if log.state in (FAILED, INTERRUPTED) or not path.exists():
-            raise RefusedError(404, f"{log.name} has no page: {log.message}")
+            raise RefusedError(404, f"there is no page of {log.name}. {log.message}")
         return path
 
     def delete(self, identity: str) -> None:

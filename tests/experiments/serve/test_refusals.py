@@ -24,6 +24,13 @@ def test_a_browser_is_refused_by_a_page_with_its_own_style_alone(served: Served,
     assert "<style>" in answer.text
 
 
+def test_what_the_address_lacks_is_named_in_words(served: Served) -> None:
+    """A comparison without logs was refused with "Query first: Field required"."""
+    client = served()
+    assert "The query has no &#x27;first&#x27;; it must give one." in client.get("/compare", headers=BROWSER).text
+    assert client.post("/api/logs", content=b"x").json() == {"detail": "the query has no 'name'; it must give one"}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_refusal_can_be_read_in_light_and_in_dark(browser: Any, scheme: str) -> None:

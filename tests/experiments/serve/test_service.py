@@ -169,11 +169,11 @@ def test_files_of_logs_that_are_kept_stay_and_those_of_no_log_go(service: Servic
 def test_a_log_that_failed_has_no_page_and_its_reason_is_told(service: Service) -> None:
     kept(service, "a", FAILED)
     page_file(service.settings, "a").write_text("half")
-    with pytest.raises(RefusedError, match=r"a\.csv has no page: normal") as refused:
+    with pytest.raises(RefusedError, match=r"there is no page of a\.csv\. normal") as refused:
         service.page("a")
     assert refused.value.status == 404
     kept(service, "b")
-    with pytest.raises(RefusedError, match=r"b\.csv has no page"):
+    with pytest.raises(RefusedError, match=r"there is no page of b\.csv"):
         service.page("b")
 
 
