@@ -151,7 +151,7 @@ def _rig_share(card: Card) -> list[str]:
     if not card.uncertainties:
         return [
             f"{rule}: an error of 1 % in the volume is an error of 1 % in bulk modulus; these bounds take the volume "
-            "as exact, because [uncertainty] in the rig file does not list it"
+            "as exact; list chamber_volume under [uncertainty] in the rig file, and they include its error"
         ]
     given = ", ".join(f"{_words(name)} {percent(std)}" for name, std in card.uncertainties.items())
     whole, alone = card.relative_std["bulk_modulus"], card.known_exactly["bulk_modulus"]
