@@ -35,20 +35,23 @@ Logs: TypeAlias = Annotated[
     list[Path],
     argument(
         "LOG",
-        "Logs: CSV, Parquet or MAT, with time_s, motor_speed_rad_s, and position_m or velocity_m_s; "
-        "differential_pressure_pa is optional. A name may carry another unit (position_mm, motor_speed_rpm). "
-        "For other names or formats, start with `hydrostate inspect`.",
+        "Logs: text with any delimiter, Parquet, Feather, MAT; with hydrostate[bench] XLSX, TDMS, MDF, HDF5. They need "
+        "time_s, motor_speed_rad_s, and position_m or velocity_m_s; differential_pressure_pa is optional. A name may "
+        "carry another unit (position_mm, motor_speed_rpm). For other names, start with `hydrostate inspect`.",
     ),
 ]
 Json: TypeAlias = Annotated[
     bool,
-    flag("--json", "Print the results as one JSON list, for logs with one object per log; notes go to standard error."),
+    flag(
+        "--json",
+        "Print the results as a JSON list, one object per log if the verb reads logs; notes go to standard error.",
+    ),
 ]
 Out: TypeAlias = Annotated[
     Path | None,
     option(
         "DIR",
-        "Also write results.json and results.csv into this folder; with a name that ends in .json, that file alone.",
+        "Also write results.json and results.csv into this folder; or, if the name ends in .json, that file alone.",
         "--out",
         "-o",
     ),
