@@ -2,6 +2,7 @@
 
 # ruff: noqa: ARG005 - every mistake is given the same two things
 
+import ast
 import subprocess
 import sys
 from collections.abc import Callable
@@ -221,10 +222,23 @@ def test_a_log_of_anything_is_read_related_and_simulated(tmp_path: Path) -> None
     model.save(tmp_path / "model.json")
     assert hs.load_model(tmp_path / "model.json").validate(log).loc["gap", "fit_percent"] > 95.0
     assert float(model.to_control().dcgain()) == pytest.approx(1.0, abs=0.05)
-    with pytest.raises(hs.HydrostateError, match="estimate needs the channels of an actuator"):
+    with pytest.raises(hs.HydrostateError, match=r"estimate needs motor_speed_rad_s and position_m or velocity_m_s, "):
         log.estimate()
     with pytest.raises(hs.HydrostateError, match="channels among coil"):
         log.identify(input="coil (V)")
+
+
+def test_a_log_under_other_names_says_how_to_name_its_columns_and_is_read_so(tmp_path: Path) -> None:
+    """The message named neither what was missing nor which column may be meant."""
+    table = hs.simulate(duration=1.0, sample_time=1e-3, seed=3).to_frame().reset_index()
+    table = table[["time_s", "motor_speed_rad_s", "position_m", "differential_pressure_pa"]]
+    table.columns = ["Zeit [s]", "Drehzahl [rad/s]", "Weg [m]", "Druckdifferenz [Pa]"]
+    table.to_csv(tmp_path / "a.csv", index=False)
+    with pytest.raises(hs.HydrostateError, match="estimate needs motor_speed_rad_s and position_m") as said:
+        hs.read(tmp_path / "a.csv").estimate()
+    columns = ast.literal_eval(str(said.value).partition("columns=")[2].partition(")")[0])
+    assert columns["motor_speed_rad_s"] == "Drehzahl [rad/s]:rad/s"
+    assert "differential_pressure_pa" in hs.read(tmp_path / "a.csv", columns=columns).channels
 
 
 def test_a_model_is_not_judged_across_a_gap_of_its_input(tmp_path: Path) -> None:

@@ -284,9 +284,16 @@ class Log(Shown):
         from experiments.actuators import actuator, offered
 
         if self.plant == ANY:
+            from plant.log.checks import REQUIRED
+            from plant.log.guess import SHOWN, guess_by_name
+            from plant.log.headings import cleaned
+
+            sure = [one for one in guess_by_name(cleaned(self.channels)) if one.sure >= SHOWN]
+            meant = {one.channel: one.spec if one.unit else f"{one.spec}:UNIT" for one in sure}
             refuse(
-                f"{verb} needs the channels of an actuator, the log has {', '.join(self.channels)}: name them by "
-                "read(..., columns={'motor_speed_rad_s': 'N:rpm'}), or relate them by identify(input=..., output=...)"
+                f"{verb} needs {' and '.join(REQUIRED)}, the log has {', '.join(self.channels)}: name them by "
+                f"read(..., columns={meant or {'motor_speed_rad_s': 'N:rpm'}}), or relate them by "
+                "identify(input=..., output=...)"
             )
         record, chosen = self.whole(), offered(actuator(self.plant), verb)
         asked = {**chosen.options, **known_options(options, chosen.options, verb)}
