@@ -46,6 +46,18 @@ def test_no_column_of_a_log_is_out_of_sight(browser: Any, pages: dict[str, Path]
     page.close()
 
 
+def test_the_name_of_a_log_above_a_value_breaks_on_a_phone(browser: Any, pages: dict[str, Path]) -> None:
+    """Of "minor_leakage_minor_friction.csv" the end was cut off on the page that compares two logs."""
+    page = browser.new_page(viewport={"width": 390, "height": 800})
+    page.goto(pages["inspect"].as_uri())
+    cell = page.locator('#columns td[data-head="range"]').first
+    height = cell.bounding_box()["height"]
+    cell.evaluate("one => { one.dataset.head = 'minor_leakage_minor_friction_2026.csv' }")
+    assert cell.evaluate("one => one.scrollWidth <= one.clientWidth")
+    assert cell.bounding_box()["height"] > height
+    page.close()
+
+
 def test_a_wide_table_shows_on_a_phone_that_it_goes_on_and_keeps_its_first_column(
     browser: Any, pages: dict[str, Path]
 ) -> None:
