@@ -144,12 +144,10 @@ def resolve_columns(
             strange.append((channel, error))
             continue
         if channel in found:
-            both = f"columns {found[channel].name[:80]!r} and {heading.name[:80]!r} both give {channel}, wanted one; "
-            told = found[channel].name != heading.name
-            raise LogError(
-                f"{both}{f'name the right one as {channel}=NAME:UNIT' if told else 'rename one of them in the file'}",
-                source,
-            )
+            first = found[channel].name
+            settled = "rename one of them" if first == heading.name else f"name the right one as {channel}=NAME:UNIT"
+            both = f"columns {first[:80]!r} and {heading.name[:80]!r} both give {channel}, wanted one; {settled}"
+            raise LogError(both, source)
         found[channel] = column
     for channel, error in strange:
         if channel not in found:
@@ -221,11 +219,8 @@ def _foreign(headings: Sequence[Heading], channel: str, spec: str, source: str) 
     if not positions:
         raise MissingColumnError(channel, name, listed(names), source)
     if len(positions) > 1:
-        raise LogError(
-            f"column {name[:80]!r} is needed once for {channel}, the log has it {len(positions)} times; "
-            "rename the others",
-            source,
-        )
+        several = f"the log has it {len(positions)} times; rename the others"
+        raise LogError(f"column {name[:80]!r} is needed once for {channel}, {several}", source)
     heading = headings[positions[0]]
     if unit is None:
         _require_one_unit(heading, Heading(heading.name).unit, channel, source)

@@ -74,7 +74,7 @@ def test_a_setpoint_beside_its_channel_is_no_second_channel() -> None:
 def test_two_columns_for_one_channel_are_refused_and_a_mapping_settles_it() -> None:
     with pytest.raises(LogError, match="'position_m' and 'position_mm' both give position_m"):
         channels("position_m", "position_mm")
-    with pytest.raises(LogError, match="both give position_m, wanted one; rename one of them in the file"):
+    with pytest.raises(LogError, match="both give position_m, wanted one; rename one of them"):
         channels("position_m", "position_m")  # no option could tell them apart
     assert channels("position_m", "position_mm", position_m="position_mm:mm") == {"position_m": "position_mm"}
 
