@@ -49,7 +49,7 @@ def test_each_log_has_its_own_offset_where_they_differ(structure: str) -> None:
 
 
 def test_it_is_warned_of() -> None:
-    with pytest.warns(LogWarning, match=r"differs from log to log \(-0\.\d+, \+0\.\d+ beside their mean\)"):
+    with pytest.warns(LogWarning, match=r"differs from log to log \(-0\.\d+, \+0\.\d+ from their mean\)"):
         identify_channels(logs((2.0, 3.0)), order=1, delay=1)
 
 
