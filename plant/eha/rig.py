@@ -173,6 +173,7 @@ def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> 
     from plant.eha.rig_entries import RigEntries, numbers_of
     from plant.eha.rig_quantities import numbers_with_units
     from plant.eha.rig_units import require_si
+    from plant.eha.scales import with_valves_sized
 
     if misplaced := [name for name in content if name in _names(parameter_class)]:
         raise RigError(f"{misplaced[0]} must stand below a line [parameters]")
@@ -186,6 +187,7 @@ def _rig(content: Mapping[str, Any], parameter_class: type[Any], plant: str) -> 
     values = numbers_of(_unpaired(given, _pairs_of(parameter_class)), parameter_class)
     parameters = parameter_class(**values)
     if isinstance(parameters, EhaParameters):
+        parameters = with_valves_sized(parameters, values)
         require_si(parameters)
     return Rig(file.name, parameters, file.uncertainty, file.columns, file.measured, plant)
 
