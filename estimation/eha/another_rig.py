@@ -4,11 +4,12 @@ The piston then does not go where the file's pump would send it.
 """
 
 from dataclasses import replace
+from math import hypot
 from math import log as ln
 
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Outcome
-from estimation.log_checks.channel_physics import MIDDLE, REFUTED, TOLD
+from estimation.log_checks.channel_physics import LONG, MIDDLE, REFUTED, TOLD
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.flow_balance import flow_balance
 from estimation.notes import EstimateCode
@@ -25,7 +26,8 @@ are up to 0.28 off."""
 def rig_contradicted(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     """Return the objection to a rig file whose pump would send the piston elsewhere than it went.
 
-    Leakage, flow bias and compression are whatever the log says they are, so only displacement over area counts.
+    Leakage, flow bias and compression are whatever the log says they are, so only displacement over area counts. Where
+    most of the flow is lost, motion takes up what a balance leaves out; other blocks then tell another ratio.
 
     Parameters
     ----------
@@ -39,10 +41,11 @@ def rig_contradicted(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     tuple of Note
         Empty where the log does not tell the ratio, where it is that of the rig file, and without pressure.
     """
-    balance = flow_balance(record, p, MIDDLE)
-    if balance is None or balance.swept <= TOLD * balance.swept_std or balance.contradicts_rig < REFUTED:
+    balance, longer = (flow_balance(record, p, length) for length in (MIDDLE, LONG))
+    if balance is None or balance.contradicts_rig < REFUTED:
         return ()
-    if abs(ln(balance.swept)) < max(OFF, TOLD * balance.swept_std / balance.swept):
+    std = balance.swept_std if longer is None else hypot(balance.swept_std, balance.swept - longer.swept)
+    if balance.swept <= TOLD * std or abs(ln(balance.swept)) < max(OFF, TOLD * std / balance.swept):
         return ()
     return (EstimateCode.RIG_CONTRADICTED.note(percent=100.0 / balance.swept),)
 

@@ -9,7 +9,7 @@ from estimation.log_checks.channel_blocks import FEWEST_BLOCKS, alike, whole
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.measurement_noise import position_variance, struck_variance
 from plant.arrays import Array
-from plant.eha.model import EhaParameters
+from plant.eha.model import EhaParameters, piston_areas
 from plant.log.record import Record
 
 FEWEST_SAMPLES = 8
@@ -83,14 +83,27 @@ def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance
     noise_p = _noise(pressure)
     noise_x = position_variance(piston) if moved == POSITION else _noise(piston)
     compliance = p.chamber_volume / p.bulk_modulus
-    swept, spread = (window.slope, window.of_slope) if moved == POSITION else (window.mean, window.of_mean)
+    spread = window.of_slope if moved == POSITION else window.of_mean
     flow = p.pump_displacement * window.mean(speed)
-    parts = [p.piston_area * swept(piston), compliance * window.slope(pressure), window.mean(pressure)]
+    areas = _pumped_areas(pressure, p)
+    parts = [window.slope(piston, areas) if moved == POSITION else window.mean(areas * piston), compliance * window.slope(pressure), window.mean(pressure)]
     parts += [np.ones_like(flow)]
     noises = [p.piston_area**2 * spread * noise_x, compliance**2 * window.of_slope * noise_p]
     noises += [window.of_mean * noise_p, 0.0]
     sign = window.mean(np.sign(speed))  # a block in which the pump turns round has both
     return _whatever_the_bias(flow, sign, parts, np.array(noises), MOST_LOST * p.rated_flow)
+
+
+def _pumped_areas(pressure: Array, p: EhaParameters) -> Array:
+    """Return the area whose flow the pump's is, shape (n,) [m^2].
+
+    What a single rod's low side takes or gives beside goes through its make-up valve, which the high side holds open.
+    With plain valves that shut, both sides may be high, and the mean counts.
+    """
+    if not (p.single_rod and p.pilot_share > 0.0):
+        return np.full(len(pressure), p.piston_area)
+    side_a, side_b = piston_areas(p)
+    return np.where(pressure > 0.0, side_a, side_b)
 
 
 def _noise(values: Array) -> float:
@@ -119,9 +132,10 @@ class _Window:
         """Return the mean over each block [unit of the signal]."""
         return self._over_blocks(0.5 * (signal[1:] + signal[:-1]))
 
-    def slope(self, signal: Array) -> Array:
-        """Return the slope over each block [unit of the signal over s]."""
-        return self._over_blocks(np.diff(signal) / self._sample_time)
+    def slope(self, signal: Array, times: Array | None = None) -> Array:
+        """Return the slope over each block, times a factor of each sample [unit of the signal over s]."""
+        factors = 1.0 if times is None else 0.5 * (times[1:] + times[:-1])
+        return self._over_blocks(factors * np.diff(signal) / self._sample_time)
 
     def _over_blocks(self, between: Array) -> Array:
         size = len(self._weights)

@@ -10,7 +10,7 @@ from typing import Any
 
 from estimation.models.aerated_oil import present_air, swellings, tangent_stiffness
 from estimation.models.completed_flow import CRACKS, USUAL_CRACK
-from estimation.models.flow import delivered_flow, leaked_flow, port_flows
+from estimation.models.flow import accumulator_rate, delivered_flow, leaked_flow, port_flows
 from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.inner_circuit import BEND, USUAL_BEND, narrowed
@@ -145,7 +145,7 @@ def wide_rates(
     fall = tangent_stiffness(p2, air, p, quick=quick) * (area_2 * velocity - at_2 + into_2) / volume_2
     # how far the sensor is behind stays small where its lag is short, which a stiff step resolves
     lagging = rise - fall - (behind + misread((p1, p2), elapsed, p)) / (p.pressure_lag + SHORTEST_LAG)
-    return rise, fall, lagging, -p.accumulator_stiffness * (into_1 + into_2)
+    return rise, fall, lagging, accumulator_rate(into_1 + into_2, supply, p)
 
 
 def misread(pressures: tuple[Scalar, Scalar], elapsed: Scalar, p: SimpleNamespace) -> Scalar:

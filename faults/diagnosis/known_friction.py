@@ -75,7 +75,7 @@ def friction_by_forces(record: Record, p: EhaParameters, rated: float) -> KnownF
         is no force, where pressure has too coarse a converter, where the piston hardly slides, and where more than the
         sensors' noise is left.
     """
-    if not {POSITION, PRESSURE} <= set(record.channels) or p.area_difference or rated <= 0.0:
+    if not {POSITION, PRESSURE} <= set(record.channels) or p.single_rod or rated <= 0.0:
         return None
     position, pressure = (np.asarray(record[name], dtype=np.float64) for name in (POSITION, PRESSURE))
     step = record.sample_time

@@ -87,7 +87,7 @@ def stands_still(record: Record, p: EhaParameters, not_told: Collection[Note]) -
         shows = ClassCode.FRICTION_NOT_VISIBLE not in said and POSITION in record
         return () if shows else (AgainstCode.STUCK_OR_LEAKS.note(moved_m=gone.piston, pumped_m=gone.pump),)
     pressure = channel_blocks(record, p, MIDDLE).pressure
-    if pressure is None or not len(pressure) or p.area_difference != 0.0:
+    if pressure is None or not len(pressure) or p.single_rod:
         return ()
     held = float(np.percentile(np.abs(pressure), HELD))
     rubs = parameters_for(CONDITIONS["major_friction"], p).friction_coulomb + abs(p.load_force)

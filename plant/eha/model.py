@@ -95,6 +95,11 @@ class EhaParameters:
         return 4.0 * self.motor_speed_per_volt
 
     @property
+    def single_rod(self) -> bool:
+        """Whether the piston has unlike areas, so that make-up valves open at every stroke."""
+        return self.area_difference != 0.0
+
+    @property
     def rated_flow(self) -> float:
         """Displaced flow of the pump at rated speed [m^3/s]."""
         return self.pump_displacement * self.rated_speed

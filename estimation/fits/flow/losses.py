@@ -74,7 +74,7 @@ def _of(fit: GreyBoxFit) -> tuple[Array, Array]:
 
 def is_single(found: Mapping[str, object], p: EhaParameters) -> bool:
     """Return whether a rod is single, by the rig file or by what was found of its log (a mapping by parameter)."""
-    return p.area_difference != 0.0 or "area_difference" in found
+    return p.single_rod or "area_difference" in found
 
 
 def with_lumped(

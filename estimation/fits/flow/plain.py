@@ -18,7 +18,7 @@ from estimation.fits.greybox.play import ShownPlay, play_untaken
 from estimation.fits.greybox.pump_ripple import Turning
 from estimation.fits.greybox.spared_steps import step_errors
 from estimation.fits.hypothesis_search.between_samples import with_course
-from estimation.fits.hypothesis_search.fit_objections import fit_explains, limits
+from estimation.fits.hypothesis_search.fit_objections import fit_explains, is_too_close, limits
 from estimation.fits.hypothesis_search.pump_ripple_fits import with_pump_ripple
 from estimation.models.flow import HELD_FLOW_FORM
 from plant.eha.model import EhaParameters
@@ -224,7 +224,8 @@ def plain_fits(logged: Logged, start: FitStart, near: Sequence[GreyBoxFit] = ())
     turning = Turning(log.teeth, log.speed_offset)
     found = _swinging(fits).values
     log = swept_evenly(carried(log, parameters, found, start.stiffest), parameters, found)
-    return PlainFits(start, starts, fitted, unturned, log, fits, explains, teeth, left, turning)
+    near = [fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates or not is_too_close(fit, log.passes_on)]
+    return PlainFits(start, starts, fitted, unturned, log, near, explains, teeth, left, turning)
 
 
 def with_implicit_steps(plain: PlainFits) -> FitStart | None:
@@ -251,7 +252,7 @@ def with_implicit_steps(plain: PlainFits) -> FitStart | None:
         return None
     swinging, p = [fit for fit in plain.fits if fit.model.rates is not HELD_FLOW_FORM.rates], plain.start.parameters
     explained = plain.explains(plain.best)
-    asked = not explained or p.area_difference != 0.0 or p.pilot_share > 0.0 or any(map(_leaps, swinging))
+    asked = not explained or p.single_rod or any(map(_leaps, swinging))
     felt = asked and any(_chatters(plain.log, fit, 0.0 if explained else LEAST_ERROR) for fit in swinging)
     return replace(plain.start, implicit=True) if felt else None
 

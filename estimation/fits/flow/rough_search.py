@@ -93,7 +93,7 @@ def rough_optima(
     relieved = reaches_relief(log.measured, parameters.relief_pressure)
     volume, mass, held = (relieving(form) if relieved else form for form in (FLOW_FORM, MASS_FLOW_FORM, HELD_FLOW_FORM))
     rough = _led([volume, mass, held], log, parameters, starts)
-    if not parameters.area_difference or any(map(_explains, rough)):
+    if not parameters.single_rod or any(map(_explains, rough)):
         return rough
     by_mass, by_volume, of_held = _led([mass, volume, held], log, parameters, starts)
     least = min(one.point.cost for one in rough)

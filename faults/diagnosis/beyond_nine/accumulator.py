@@ -49,7 +49,7 @@ def whatever_accumulator(found: Loaded, again: Callable[[EhaParameters], Loaded]
     Loaded
         The same where a circuit follows the log already, or none does with another accumulator.
     """
-    if found.diagnosis.followed or not found.parameters.area_difference:
+    if found.diagnosis.followed or not found.parameters.single_rod:
         return found
     board = found.diagnosis.scoreboard
     fed = fed_otherwise(board.blocks, board.fits, actuator_of(found.parameters))
