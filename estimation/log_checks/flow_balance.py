@@ -86,7 +86,11 @@ def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance
     spread = window.of_slope if moved == POSITION else window.of_mean
     flow = p.pump_displacement * window.mean(speed)
     areas = _pumped_areas(pressure, p)
-    parts = [window.slope(piston, areas) if moved == POSITION else window.mean(areas * piston), compliance * window.slope(pressure), window.mean(pressure)]
+    parts = [
+        window.slope(piston, areas) if moved == POSITION else window.mean(areas * piston),
+        compliance * window.slope(pressure),
+        window.mean(pressure),
+    ]
     parts += [np.ones_like(flow)]
     noises = [p.piston_area**2 * spread * noise_x, compliance**2 * window.of_slope * noise_p]
     noises += [window.of_mean * noise_p, 0.0]

@@ -23,7 +23,16 @@ from estimation.fits.flow.misread import UNLIKE_SLIPS, CorrectedLogs
 from estimation.fits.flow.motor_course import by_course, with_open_turns
 from estimation.fits.flow.offset_beside import offset_settled
 from estimation.fits.flow.other_minimum import lower_minimum
-from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer, with_implicit_steps
+from estimation.fits.flow.plain import (
+    FitStart,
+    Logged,
+    PlainFits,
+    in_finer_steps,
+    plain_fits,
+    quieter,
+    stiffer,
+    with_implicit_steps,
+)
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.flow.told_volume import bound_told, ratio_doubt
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
@@ -171,7 +180,7 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
         if (implicit := with_implicit_steps(plain)) is not None:
             start = implicit
             continue
-        plain = by_course(logged, plain)
+        plain = by_course(logged, in_finer_steps(logged, plain))
         asked, open_ends = _asked(plain, sensed, traits)
         try:
             with work.counted():
