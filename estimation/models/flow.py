@@ -14,7 +14,7 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
-from estimation.models.inner_circuit import inner_flows
+from estimation.models.inner_circuit import accumulator_rate, inner_flows
 from plant.compiled.functions import Scalar, absolute, maximum, sign, where
 from plant.components.oil import ATMOSPHERE
 from plant.components.valves import pumped_flow
@@ -247,29 +247,6 @@ def fed_rates(
     into_1, into_2 = inner_flows((p1, p2), fed, (p.crack_a, p.crack_b), bend)
     pushed_back = accumulator_rate(into_1 + into_2, supply, p)
     return *flow_rates((p1, p2), drives, fed, share, by_mass=by_mass, bend=bend), pushed_back
-
-
-def accumulator_rate(taken: Scalar, supply: Scalar, p: SimpleNamespace) -> Scalar:
-    """Return the rate of the inner circuit's pressure: its gas is as much stiffer as it is smaller, and under pressure.
-
-    A single rod takes a third of it and gives it back at every stroke.
-
-    Parameters
-    ----------
-    taken : float or Expression
-        Oil that flows from it into the chambers [m^3/s].
-    supply : float or Expression
-        Its pressure, absolute [Pa].
-    p : namespace
-        `accumulator_pressure` at rest [Pa], and `accumulator_stiffness` there [Pa/m^3].
-
-    Returns
-    -------
-    float or Expression
-        Rate [Pa/s].
-    """
-    compressed = supply / p.accumulator_pressure
-    return -p.accumulator_stiffness * compressed * compressed * taken
 
 
 def _by_mass(state: Any, drives: Any, p: SimpleNamespace, share: Scalar) -> tuple[Scalar, Scalar, Scalar]:

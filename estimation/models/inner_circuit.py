@@ -42,6 +42,29 @@ def inner_flows(
     return into_1, into_2
 
 
+def accumulator_rate(taken: Scalar, supply: Scalar, p: SimpleNamespace) -> Scalar:
+    """Return the rate of the inner circuit's pressure: its gas is as much stiffer as it is smaller, and under pressure.
+
+    A single rod takes a third of it and gives it back at every stroke.
+
+    Parameters
+    ----------
+    taken : float or Expression
+        Oil that flows from it into the chambers [m^3/s].
+    supply : float or Expression
+        Its pressure, absolute [Pa].
+    p : namespace
+        `accumulator_pressure` at rest [Pa], and `accumulator_stiffness` there [Pa/m^3].
+
+    Returns
+    -------
+    float or Expression
+        Rate [Pa/s].
+    """
+    compressed = supply / p.accumulator_pressure
+    return -p.accumulator_stiffness * compressed * compressed * taken
+
+
 def narrowed(drop: Scalar, conductance: Scalar, bend: Scalar) -> Scalar:
     """Return the conductance of a make-up valve, which falls with the root of a large drop either way, as an orifice's.
 

@@ -10,10 +10,10 @@ from typing import Any
 
 from estimation.models.aerated_oil import present_air, swellings, tangent_stiffness
 from estimation.models.completed_flow import CRACKS, USUAL_CRACK
-from estimation.models.flow import accumulator_rate, delivered_flow, leaked_flow, port_flows
+from estimation.models.flow import delivered_flow, leaked_flow, port_flows
 from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
-from estimation.models.inner_circuit import BEND, USUAL_BEND, narrowed
+from estimation.models.inner_circuit import BEND, USUAL_BEND, accumulator_rate, narrowed
 from plant.compiled.functions import Scalar, maximum, minimum, sqrt, where
 from plant.components.check_valve import make_up_flow
 from plant.eha.circuit import chamber_volumes

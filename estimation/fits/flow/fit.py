@@ -20,19 +20,11 @@ from estimation.fits.flow.log import homed_at_stop, require_flow_channels, witho
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import UNEVEN_OIL, is_single, with_lumped, with_lumped_slopes
 from estimation.fits.flow.misread import UNLIKE_SLIPS, CorrectedLogs
+from estimation.fits.flow.model_steps import in_finer_steps, with_implicit_steps
 from estimation.fits.flow.motor_course import by_course, with_open_turns
 from estimation.fits.flow.offset_beside import offset_settled
 from estimation.fits.flow.other_minimum import lower_minimum
-from estimation.fits.flow.plain import (
-    FitStart,
-    Logged,
-    PlainFits,
-    in_finer_steps,
-    plain_fits,
-    quieter,
-    stiffer,
-    with_implicit_steps,
-)
+from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.flow.told_volume import bound_told, ratio_doubt
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
@@ -211,8 +203,7 @@ def _misread(corrected: CorrectedLogs, plain: PlainFits, asked: Sequence[Hypothe
 
 def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequence[Hypothesis], Sequence[Note]]:
     """Return the hypotheses to test on a log beside the plain form, and notes on what it leaves open."""
-    loaded, moving = traits.loaded, traits.moving
-    worth = wanted_of(plain)
+    loaded, moving, worth = traits.loaded, traits.moving, wanted_of(plain)
     asked, open_ends = hypotheses_asked(
         plain.log, plain.start.parameters, plain.swinging, plain.best, sensed, loaded=loaded, moving=moving, worth=worth
     )

@@ -12,13 +12,11 @@ from estimation.fits.flow.search import balanced, flow_starts, followed
 from estimation.fits.flow.swept import swept_evenly
 from estimation.fits.flow.turns_read import with_turns_read
 from estimation.fits.greybox.fit import GreyBoxFit
-from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play import ShownPlay, play_untaken
 from estimation.fits.greybox.pump_ripple import Turning
-from estimation.fits.greybox.spared_steps import apart, step_errors
 from estimation.fits.hypothesis_search.between_samples import with_course
-from estimation.fits.hypothesis_search.fit_objections import doubted, fit_explains, is_too_close, limits
+from estimation.fits.hypothesis_search.fit_objections import fit_explains, is_too_close, limits
 from estimation.fits.hypothesis_search.pump_ripple_fits import with_pump_ripple
 from estimation.models.flow import HELD_FLOW_FORM
 from plant.eha.model import EhaParameters
@@ -33,22 +31,10 @@ TOO_LOUD = 2.0
 judged anew [dimensionless]: up to it gates of 1.1 to 1.44 times the noise still see a misfit, and searches of sound
 logs stay as they are."""
 
-STEPS_FELT = 1.0
-"""Error of a block's residual from which implicit steps are taken, in deviations of its noise [dimensionless]. Of 26
-random rigs 18 err by less than 1 at the true values, the others by 2 to 180."""
-
-LEAST_ERROR = 0.04
-"""Errors of steps over what a fit leaves of a log, root mean square, from which exact ones may explain it [fraction]:
-of those that they do explain it is 0.09 to 0.6, of one at 190 times the noise 0.02."""
-
 FINER = 8
 """How many times as many implicit steps a single rod's log has that none explains [count]: where the pressures of both
 sides cross, a piloted valve shuts at once, which no step of any order follows within itself. At the true values of two
 such logs usual implicit steps leave 2.6 and 1.7 times the noise (mean square), finer ones 1.3 and 1.04."""
-
-STEEP, BESIDE_STEEP = 3.0, 10
-"""How many times as steep as the last of so many blocks the steepest is, where steps are looked at of a log that is
-explained, too [dimensionless, count]; judged."""
 
 _cost = attrgetter("cost")
 
@@ -234,78 +220,6 @@ def plain_fits(logged: Logged, start: FitStart, near: Sequence[GreyBoxFit] = ())
     log = swept_evenly(carried(log, parameters, found, start.stiffest), parameters, found)
     near = [fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates or not is_too_close(fit, log.passes_on)]
     return PlainFits(start, starts, fitted, unturned, log, near, explains, teeth, left, turning)
-
-
-def with_implicit_steps(plain: PlainFits) -> FitStart | None:
-    """Return the start of a second fit with implicit model steps, if those of the first err by more than noise does.
-
-    Valves of small chambers fill them in less time than a step takes. Where both sides of a piston float at the inner
-    circuit's pressure, make-up valves open and shut by turns, above all those that a pilot of the other side holds
-    open. With usual steps the model chatters there, by up to 300 deviations of the noise at the true values, and no
-    search finds a way.
-
-    Parameters
-    ----------
-    plain : PlainFits
-        The log's fits.
-
-    Returns
-    -------
-    FitStart or None
-        None where steps are exact enough, or implicit already. Not asked of a log that is explained, but for that of a
-        single rod, whose chatter may pass for a bulk modulus that the log does not tell or end a search above its
-        minimum, and for one whose slopes leap: the deviation of bulk modulus came out 26 times too small.
-    """
-    if plain.start.implicit:
-        return None
-    swinging, p = [fit for fit in plain.fits if fit.model.rates is not HELD_FLOW_FORM.rates], plain.start.parameters
-    explained = plain.explains(plain.best)
-    asked = not explained or p.single_rod or any(map(_leaps, swinging))
-    felt = asked and any(_chatters(plain.log, fit, 0.0 if explained else LEAST_ERROR) for fit in swinging)
-    return replace(plain.start, implicit=True) if felt else None
-
-
-def in_finer_steps(logged: Logged, plain: PlainFits) -> PlainFits:
-    """Return the fits of a single rod's log with finer implicit steps, if it is explained with these alone.
-
-    Parameters
-    ----------
-    logged : Logged
-        The log.
-    plain : PlainFits
-        Its fits.
-
-    Returns
-    -------
-    PlainFits
-        The same where steps are usual ones, or not what is left. Searches among so many corners end above their
-        minimum, so that a fit is none that leaves more than the sensors' noise: one at 1.3 times it was 0.3 % off.
-    """
-    start = plain.start
-    if not start.implicit or start.finer or not start.parameters.single_rod or plain.explains(plain.best):
-        return plain
-    fine = replace(plain.log, steps=FINER * plain.log.steps)
-    problem = FreedProblem.of(plain.swinging.model, plain.log)
-    errors = apart(problem, problem.model.theta(plain.swinging.values), plain.log, fine)
-    if float(np.mean(errors**2)) < LEAST_ERROR * plain.swinging.chi_square[0]:
-        return plain
-    finer = plain_fits(logged, replace(start, finer=True))
-    return finer if finer.explains(finer.best) and not doubted(finer.best) else plain
-
-
-def _chatters(log: GreyBoxLog, fit: GreyBoxFit, least: float) -> bool:
-    """Return whether steps err by more than noise at a fit, and by the least share of what it leaves of its log."""
-    errors = step_errors(FreedProblem.of(fit.model, log), fit.model.theta(fit.values))
-    share = float(np.sqrt(np.mean(errors**2) / max(fit.chi_square[0], 1.0)))
-    return share >= least and float(np.max(np.abs(errors))) > STEPS_FELT
-
-
-def _leaps(fit: GreyBoxFit) -> bool:
-    """Return whether single blocks tell far more of bulk modulus than those that tell most after them."""
-    if not fit.slopes.size:
-        return False
-    slopes = np.sort(np.abs(fit.slopes[:, fit.model.unknowns.index("bulk_modulus")]))[-BESIDE_STEEP:]
-    return bool(slopes[-1] > STEEP * slopes[0])
 
 
 def stiffer(logged: Logged, plain: PlainFits) -> EhaParameters | None:
