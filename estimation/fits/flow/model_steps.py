@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.fits.flow.asked_hypotheses import at_widest
 from estimation.fits.flow.plain import FINER, FitStart, Logged, PlainFits, plain_fits
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
@@ -50,6 +51,8 @@ def with_implicit_steps(plain: PlainFits) -> FitStart | None:
     swinging, p = [fit for fit in plain.fits if fit.model.rates is not HELD_FLOW_FORM.rates], plain.start.parameters
     explained = plain.explains(plain.best)
     asked = not explained or p.single_rod or any(map(_leaps, swinging))
+    if p.single_rod and at_widest(plain.swinging, p, plain.log):
+        return replace(plain.start, implicit=True)
     felt = asked and any(_chatters(plain.log, fit, 0.0 if explained else LEAST_ERROR) for fit in swinging)
     return replace(plain.start, implicit=True) if felt else None
 
