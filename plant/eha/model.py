@@ -108,6 +108,9 @@ class EhaParameters:
 PAIRS: Mapping[str, str] = {"piston_area": "area_difference", "chamber_volume": "volume_difference"}
 """Entries that a rig file may give as two numbers, of sides A and B: mean, and their difference over their sum."""
 
+VALVES = ("relief_conductance", "makeup_conductance")
+"""Entries that go with the flow of the pump where a rig file does not give them: what is judged of the paper's."""
+
 JUDGED_STROKE = 0.25
 """Stroke [m] of a simulated actuator whose own is not known: the paper gives none."""
 

@@ -14,7 +14,7 @@ from typing_extensions import TypeVar
 
 from plant.atomic import replacing
 from plant.eha.doubts import Spread, doubts_of, spreads_of
-from plant.eha.model import PAIRS, EhaParameters
+from plant.eha.model import PAIRS, VALVES, EhaParameters
 from plant.errors import RigError
 from plant.log.columns import check_columns
 from plant.small_file import small_toml
@@ -267,7 +267,8 @@ def rig_template(
         "# A rig file: an actuator's parameters, how well each is known, and the names of the columns in its logs.",
         "# All values are those of the healthy actuator, in SI, or with a unit in quotes as a nameplate has them: "
         + ('"3.5 cm^3/rev", "160 bar".' if parameter_class is EhaParameters else '"160 bar".'),
-        "# A parameter that is left out keeps the value shown here.",
+        "# A parameter that is left out keeps the value shown here"
+        + (", but that flow through valves goes with the pump's." if parameter_class is EhaParameters else "."),
         "",
         *([f'name = "{UNNAMED}"'] if plant == EHA else [f'name = "{plant}"', f'plant = "{plant}"']),
         *(
@@ -288,8 +289,8 @@ def rig_template(
             lines.append(f"# two numbers where sides A and B differ: {name} = [A, B]")
         lines.append(f"# {note.meaning} [{note.unit}]; source: {note.source}")
         known = list(value) if isinstance(value, tuple) else value
-        sides = pairs and name in UNEQUAL_SIDES
-        lines.append(f"# {name} = NUMBER" if known is None else f"{'# ' if sides else ''}{name} = {known!r}")
+        left_out = pairs and name in (*UNEQUAL_SIDES, *VALVES)
+        lines.append(f"# {name} = NUMBER" if known is None else f"{'# ' if left_out else ''}{name} = {known!r}")
     lines += [
         "",
         *_uncertainty_lines(parameter_class),

@@ -9,7 +9,7 @@ from collections.abc import Container, Mapping
 from dataclasses import replace
 from functools import lru_cache
 
-from plant.eha.model import EhaParameters
+from plant.eha.model import VALVES, EhaParameters
 from plant.eha.steady_state import steady_state
 
 PAPER_RIG = EhaParameters()
@@ -65,10 +65,6 @@ def friction_scales(p: EhaParameters) -> Mapping[str, float]:
         "friction_linear": force / velocity,
         "friction_coulomb": force,
     }
-
-
-VALVES = ("relief_conductance", "makeup_conductance")
-"""What is judged of an actuator's valves, by the flow of the paper's pump."""
 
 
 def with_valves_sized(p: EhaParameters, given: Container[str]) -> EhaParameters:

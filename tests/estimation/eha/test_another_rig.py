@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import pytest
 
+from estimation.eha import another_rig
 from estimation.eha.another_rig import rig_contradicted, unless_another_rig
 from estimation.eha.estimate import estimate_log
 from estimation.eha.result import too_wide, without_number
 from estimation.finding import Outcome
 from estimation.fits.flow.log import FLOW_CHANNELS
+from estimation.log_checks.channel_physics import LONG, MIDDLE
 from estimation.log_checks.clean import clean_log
+from estimation.log_checks.flow_balance import FlowBalance
 from estimation.notes import EstimateCode
 from experiments.eha.entries import estimate_entries
 from plant.eha.model import EhaParameters
@@ -53,3 +56,14 @@ def test_its_estimate_says_so_in_place_of_asking_for_pressure_that_is_logged() -
     said = estimate_entries(found)["message"]
     assert said.startswith("no value of bulk modulus: the model does not describe the log; the piston moves as if")
     assert "log pressure" not in said
+
+
+@pytest.mark.parametrize(("longer", "told"), [(0.52, True), (0.87, False)])
+def test_a_ratio_that_longer_blocks_do_not_confirm_is_none(
+    longer: float, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a leaky rig whose file was right, blocks of 20 ms told 0.62 and those of 50 ms 0.87."""
+    swept = {MIDDLE: 0.55, LONG: longer}
+    balance = FlowBalance(0.0, 0.01, 1.0, 0.1, 0.9999, 0.5)
+    monkeypatch.setattr(another_rig, "flow_balance", lambda _, __, length: balance._replace(swept=swept[length]))
+    assert bool(rig_contradicted(log(1.0), PAPER)) == told

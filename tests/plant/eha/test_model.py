@@ -302,3 +302,7 @@ def test_a_long_stage_opens_the_relief_valve_where_the_pressure_after_it_says_so
     flow = -p.leakage_coefficient * pressure - relieved - p.piston_area * moves
     gained = h * p.bulk_modulus / p.chamber_volume * flow
     assert pressure - base[2] == pytest.approx(gained, rel=1e-9, abs=1e-3)
+
+
+def test_a_single_rod_has_unlike_areas_on_whichever_side_the_rod_is() -> None:
+    assert [EhaParameters(area_difference=one).single_rod for one in (-0.2, 0.0, 0.2)] == [True, False, True]

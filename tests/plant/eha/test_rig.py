@@ -208,3 +208,10 @@ def test_a_template_takes_two_areas_and_volumes_in_place_of_one(tmp_path: Path) 
 def test_what_is_no_pair_is_refused(tmp_path: Path, entry: str, said: str) -> None:
     with pytest.raises(RigError, match=said):
         rig_of(tmp_path, f"[parameters]\n{entry}\n")
+
+
+def test_valves_that_a_file_does_not_give_go_with_its_pump_and_those_that_it_gives_stay(tmp_path: Path) -> None:
+    text = "[parameters]\npump_displacement = 1.114e-6\nrelief_conductance = 3e-8\n"
+    p = rig_of(tmp_path, text).parameters
+    assert p.makeup_conductance == pytest.approx(2e-9)
+    assert p.relief_conductance == 3e-8

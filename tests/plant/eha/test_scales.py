@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from plant.eha.scales import PAPER_RIG, friction_scales, leakage_scales
+from plant.eha.scales import PAPER_RIG, friction_scales, leakage_scales, with_valves_sized
 from plant.eha.steady_state import steady_state
 
 
@@ -29,3 +29,12 @@ def test_a_scaled_actuator_loses_the_same_share_of_velocity_and_adds_the_same_sh
     assert friction_scales(p)["friction_linear"] == pytest.approx(area * area / flow, rel=1e-6)
     (_, own), (_, paper) = (steady_state(one.rated_speed, one) for one in (p, PAPER_RIG))
     assert own == pytest.approx(paper, rel=1e-6)
+
+
+def test_valves_of_which_nothing_is_said_let_the_pumps_own_flow_through() -> None:
+    """A pump of 19 times the flow drew 7 bar of vacuum through the paper's valves."""
+    p = replace(PAPER_RIG, pump_displacement=19.0 * PAPER_RIG.pump_displacement)
+    sized = with_valves_sized(p, ())
+    assert sized.makeup_conductance == pytest.approx(19.0 * PAPER_RIG.makeup_conductance)
+    assert sized.relief_conductance == pytest.approx(19.0 * PAPER_RIG.relief_conductance)
+    assert with_valves_sized(p, ("makeup_conductance",)).makeup_conductance == PAPER_RIG.makeup_conductance

@@ -1,0 +1,16 @@
+"""The inner circuit that feeds the chambers."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from estimation.models.inner_circuit import accumulator_rate
+
+
+def test_gas_that_gives_a_third_of_its_oil_follows_its_law() -> None:
+    """A constant stiffness has its pressure at two thirds, where three quarters are true."""
+    p, gas, steps = SimpleNamespace(accumulator_pressure=6e5, accumulator_stiffness=6e5 / 1e-3), 1e-3, 10_000
+    supply, taken = 6e5, gas / 3.0
+    for _ in range(steps):
+        supply += accumulator_rate(taken / steps, supply, p)
+    assert supply == pytest.approx(6e5 * gas / (gas + taken), rel=1e-3)
