@@ -82,7 +82,7 @@ def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=fit.chi_square[0] ** 0.5))
     if is_too_close(fit, noisy):
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_SMALL.note(ratio=fit.chi_square[0] ** -0.5))
-    if abs(fit.autocorrelation[0]) > correlated and not _too_noisy(fit):
+    if abs(fit.autocorrelation[0]) > correlated and not _alternates(fit, noisy):
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_CORRELATED.note(correlation=fit.autocorrelation[0]))
     channel, late, gain = most_late(fit.late)
     wanted = LATE_SHARE * fit.cost * max(1.0 - 1.0 / fit.chi_square[0], 0.0) if reasons else 0.0
@@ -105,12 +105,14 @@ def is_too_close(fit: GreyBoxFit, noisy: bool) -> bool:
     return noisy and 0.0 < fit.chi_square[0] < QUIET  # of a pressure that is 0 throughout nothing is left
 
 
-def _too_noisy(fit: GreyBoxFit) -> bool:
-    """Return whether residuals are smaller than expected and alternate: the motor's noise was assumed too large.
+def _alternates(fit: GreyBoxFit, noisy: bool) -> bool:
+    """Return whether residuals alternate by their noise: the motor's was assumed too large, or the encoder's leaks off.
 
-    The random walk that it makes of pressure is then followed too closely. Intervals are too wide, not too narrow.
+    The random walk that a motor's noise makes of pressure is then followed too closely. Intervals are too wide, not
+    too narrow. What losses leave of an encoder's noise is its change, and successive means share the reading between
+    them: where oil leaks off within a block, they alternate by up to -0.5.
     """
-    return fit.chi_square[0] < 1.0 and fit.autocorrelation[0] < 0.0
+    return fit.autocorrelation[0] < 0.0 and (noisy or fit.chi_square[0] < 1.0)
 
 
 def fit_explains(fit: GreyBoxFit, noisy: bool) -> bool:
