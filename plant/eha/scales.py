@@ -70,8 +70,8 @@ def friction_scales(p: EhaParameters) -> Mapping[str, float]:
 def with_valves_sized(p: EhaParameters, given: Container[str]) -> EhaParameters:
     """Return an actuator whose valves, where its rig file says nothing of them, let its own pump's flow through.
 
-    A single rod sends half of that through its make-up valves at every stroke. With the paper's valves, a pump of 19
-    times the flow drew 7 bar of vacuum there, and its friction came out half as large as it was.
+    A single rod sends half of that through its make-up valves at every stroke. With the paper's valves, a pump of 15
+    times the flow lost 5 bar there, and its friction came out half as large as it was.
 
     Parameters
     ----------
