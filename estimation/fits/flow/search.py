@@ -14,8 +14,6 @@ from estimation.fits.flow.swept import swept_evenly
 from estimation.fits.flow.wide_valves import opens_wide
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.drive_noise import SAMPLES_KEPT, moved_by_drives
-from estimation.fits.greybox.descent import descend
 from estimation.fits.greybox.drive_noise import moved_by_drives
 from estimation.fits.greybox.fit import GreyBoxFit, concluded, explained
 from estimation.fits.greybox.freed_problem import FreedProblem

@@ -115,7 +115,7 @@ def test_a_stretch_in_which_the_pressure_is_missing_has_no_tone() -> None:
 
 @pytest.mark.parametrize("goes_on", [False, True])
 def test_a_tone_of_a_motor_at_its_limit_of_speed_is_of_its_pump_unless_it_goes_on_without(goes_on: bool) -> None:
-    record = log("steps")
+    record = circuit_log("steps")
     time = record.sample_time * np.arange(len(record))
     turning = time > 1.5
     speed = np.where(turning, 130.0, 20.0) + 0.05 * np.random.default_rng(1).standard_normal(len(time))
