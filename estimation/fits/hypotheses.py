@@ -319,7 +319,7 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "crack_b": (-2e4, 2e4),
     "leakage_bend": (-4.0, 4.0),
     "leakage_rise": (-6.0, 6.0),
-    "leakage_before": (-0.99, 50.0),
+    "leakage_before": (-0.9999, 50.0),
     "step_at": (0.0, 1.0),
     "leakage_turbulent": (0.0, 1.0),
     "pump_compression": (-3.0, 5.0),

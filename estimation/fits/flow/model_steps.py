@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.fits.flow.asked_hypotheses import at_widest
-from estimation.fits.flow.plain import FINER, FitStart, Logged, PlainFits, plain_fits
+from estimation.fits.flow.plain import FINER, FitStart, Logged, PlainFits, fills_within_a_step, plain_fits
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
@@ -50,9 +50,10 @@ def with_implicit_steps(plain: PlainFits) -> FitStart | None:
         return None
     swinging, p = [fit for fit in plain.fits if fit.model.rates is not HELD_FLOW_FORM.rates], plain.start.parameters
     explained = plain.explains(plain.best)
-    asked = not explained or p.single_rod or any(map(_leaps, swinging))
-    if p.single_rod and at_widest(plain.swinging, p, plain.log):
+    quick = not explained and fills_within_a_step(p)  # a search in the wrong valley shuts valves, and feels no step
+    if quick or (p.single_rod and at_widest(plain.swinging, p, plain.log)):
         return replace(plain.start, implicit=True)
+    asked = not explained or p.single_rod or p.pilot_share > 0.0 or any(map(_leaps, swinging))
     felt = asked and any(_chatters(plain.log, fit, 0.0 if explained else LEAST_ERROR) for fit in swinging)
     return replace(plain.start, implicit=True) if felt else None
 

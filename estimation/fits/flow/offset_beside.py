@@ -48,7 +48,7 @@ def offset_settled(
     offset = taken + shown.value
     if taken and abs(offset) < NORMAL_95 * shown.std:
         offset = 0.0
-    if abs(offset) > MOST_OFFSET:
+    if abs(offset) > max(MOST_OFFSET, 2.0 * abs(taken)):
         return plain, strange
     other = _turned(plain, offset, shown.std)
     same = [one for one in asked if one.name in strange.names]

@@ -48,6 +48,10 @@ LESS_DRAINED, APART = 0.05, 0.5
 """Drain from which the search for a second one begins, over the first, and how far apart logarithms of two drains are
 [fraction, dimensionless]; judged. From a minimum with 14 times the drain the right one was found so."""
 
+RELIEF_RISE = 0.05
+"""Rise of pressure over its setting at which a relief valve passes the rated flow where searches begin, at least
+[fraction]: valves need 0.05 to 0.2. In small rigs the slope of a file that says nothing is a corner of 0.0004."""
+
 NEAR = 0.2
 """How far the residuals of a balance move at the end of a search before it is told, up to which they are taken along
 their slopes and not run [dimensionless], see `FreedProblem`: 0.02 in log-likelihood."""
@@ -102,7 +106,7 @@ def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]
             "case_leakage": DRAIN_START * leakage,
             "speed_lead": LEAD_START,
             "relief_pressure": p.relief_pressure,
-            "relief_conductance": p.relief_conductance,
+            "relief_conductance": min(p.relief_conductance, p.rated_flow / (RELIEF_RISE * p.relief_pressure)),
         }
         for leaking, biased in FAULTS_TRIED
         for makeup in MAKEUP_TRIED

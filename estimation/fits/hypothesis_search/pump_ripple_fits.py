@@ -153,12 +153,30 @@ def with_pump_ripple(
         found = _with_teeth(log, begun, fitted)
         if found is not None and found.best.cost < worth and explains(found.best):
             return found
-        sure = begun.best.chi_square[0] <= 1.0 + SURE * (largest - 1.0) + CHANCE * (2.0 / len(log.drives)) ** 0.5
-        if begun is shifted and sure and explains(begun.best) and begun.best.cost < plain.best.cost - OFFSET_WORTH:
+        if (
+            begun is shifted
+            and is_sure(begun, largest)
+            and explains(begun.best)
+            and begun.best.cost < plain.best.cost - OFFSET_WORTH
+        ):
             offset = begun.log.speed_offset
             told = told_offset(offset, begun.best.speed_offset.std)
             return begun._replace(log=replace(begun.log, counts=()), remarks=told)
     return plain._replace(left=() if found is not None and _by_chance(plain.best, found.best) else _left(plain))
+
+
+def is_sure(found: RippleFits, largest: float) -> bool:
+    """Return whether fits with an offset of speed leave so little that nothing else is likely to look like one.
+
+    Parameters
+    ----------
+    found : RippleFits
+        The fits.
+    largest : float
+        As of `with_pump_ripple` [dimensionless].
+    """
+    left, by_chance = found.best.chi_square[0], CHANCE * (2.0 / len(found.log.drives)) ** 0.5
+    return left <= 1.0 + SURE * (largest - 1.0) + by_chance
 
 
 def _by_chance(plain: GreyBoxFit, with_them: GreyBoxFit) -> bool:
@@ -193,7 +211,7 @@ def _shifted(log: GreyBoxLog, plain: RippleFits, fitted: Fitted, largest: float)
         if shown.gain < wanted:
             break
         offset, wanted = offset + shown.value, OFFSET_SETTLED
-        if abs(offset - plain.log.speed_offset) > MOST_OFFSET:
+        if abs(offset - plain.log.speed_offset) > MOST_OFFSET + abs(plain.log.speed_offset):
             return None
         held = with_ripple(replace(log, counts=COUNTS), (), offset)
         found = RippleFits(held, fitted(held))

@@ -1,15 +1,31 @@
-"""`speed_offset_instead(log, fitted, found, displacement, cost)`: an offset of speed mistaken for one of pressure.
+"""An offset of motor speed that slopes do not tell: one mistaken for an offset of pressure, and one on a tight rig.
 
 Leakage under a pressure that reads too much is what a pump would have to deliver in the other direction. Only what else
 hangs on a chamber's pressure, as make-up does, tells the two apart.
+
+Oil that a pump seems to deliver too much leaks off under a pressure of its own, which is large where little leaks. The
+plain form then ends in another valley. What is lost between pump and piston tells the offset without it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.pump_ripple import with_ripple
-from estimation.fits.hypothesis_search.pump_ripple_fits import LEAST_OFFSET
+from estimation.fits.hypothesis_search.lost_flow import lost_flow
+from estimation.fits.hypothesis_search.pump_ripple_fits import LEAST_OFFSET, OFFSET_WORTH, RippleFits
+from estimation.fits.hypothesis_search.wide_log import widened
+from plant.eha.model import EhaParameters
+
+TOLD = 4.0
+"""Deviations from which lost flow tells an offset of speed [dimensionless]; judged: a fit with it says whether it is
+one, and pieces of a log are not independent."""
+
+MOST_SHARE = 0.03
+"""Largest offset that is told so, over the rated speed [fraction]; judged: converters and tachometers promise 0.1 to 2
+%. A slow loop with hardly a pressure told 12 %."""
 
 
 def speed_offset_instead(
@@ -45,3 +61,49 @@ def speed_offset_instead(
     if abs(offset) < LEAST_OFFSET:
         return 0.0
     return offset if min(fit.cost for fit in fitted(with_ripple(log, (), offset))) < cost else 0.0
+
+
+def offset_by_lost_flow(log: GreyBoxLog, parameters: EhaParameters) -> float:
+    """Return the offset of the logged speed by what is lost between pump and piston.
+
+    Least squares over pieces of the log, beside leakage, flow bias, what the oil takes up and a pump that delivers
+    less.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the plain flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+
+    Returns
+    -------
+    float
+        First guess [rad/s]; zero where the log tells none.
+    """
+    flow = lost_flow(widened(log, parameters))
+    rise, swept = np.diff(flow.ends) / flow.time, np.diff(flow.positions) / flow.time
+    columns = np.column_stack([flow.pressure, flow.sign, rise, swept, np.full_like(rise, parameters.pump_displacement)])
+    there = np.isfinite(columns).all(axis=1) & np.isfinite(flow.lost)
+    sizes = np.max(np.abs(columns[there]), axis=0, initial=0.0)
+    if np.count_nonzero(there) <= len(sizes) or not np.all(sizes > 0.0):
+        return 0.0
+    columns, lost = columns[there] / sizes, flow.lost[there]
+    known = np.linalg.pinv(columns.T @ columns, hermitian=True)
+    found = known @ (columns.T @ lost)
+    left = lost - columns @ found
+    spread = (float(left @ left) / (len(left) - len(sizes)) * float(known[-1, -1])) ** 0.5
+    offset = float(found[-1] / sizes[-1])
+    told = abs(found[-1]) > TOLD * spread and abs(offset) < MOST_SHARE * parameters.rated_speed
+    return offset if told else 0.0
+
+
+def is_settled(found: RippleFits) -> bool:
+    """Return whether fits with an offset of speed ask for no other one.
+
+    Parameters
+    ----------
+    found : RippleFits
+        The fits.
+    """
+    return found.best.speed_offset.gain < OFFSET_WORTH

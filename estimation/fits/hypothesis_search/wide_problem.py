@@ -76,6 +76,8 @@ POSITION_ZERO = "position_zero"
 
 AIR_ONSET, AIR_WIDTH = "air_onset", "air_width"
 
+STEP_AT, STEP_WIDTH = "step_at", "step_width"
+
 START_PRESSURE = "start_pressure"
 
 LEVELS_TRIED = (0.0, 0.3)

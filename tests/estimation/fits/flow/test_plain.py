@@ -6,10 +6,16 @@ from typing import Any
 
 import pytest
 
-from estimation.fits.flow.plain import FitStart, quieter
+from estimation.fits.flow.plain import FitStart, fills_within_a_step, quieter
 from plant.eha.model import EhaParameters
 
 START = FitStart(EhaParameters(), 2e8)
+
+
+@pytest.mark.parametrize(("shrunk", "quick"), [(1.0, False), (10.0, False), (100.0, True)])
+def test_valves_of_usual_size_fill_the_chambers_of_small_rigs_within_a_step(shrunk: float, *, quick: bool) -> None:
+    small = replace(EhaParameters(), chamber_volume=EhaParameters().chamber_volume / shrunk)
+    assert fills_within_a_step(small) is quick
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,15 @@
-"""An offset of the motor's speed that passed for one of the pressure, by fits that are made up."""
+"""An offset of the motor's speed that passed for one of the pressure, by fits that are made up; and by lost flow."""
 
 from collections.abc import Sequence
 
+import numpy as np
 import pytest
 
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypothesis_search.pump_ripple_fits import LEAST_OFFSET
-from estimation.fits.hypothesis_search.speed_offset import speed_offset_instead
-from tests.estimation.fits.short_logs import PAPER, log, made_fit, seen
+from estimation.fits.hypothesis_search.speed_offset import MOST_SHARE, offset_by_lost_flow, speed_offset_instead
+from tests.estimation.fits.short_logs import PAPER, SPEED, WORN, log, made_fit, seen
 
 LEAKAGE, DISPLACEMENT = 5e-11, PAPER.pump_displacement
 
@@ -42,3 +43,24 @@ def test_nothing_is_tried_where_no_pressure_offset_was_found_or_the_speed_would_
     if share is not None:
         found["pressure_offset"] = (share * LEAST_OFFSET * DISPLACEMENT / LEAKAGE, 1e2)
     assert speed_offset_instead(seen(log(0.2)), fitted, found, DISPLACEMENT, 100.0) == 0.0
+
+
+def turned_by(offset: float) -> float:
+    record = log(6.0, 1e-3, WORN, drive="prbs")
+    return offset_by_lost_flow(seen(record.replace(**{SPEED: record[SPEED] + offset})), PAPER)
+
+
+@pytest.mark.parametrize("offset", [-2.5, 2.5])
+def test_what_is_lost_between_pump_and_piston_tells_an_offset_of_speed(offset: float) -> None:
+    assert turned_by(offset) == pytest.approx(offset, rel=0.1)
+
+
+def test_a_right_speed_and_one_that_no_converter_has_tell_none() -> None:
+    assert turned_by(0.0) == 0.0
+    assert turned_by(2.0 * MOST_SHARE * PAPER.rated_speed) == 0.0
+
+
+def test_a_dead_pressure_tells_no_offset() -> None:
+    record = log(0.5)
+    still = record.replace(differential_pressure_pa=np.zeros_like(record[SPEED]))
+    assert offset_by_lost_flow(seen(still), PAPER) == 0.0
