@@ -154,8 +154,11 @@ class Note:
         )
 
     def __repr__(self) -> str:
-        """Return code and sentence, since lists of notes are read at a prompt."""
-        return f"<{self.code}: {self}>"
+        """Return code and sentence, since lists of notes are read at a prompt; the data where they do not fill it."""
+        try:
+            return f"<{self.code}: {self}>"
+        except KeyError:
+            return f"<{self.code}: {dict(self.data)}>"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the note for JSON.

@@ -31,3 +31,7 @@ def test_notes_at_a_prompt_are_sentences() -> None:
     note = LogCode.CLOCK_ASSUMED.note(sample_time_s=0.5)
     assert repr((note,)) == f"(<clock_assumed: {note}>,)"
     assert "{" not in repr(note)
+
+
+def test_a_note_that_lacks_its_data_still_has_a_repr() -> None:
+    assert repr(LogCode.CLOCK_ASSUMED.note()) == "<clock_assumed: {}>"

@@ -51,7 +51,8 @@ class LimitedCandidate(Compared):
 def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
     """Return the best model between limits, where it is better than the linear one; None where there is none.
 
-    Where it explains more of the log and is not surely better, the comparison's notes say where the output stands.
+    Where it explains more of the log and is not surely better, the comparison's notes say where the output stands, but
+    for the two levels of steps.
 
     Parameters
     ----------
@@ -79,13 +80,12 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
     # what is cut off leaves noise: an output that bends towards an end gains less, and goes beyond it in other logs
     best, stops = one.best, taken.limits.stops
     least = min((1.0 - MARGIN) * best.held_back, BELIEVED) if stops else CUT_OFF * best.held_back
-    if (
-        taken.held_back < least
-        and not _at_one_level(data, limits)
-        and told_apart(taken.block_errors, best.block_errors)
-    ):
+    settled = _at_one_level(data, limits)
+    if taken.held_back < least and not settled and told_apart(taken.block_errors, best.block_errors):
         return taken
-    if taken.bic < best.bic and taken.held_back < best.held_back:
+    # two ends at which the input stays, too, are the levels of steps: no log of steps would be without the note
+    open_end = not stops and not (settled and limits.count == 2)
+    if open_end and taken.bic < best.bic and taken.held_back < best.held_back:
         shown, share = told_limits(data, one.task.by, limits)
         one.notes.append(IdentificationCode.OUTPUT_AT_END.note(output=data.output, limits=shown, share=share))
     return None

@@ -18,7 +18,7 @@ from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import chirp
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.sensors.sensors import BENCH
-from tests.estimation.fits.flow.test_plain import PILOTED, SPEED
+from tests.estimation.fits.flow.test_model_steps import PILOTED, SPEED
 from tests.faults.diagnosis.short_logs import ACTUATOR, blocks, classes
 
 LITTLE = replace(circuit_of(PILOTED), accumulator_gas=1.5e-4, accumulator_oil=1.5e-4, leakage_coefficient=6.86e-11)
