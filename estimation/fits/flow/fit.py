@@ -20,7 +20,7 @@ from estimation.fits.flow.log import homed_at_stop, require_flow_channels, witho
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import UNEVEN_OIL, is_single, with_lumped, with_lumped_slopes
 from estimation.fits.flow.misread import UNLIKE_SLIPS, CorrectedLogs
-from estimation.fits.flow.model_steps import in_finer_steps, with_implicit_steps
+from estimation.fits.flow.model_steps import with_implicit_steps
 from estimation.fits.flow.motor_course import by_course, with_open_turns
 from estimation.fits.flow.offset_beside import offset_settled
 from estimation.fits.flow.other_minimum import lower_minimum
@@ -172,7 +172,7 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
         if (implicit := with_implicit_steps(plain)) is not None:
             start = implicit
             continue
-        plain = by_course(logged, in_finer_steps(logged, plain))
+        plain = by_course(logged, plain)
         asked, open_ends = _asked(plain, sensed, traits)
         try:
             with work.counted():

@@ -19,7 +19,7 @@ from estimation.fits.hypothesis_search.between_samples import with_course
 from estimation.fits.hypothesis_search.fit_objections import fit_explains, is_too_close, limits
 from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
 from estimation.fits.hypothesis_search.pump_ripple_fits import is_sure, with_pump_ripple
-from estimation.fits.hypothesis_search.speed_offset import is_settled, offset_by_lost_flow
+from estimation.fits.hypothesis_search.speed_offset import MOST_SHARE, is_settled, offset_by_lost_flow
 from estimation.models.flow import HELD_FLOW_FORM
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -32,11 +32,6 @@ TOO_LOUD = 2.0
 """Variance of a residual by which a log was judged, over that at the bulk modulus that explains it, from which it is
 judged anew [dimensionless]: up to it gates of 1.1 to 1.44 times the noise still see a misfit, and searches of sound
 logs stay as they are."""
-
-FINER = 8
-"""How many times as many implicit steps a single rod's log has that none explains [count]: where the pressures of both
-sides cross, a piloted valve shuts at once, which no step of any order follows within itself. At the true values of two
-such logs usual implicit steps leave 2.6 and 1.7 times the noise (mean square), finer ones 1.3 and 1.04."""
 
 VALVE_DROP = 5e4
 """Drop at which a make-up valve of a usual size passes the rated flow [Pa]; judged: check valves have 0.3 to 1 bar. In
@@ -88,8 +83,6 @@ class FitStart:
         Whether what a slow log's turns pump is read off the samples after them, see `with_turns_read`.
     implicit : bool
         Whether model steps are implicit, see `with_implicit_steps`.
-    finer : bool
-        Whether there are `FINER` times as many, see `in_finer_steps`.
     held, turns_open : bool
         Whether the motor's command is held between samples, and whether the course of its turns is open in a log that
         is not slow; see `estimation.fits.flow.motor_course`.
@@ -102,7 +95,6 @@ class FitStart:
     stiffest: float = np.inf
     turns_read: bool = False
     implicit: bool = False
-    finer: bool = False
     held: bool = False
     turns_open: bool = False
 
@@ -213,7 +205,7 @@ def plain_fits(logged: Logged, start: FitStart, near: Sequence[GreyBoxFit] = ())
     log = logged.seen_at(parameters, held=start.held)
     if start.turns_read:
         log = with_turns_read(log, parameters)
-    log = replace(log, stiff=start.implicit, steps=log.steps * (FINER if start.finer else 1))
+    log = replace(log, stiff=start.implicit)
     starts = flow_starts(parameters, max(start.bulk_modulus, LEAST_GUESS * parameters.bulk_modulus))
     explains = partial(fit_explains, noisy=log.passes_on)
     largest, _ = limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))
@@ -226,7 +218,8 @@ def plain_fits(logged: Logged, start: FitStart, near: Sequence[GreyBoxFit] = ())
     if settled and not (explains(found.best) or start.speed_offset):
         offset = offset_by_lost_flow(unturned, parameters)
         other = turned(offset) if offset else found
-        found = other if explains(other.best) and is_sure(other, largest) and is_settled(other) else found
+        small = abs(other.log.speed_offset) < MOST_SHARE * parameters.rated_speed
+        found = other if small and explains(other.best) and is_sure(other, largest) and is_settled(other) else found
     log, fits, teeth, left = found
     turning = Turning(log.teeth, log.speed_offset)
     values = _swinging(fits).values

@@ -73,10 +73,9 @@ NOWHERE: Mapping[str, float] = {}
 SETTLING = 15
 """Evaluations with short model steps of a form that does not explain its log: it is asked what is strange [count]."""
 
-CLOSE, CLOSE_IN_STEPS = 0.75, 1.0
-"""Cost over the count of residuals, 0.5 where noise alone is left, below which such a search goes on to its end, and
-the same with implicit steps [dimensionless]; judged. A single rod's was cut off at 0.65 on its way to 0.47, and passed
-its gate there; in finer steps one was at 0.80 on its way to 0.52."""
+CLOSE = 0.75
+"""Cost over the count of residuals, 0.5 where noise alone is left, below which such a search goes on to its end
+[dimensionless]; judged. A single rod's was cut off at 0.65 on its way to 0.47, and passed its gate there."""
 
 
 def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
@@ -251,7 +250,7 @@ def _finished(
     one = replace(one, problem=one.problem.on(log.stepped(steps)))
     if not _plain(one):
         settled = descend(one.problem.at, one.point.theta, SETTLING, one.bounds, wanted=wanted)
-        if settled.cost < (CLOSE_IN_STEPS if log.stiff else CLOSE) * one.problem.blocks:
+        if settled.cost < CLOSE * one.problem.blocks:
             settled = descend(one.problem.at, settled.theta, FINISHING, one.bounds, wanted=wanted)
         one = replace(one, point=settled)
         if not _plain(one):

@@ -109,7 +109,7 @@ def step_errors(problem: Problem, theta: Array) -> Array:
     ndarray, shape (outputs, blocks)
         Of each block's residual, in standard deviations of its noise [dimensionless].
     """
-    return apart(problem, theta, problem.log, replace(problem.log, stiff=True))
+    return _apart(problem, theta, problem.log, replace(problem.log, stiff=True))
 
 
 def _long_step_errors(problem: Problem, theta: Array) -> Array:
@@ -120,27 +120,12 @@ def _long_step_errors(problem: Problem, theta: Array) -> Array:
     log = problem.log
     white = tuple(one.scaled(1.0, 0.0) for one in log.noise)
     bare = replace(log, measured=np.zeros(log.measured.shape), block=log.sample_time, noise=white, course=None)
-    errors = apart(problem, theta, bare.coarsened(), bare)
+    errors = _apart(problem, theta, bare.coarsened(), bare)
     return np.max(np.abs(np.diff(errors, axis=1, prepend=0.0)), axis=0)
 
 
-def apart(problem: Problem, theta: Array, rough: GreyBoxLog, fine: GreyBoxLog) -> Array:
-    """Return what a log's residuals with some model steps have beyond those with others, near a point.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-    theta : ndarray, shape (unknowns,)
-        The point [dimensionless].
-    rough, fine : GreyBoxLog
-        The log with both steps.
-
-    Returns
-    -------
-    ndarray, shape (outputs, blocks)
-        In standard deviations of each block's noise [dimensionless].
-    """
+def _apart(problem: Problem, theta: Array, rough: GreyBoxLog, fine: GreyBoxLog) -> Array:
+    """Return what a log's residuals with some model steps have beyond those with others, shape (outputs, blocks)."""
     # side by side, as a search has them: no kernel for these two
     rows = [rough.parameters] * min(1 + len(theta), LANES)
     there, exact = (problem.on(one).residuals_of(theta, rows)[0] for one in (rough, fine))

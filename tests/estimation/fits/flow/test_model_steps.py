@@ -1,17 +1,14 @@
 """Model steps that err by less than noise does."""
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from estimation.fits.flow import fit as flow_fit
-from estimation.fits.flow import model_steps
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import without_strays
-from estimation.fits.flow.model_steps import in_finer_steps, with_implicit_steps
+from estimation.fits.flow.model_steps import with_implicit_steps
 from estimation.fits.flow.plain import FitStart, Logged, plain_fits
 from plant.eha.circuit_parameters import CircuitParameters
 from plant.eha.drives import chirp
@@ -68,27 +65,3 @@ def test_steps_that_chatter_are_taken_implicitly_and_the_log_is_explained(monkey
     assert with_implicit_steps(followed) is None
     monkeypatch.setattr(flow_fit, "plain_fits", lambda _, start: followed if start.implicit else plain)
     assert fit_flow(logged.record, rod, rod.bulk_modulus, {}, logged.variances).chi_square < 1.2
-
-
-@pytest.mark.parametrize(("left", "taken"), [(1.04, True), (1.31, False)])
-def test_finer_steps_are_taken_where_they_leave_noise_alone(
-    left: float, taken: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fits(chi_square: float, start: FitStart) -> Any:
-        fit = SimpleNamespace(chi_square=(chi_square,), seen=4000, model=None, values={})
-        log = SimpleNamespace(steps=np.ones(8, dtype=np.int64))
-        return SimpleNamespace(
-            start=start, best=fit, swinging=fit, log=log, explains=lambda one: one.chi_square[0] < 1.5
-        )
-
-    rod = EhaParameters(area_difference=0.2, pilot_share=1.0)
-    usual, finer = (fits(one, FitStart(rod, 2e8, implicit=True)) for one in (2.0, left))
-    problem = SimpleNamespace(model=SimpleNamespace(theta=lambda _: np.zeros(1)))
-    monkeypatch.setattr(model_steps, "FreedProblem", SimpleNamespace(of=lambda _, __: problem))
-    monkeypatch.setattr(model_steps, "replace", lambda one, **changes: SimpleNamespace(**{**vars(one), **changes}))
-    monkeypatch.setattr(model_steps, "apart", lambda *_: np.ones((1, 8)))
-    monkeypatch.setattr(model_steps, "plain_fits", lambda *_: finer)
-    logged: Any = None
-    assert in_finer_steps(logged, usual) is (finer if taken else usual)
-    through = fits(2.0, FitStart(EhaParameters(), 2e8, implicit=True))
-    assert in_finer_steps(logged, through) is through
