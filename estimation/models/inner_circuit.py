@@ -2,7 +2,7 @@
 
 from types import SimpleNamespace
 
-from plant.compiled.functions import Scalar, absolute, sqrt
+from plant.compiled.functions import Scalar, absolute, sqrt, where
 from plant.components.check_valve import make_up_flow
 
 BEND, USUAL_BEND = "makeup_bend", 1e-4
@@ -43,9 +43,10 @@ def inner_flows(
 
 
 def accumulator_rate(taken: Scalar, supply: Scalar, p: SimpleNamespace) -> Scalar:
-    """Return the rate of the inner circuit's pressure: its gas is as much stiffer as it is smaller, and under pressure.
+    """Return the rate of the inner circuit's pressure: a single rod's gas is stiffer the smaller it is.
 
-    A single rod takes a third of it and gives it back at every stroke.
+    Such a rod takes a third of it and gives it back at every stroke. A through rod hardly moves it, and a search that
+    could stiffen it by far ended in another valley.
 
     Parameters
     ----------
@@ -54,14 +55,14 @@ def accumulator_rate(taken: Scalar, supply: Scalar, p: SimpleNamespace) -> Scala
     supply : float or Expression
         Its pressure, absolute [Pa].
     p : namespace
-        `accumulator_pressure` at rest [Pa], and `accumulator_stiffness` there [Pa/m^3].
+        `accumulator_pressure` at rest [Pa], `accumulator_stiffness` there [Pa/m^3], and `area_difference` [fraction].
 
     Returns
     -------
     float or Expression
         Rate [Pa/s].
     """
-    compressed = supply / p.accumulator_pressure
+    compressed = where(absolute(p.area_difference) > 0.0, supply / p.accumulator_pressure, 1.0)
     return -p.accumulator_stiffness * compressed * compressed * taken
 
 

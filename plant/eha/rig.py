@@ -48,6 +48,10 @@ UNEQUAL_SIDES = (*PAIRS.values(), "pilot_share")
 P = TypeVar("P", default=EhaParameters)
 
 
+SIZED = ",\n# except relief_conductance and makeup_conductance, which then go with the pump's flow."
+"""What the template says of entries that are left out."""
+
+
 @dataclass(frozen=True)
 class Rig(Generic[P]):
     """An actuator on its bench.
@@ -57,7 +61,8 @@ class Rig(Generic[P]):
     name : str
         What reports call it.
     parameters : dataclass
-        Its parameters, SI; the paper's gear-pump actuator by default.
+        Its parameters, SI; the paper's gear-pump actuator by default. A file that leaves out the conductances of the
+        valves has them sized by its pump; given here, they are what they are (`plant.eha.scales.with_valves_sized`).
     uncertainties : Mapping[str, float]
         Relative standard deviation by parameter, a fraction, 0.3 for 30 %, or of the `pressure_gain`; what has none is
         known as well as `plant.eha.doubts.DOUBTS` says.
@@ -268,7 +273,7 @@ def rig_template(
         "# All values are those of the healthy actuator, in SI, or with a unit in quotes as a nameplate has them: "
         + ('"3.5 cm^3/rev", "160 bar".' if parameter_class is EhaParameters else '"160 bar".'),
         "# A parameter that is left out keeps the value shown here"
-        + (", but that flow through valves goes with the pump's." if parameter_class is EhaParameters else "."),
+        + (SIZED if parameter_class is EhaParameters else "."),
         "",
         *([f'name = "{UNNAMED}"'] if plant == EHA else [f'name = "{plant}"', f'plant = "{plant}"']),
         *(

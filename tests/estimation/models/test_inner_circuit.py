@@ -9,8 +9,14 @@ from estimation.models.inner_circuit import accumulator_rate
 
 def test_gas_that_gives_a_third_of_its_oil_follows_its_law() -> None:
     """A constant stiffness has its pressure at two thirds, where three quarters are true."""
-    p, gas, steps = SimpleNamespace(accumulator_pressure=6e5, accumulator_stiffness=6e5 / 1e-3), 1e-3, 10_000
+    rod = {"area_difference": 0.3, "accumulator_pressure": 6e5, "accumulator_stiffness": 6e5 / 1e-3}
+    p, gas, steps = SimpleNamespace(**rod), 1e-3, 10_000
     supply, taken = 6e5, gas / 3.0
     for _ in range(steps):
         supply += accumulator_rate(taken / steps, supply, p)
     assert supply == pytest.approx(6e5 * gas / (gas + taken), rel=1e-3)
+
+
+def test_gas_that_a_through_rod_hardly_moves_is_as_stiff_as_at_rest() -> None:
+    p = SimpleNamespace(area_difference=0.0, accumulator_pressure=6e5, accumulator_stiffness=6e8)
+    assert accumulator_rate(1e-6, 9e5, p) == -6e8 * 1e-6
