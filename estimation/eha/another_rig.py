@@ -9,6 +9,7 @@ from math import log as ln
 
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Outcome
+from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.channel_physics import LONG, MIDDLE, REFUTED, TOLD
 from estimation.log_checks.clean import CleanLog
 from estimation.log_checks.flow_balance import flow_balance
@@ -48,6 +49,24 @@ def rig_contradicted(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     if balance.swept <= TOLD * std or abs(ln(balance.swept)) < max(OFF, TOLD * std / balance.swept):
         return ()
     return (EstimateCode.RIG_CONTRADICTED.note(percent=100.0 / balance.swept),)
+
+
+def unless_rig_contradicted(slips: tuple[Note, ...], record: Record, p: EhaParameters) -> tuple[Note, ...]:
+    """Return wrong signs and units that a fit names; the objection to the rig file where pressure alone is to be wrong.
+
+    The unit of pressure changes nothing about how far the pump sends the piston.
+
+    Parameters
+    ----------
+    slips : tuple of Note
+        What the fit names.
+    record : Record
+        The log.
+    p : EhaParameters
+        The healthy actuator.
+    """
+    of_pressure = all(one.data.get("channel") == PRESSURE for one in slips)
+    return (rig_contradicted(record, p) if of_pressure else ()) or slips
 
 
 def unless_another_rig(found: BulkModulusEstimate, log: CleanLog, p: EhaParameters) -> BulkModulusEstimate:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from estimation.eha.another_rig import unless_another_rig
+from estimation.eha.another_rig import unless_another_rig, unless_rig_contradicted
 from estimation.eha.another_rod import vague_areas
 from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
 from estimation.eha.foreign_oil import shows_no_motion, unless_foreign
@@ -206,6 +206,7 @@ def estimate_clean(
         return without_number(Outcome.NOT_OBSERVABLE, still, form, FLOW_CHANNELS)
     fit = None if filtering else _fit(log, parameters, form, guess, spreads, chosen=options.method == LEAST_SQUARES)
     if fit is not None and (slips := _channel_slips(fit, parameters)):
+        slips = unless_rig_contradicted(slips, log.record, parameters)
         return without_number(Outcome.MISMATCH, slips, form, FITTED[form][1])
     if fit is not None:
         found = _fitted(fit, form, FITTED[form][1])

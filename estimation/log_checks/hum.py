@@ -71,7 +71,7 @@ def without_hum(record: Record) -> tuple[Record, tuple[Note, ...]]:
         return record, ()
     motion = [_lines(record[name]) for name in MOVING if name in record and np.any(np.isfinite(record[name]))]
     pressure, notes, of_teeth = record[PRESSURE], list[Note](), list[float]()
-    for _ in range(MOST_TONES):
+    while len(notes) < MOST_TONES and len(of_teeth) < MOST_TONES:
         lines = _lines(pressure)
         frequencies = np.arange(len(lines)) / (2 * (len(lines) - 1) * record.sample_time)
         moved = np.max(motion, axis=0, initial=0.0) if motion else np.zeros(len(lines))

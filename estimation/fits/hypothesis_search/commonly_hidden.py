@@ -50,7 +50,7 @@ def delivery_followed(
     followed = any(one.together == (DELIVERY,) and one.fits for one in finished)
     if not promises or followed or is_explained(finished[0], accepted):
         return []
-    return likeliest(log, [[*screen(log, (DELIVERY,), spared.starts)]], spared=spared)
+    return likeliest(log, [[*screen(log, (DELIVERY,), spared.starts, every=spared.every)]], spared=spared)
 
 
 def with_zero(log: GreyBoxLog, first: Trial, spared: Decimation, accepted: Accepted) -> list[Trial]:

@@ -108,7 +108,7 @@ def explain(
     left = cost_over_noise(wide, plain.cost)
     spared = Decimation(decimation_limit(wide, starts[0], decimation_for(wide, left)), left, starts)
     finished = _alone(wide, plain.cost, (likely, others, gains), spared, accepted, useful)
-    if paired:
+    if paired and finished[0].cost < hopeless:
         finished = ranked([*finished, *delivery_followed(wide, finished, gains, spared, accepted)])
     finished = _distinct([behind_filter(wide, finished[0]), *finished])
     if paired and homed:

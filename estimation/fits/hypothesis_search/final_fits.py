@@ -8,6 +8,7 @@ from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.play import play_left
 from estimation.fits.greybox.spared_steps import LAST, spared
 from estimation.fits.hypotheses import CHECKS_CRACK, PRESSURE_FILTERED, PRESSURE_LATE
 from estimation.fits.hypothesis_search.coarse_search import NEAR, coarsened, descended
@@ -123,6 +124,10 @@ def with_details(log: GreyBoxLog, tried: Trial) -> Trial:
     if VALVES & {name for one in tried.together for name in (*one.free, *one.beside)}:
         return tried
     further = final_fit(log, tried, np.inf, STIFFNESS, *CRACKS)
+    if "pilot_share" in further.values and further.fits and play_left(further.fit.play):
+        # among the corners of piloted valves a search ends early, and what it leaves looks like play
+        again = final_fit(log, further, np.inf, STIFFNESS, *CRACKS)
+        further = replace(again, coarse=tried.coarse) if again.cost < further.cost else further
     if further.cost > tried.cost:
         return tried
     known, before = (one.fit.std["bulk_modulus"] for one in (further, tried))
