@@ -43,7 +43,8 @@ SampleTime = Annotated[
     option(
         "S",
         "Sample time of the model [s], and of a log without a time column; by default 1e-3 (Table 6), or the log's "
-        "if that is longer. With --input, only of logs without a time column.",
+        "if that is longer. It replaces a clock that stands still or goes back. With --input, only of logs without a "
+        "time column.",
     ),
 ]
 

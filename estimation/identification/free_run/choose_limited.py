@@ -25,6 +25,11 @@ MARGIN, CUT_OFF = 0.02, 0.7
 """Share by which stops must do better than none on what was held back, as a nonlinearity at the input must; and share
 of the error without a limit that a model which is cut off may leave, as a pole at 1 may."""
 
+SETTLED = 0.2
+"""Share of the error without stops that a model between stops may leave where the output may have settled at both
+[fraction]; judged: of pistons driven to and fro between stops 0.06 to 0.13 is left, of an output that rises faster than
+it falls, told as stops, 0.26."""
+
 ONE_LEVEL, NEARLY = 0.05, 0.9
 """How far an input may be from its median, over its deviation in the whole log, to have one value, and share of the
 samples that must have it [fraction]; judged. A sample or two behind each change of the input have the other one."""
@@ -52,7 +57,7 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
     """Return the best model between limits, where it is better than the linear one; None where there is none.
 
     Where it explains more of the log and is not surely better, the comparison's notes say where the output stands, but
-    for the two levels of steps.
+    for the ends of a staircase.
 
     Parameters
     ----------
@@ -79,25 +84,33 @@ def limited_candidate(one: LinearComparison) -> LimitedCandidate | None:
     # a run between stops may drift as a pole at 1 does, and is believed where that is: not if it leaves most of it;
     # what is cut off leaves noise: an output that bends towards an end gains less, and goes beyond it in other logs
     best, stops = one.best, taken.limits.stops
-    least = min((1.0 - MARGIN) * best.held_back, BELIEVED) if stops else CUT_OFF * best.held_back
-    settled = _at_one_level(data, limits)
-    if taken.held_back < least and not settled and told_apart(taken.block_errors, best.block_errors):
+    settled, between_ends = _levels_at_ends(data, limits)
+    if stops:
+        least = min((SETTLED if settled else 1.0 - MARGIN) * best.held_back, BELIEVED)
+    else:
+        least = 0.0 if settled else CUT_OFF * best.held_back
+    if taken.held_back < least and told_apart(taken.block_errors, best.block_errors):
         return taken
-    # two ends at which the input stays, too, are the levels of steps: no log of steps would be without the note
-    open_end = not stops and not (settled and limits.count == 2)
+    # where an input that stays at each end has other levels, too, these tell the gain: a staircase asks no one to check
+    open_end = between_ends < 1.0 - NEARLY if settled else not stops
     if open_end and taken.bic < best.bic and taken.held_back < best.held_back:
         shown, share = told_limits(data, one.task.by, limits)
         one.notes.append(IdentificationCode.OUTPUT_AT_END.note(output=data.output, limits=shown, share=share))
     return None
 
 
-def _at_one_level(data: Channels, limits: Limits) -> bool:
-    """Return whether inputs have one value nearly wherever the output stands at an end: it may have settled there."""
+def _levels_at_ends(data: Channels, limits: Limits) -> tuple[bool, float]:
+    """Return whether inputs have one value nearly wherever the output stands at an end, and how often another one.
+
+    Where they have, the output may have settled there. The share is of the samples whose input has the value of no end.
+    """
     u, y = np.concatenate(data.u), np.concatenate(data.y)
     at, middle = at_limits(y, limits), 0.5 * (limits.low + limits.high)  # infinite where one end alone is finite
     ends = [at & end for end in (y > middle, y < middle) if np.any(at & end)]
-    apart, most = [np.abs(u[end] - np.median(u[end], axis=0)) for end in ends], ONE_LEVEL * np.std(u, axis=0)
-    return all(np.mean(np.all(one <= most, axis=1)) > NEARLY for one in apart)  # a constant input has one value too
+    most = ONE_LEVEL * np.std(u, axis=0)  # a constant input has one value too
+    there = [np.all(np.abs(u - np.median(u[end], axis=0)) <= most, axis=1) for end in ends]
+    settled = all(np.mean(one[end]) > NEARLY for one, end in zip(there, ends, strict=True))
+    return settled, float(np.mean(~np.any(there, axis=0)))
 
 
 def told_limits(data: Channels, by: Scaling, limits: Limits) -> tuple[str, float]:

@@ -148,14 +148,14 @@ def _identified(
     asked = Asked(order, delay, n_numerator)
     task = Task(data, whole, by, section(whole, MOST_CHOSEN), asked, orders, delays)
     given = structure in ("output-error", "auto")
-    other = _of_changes(task) if given else None
-    if other is not None and structure == "output-error":
-        return other
+    walk = _of_changes(task) if given else None
+    if walk is not None and structure == "output-error":
+        return walk
     linear = linear_comparison(task)
-    if given and other is None:
-        other = _of_other_levels(task, linear)
-    if other is not None:
-        return _or_nonlinear(other, linear, structure)
+    if walk is not None:
+        return _or_nonlinear(walk, linear, structure)
+    if given and (apart := _of_other_levels(task, linear)) is not None:
+        return _or_nonlinear(apart[0], linear, structure, apart[1])
     if structure in ADOPTED:
         return _adopted(structure, linear)
     if structure == "auto" and linear.best.held_back < ROUNDING:
@@ -182,8 +182,11 @@ def _of_changes(task: Task) -> Identified | None:
     return None if found is None or fed_back(found.model, task.data, changes=True) else found
 
 
-def _of_other_levels(task: Task, linear: LinearComparison) -> Identified | None:
-    """Return the linear model of logs that were brought to one offset, or without their trend; None where none is."""
+def _of_other_levels(task: Task, linear: LinearComparison) -> tuple[Identified, float] | None:
+    """Return the linear model of logs that were brought to one offset, or without their trend; None where none is.
+
+    With it, the deviation of that output [its unit].
+    """
     data, orders, delays = task.data, task.orders, task.delays
     apart = levelled(data, orders, delays)
     if apart is not None:
@@ -191,17 +194,23 @@ def _of_other_levels(task: Task, linear: LinearComparison) -> Identified | None:
         own = linear_comparison(replace(task, data=apart.data, whole=whole, by=by, part=section(whole, MOST_CHOSEN)))
         if believed(own, linear):
             own.notes.append(apart.note)
-            return replace(own.identified(), above=tuple(apart.above.tolist()))
+            return replace(own.identified(), above=tuple(apart.above.tolist())), by.y_std
     drift = detrended(linear, orders)
-    return None if drift is None else replace(drift.linear.identified(), above=drift.trends)
+    if drift is None:
+        return None
+    return replace(drift.linear.identified(), above=drift.trends), drift.linear.task.by.y_std
 
 
-def _or_nonlinear(found: Identified, linear: LinearComparison, structure: str) -> Identified:
-    """Return what was found, or of ``auto`` a nonlinear model that leaves clearly less held back of the data."""
+def _or_nonlinear(found: Identified, linear: LinearComparison, structure: str, std: float | None = None) -> Identified:
+    """Return what was found, or of ``auto`` a nonlinear model that leaves clearly less held back of the data.
+
+    Errors are over the deviation of the output that each was judged on, which is ``std`` of the one that was found.
+    """
     if structure != "auto":
         return found
     other = _nonlinear_or_linear(structure, linear)
     left, own = (100.0 - one.held_back_percent for one in (other, found))
+    own *= 1.0 if std is None else std / linear.task.by.y_std
     return other if other.model.structure != "output-error" and left < (1.0 - CLEAR_MARGIN) * own else found
 
 

@@ -93,10 +93,36 @@ def test_an_output_that_settles_at_the_level_of_its_input_has_no_limits(seed: in
     for t in range(1, 1500):
         y[t] = y[t - 1] + (0.12 if u[t - 1] > y[t - 1] else 0.04) * (u[t - 1] - y[t - 1])
     y += 0.005 * rng.normal(size=1500)
-    found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"))
-    assert IdentificationCode.OUTPUT_AT_END not in {note.code for note in found.notes}
+    with pytest.warns(LogWarning, match="does not tell whether it is cut off"):
+        found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"))
     assert found.model.linear is not None
     assert found.model.linear.dc_gain == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
+def test_a_piston_driven_to_and_fro_between_its_stops_has_them() -> None:
+    """Its input has one value at each end, as that of an output that has settled has."""
+    rng = np.random.default_rng(0)
+    u, x, v = np.repeat(rng.choice([-1.0, 1.0], 1500), rng.integers(15, 90, 1500))[:1500], np.zeros(1500), 0.0
+    for t in range(1, 1500):
+        v = 0.7 * v + 0.009 * u[t - 1]
+        x[t] = np.clip(x[t - 1] + v, -1.0, 1.0)
+        v *= abs(x[t]) < 1.0
+    y = x + 0.003 * rng.normal(size=1500)
+    found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"))
+    assert IdentificationCode.OUTPUT_STOPPED in {note.code for note in found.notes}
+    assert found.sound
+
+
+@pytest.mark.filterwarnings("error::plant.errors.LogWarning")
+def test_the_ends_of_a_staircase_ask_no_one_to_check_them() -> None:
+    """Levels between them tell the gain; each log of steps had the warning."""
+    rng = np.random.default_rng(3)
+    u = np.repeat(rng.integers(-2, 3, 1500).astype(float), 60)[:1500]
+    y = filtered(np.array([0.0, 0.1]), np.array([1.0, -0.9]), np.sign(u) * np.maximum(np.abs(u) - 0.2, 0.0))
+    y += 0.01 * rng.normal(size=1500)
+    found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"))
+    assert IdentificationCode.OUTPUT_AT_END not in {note.code for note in found.notes}
 
 
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")

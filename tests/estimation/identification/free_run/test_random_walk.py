@@ -98,7 +98,7 @@ def test_white_noise_is_no_walk() -> None:
     assert identified(16801, 0.0, 0.3).notes == ()
 
 
-def test_an_automatic_choice_looks_for_no_bends_where_the_output_wanders() -> None:
+def test_an_automatic_choice_takes_no_bends_where_the_output_wanders() -> None:
     found = identified(16801, structure="auto")
     assert [note.code for note in found.notes] == ["random_walk"]
     assert found.model.structure == "output-error"
