@@ -167,7 +167,8 @@ def read(
         Kind of actuator, one of `actuators`; the one that the columns' names tell if not given, else the gear-pump
         actuator.
     sample_time : float, optional
-        Time between rows [s] of a log that has no time, or times that do not increase.
+        Time between rows [s] of a log that has no time, or of an actuator's whose times do not increase. In a table of
+        anything else, time is then not read.
     beside : str, Path or sequence of them
         Files of other loggers of the same test; all are put on one clock.
 

@@ -157,7 +157,7 @@ class Note:
         """Return code and sentence, since lists of notes are read at a prompt; the data where they do not fill it."""
         try:
             return f"<{self.code}: {self}>"
-        except KeyError:
+        except (KeyError, TypeError, ValueError):
             return f"<{self.code}: {dict(self.data)}>"
 
     def to_dict(self) -> dict[str, Any]:

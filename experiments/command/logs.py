@@ -230,7 +230,7 @@ def read_log(
     required : collection of str, optional
         Channels that must be there; those of the gear-pump actuator if not given.
     sample_time : float, optional
-        Time between rows [s] of a log that has no time.
+        Time between rows [s] of a log that has no time, or times that do not increase.
     beside : sequence of Path
         Files of other loggers of the same test.
     most_missing : float, optional

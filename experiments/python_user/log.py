@@ -290,6 +290,8 @@ class Log(Shown):
 
             sure = [one for one in guess_by_name(cleaned(self.channels)) if one.sure >= SHOWN]
             meant = {one.channel: one.spec if one.unit else f"{one.spec}:UNIT" for one in sure}
+            # a channel that nobody asked for is no example
+            meant = meant if any(one in " ".join(REQUIRED).split() for one in meant) else {}
             refuse(
                 f"{verb} needs {' and '.join(REQUIRED)}, the log has {', '.join(self.channels)}: name them by "
                 f"read(..., columns={meant or {'motor_speed_rad_s': 'N:rpm'}}), or relate them by "

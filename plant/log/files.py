@@ -88,11 +88,12 @@ def read_record(
     except ClockError:
         if sample_time is None or beside:
             raise
-        rows = len(found.columns[TIME])
-        checked = trust(
-            {**found.columns, TIME: sample_time * np.arange(rows, dtype=np.float64)}, clock=Clock(sample_time, 0.0)
-        )
-        notes = (*notes, LogCode.TIME_REPLACED.note(channel=TIME, sample_time_s=sample_time))
+        given = np.asarray(found.columns[TIME], dtype=np.float64)
+        even = sample_time * np.arange(len(given), dtype=np.float64)
+        checked = trust({**found.columns, TIME: even}, clock=Clock(sample_time, 0.0))
+        held = np.flatnonzero(np.diff(given) <= 0.0)
+        where = {"count": held.size, "row": int(held[0]) + 2 if held.size else 1}
+        notes = (*notes, LogCode.TIME_REPLACED.note(channel=TIME, sample_time_s=sample_time, **where))
     for note in (*notes, *found.notes, *checked.notes):
         warnings.warn(LogWarning(note, source), stacklevel=2)
     began = {} if found.began is None else {"began": found.began}

@@ -93,7 +93,10 @@ class LogCode(Code):
         "the piston travels {travel_m:.2g} m per radian of the pump, but {least:g} to {most:g} m is usual: check the "
         "units of {channel} and of motor speed"
     )
-    TIME_REPLACED = "{channel} does not increase; the rows were taken as evenly spaced by {sample_time_s:g} s, as asked"
+    TIME_REPLACED = (
+        "{channel} does not increase in {count} places, the first in row {row}; all rows were taken as evenly spaced "
+        "by {sample_time_s:g} s, as asked: if another test begins there, keep one side of it"
+    )
     CLOCK_ASSUMED = (
         "the log has no time column: a sample time of {sample_time_s:g} s was assumed; --sample-time gives another"
     )

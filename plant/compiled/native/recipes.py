@@ -41,17 +41,22 @@ def recipe(name: str, made_of: object, machine: str) -> str | None:
     import hashlib  # which a call for help need not wait for
 
     known = identity(made_of) if _trusted and made_of is not None else None
-    if known is None:
+    sources = _sources() if known is not None else None
+    if sources is None:
         return None
-    return hashlib.sha256(f"{name}\n{machine}\n{_sources()}\n{known}".encode()).hexdigest()
+    return hashlib.sha256(f"{name}\n{machine}\n{sources}\n{known}".encode()).hexdigest()
 
 
 @cache
-def _sources() -> str:
+def _sources() -> str | None:
+    """Return a hash of all sources' stamps, or None where they are no files, as in an archive."""
     import hashlib
 
-    stamps = (stamp for package in PACKAGES for stamp in _stamps(str(_ROOT / package)))
-    return hashlib.sha256("".join(stamps).encode()).hexdigest()
+    try:
+        stamps = "".join(stamp for package in PACKAGES for stamp in _stamps(str(_ROOT / package)))
+    except OSError:
+        return None
+    return hashlib.sha256(stamps.encode()).hexdigest()
 
 
 def _stamps(folder: str) -> Iterator[str]:

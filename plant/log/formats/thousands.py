@@ -193,7 +193,10 @@ def require_none_grouped(cells: Iterable[str], name: str, source: str) -> None:
 
 
 def require_decimal_points(rows: Sequence[Sequence[str]], above: Sequence[str], source: str) -> None:
-    """Refuse rows at whose commas numbers are cut: two whole numbers below each name, such as ``0,5,1,2`` below two.
+    """Refuse rows at whose commas numbers are cut: two whole numbers below each name, such as ``0,05,1,2`` below two.
+
+    A fraction has no sign, and one that begins with a zero shows that it is one: whole numbers below a title are not
+    refused.
 
     Parameters
     ----------
@@ -212,7 +215,9 @@ def require_decimal_points(rows: Sequence[Sequence[str]], above: Sequence[str], 
     wide = len(above)
     if wide < 2 or any(len(row) != 2 * wide for row in rows) or any(_WHOLE.fullmatch(one.strip()) for one in above):
         return
-    if all(_WHOLE.fullmatch(cell.strip()) for row in rows for cell in row):
+    fractions = [cell.strip() for row in rows for cell in row[1::2]]
+    whole = all(_WHOLE.fullmatch(cell.strip()) for row in rows for cell in row)
+    if whole and all(one.isdigit() for one in fractions) and any(len(one) > 1 and one[0] == "0" for one in fractions):
         raise LogError(
             f"every row must have {wide} cells as the header has, got {2 * wide}: a comma is the decimal sign here, "
             "and stands between cells too; export the log with semicolons between cells, or with decimal points",
