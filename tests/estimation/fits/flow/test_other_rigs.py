@@ -106,6 +106,7 @@ def test_means_are_shorter_where_stiff_chambers_show_the_corners_of_the_flow() -
     assert seen(log(STIFF, 1.0, 2e-4), STIFF) == 1
 
 
+@pytest.mark.slow
 def test_a_leaky_stiff_actuator_is_followed_to_the_true_bulk_modulus() -> None:
     fit = fit_flow(log(STIFF, 2.0, 2e-4), STIFF, 1.2 * STIFF.bulk_modulus)
     value, std = fit.parameters["bulk_modulus"]

@@ -114,6 +114,7 @@ def test_a_piston_driven_to_and_fro_between_its_stops_has_them() -> None:
     assert found.sound
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error::plant.errors.LogWarning")
 def test_the_ends_of_a_staircase_ask_no_one_to_check_them() -> None:
     """Levels between them tell the gain; each log of steps had the warning."""
