@@ -42,9 +42,10 @@ def rig_contradicted(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     tuple of Note
         Empty where the log does not tell the ratio, where it is that of the rig file, and without pressure.
     """
-    balance, longer = (flow_balance(record, p, length) for length in (MIDDLE, LONG))
+    balance = flow_balance(record, p, MIDDLE)
     if balance is None or balance.contradicts_rig < REFUTED:
         return ()
+    longer = flow_balance(record, p, LONG)
     std = balance.swept_std if longer is None else hypot(balance.swept_std, balance.swept - longer.swept)
     if balance.swept <= TOLD * std or abs(ln(balance.swept)) < max(OFF, TOLD * std / balance.swept):
         return ()

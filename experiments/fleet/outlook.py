@@ -103,8 +103,7 @@ class Outlook:
         if ends[1] <= 0.0:
             return "reached"
         growth, std = self.trend.growth
-        upward = 1.0 if self.series.limit > self.series.healthy else -1.0
-        if upward * growth + std < 0.0:
+        if math.copysign(1.0, self.series.size) * growth + std < 0.0:
             return OUT_OF_SIGHT  # futures may turn round, but no reader looks for that in a severity that recedes
         if self.days_apart is None:
             return f"{span_of(*ends)} logs" if low != high else f"{ends[0]:.0f} log{'' if round(ends[0]) == 1 else 's'}"

@@ -284,17 +284,17 @@ class Log(Shown):
         from experiments.actuators import actuator, offered
 
         if self.plant == ANY:
-            from plant.log.checks import REQUIRED
+            from plant.log.checks import REQUIRED, alternatives
             from plant.log.guess import SHOWN, guess_by_name
             from plant.log.headings import cleaned
 
             sure = [one for one in guess_by_name(cleaned(self.channels)) if one.sure >= SHOWN]
             meant = {one.channel: one.spec if one.unit else f"{one.spec}:UNIT" for one in sure}
-            # a channel that nobody asked for is no example
-            meant = meant if any(one in " ".join(REQUIRED).split() for one in meant) else {}
+            if not any(name in meant for one in REQUIRED for name in alternatives(one)):
+                meant = {"motor_speed_rad_s": "N:rpm"}  # a channel that nobody asked for is no example
             refuse(
                 f"{verb} needs {' and '.join(REQUIRED)}, the log has {', '.join(self.channels)}: name them by "
-                f"read(..., columns={meant or {'motor_speed_rad_s': 'N:rpm'}}), or relate them by "
+                f"read(..., columns={meant}), or relate them by "
                 "identify(input=..., output=...)"
             )
         record, chosen = self.whole(), offered(actuator(self.plant), verb)

@@ -108,7 +108,7 @@ class EhaParameters:
 PAIRS: Mapping[str, str] = {"piston_area": "area_difference", "chamber_volume": "volume_difference"}
 """Entries that a rig file may give as two numbers, of sides A and B: mean, and their difference over their sum."""
 
-VALVES = ("relief_conductance", "makeup_conductance")
+SIZED_BY_PUMP = ("relief_conductance", "makeup_conductance")
 """Entries that go with the flow of the pump where a rig file does not give them: what is judged of the paper's."""
 
 JUDGED_STROKE = 0.25

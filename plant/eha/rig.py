@@ -14,7 +14,7 @@ from typing_extensions import TypeVar
 
 from plant.atomic import replacing
 from plant.eha.doubts import Spread, doubts_of, spreads_of
-from plant.eha.model import PAIRS, VALVES, EhaParameters
+from plant.eha.model import PAIRS, SIZED_BY_PUMP, EhaParameters
 from plant.errors import RigError
 from plant.log.columns import check_columns
 from plant.small_file import small_toml
@@ -48,7 +48,7 @@ UNEQUAL_SIDES = (*PAIRS.values(), "pilot_share")
 P = TypeVar("P", default=EhaParameters)
 
 
-SIZED = ",\n# except relief_conductance and makeup_conductance, which then go with the pump's flow."
+SIZED = f",\n# except {' and '.join(SIZED_BY_PUMP)}, which then go with the pump's flow."
 """What the template says of entries that are left out."""
 
 
@@ -294,7 +294,7 @@ def rig_template(
             lines.append(f"# two numbers where sides A and B differ: {name} = [A, B]")
         lines.append(f"# {note.meaning} [{note.unit}]; source: {note.source}")
         known = list(value) if isinstance(value, tuple) else value
-        left_out = pairs and name in (*UNEQUAL_SIDES, *VALVES)
+        left_out = pairs and name in (*UNEQUAL_SIDES, *SIZED_BY_PUMP)
         lines.append(f"# {name} = NUMBER" if known is None else f"{'# ' if left_out else ''}{name} = {known!r}")
     lines += [
         "",

@@ -9,7 +9,7 @@ from collections.abc import Container, Mapping
 from dataclasses import replace
 from functools import lru_cache
 
-from plant.eha.model import VALVES, EhaParameters
+from plant.eha.model import SIZED_BY_PUMP, EhaParameters
 from plant.eha.steady_state import steady_state
 
 PAPER_RIG = EhaParameters()
@@ -91,7 +91,7 @@ def with_valves_sized(p: EhaParameters, given: Container[str]) -> EhaParameters:
     True
     """
     flow = p.rated_flow / PAPER_RIG.rated_flow
-    return replace(p, **{name: flow * getattr(p, name) for name in VALVES if name not in given})
+    return replace(p, **{name: flow * getattr(p, name) for name in SIZED_BY_PUMP if name not in given})
 
 
 def natural_frequency(p: EhaParameters) -> float:

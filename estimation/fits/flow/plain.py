@@ -7,9 +7,9 @@ from operator import attrgetter
 
 import numpy as np
 
-from estimation.fits.flow.log import carried, flow_log
-from estimation.fits.flow.search import balanced, flow_starts, followed
-from estimation.fits.flow.swept import swept_evenly
+from estimation.fits.flow.log import flow_log
+from estimation.fits.flow.search import balanced, flow_starts, followed, likeliest_swinging
+from estimation.fits.flow.swept import with_first_fit
 from estimation.fits.flow.turns_read import with_turns_read
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
@@ -18,8 +18,8 @@ from estimation.fits.greybox.pump_ripple import Turning
 from estimation.fits.hypothesis_search.between_samples import with_course
 from estimation.fits.hypothesis_search.fit_objections import fit_explains, is_too_close, limits
 from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
-from estimation.fits.hypothesis_search.pump_ripple_fits import is_sure, with_pump_ripple
-from estimation.fits.hypothesis_search.speed_offset import MOST_SHARE, is_settled, offset_by_lost_flow
+from estimation.fits.hypothesis_search.pump_ripple_fits import with_pump_ripple
+from estimation.fits.hypothesis_search.speed_offset import bears_out, offset_by_lost_flow
 from estimation.models.flow import HELD_FLOW_FORM
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -149,7 +149,7 @@ class PlainFits:
     @property
     def swinging(self) -> GreyBoxFit:
         """The likeliest with volumes that swing."""
-        return _swinging(self.fits)
+        return likeliest_swinging(self.fits)
 
     def yields(self, sensed: ShownPlay, bulk_modulus: float) -> float:
         """Return the compliance within the encoder's play over that of the oil.
@@ -218,12 +218,11 @@ def plain_fits(logged: Logged, start: FitStart, near: Sequence[GreyBoxFit] = ())
     if settled and not (explains(found.best) or start.speed_offset):
         offset = offset_by_lost_flow(unturned, parameters)
         other = turned(offset) if offset else found
-        small = abs(other.log.speed_offset) < MOST_SHARE * parameters.rated_speed
-        found = other if small and explains(other.best) and is_sure(other, largest) and is_settled(other) else found
+        found = other if explains(other.best) and bears_out(other, largest, parameters) else found
     log, fits, teeth, left = found
     turning = Turning(log.teeth, log.speed_offset)
-    values = _swinging(fits).values
-    log = swept_evenly(carried(log, parameters, values, start.stiffest), parameters, values)
+    values = likeliest_swinging(fits).values
+    log = with_first_fit(log, parameters, values, start.stiffest)
     kept = [fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates or not is_too_close(fit, log.passes_on)]
     return PlainFits(start, starts, fitted, unturned, log, kept, explains, teeth, left, turning)
 
@@ -286,7 +285,3 @@ def quieter(plain: PlainFits, strange: GreyBoxFit) -> FitStart | None:
     white, walked = log.noise[0].variance * log.sample_time / log.block, log.noise[0].walk * log.block
     quiet = white + walked * min(modulus / heard, 1.0) ** 2
     return replace(plain.start, stiffest=modulus) if white + walked > TOO_LOUD * quiet else None
-
-
-def _swinging(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:
-    return min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=_cost)

@@ -7,10 +7,10 @@ import numpy as np
 
 from estimation.arrays import IntArray
 from estimation.fits.flow.accumulator import first_stiffness
-from estimation.fits.flow.log import DRAIN_START, OPENING_START, carried
+from estimation.fits.flow.log import DRAIN_START, OPENING_START
 from estimation.fits.flow.other_minimum import FINISHING, Found, completed_form, from_minimum, nearest
 from estimation.fits.flow.rough_search import RIVAL, UNLIKELY, RoughOptimum, rough_optima
-from estimation.fits.flow.swept import swept_evenly
+from estimation.fits.flow.swept import with_first_fit
 from estimation.fits.flow.wide_valves import opens_wide
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
@@ -147,7 +147,7 @@ def balanced(
     likely = [one for one in rough if one is near or one.point.cost < least + RIVAL]
     behind = [one for one in rough if not (_held(one.problem) or one in likely)]
     bent = opens_wide(log, parameters)
-    log = swept_evenly(carried(log, parameters, near.values, stiffest), parameters, near.values)
+    log = with_first_fit(log, parameters, near.values, stiffest)
     first = rough[0] if rough[0] in likely else near  # whose kernel has fewer runs side by side
     steps = sparing_steps(first.problem.on(log), first.point.theta)
     # the balance by mass, which has had an accumulator from the first
@@ -185,10 +185,9 @@ def followed(
     stiffest : float
         Bulk modulus that counts at most in what noise of motor speed leaves [Pa].
     """
-    near = min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=lambda fit: fit.cost)
-    log = swept_evenly(carried(log, parameters, near.values, stiffest), parameters, near.values)
+    near = likeliest_swinging(fits)
+    log = with_first_fit(log, parameters, near.values, stiffest)
     steps = log.steps if near.steps is None else near.steps
-
     bent = opens_wide(log, parameters)
 
     def led(fit: GreyBoxFit) -> Found:
@@ -196,6 +195,11 @@ def followed(
         return _finished(RoughOptimum(FreedProblem.of(fit.model, log), ended, bounds), log, steps, bent=bent)
 
     return _told(each(led, fits), log, steps)
+
+
+def likeliest_swinging(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:
+    """Return the likeliest of the fits whose volumes swing."""
+    return min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=lambda fit: fit.cost)
 
 
 def _told(done: Sequence[Found], log: GreyBoxLog, steps: IntArray) -> Sequence[GreyBoxFit]:

@@ -1,4 +1,4 @@
-"""`swept_evenly(log, ...)`: positions whose straight lines sweep the volume that the piston does.
+"""`swept_evenly(log, ...)`: positions whose straight lines sweep the volume that the piston does; `with_first_fit`.
 
 See decision 313.
 """
@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.fits.flow.log import carried
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.models.flow import FLOW_FORM
 from plant.eha.model import EhaParameters
@@ -52,3 +53,22 @@ def swept_evenly(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str
     drives = log.drives.copy()
     drives[:, position] += log.sample_time * leaks / 12.0 * np.gradient(drives[:, position])
     return replace(log, drives=drives)
+
+
+def with_first_fit(
+    log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float], stiffest: float
+) -> GreyBoxLog:
+    """Return a log as the flow form sees it once a first fit is known: the motor's noise that it keeps, even positions.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, as the flow form sees it.
+    parameters : EhaParameters
+        The actuator.
+    values : Mapping[str, float]
+        What the first fit has found [SI].
+    stiffest : float
+        As of `carried` [Pa].
+    """
+    return swept_evenly(carried(log, parameters, values, stiffest), parameters, values)

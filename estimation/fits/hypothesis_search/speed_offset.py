@@ -15,7 +15,7 @@ from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.pump_ripple import with_ripple
 from estimation.fits.hypothesis_search.lost_flow import lost_flow
-from estimation.fits.hypothesis_search.pump_ripple_fits import LEAST_OFFSET, OFFSET_WORTH, RippleFits
+from estimation.fits.hypothesis_search.pump_ripple_fits import LEAST_OFFSET, OFFSET_WORTH, RippleFits, is_sure
 from estimation.fits.hypothesis_search.wide_log import widened
 from plant.eha.model import EhaParameters
 
@@ -98,12 +98,17 @@ def offset_by_lost_flow(log: GreyBoxLog, parameters: EhaParameters) -> float:
     return offset if told else 0.0
 
 
-def is_settled(found: RippleFits) -> bool:
-    """Return whether fits with an offset of speed ask for no other one.
+def bears_out(found: RippleFits, largest: float, parameters: EhaParameters) -> bool:
+    """Return whether fits with an offset by lost flow leave nothing for anything else, or another offset, to explain.
 
     Parameters
     ----------
     found : RippleFits
         The fits.
+    largest : float
+        As of `with_pump_ripple` [dimensionless].
+    parameters : EhaParameters
+        The actuator.
     """
-    return found.best.speed_offset.gain < OFFSET_WORTH
+    small = abs(found.log.speed_offset) < MOST_SHARE * parameters.rated_speed
+    return small and is_sure(found, largest) and found.best.speed_offset.gain < OFFSET_WORTH
