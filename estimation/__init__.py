@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from estimation.diaphragm_motor.estimate import estimate_motor as estimate_motor
     from estimation.eha.bulk_modulus import EstimateOptions as EstimateOptions
     from estimation.eha.estimate import estimate_log as estimate_log
-    from estimation.filters.run import METHODS as METHODS
+    from estimation.filters.methods import METHODS as METHODS
     from estimation.filters.run import Estimate as Estimate
     from estimation.filters.run import run_filter as run_filter
     from estimation.finding import Finding as Finding

@@ -23,7 +23,7 @@ from benchmarks.peers.c_filter import FUSING, CFilter, built
 from benchmarks.targets import Check, keep
 from estimation.engine.contract import FilterProblem
 from estimation.export.task import EXPORTED_FORMS, filter_task
-from estimation.filters.run import METHODS
+from estimation.filters.methods import METHODS
 from faults.conditions import CONDITIONS, parameters_for
 from plant.arrays import Array
 from plant.eha.drives import sine

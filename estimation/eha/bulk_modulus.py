@@ -9,7 +9,6 @@ import numpy as np
 
 from estimation.eha.another_rig import unless_another_rig, unless_rig_contradicted
 from estimation.eha.another_rod import vague_areas
-from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
 from estimation.eha.foreign_oil import shows_no_motion, unless_foreign
 from estimation.eha.named_methods import NAMED
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, is_vague, too_wide, without_number
@@ -57,7 +56,7 @@ class EstimateOptions:
         errata E9), or ``"auto"``: flow or motion where their channels are logged, else pressure.
     method : str
         ``"least-squares"`` for the forms that can be fitted, flow and motion; a filter of
-        `estimation.filters.run.METHODS`; a method of `estimation.eha.named_methods.NAMED`, which has a form of its own;
+        `estimation.filters.methods.METHODS`; a method of `estimation.eha.named_methods.NAMED`, with a form of its own;
         or ``"auto"``: least squares where the form allows, the log begins at rest, and nothing is asked for that only a
         filter does, else what `estimation.eha.by_filter.chosen_method` says.
     start : float, optional
@@ -83,13 +82,7 @@ class EstimateOptions:
     @property
     def filtering(self) -> bool:
         """Whether an option is set that only a filter has."""
-        return self.method not in ("auto", LEAST_SQUARES) or self.filter_options != FilterOptions()
-
-    @property
-    def filter_options(self) -> FilterOptions:
-        """The filter's part."""
-        method = "auto" if self.method in ("auto", LEAST_SQUARES) else self.method
-        return FilterOptions(method, self.states, self.tuned, self.robust)
+        return self.method not in ("auto", LEAST_SQUARES) or bool(self.states) or self.tuned or self.robust != "none"
 
 
 DEFAULT_OPTIONS = EstimateOptions()
@@ -208,21 +201,11 @@ def estimate_clean(
     if fit is not None and (slips := _channel_slips(fit, parameters)):
         slips = unless_rig_contradicted(slips, log.record, parameters)
         return without_number(Outcome.MISMATCH, slips, form, FITTED[form][1])
-    if fit is not None:
-        found = _fitted(fit, form, FITTED[form][1])
-        if form == "flow":
-            found = replace(found, responses=fitted_responses(fit))
-    elif form == "flow":
-        found = estimate_by_flow_filter(log, parameters, options.filter_options, guess)
-    elif options.method == LEAST_SQUARES or form == "motion":
-        raise HydrostateError(
-            f"the {form} form is {'filtered' if form in FORMS else 'fitted by least squares'}, "
-            f"got method {options.method!r}"
-        )
+    if fit is None:
+        found = _filtered(log, parameters, form, guess, options)
     else:
-        require_known("form", form, FORMS)
-        how = options.filter_options
-        found = estimate_by_filter(log, parameters, FORMS[form], guess, options.start_std, how)
+        found = _fitted(fit, form, FITTED[form][1])
+        found = replace(found, responses=fitted_responses(fit)) if form == "flow" else found
     found = unless_another_rig(_with_rig(found, parameters, spreads), log, parameters)
     return _doubting_sensors(unless_foreign(found, log.record, parameters) if form == "flow" else found, log)
 
@@ -244,6 +227,23 @@ def _fit(
     ended = any(note.code == EstimateCode.SEARCH_ENDED for note in fit.reasons)
     plain = not fit.reasons  # to the noise: a load that leaks off at once leaves nothing strange
     return None if loaded and fit.explanation is None and not (ended or plain) else fit  # a filter needs no rest
+
+
+def _filtered(
+    log: CleanLog, parameters: EhaParameters, form: str, guess: float, options: EstimateOptions
+) -> BulkModulusEstimate:
+    """Return the estimate of a filter; a log that is fitted imports none."""
+    from estimation.eha.by_filter import FilterOptions, estimate_by_filter, estimate_by_flow_filter
+
+    method = "auto" if options.method == LEAST_SQUARES else options.method
+    chosen = FilterOptions(method, options.states, options.tuned, options.robust)
+    if form == "flow":
+        return estimate_by_flow_filter(log, parameters, chosen, guess)
+    if options.method == LEAST_SQUARES or form == "motion":
+        how = "filtered" if form in FORMS else "fitted by least squares"
+        raise HydrostateError(f"the {form} form is {how}, got method {options.method!r}")
+    require_known("form", form, FORMS)
+    return estimate_by_filter(log, parameters, FORMS[form], guess, options.start_std, chosen)
 
 
 def _wrong_sensors(log: CleanLog, form: str) -> tuple[Note, ...]:

@@ -10,7 +10,8 @@ from estimation.eha.by_flow_filter import filter_flow
 from estimation.eha.named_methods import NAMED, NamedMethod
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, too_wide
 from estimation.filters.iterated_smoother import LONGEST
-from estimation.filters.run import METHODS, Estimate, available_channels, run_filter
+from estimation.filters.methods import METHODS
+from estimation.filters.run import Estimate, available_channels, run_filter
 from estimation.finding import Gate, Outcome
 from estimation.log_checks.channel_names import POSITION, PRESSURE
 from estimation.log_checks.clean import CleanLog
@@ -54,8 +55,8 @@ class FilterOptions:
     Parameters
     ----------
     method : str
-        A filter of `estimation.filters.run.METHODS`, a method of `estimation.eha.named_methods.NAMED`, or ``"auto"``:
-        see `chosen_method`.
+        A filter of `estimation.filters.methods.METHODS`, a method of `estimation.eha.named_methods.NAMED`, or
+        ``"auto"``: see `chosen_method`.
     states : tuple of str
         What is estimated beside bulk modulus: of `AUGMENTABLE`, or of `GROUPS`.
     tuned : bool

@@ -35,7 +35,7 @@ class NamedMethod:
     form : str
         What is believed of the actuator.
     method : str
-        A filter of `estimation.filters.run.METHODS`.
+        A filter of `estimation.filters.methods.METHODS`.
     noise : Mapping[str, float]
         Process-noise densities by state, in place of the form's [SI squared a second].
     variances : Mapping[str, float]

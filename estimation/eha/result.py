@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from estimation.eha.rig_share import Responses, rig_notes, with_total
 from estimation.filters.run import Estimate
@@ -10,9 +11,11 @@ from estimation.finding import Gate, Outcome, Quantity, positive_interval_95
 from estimation.fits.greybox.pump_ripple import EVENLY, Turning
 from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.notes import EstimateCode
-from estimation.tuning.tuning import Tuning
 from plant.eha.doubts import Spread
 from plant.notes import Note
+
+if TYPE_CHECKING:
+    from estimation.tuning.tuning import Tuning
 
 LARGEST_BOUND = 0.03
 """Relative Cramér-Rao bound above which bulk modulus is called not observable (errata E13) [fraction]."""
@@ -61,7 +64,7 @@ class BulkModulusEstimate:
     remarks : tuple of Note
         What the log leaves open, and is nothing against the estimate.
     method : str
-        How it was estimated: ``least-squares``, a filter of `estimation.filters.run.METHODS`, or a method of
+        How it was estimated: ``least-squares``, a filter of `estimation.filters.methods.METHODS`, or a method of
         `estimation.eha.named_methods.NAMED`.
     turning : Turning
         Teeth of the pump and offset of the speed that were taken up.
@@ -82,7 +85,7 @@ class BulkModulusEstimate:
     first_pass: Estimate | None = None
     responses: Mapping[str, Responses] = field(default_factory=lambda: MappingProxyType({}))
     spreads: Mapping[str, Spread] = field(default_factory=lambda: MappingProxyType({}))
-    tuning: Tuning | None = None
+    tuning: "Tuning | None" = None
     explanation: Explanation | None = None
     remarks: tuple[Note, ...] = ()
     method: str = "least-squares"

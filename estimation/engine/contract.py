@@ -1,7 +1,7 @@
 """Input and output of a filter: the contract of every method in `METHODS`.
 
 A method is a function ``method(problem) -> Trace``. To add one, write such a function in a file of its own and give it
-a line in `estimation.filters.run.METHODS`; nothing else changes.
+a line in `estimation.filters.methods.METHODS`; nothing else changes.
 """
 
 from collections.abc import Callable, Mapping

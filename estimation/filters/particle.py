@@ -5,7 +5,7 @@ something is measured. Weights are logarithms. It converges to the exact posteri
 all that it is for: a state without process noise keeps only the values that were drawn at first, so give it noise, and
 a sensor much sharper than the belief needs as many particles as the belief is wider, at least.
 
-As a method of `estimation.filters.run.METHODS` it draws from a seed that is one of its settings, so that it repeats
+As a method of `estimation.filters.methods.METHODS` it draws from a seed that is one of its settings, so that it repeats
 itself, and lets constants walk: bulk modulus is then found to a few percent where pressure is logged. Position and
 velocity alone are so sharp that a thousand particles all miss them, and the consistency gate says so.
 """

@@ -8,17 +8,6 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.engine.contract import FilterProblem, Method, Trace
-from estimation.filters.ckf import ckf
-from estimation.filters.ekf import ekf
-from estimation.filters.filterpy_bridge import filterpy_ekf
-from estimation.filters.iekf import iekf
-from estimation.filters.imm import imm
-from estimation.filters.iterated_smoother import iterated_smoother
-from estimation.filters.particle import particle
-from estimation.filters.sif import sif
-from estimation.filters.smoother import smoother
-from estimation.filters.svsf import svsf
-from estimation.filters.ukf import ukf
 from estimation.log_checks.bridging import with_gaps_open
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.gaussian import Gaussian
@@ -27,21 +16,6 @@ from plant.compiled.expression import symbol
 from plant.errors import LogError, require_known
 from plant.log.record import Record
 from plant.solvers.steps import Parameters, parameter_row, parameter_symbols
-
-METHODS: Mapping[str, Method] = {
-    "ekf": ekf,
-    "iekf": iekf,
-    "ukf": ukf,
-    "ckf": ckf,
-    "svsf": svsf,
-    "sif": sif,
-    "imm": imm,
-    "particle": particle,
-    "smoother": smoother,
-    "iterated-smoother": iterated_smoother,
-    "filterpy-ekf": filterpy_ekf,
-}
-"""The filters, by name."""
 
 ROBUST = ("none", "huber", "student-t")
 """How gross outliers may count."""
@@ -130,7 +104,7 @@ def run_filter(
     Parameters
     ----------
     method : callable
-        A filter of `METHODS`.
+        A filter of `estimation.filters.methods.METHODS`.
     prior : Gaussian
         Belief before the first sample, in SI.
     record : Record

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from estimation.eha.named_methods import NAMED
-from estimation.filters.run import METHODS
+from estimation.filters.methods import METHODS
 from estimation.log_checks.first_belief import START_STD
 from estimation.models.eha_forms import FORMS
 from experiments.actuator_kind import ActuatorKind

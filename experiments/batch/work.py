@@ -22,7 +22,8 @@ from estimation.eha.bulk_modulus import DEFAULT_OPTIONS, EstimateOptions, estima
 from estimation.eha.estimate import estimated, finding_of
 from estimation.eha.result import BulkModulusEstimate
 from estimation.engine.contract import FilterProblem
-from estimation.filters.run import METHODS, filter_problem, predicted_channels
+from estimation.filters.methods import METHODS
+from estimation.filters.run import filter_problem, predicted_channels
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.log_checks.first_belief import PRESSURE_NOISE_LOGGED, first_belief
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances

@@ -64,21 +64,25 @@ def _prepared_estimation(
 def _how(options: Options) -> "EstimateOptions":
     """Check the options, and return them as the estimate takes them."""
     from estimation.eha.bulk_modulus import FITTED, LEAST_SQUARES, EstimateOptions
-    from estimation.eha.by_filter import GROUPS
-    from estimation.eha.named_methods import NAMED
-    from estimation.filters.run import METHODS, ROBUST
-    from estimation.models.augment import AUGMENTABLE
+    from estimation.filters.run import ROBUST
     from estimation.models.eha_forms import FORMS
 
     form, method, robust, start = (options[name] for name in ("form", "method", "robust", "start"))
     require_known("--form", form, ["auto", *FITTED, *FORMS])
-    require_known("--method", method, ["auto", LEAST_SQUARES, *NAMED, *METHODS])
+    if method not in ("auto", LEAST_SQUARES):  # else no filter is imported
+        from estimation.eha.named_methods import NAMED
+        from estimation.filters.methods import METHODS
+
+        require_known("--method", method, ["auto", LEAST_SQUARES, *NAMED, *METHODS])
     require_known("--robust", robust, list(ROBUST))
     if options["smooth"] and method not in ("auto", "ekf", "smoother"):
         raise HydrostateError(f"--smooth smooths the ekf, got --method {method}")
-    wanted = listed(options["states"])
-    for name in wanted:
-        require_known("--states", name, [*GROUPS, *AUGMENTABLE])
+    if wanted := listed(options["states"]):
+        from estimation.eha.by_filter import GROUPS
+        from estimation.models.augment import AUGMENTABLE
+
+        for name in wanted:
+            require_known("--states", name, [*GROUPS, *AUGMENTABLE])
     require_positive("--start-std", options["start_std"], "Pa")
     if start != 0.0:
         require_positive("--start", start, "Pa")

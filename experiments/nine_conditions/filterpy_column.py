@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 
 from estimation.eha.named_methods import NAMED
-from estimation.filters.run import METHODS, Estimate, available_channels, run_filter
+from estimation.filters.methods import METHODS
+from estimation.filters.run import Estimate, available_channels, run_filter
 from estimation.log_checks.first_belief import START_STD, first_belief
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.eha_forms import BULK_MODULUS, FORMS

@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 
 from estimation.eha.named_methods import NAMED, PUBLISHED_TIME
-from estimation.filters.run import METHODS, run_filter
+from estimation.filters.methods import METHODS
+from estimation.filters.run import run_filter
 from estimation.log_checks.first_belief import START_STD, first_belief
 from estimation.models.eha_forms import BULK_MODULUS, PRINTED_FORM
 from experiments.nine_conditions.bulk_modulus import PUBLISHED_WAY

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from estimation.filters.run import METHODS, run_filter
+from estimation.filters.methods import METHODS
+from estimation.filters.run import run_filter
 from estimation.finding import NORMAL_95
 from estimation.fits.greybox.fit import fit_greybox
 from estimation.fits.greybox.log import greybox_log

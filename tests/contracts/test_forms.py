@@ -7,7 +7,8 @@ import pytest
 
 from estimation.engine.contract import Method
 from estimation.engine.linearised import compile_step
-from estimation.filters.run import METHODS, Estimate, run_filter
+from estimation.filters.methods import METHODS
+from estimation.filters.run import Estimate, run_filter
 from estimation.log_checks.first_belief import first_belief
 from estimation.models.eha_forms import BULK_MODULUS, FORMS
 from estimation.models.model import ProcessModel

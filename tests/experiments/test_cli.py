@@ -115,6 +115,18 @@ def test_help_and_version_wait_for_no_heavy_import() -> None:
     assert done.stdout.splitlines()[-2:] == ["hydrostate 0.1.0", "[]"]
 
 
+def test_a_log_that_is_fitted_waits_for_no_filter(tmp_path: Path) -> None:
+    """They and the tuning were a fifteenth of all imports, for the names of their options."""
+    (tmp_path / "log.csv").write_text("time_s,motor_speed_rad_s\n0,1\n")
+    code = (
+        "import sys\nimport faults.diagnosis.diagnose\nfrom experiments.cli import app\n"
+        f"try:\n    app(['estimate', {str(tmp_path / 'log.csv')!r}])\nexcept SystemExit as end:\n    assert end.code\n"
+        "print(sorted({'estimation.filters.methods', 'estimation.tuning.tuning'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)  # noqa: S603
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

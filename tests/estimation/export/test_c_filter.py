@@ -12,7 +12,8 @@ from benchmarks.peers.c_filter import built
 from estimation.engine.contract import FilterProblem
 from estimation.export.c_filter import EXPORTED, filter_in_c
 from estimation.export.task import EXPORTED_FORMS, filter_task
-from estimation.filters.run import METHODS, in_si
+from estimation.filters.methods import METHODS
+from estimation.filters.run import in_si
 from estimation.models.eha_forms import BULK_MODULUS
 from estimation.trust.consistency import LARGEST_NIS
 from faults.conditions import CONDITIONS

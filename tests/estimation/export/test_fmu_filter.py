@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.filters.export_c import SAMPLE_TIME, task
 from estimation.export.fmu_filter import filter_fmu
-from estimation.filters.run import METHODS
+from estimation.filters.methods import METHODS
 from tests.c_compiler import compiler
 
 

@@ -9,7 +9,8 @@ from estimation.eha.bulk_modulus import estimate_bulk_modulus
 from estimation.filters.ckf import CKF
 from estimation.filters.ekf import ekf
 from estimation.filters.imm import bank_parameters, imm, log_transitions
-from estimation.filters.run import METHODS, filter_problem, run_filter
+from estimation.filters.methods import METHODS
+from estimation.filters.run import filter_problem, run_filter
 from estimation.filters.svsf import SVSF
 from estimation.models.augment import augmented, augmented_prior
 from estimation.models.eha_forms import FORMS

@@ -15,10 +15,11 @@ import pytest
 from estimation.engine.contract import FilterProblem, Trace
 from estimation.filters.batch import filter_batch
 from estimation.filters.imm import IMM_SETTINGS, bank_parameters, log_transitions
+from estimation.filters.methods import METHODS
 from estimation.filters.online import OnlineFilter
 from estimation.filters.particle import PARTICLE_SETTINGS
 from estimation.filters.relinearised import relinearised
-from estimation.filters.run import METHODS, filter_problem, in_si, run_filter
+from estimation.filters.run import filter_problem, in_si, run_filter
 from estimation.filters.sif import SIF_SETTINGS
 from estimation.filters.svsf import SVSF_SETTINGS
 from estimation.filters.ukf import UKF_SETTINGS

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from benchmarks.filters.export_c import task
+from estimation.filters.methods import METHODS
 from estimation.filters.online import RULES, OnlineFilter
-from estimation.filters.run import METHODS
 from plant.errors import HydrostateError
 
 SAMPLES = 1200

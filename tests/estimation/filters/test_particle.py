@@ -8,8 +8,9 @@ from scipy.stats import norm
 
 from estimation.engine.contract import FilterProblem
 from estimation.filters.ekf import ekf
+from estimation.filters.methods import METHODS
 from estimation.filters.particle import gather, particle, particle_filter, predicted, resample, weigh
-from estimation.filters.run import METHODS, filter_problem
+from estimation.filters.run import filter_problem
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
 from plant.eha.model import EhaParameters

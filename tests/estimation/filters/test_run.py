@@ -8,7 +8,8 @@ import pytest
 
 from estimation.engine.contract import Method
 from estimation.filters.ekf import ekf
-from estimation.filters.run import METHODS, Estimate, available_channels, run_filter
+from estimation.filters.methods import METHODS
+from estimation.filters.run import Estimate, available_channels, run_filter
 from estimation.log_checks.first_belief import first_belief
 from estimation.models.eha_forms import ACCELERATION_FORM, FORMS, PRESSURE_FORM
 from estimation.models.gaussian import Gaussian

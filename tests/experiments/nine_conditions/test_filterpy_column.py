@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.filters.run import METHODS, Estimate, run_filter
+from estimation.filters.methods import METHODS
+from estimation.filters.run import Estimate, run_filter
 from estimation.log_checks.first_belief import first_belief
 from estimation.models.eha_forms import BULK_MODULUS, FORMS
 from experiments.nine_conditions.filterpy_column import EQUAL, compared, verdict_counts
