@@ -271,11 +271,11 @@ def _fitted(ended: list[Ended], *, sparing: bool = False) -> tuple[list[GreyBoxF
     They may be spared where the log holds bulk modulus far too weakly; what it was on the way is another one then.
     """
     first, second = sorted(ended, key=lambda one: (not one.explains, one.point.cost))
-    search, best, others = first.search, first.point, list[float]()
+    search, best, reached, others = first.search, first.point, first.point, list[float]()
     part, whole, bounds = search.part, search.whole, search.bounds
     if not first.explains:
         wanted = _wanted(part, best, BEGINNING)
-        best = descend(part.at, best.theta, FINISHING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
+        best = reached = descend(part.at, best.theta, FINISHING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
     asked = best.cost < explained(part)
     spared = sparing and asked and far_too_weak(part, best, whole)
     if spared:
@@ -286,7 +286,7 @@ def _fitted(ended: list[Ended], *, sparing: bool = False) -> tuple[list[GreyBoxF
     hopeful = asked and not disagree([bulk_modulus(part, best), *others])
     if hopeful:
         best = descend(whole.at, best.theta, FINISHING, bounds)
-    else:
+    elif first.explains or best is not reached or len(part.log.measured) < len(whole.log.measured):
         wanted = _wanted(whole, best)
         best = descend(whole.at, best.theta, FINISHING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
     if not asked and best.cost < explained(whole):

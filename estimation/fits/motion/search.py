@@ -68,6 +68,10 @@ EXPLAINED = 1.1
 HOPELESS = 3.0
 """The same from which no other than the likeliest start of each way is tried [dimensionless]."""
 
+FOREIGN = 10.0
+"""The same, on the first `SEARCHED` samples, from which what nearly explains the first `SCREENED` is not left for a
+deeper minimum [dimensionless]. Judged: such ends had 100 to 600, and the beginning held little that moves."""
+
 SLIGHT = 1e-3
 """Cost that a further step must promise where nothing explains the log, over what would explain it [fraction]."""
 
@@ -301,10 +305,16 @@ class _Tries:
             return short.at(more.theta), False
         promising, share = SLIGHT * wanted, SLIGHT_SHARE if self._begun.work > MOST_WORK else 0.0
         point = descend(at(short), self.best.theta, RETURNING, bounds, promising, least_share=share)
-        if point.cost < HOPELESS * wanted:
+        if point.cost < HOPELESS * wanted and self._leads_on(point):
             point = annealed(short, point, bounds, promising, SAME_COST * wanted, at, share)
         found = self.carried_on(point.theta) if point.cost < wanted else None
         return (point, False) if found is None else (found, True)
+
+    def _leads_on(self, point: Point) -> bool:
+        """Return whether more of the log is nearly explained from a point that nearly explains its beginning."""
+        search, wanted = self.search, FOREIGN * explained(self.search.part)
+        at = self._begun.at(search.part)
+        return descend(at, point.theta, FINISHING, search.bounds, ENOUGH, wanted=wanted).cost < wanted
 
 
 def rough(problem: FreedProblem, factors: tuple[float, float]) -> FreedProblem:

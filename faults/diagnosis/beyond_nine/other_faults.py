@@ -17,6 +17,7 @@ import numpy as np
 from faults.conditions import CONDITIONS
 from faults.diagnosis.beyond_nine.left_open import (
     DELIVERIES,
+    UNSEEN,
     WORTH_SAYING,
     OpenFault,
     not_excluded,
@@ -55,6 +56,9 @@ EARLY = "a relief valve that opens early"
 
 STUCK = "a make-up valve that is stuck shut"
 """What that one is called. One that never has to open leaves no trace, whatever it is."""
+
+LEFT_UNSEEN = math.log(UNSEEN / (1.0 - UNSEEN))
+"""Log-likelihood of one before a log is seen, where the log does not tell it [dimensionless]: as with pressure."""
 
 SOUND = "a sound circuit"
 """What one is called that differs from the rig file's in what no rig file knows."""
@@ -163,6 +167,8 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     odds = {name: gain - GAIN for name, gain in gains.items() if gain > NOT_EXCLUDED}
     if WORN in odds:
         odds[WORN] = wear
+    if STUCK in odds:  # one that never has to open has the likelihood of a sound one, and keeps what is presumed of it
+        odds[STUCK] = max(odds[STUCK], min(gains[STUCK], 0.0) + LEFT_UNSEEN)
     pressure = largest_pressure(blocks, sound.fits.best, sound.actuator)
     hidden = odds_of_hidden_relief(pressure, sound.actuator.circuit.relief_pressure) - GAIN
     likeliest[EARLY] = likeliest[EARLY] if odds.get(EARLY, -math.inf) > hidden else best  # none moves what it hides in

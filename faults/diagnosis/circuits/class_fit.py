@@ -283,8 +283,7 @@ def _pull() -> Array:
 
 
 def _at(blocks: Blocks, actuator: Actuator, centre: Array, point: Array, pull: Array) -> PointFit:
-    around = np.vstack([point, point + STEP * np.eye(len(point))])
-    runs = predicted(blocks, parameter_rows(around, actuator.circuit, actuator.rated))
+    runs = _around(blocks, actuator, point.tobytes())
     scales = scales_of(blocks, runs[0])
     slopes = (runs[1:] - runs[0]) / STEP
     weighted = np.where(blocks.seen, slopes[:, blocks.first :] / scales, 0.0).reshape(len(point), -1)
@@ -292,6 +291,16 @@ def _at(blocks: Blocks, actuator: Actuator, centre: Array, point: Array, pull: A
     off = point - centre
     cost = misfit(blocks, runs[0], scales) + 0.5 * float(off @ pull @ off)
     return PointFit(point, cost, information, scales, runs[0], slopes)
+
+
+@lru_cache(maxsize=ROUNDS + 1)
+def _around(blocks: Blocks, actuator: Actuator, place: bytes) -> Array:
+    """Return the runs of a circuit and of its neighbours: a rough and a thorough search from one start begin alike."""
+    point = np.frombuffer(place)
+    around = np.vstack([point, point + STEP * np.eye(len(point))])
+    runs = predicted(blocks, parameter_rows(around, actuator.circuit, actuator.rated))
+    runs.flags.writeable = False
+    return runs
 
 
 def _step(blocks: Blocks, fit: PointFit, centre: Array, pull: Array) -> Array:

@@ -12,6 +12,7 @@ from estimation.fits.motion import search as motion_search
 from estimation.fits.motion.fit import unseen
 from estimation.fits.motion.search import (
     FINALISTS,
+    FOREIGN,
     HOPELESS,
     MOST_WORK,
     SLIGHT_SHARE,
@@ -148,6 +149,21 @@ def test_an_end_that_explains_the_beginning_is_carried_on_as_a_start_is(monkeypa
     assert (first.explains, second.explains) == (True, False)
     assert first.point.theta[0] == 7.5
     assert first.point.cost == 0.5 * PART
+
+
+@pytest.mark.parametrize(("factor", "left"), [(0.9, True), (1.1, False)])
+def test_an_end_is_not_left_for_a_deeper_one_where_more_of_the_log_is_foreign(
+    monkeypatch: pytest.MonkeyPatch, factor: float, left: bool
+) -> None:
+    def of_part(problem: SimpleNamespace) -> float:
+        here = explained(cast("motion_search.FreedProblem", problem))
+        return here * 2.0 / (1.1 * factor * FOREIGN) if len(problem.log.measured) == PART else here
+
+    ends: list[Point] = []
+    monkeypatch.setattr(motion_search, "explained", of_part)
+    monkeypatch.setattr(motion_search, "annealed", lambda _, point, *__: ends.append(point) or point)
+    ended(lambda _: 2.0, lambda _: 2.5)
+    assert bool(ends) is left
 
 
 def test_what_explains_the_first_seconds_alone_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -43,7 +43,15 @@ def test_a_search_need_not_go_on_that_cannot_come_to_explain_a_log_whose_class_s
 def test_the_beginning_of_a_log_is_searched_on_further_than_the_whole(
     chi_square: float, spared: tuple[bool, bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    part, whole = problem_of(chi_square, 10_000), problem_of(chi_square, 20_000)
+    assert tuple(searched(problem_of(chi_square, 10_000), problem_of(chi_square, 20_000), monkeypatch)) == spared
+
+
+def test_a_log_that_is_no_longer_than_its_beginning_is_searched_on_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert len(searched(problem_of(50.1, 10_000), problem_of(50.1, 10_000), monkeypatch)) == 1
+
+
+def searched(part: Any, whole: Any, monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """Return which searches of a log that nothing explains may end early, in their order."""
     asked: list[bool] = []
 
     def noted(*_: Any, wanted: float = np.inf, **__: Any) -> Point:
@@ -57,4 +65,4 @@ def test_the_beginning_of_a_log_is_searched_on_further_than_the_whole(
     search: Any = SimpleNamespace(part=part, whole=whole, bounds=None)
     ended = [Ended(search, BEGUN, explains=False)] * 2
     assert motion_fit._fitted(ended) == (["concluded"], [], False)
-    assert tuple(asked) == spared
+    return asked

@@ -100,7 +100,7 @@ def test_what_no_rig_file_knows_is_no_fault(circuit: CircuitParameters) -> None:
 def test_a_valve_that_never_had_to_open_is_not_excluded_and_a_worn_pump_is_where_speeds_tell_it() -> None:
     against, open_ = said(log_of(condition="normal"))
     assert not against
-    assert "stuck shut" in open_
+    assert "stuck shut (10 %)" in open_  # as likely as with pressure, where it never opened either
     assert "worn pump" not in open_
 
 

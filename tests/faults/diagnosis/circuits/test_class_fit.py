@@ -111,11 +111,23 @@ def test_a_search_that_cannot_come_to_what_is_wanted_ends_after_a_step_or_two(be
     whole = fit_freely(log(), ACTUATOR, "minor_leakage", start)
     runs: list[int] = []
     with pytest.MonkeyPatch.context() as patch:
-        real = class_fit.predicted
-        patch.setattr(class_fit, "predicted", lambda *args: runs.append(1) or real(*args))
+        real = class_fit._at
+        patch.setattr(class_fit, "_at", lambda *args: runs.append(1) or real(*args))
         there = fit_freely(log(), ACTUATOR, "minor_leakage", start, wanted=whole.cost - below)
     assert (len(runs) <= 2) == ends
     assert (there.cost == whole.cost) == (not ends)
+
+
+def test_a_thorough_search_runs_no_circuit_again_that_a_rough_one_from_the_same_start_ran() -> None:
+    blocks, name, runs = replace(log()), "minor_leakage", list[int]()
+    with pytest.MonkeyPatch.context() as patch:
+        real = class_fit.predicted
+        patch.setattr(class_fit, "predicted", lambda *args: runs.append(1) or real(*args))
+        roughly = fit_freely(blocks, ACTUATOR, name, gained=10.0)
+        count = len(runs)
+        thorough = fit_freely(blocks, ACTUATOR, name, ACTUATOR.conditions[list(CONDITIONS).index(name)], gained=10.0)
+    assert count == len(runs) > 1
+    np.testing.assert_array_equal(thorough.coordinates, roughly.coordinates)
 
 
 def test_nominal_circuits_of_a_log_run_once_and_nobody_changes_them() -> None:
