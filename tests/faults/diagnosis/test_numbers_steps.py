@@ -57,7 +57,7 @@ def rounds_of_free_fits() -> dict[str, Any]:
     afar = ACTUATOR.conditions[8] + 0.4
     for name, start, gained in (("usual", None, 0.5), ("roughly", None, 50.0), ("from afar", afar, 0.5)):
         with patch.object(class_fit, "predicted", side_effect=runs) as asked:
-            fit = fit_freely(blocks(), ACTUATOR, "normal", start, gained)
+            fit = fit_freely(replace(blocks()), ACTUATOR, "normal", start, gained)  # whose runs are not known yet
         told[name] = {"rounds": Roughly(asked.call_count, 0.1), "cost": Roughly(fit.cost, 1e-3)}
     with patch.object(class_fit, "predicted", side_effect=runs) as asked:
         fit_classes(blocks("major_friction"), ACTUATOR)
