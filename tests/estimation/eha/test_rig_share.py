@@ -173,7 +173,7 @@ def test_a_note_names_the_entry_that_bulk_modulus_is_known_as_well_as() -> None:
 
 @pytest.mark.slow
 def test_total_intervals_cover_where_rigs_are_as_wrong_as_they_are_said_to_be() -> None:
-    logs = 60
+    logs = 30
     rng, covered, given = np.random.default_rng(5), list[bool](), list[bool]()
     for trial in range(logs):
         wrong = {name: math.exp(DOUBTS[name].usual.up * rng.standard_normal()) for name in (*ENTRIES, PRESSURE_GAIN)}

@@ -75,23 +75,16 @@ def test_every_foreign_log_gets_its_class(truth: dict[str, dict[str, str]]) -> N
 
 
 @pytest.mark.slow
-def test_every_foreign_log_gets_its_class_without_pressure(truth: dict[str, dict[str, str]]) -> None:
-    found = {one["file"]: one["condition"] for one in results("diagnose", *truth, "--no-pressure")}
-    assert found == {log: row["name"] for log, row in truth.items()}  # measured: all 18; 15 are asked for
-
-
-@pytest.mark.slow
-def test_a_leaking_foreign_log_gets_its_class_without_pressure(truth: dict[str, dict[str, str]]) -> None:
-    *_, log = (log for log, row in truth.items() if row["name"] == "major_leakage")
-    (found,) = results("diagnose", log, "--no-pressure")
-    assert found["condition"] == "major_leakage"
-
-
-@pytest.mark.slow
-def test_estimates_that_the_model_does_not_explain_are_not_called_good(truth: dict[str, dict[str, str]]) -> None:
-    for one in results("estimate", *truth, "--no-pressure"):
-        off = (
-            one["bulk_modulus_pa"]["value"] is None
-            or abs(one["bulk_modulus_pa"]["value"] / float(truth[one["file"]]["bulk_modulus_pa"]) - 1.0) > 0.1
-        )
-        assert not (off and one["gate"]["passed"])
+def test_without_pressure_every_foreign_log_gets_its_class_and_is_close_or_not_called_good(
+    truth: dict[str, dict[str, str]],
+) -> None:
+    found = results("diagnose", *truth, "--no-pressure")
+    # measured: all 18; 15 are asked for
+    assert {one["file"]: one["condition"] for one in found} == {log: row["name"] for log, row in truth.items()}
+    close = 0
+    for one in found:
+        value, true = one["bulk_modulus_pa"]["value"], float(truth[one["file"]]["bulk_modulus_pa"])
+        error = float("inf") if value is None else abs(value / true - 1.0)
+        close += error < 0.05
+        assert error <= 0.1 or not one["gate"]["passed"]
+    assert close >= 15
