@@ -42,10 +42,10 @@ def between_stops(seed: int, n: int = 600) -> tuple[Array, Array]:
     return u, y + 0.005 * np.random.default_rng([seed, 2]).normal(size=n)
 
 
-@pytest.mark.parametrize("after", [0.0, 0.01])
-def test_the_gain_of_an_output_that_is_cut_off_is_that_of_the_plant(after: float) -> None:
+@pytest.mark.parametrize(("after", "order"), [(0.0, 1), (0.01, None)])
+def test_the_gain_of_an_output_that_is_cut_off_is_that_of_the_plant(after: float, order: int | None) -> None:
     with pytest.warns(LogWarning, match="cut off at"):
-        found = identify_channels(cut_off(0, 0.4, after=after))
+        found = identify_channels(cut_off(0, 0.4, after=after), order=order, delay=order)
     assert found.sound
     assert found.model.linear is not None
     assert abs(found.model.linear.dc_gain - 2.0) < 3.0 * found.model.linear.dc_gain_std < 0.05
@@ -61,14 +61,14 @@ def test_limits_are_looked_for_where_outputs_are_missing_regularly(every: int, s
     data = cut_off(seed, 0.5)
     rows = np.arange(data.y[0].size) % every
     missing = rows == 2 if every == 3 else rows > 0
-    found = identify_channels(replace(data, y=(np.where(missing, np.nan, data.y[0]),)))
+    found = identify_channels(replace(data, y=(np.where(missing, np.nan, data.y[0]),)), order=1, delay=1)
     assert IdentificationCode.OUTPUT_CUT_OFF in {note.code for note in found.notes}
     assert found.model.linear is not None
     assert abs(found.model.linear.dc_gain - 2.0) < 3.0 * found.model.linear.dc_gain_std < 0.2
 
 
 def test_an_output_that_is_nowhere_cut_off_has_no_limits() -> None:
-    found = identify_channels(cut_off(0, np.inf))
+    found = identify_channels(cut_off(0, np.inf), order=1, delay=1)
     assert not {IdentificationCode.OUTPUT_CUT_OFF, IdentificationCode.OUTPUT_STOPPED} & {n.code for n in found.notes}
     assert not isinstance(found.model.dynamics, LimitedDynamics)
 
@@ -79,7 +79,7 @@ def test_an_end_that_one_block_alone_reaches_is_told() -> None:
     u *= np.where(np.arange(600) // 120 == 2, 1.0, 0.2)
     y = np.minimum(filtered(np.array([0.0, 0.2]), np.array([1.0, -0.9]), u), 0.5) + 0.01 * rng.normal(size=600)
     with pytest.warns(LogWarning, match="does not tell whether it is cut off"):
-        found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"))
+        found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"), order=1, delay=1)
     (said,) = (note for note in found.notes if note.code == IdentificationCode.OUTPUT_AT_END)
     assert float(said.data["limits"]) == pytest.approx(0.5, abs=0.01)
     assert not isinstance(found.model.dynamics, LimitedDynamics)
@@ -94,7 +94,7 @@ def test_an_output_that_settles_at_the_level_of_its_input_has_no_limits(seed: in
         y[t] = y[t - 1] + (0.12 if u[t - 1] > y[t - 1] else 0.04) * (u[t - 1] - y[t - 1])
     y += 0.005 * rng.normal(size=1500)
     with pytest.warns(LogWarning, match="does not tell whether it is cut off"):
-        found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"))
+        found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"), order=1, delay=1)
     assert found.model.linear is not None
     assert found.model.linear.dc_gain == pytest.approx(1.0, abs=0.1)
 
@@ -109,7 +109,7 @@ def test_a_piston_driven_to_and_fro_between_its_stops_has_them() -> None:
         x[t] = np.clip(x[t - 1] + v, -1.0, 1.0)
         v *= abs(x[t]) < 1.0
     y = x + 0.003 * rng.normal(size=1500)
-    found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"))
+    found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"), order=1, delay=1)
     assert IdentificationCode.OUTPUT_STOPPED in {note.code for note in found.notes}
     assert found.sound
 
@@ -122,14 +122,14 @@ def test_the_ends_of_a_staircase_ask_no_one_to_check_them() -> None:
     u = np.repeat(rng.integers(-2, 3, 1500).astype(float), 60)[:1500]
     y = filtered(np.array([0.0, 0.1]), np.array([1.0, -0.9]), np.sign(u) * np.maximum(np.abs(u) - 0.2, 0.0))
     y += 0.01 * rng.normal(size=1500)
-    found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"))
+    found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"), delay=1)
     assert IdentificationCode.OUTPUT_AT_END not in {note.code for note in found.notes}
 
 
 @pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
 def test_an_output_between_stops_leaves_them_at_once() -> None:
     u, y = between_stops(0)
-    found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"))
+    found = identify_channels(channels_from([u[:, None]], [y], 0.01, ["u"], "y"), order=1, delay=1)
     codes = {note.code for note in found.notes}
     assert {IdentificationCode.OUTPUT_STOPPED, IdentificationCode.INTEGRATES} <= codes
     assert found.sound
