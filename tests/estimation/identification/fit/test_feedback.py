@@ -95,7 +95,7 @@ def test_columns_that_are_swapped_are_told_and_not_ok() -> None:
     u = np.repeat(rng.uniform(-1.0, 1.0, 80), 10)
     y = filtered(np.array([0.0, 0.2]), np.array([1.0, -0.9]), u) + 0.01 * rng.normal(size=u.size)
     with pytest.warns(LogWarning, match="exchange --input and --output"):
-        found = identify_channels(channels_from([y[:, None]], [u], 0.01, ["pressure"], "valve"))
+        found = identify_channels(channels_from([y[:, None]], [u], 0.01, ["pressure"], "valve"), order=1, delay=0)
     assert not found.sound
     (note,) = (one for one in found.notes if one.code == IdentificationCode.SWAPPED)
     assert note.data["back"] < 0.05 < 0.2 < note.data["left"]

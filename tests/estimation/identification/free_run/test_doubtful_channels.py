@@ -129,7 +129,8 @@ def test_an_output_without_sign_that_is_cut_off_is_no_match() -> None:
     y = np.minimum(np.abs(filtered(np.array([0.0, 0.2]), np.array([1.0, -0.9]), u)), 1.0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # which model is taken is not asked
-        found = identify_channels(channels_from([u[:, None]], [y + 0.005 * rng.normal(size=1000)], 0.01, ["u"], "y"))
+        data = channels_from([u[:, None]], [y + 0.005 * rng.normal(size=1000)], 0.01, ["u"], "y")
+        found = identify_channels(data, order=1, delay=1)
     assert IdentificationCode.SIGN_NOT_MEASURED in {note.code for note in found.notes}
     assert not found.sound
 
@@ -143,7 +144,7 @@ def test_an_input_that_is_logged_late_is_not_told_as_swapped(late: int | None, t
     one, other = (y, u) if late is None else (u[:-late], y[late:])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # notes are asked
-        found = identify_channels(channels_from([one[:, None]], [other], 0.01, ["one"], "other"))
+        found = identify_channels(channels_from([one[:, None]], [other], 0.01, ["one"], "other"), order=1, delay=0)
     codes = {note.code for note in found.notes}
     both = {IdentificationCode.SWAPPED, IdentificationCode.INPUT_LOGGED_LATE}
     assert codes & both == {IdentificationCode[told]}

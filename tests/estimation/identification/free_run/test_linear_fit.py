@@ -190,7 +190,7 @@ def test_a_model_no_better_than_the_mean_is_not_sound() -> None:
     rng = np.random.default_rng(5)
     data = channels_from([rng.normal(size=(300, 1))], [rng.normal(size=300)], 1.0, ["u"], "y")
     with pytest.warns(LogWarning) as said:
-        found = identify_channels(data)
+        found = identify_channels(data, order=1, delay=1)
     assert not found.sound
     places = {one.message.note.code: one.filename for one in said}  # type: ignore[union-attr]
     assert places[IdentificationCode.NO_FIT] == __file__
