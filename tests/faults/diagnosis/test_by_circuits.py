@@ -44,10 +44,18 @@ def population() -> list[Drawn]:
     return list(draw_logs([TEST]))
 
 
+@pytest.fixture(scope="module")
+def verdicts(population: list[Drawn]) -> Mapping[bool, list[Diagnosis]]:
+    """Return the verdicts on the logs, with pressure and without."""
+    return {pressure: [diagnosed(log.record, pressure=pressure) for log in population] for pressure in (True, False)}
+
+
 @pytest.mark.slow
 @PRESSURES
-def test_every_log_of_a_seed_gets_its_class_and_none_is_flagged(population: list[Drawn], *, pressure: bool) -> None:
-    found = [diagnosed(log.record, pressure=pressure) for log in population]
+def test_every_log_of_a_seed_gets_its_class_and_none_is_flagged(
+    population: list[Drawn], verdicts: Mapping[bool, list[Diagnosis]], *, pressure: bool
+) -> None:
+    found = verdicts[pressure]
     assert [one.condition for one in found] == [log.condition for log in population]
     assert [one.against for one in found] == [()] * len(found)
     sums = [sum(one.probabilities.values()) for one in found]  # without pressure less what a worn pump may have
@@ -81,11 +89,13 @@ def test_an_actuator_whose_friction_is_all_coulombs_gets_its_class_and_severitie
 
 @pytest.mark.slow
 @PRESSURES
-def test_severities_come_with_intervals_that_mostly_cover(population: list[Drawn], *, pressure: bool) -> None:
+def test_severities_come_with_intervals_that_mostly_cover(
+    population: list[Drawn], verdicts: Mapping[bool, list[Diagnosis]], *, pressure: bool
+) -> None:
     covered: list[bool] = []
-    for log in population:
+    for log, found in zip(population, verdicts[pressure], strict=True):
         true = severities_at(coordinates_of(log.parameters, ACTUATOR.rated), ACTUATOR)
-        covered += [one.covers(true[name]) for name, one in diagnosed(log.record, pressure=pressure).severity.items()]
+        covered += [one.covers(true[name]) for name, one in found.severity.items()]
     assert np.mean(covered) > 0.85
 
 
