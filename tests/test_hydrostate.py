@@ -215,7 +215,7 @@ def test_a_log_of_anything_is_read_related_and_simulated(tmp_path: Path) -> None
     pd.DataFrame({"t": 0.1 * np.arange(300), "coil (V)": u, "gap": y}).to_csv(tmp_path / "a.csv", index=False)
     log = hs.read(tmp_path / "a.csv")
     assert log.channels == ("coil (V)", "gap")
-    model = log.identify(input="coil (V)", output="gap", order=1)
+    model = log.identify(input="coil (V)", output="gap", order=1, delay=1)
     assert model.fit_percent > 95.0
     assert "output-error" in str(model)
     assert model.simulate(log).shape == (300,)

@@ -42,7 +42,8 @@ def sparse(path: Path) -> hs.Log:
 
 def by_command(path: Path, tmp_path: Path, *arguments: str) -> list[float]:
     names = ["--input", MOTION["input"], "--output", arguments[0] if arguments else MOTION["output"]]
-    done = CliRunner().invoke(app, ["identify", str(path), *names, "--order", "2", "--out", str(tmp_path / "m.json")])
+    form = ["--order", "2", "--delay", "1", "--out", str(tmp_path / "m.json")]
+    done = CliRunner().invoke(app, ["identify", str(path), *names, *form])
     assert done.exit_code == 0, done.stderr
     (found,) = json.loads((tmp_path / "m.json").read_text())
     return [*np.ravel(found["numerator"]), *found["denominator"]]
@@ -50,7 +51,7 @@ def by_command(path: Path, tmp_path: Path, *arguments: str) -> list[float]:
 
 def test_a_log_with_a_hole_gives_python_the_commands_model(holed: Path, tmp_path: Path) -> None:
     with pytest.warns(LogWarning):
-        model = sparse(holed).identify(**MOTION, order=2)
+        model = sparse(holed).identify(**MOTION, order=2, delay=1)
     assert [*np.ravel(model.numerator), *model.denominator] == pytest.approx(by_command(holed, tmp_path), rel=1e-9)
 
 
@@ -84,7 +85,7 @@ def test_a_channel_that_an_estimate_leaves_out_is_related_and_told(run: pd.DataF
         log = hs.read(tmp_path / "gone.csv")
     assert "differential_pressure_pa" not in log.channels
     with pytest.warns(LogWarning, match=r"pressure_pa is missing in 401 of 2000 .*; those samples are not used"):
-        model = log.identify(input="motor_speed_rad_s", output="differential_pressure_pa", order=2)
+        model = log.identify(input="motor_speed_rad_s", output="differential_pressure_pa", order=2, delay=1)
     wanted = by_command(tmp_path / "gone.csv", tmp_path, "differential_pressure_pa")
     assert [*np.ravel(model.numerator), *model.denominator] == pytest.approx(wanted, rel=1e-9)
     assert "differential_pressure_pa" in log.between(0.0, 1.0).related

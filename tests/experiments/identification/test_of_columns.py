@@ -41,7 +41,7 @@ def test_several_logs_give_one_model_an_output_that_is_tested_and_simulated_agai
     logs: list[Path], tmp_path: Path
 ) -> None:
     saved, table = tmp_path / "model.json", tmp_path / "sim.csv"
-    channels = ("--input", "Valve [%],load", "--output", "flow", "--output", "heat", "--order", 1)
+    channels = ("--input", "Valve [%],load", "--output", "flow", "--output", "heat", "--order", 1, "--delay", 1)
     ran = run(*logs[:2], *channels, "--validate", logs[2], "--out", saved, "--json", "--simulated", table)
     assert ran.exit_code == 0, ran.output
     flow, heat = json.loads(ran.stdout)
@@ -68,13 +68,14 @@ def test_one_input_gives_a_transfer_function_with_its_uncertainty(logs: list[Pat
     assert (one["structure"], one["order"], one["delay"]["samples"]) == ("output-error", 1, 2)
     assert (tmp_path / "fit.png").read_bytes()[:4] == b"\x89PNG"
     assert "running free" in one["message"]
-    assert "heat" in run(logs[0], "--input", "load", "--output", "heat", "--order", 1).stdout
+    assert "heat" in run(logs[0], "--input", "load", "--output", "heat", "--order", 1, "--delay", 2).stdout
 
 
 def test_a_test_log_that_is_too_short_is_named(logs: list[Path], tmp_path: Path) -> None:
     short = tmp_path / "short.csv"
     pd.read_csv(logs[1]).head(12).to_csv(short, index=False)
-    ran = run(logs[0], "--input", "Valve [%],load", "--output", "flow", "--order", 1, "--validate", short)
+    form = ("--input", "Valve [%],load", "--output", "flow", "--order", 1, "--delay", 1)
+    ran = run(logs[0], *form, "--validate", short)
     assert "short.csv: output 'flow' needs 20 samples or more, got 12" in " ".join(ran.output.split())
     pd.read_csv(logs[1]).head(25).to_csv(short, index=False)
     late = ("--input", "load", "--output", "heat", "--order", 1, "--delay", 30)
@@ -139,7 +140,8 @@ def test_a_slip_is_answered_with_a_sentence(arguments: tuple[object, ...], said:
 
 
 def test_a_model_at_a_longer_sample_time(logs: list[Path]) -> None:
-    ran = run(logs[0], "--input", "load", "--output", "heat", "--order", 1, "--resample", 0.06, "--json")
+    form = ("--input", "load", "--output", "heat", "--order", 1, "--delay", 1)
+    ran = run(logs[0], *form, "--resample", 0.06, "--json")
     (one,) = json.loads(ran.stdout)
     assert one["sample_time_s"] == pytest.approx(0.06)
 
@@ -309,7 +311,8 @@ def test_a_gain_that_means_nothing_is_not_shown_as_a_number() -> None:
 
 def test_a_log_without_time_is_simulated_on_the_model_s_sample_time(logs: list[Path], tmp_path: Path) -> None:
     saved, timeless = tmp_path / "model.json", tmp_path / "timeless.csv"
-    run(*logs[:2], "--input", "Valve [%],load", "--output", "flow", "--order", 1, "--out", saved)
+    form = ("--input", "Valve [%],load", "--output", "flow", "--order", 1, "--delay", 1)
+    run(*logs[:2], *form, "--out", saved)
     pd.read_csv(logs[2]).drop(columns="t_ms").to_csv(timeless, index=False)
     (timed,), (one,) = (json.loads(run(log, "--simulate", saved, "--json").stdout) for log in (logs[2], timeless))
     assert one["fit_percent"] == pytest.approx(timed["fit_percent"], abs=1e-6)

@@ -184,12 +184,12 @@ def columns(tmp_path_factory: pytest.TempPathFactory) -> Path:
             ("steady gain from b", "in the unit of y (rms)"),
         ),
         (
-            ("--input", "a,b", "--output", "y,z", "--structure", "state-space", "--order", "1"),
+            ("--input", "a,b", "--output", "y,z", "--structure", "state-space"),
             ["page-y.html", "page-z.html"],
             ("state space",),
         ),
         (
-            ("--input", "a", "--output", "w", "--structure", "narx", "--order", "1"),
+            ("--input", "a", "--output", "w", "--structure", "narx"),
             ["page.html"],
             ("polynomial", "The model is not linear"),
         ),
@@ -198,7 +198,8 @@ def columns(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_models_between_any_columns_have_a_page(
     columns: Path, tmp_path: Path, arguments: tuple[str, ...], names: list[str], words: tuple[str, ...]
 ) -> None:
-    ran = CliRunner().invoke(app, ["identify", str(columns), *arguments, "--html", str(tmp_path / "page.html")])
+    form = ("--order", "1", "--delay", "1", "--html", str(tmp_path / "page.html"))
+    ran = CliRunner().invoke(app, ["identify", str(columns), *arguments, *form])
     assert ran.exit_code == 0, ran.output
     assert sorted(one.name for one in tmp_path.iterdir()) == names
     page = (tmp_path / names[0]).read_text("utf-8")

@@ -93,8 +93,8 @@ def test_what_cannot_be_exported_is_said_in_a_sentence(given: tuple[str, ...], s
 
 def test_an_identified_model_is_written_for_c_and_for_matlab(log: Path, tmp_path: Path) -> None:
     saved = tmp_path / "model.json"
-    relation = ("--input", "motor_speed_rad_s", "--output", "differential_pressure_pa")
-    done = CliRunner().invoke(app, ["identify", str(log), *relation, "--order", "2", "--out", str(saved)])
+    relation = ("--input", "motor_speed_rad_s", "--output", "differential_pressure_pa", "--order", "2", "--delay", "1")
+    done = CliRunner().invoke(app, ["identify", str(log), *relation, "--out", str(saved)])
     assert done.exit_code == 0, done.output
     done = export("model", saved, "--name", "pressure", "--out", tmp_path / "c", "--json")
     assert json.loads(done.stdout)[0]["files"] == ["pressure.h", "pressure.c", "example.c", "Makefile"]
@@ -124,8 +124,9 @@ def test_one_model_is_exported_and_a_file_of_two_is_refused(tmp_path: Path) -> N
     table.to_csv(tmp_path / "log.csv", index=False)
     for outputs, code in (("a", 0), ("a,b", 2)):
         model = tmp_path / f"{len(outputs)}.json"
-        asked = ["identify", str(tmp_path / "log.csv"), "--input", "u", "--output", outputs, "--order", "1"]
-        assert CliRunner().invoke(app, [*asked, "--out", str(model)]).exit_code == 0
+        form = ["--input", "u", "--output", outputs, "--order", "1", "--delay", "1"]
+        asked = ["identify", str(tmp_path / "log.csv"), *form, "--out", str(model)]
+        assert CliRunner().invoke(app, asked).exit_code == 0
         done = export("model", model, "--out", tmp_path / f"out{len(outputs)}")
         assert done.exit_code == code, done.output
         assert ("one model is needed, got 2" in done.output) is (code == 2)

@@ -72,10 +72,10 @@ def test_outputs_next_to_a_gap_are_left_out_for_they_may_answer_what_is_not_know
 
 
 def test_a_model_of_a_log_with_gaps_is_that_of_the_whole_log() -> None:
-    whole = identify_channels(channels_of([log(binary())], ["u"], "y"), structure="output-error", order=2).model
+    whole = identify_channels(channels_of([log(binary())], ["u"], "y"), order=2, delay=1).model
     with pytest.warns(LogWarning):
         data = channels_of([log(binary(), slice(1000, 1010), slice(2000, 2060))], ["u"], "y", split=True)
-    found = identify_channels(data, structure="output-error", order=2).model
+    found = identify_channels(data, order=2, delay=1).model
     tested = channels_of([log(binary(7))], ["u"], "y")
     off = [one.simulate(tested.u[0], tested.y[0]) - tested.y[0] for one in (whole, found)]
     assert np.std(off[1]) == pytest.approx(np.std(off[0]), rel=0.02)

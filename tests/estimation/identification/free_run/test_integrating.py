@@ -70,6 +70,6 @@ def test_a_model_that_cannot_be_written_once_it_is_fitted_on_stays_as_it_was_jud
     lost = lambda fit, _: replace(fit, theta=np.zeros(fit.theta.size), cost=float("inf"))  # noqa: E731 -- used once
     monkeypatch.setattr(linear_comparison, "refitted_linear", lost)
     with pytest.warns(LogWarning, match="integrates its input"):
-        found = identify.identify_channels(data, order=2)
+        found = identify.identify_channels(data, order=2, delay=1)
     assert found.sound
     assert found.quality.fit_percent > 90.0
