@@ -154,7 +154,11 @@ CALLS: dict[str, tuple[str, ...]] = {
     "diagnose, without pressure": ("diagnose", "healthy.csv", "stuck.csv", "--no-pressure"),
 }
 
-SLOW = {name for name in CALLS if "without pressure" in name or "long" in name} | {"diagnose, most logs"}
+SLOW = {name for name in CALLS if "without pressure" in name or "long" in name} | {
+    "diagnose, most logs",
+    "diagnose, a column of the rig missing",
+    "estimate, filtered",
+}
 
 
 @pytest.mark.parametrize(

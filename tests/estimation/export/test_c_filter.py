@@ -57,7 +57,7 @@ def apart(found: np.ndarray, wanted: np.ndarray) -> float:
     ("form", "using"),
     thinned(
         [(form, using) for form in EXPORTED_FORMS for using in ("gcc", "clang")],
-        [("acceleration", "gcc"), ("pressure", "gcc"), ("chambers_by_mass", "gcc")],
+        [("pressure", "gcc"), ("chambers_by_mass", "gcc")],
     ),
 )
 def test_every_form_gives_in_c_what_it_gives_in_python(form: str, using: str, tmp_path: Path) -> None:
@@ -139,7 +139,7 @@ def test_likelihood_and_counters_of_the_gate_are_those_of_python(tmp_path: Path)
     assert shown == pytest.approx(list(in_si(problem, trace, 0.0).nis.values()), rel=1e-5)
 
 
-@pytest.mark.parametrize(("shrunk", "wanted"), [(1.0, 0), (1e-2, 1), (1e-6, 3)])
+@pytest.mark.parametrize(("shrunk", "wanted"), thinned([(1.0, 0), (1e-2, 1), (1e-6, 3)], [(1.0, 0), (1e-6, 3)]))
 def test_the_gate_says_how_far_innovations_are_from_what_is_predicted(
     shrunk: float, wanted: int, tmp_path: Path
 ) -> None:

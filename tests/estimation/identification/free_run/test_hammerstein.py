@@ -39,8 +39,12 @@ def planted(request: pytest.FixtureRequest) -> Planted:
     return request.param
 
 
-def test_what_was_planted_is_found_within_its_interval(planted: Planted) -> None:
-    found = identified(logged(planted, 1))
+@pytest.fixture(scope="module")
+def found(planted: Planted) -> Identified:
+    return identified(logged(planted, 1))
+
+
+def test_what_was_planted_is_found_within_its_interval(planted: Planted, found: Identified) -> None:
     assert found.sound
     assert found.model.structure == "hammerstein"
     assert isinstance(found.model.dynamics, HammersteinDynamics)
@@ -56,9 +60,8 @@ def test_what_was_planted_is_found_within_its_interval(planted: Planted) -> None
     assert planted.kind in kinds <= set(NONLINEARITIES)
 
 
-def test_a_model_is_the_same_after_it_was_saved(planted: Planted) -> None:
-    data = logged(planted, 2)
-    model = identified(data).model
+def test_a_model_is_the_same_after_it_was_saved(planted: Planted, found: Identified) -> None:
+    data, model = logged(planted, 2), found.model
     again = FreeRunModel.from_dict(json.loads(json.dumps(model.to_dict())))
     np.testing.assert_array_equal(again.simulate(data.u[0], data.y[0]), model.simulate(data.u[0], data.y[0]))
     assert isinstance(again.dynamics, HammersteinDynamics)
@@ -67,9 +70,8 @@ def test_a_model_is_the_same_after_it_was_saved(planted: Planted) -> None:
         model.to_control()
 
 
-def test_a_run_without_outputs_follows_all_the_same(planted: Planted) -> None:
-    data = logged(planted, 3)
-    model = identified(data).model
+def test_a_run_without_outputs_follows_all_the_same(planted: Planted, found: Identified) -> None:
+    data, model = logged(planted, 3), found.model
     left = (model.simulate(data.u[0]) - data.y[0])[200:]
     assert left.std() < 0.1 * data.y[0].std()
 

@@ -226,7 +226,7 @@ def test_a_log_of_hardly_more_samples_than_are_needed_has_a_model(samples: int) 
     """The residual is asked whether it is white at as many lags as the log has room for."""
     u = steps(samples, 8, hold=3)
     y = filtered([0.0, 0.5], [1.0, -0.5], u) + 0.01 * np.random.default_rng(8).normal(size=samples)
-    found = identify_channels(channels_from([u[:, None]], [y], 1.0, ["u"], "y"))
+    found = identify_channels(channels_from([u[:, None]], [y], 1.0, ["u"], "y"), order=1, delay=1)
     assert found.quality.fit_percent > 90.0
     assert found.model.linear is not None
     assert np.isfinite(found.model.linear.covariance).all()
