@@ -41,12 +41,11 @@ def results(*arguments: object) -> list[dict[str, Any]]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("start", [0.5e8, 4e8])
-def test_bulk_modulus_of_all_foreign_logs_comes_within_a_tenth(start: float, truth: dict[str, dict[str, str]]) -> None:
+def test_bulk_modulus_of_all_foreign_logs_comes_within_a_tenth(truth: dict[str, dict[str, str]]) -> None:
     errors: dict[str, float] = {}
     for name in CONDITIONS:
         logs = [log for log, row in truth.items() if row["name"] == name]
-        for one in results("estimate", *logs, "--condition", name, "--start", start, "--start-std", 1e8):
+        for one in results("estimate", *logs, "--condition", name, "--start", 0.5e8, "--start-std", 1e8):
             errors[one["file"]] = one["bulk_modulus_pa"]["value"] / float(truth[one["file"]]["bulk_modulus_pa"]) - 1.0
     assert len(errors) == 18
     assert max(abs(error) for error in errors.values()) < 0.1  # measured: all 18, the largest 6.7 %; 14 are asked for
