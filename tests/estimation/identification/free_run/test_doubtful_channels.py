@@ -75,7 +75,8 @@ def test_a_log_no_longer_than_the_dead_time_has_no_fit_and_says_why(model: FreeR
 
 def test_an_output_that_is_its_input_is_identified_as_that() -> None:
     u = np.repeat([1.0, -1.0, 1.0, 1.0, -1.0], 60)
-    found = identify_channels(channels_from([u[:, None]], [u], 1.0, ["u"], "y"), structure="auto")
+    data = channels_from([u[:, None]], [u], 1.0, ["u"], "y")
+    found = identify_channels(data, structure="auto", order=1, delay=0)
     assert found.sound
     assert found.model.structure == "output-error"
     assert found.quality.fit_percent == pytest.approx(100.0)
