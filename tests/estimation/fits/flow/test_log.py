@@ -86,7 +86,7 @@ def lagging(values: np.ndarray, lag: float) -> np.ndarray:
 def test_a_position_sensor_that_lags_is_named_and_its_number_is_right(condition: str) -> None:
     rng = np.random.default_rng(9)
     p = circuit_of(parameters_for(CONDITIONS[condition]))
-    drive = make_drive("prbs", 2.0, 1e-3, p, rng)
+    drive = make_drive("prbs", 1.2, 1e-3, p, rng)
     record = simulate(CIRCUIT, drive, 1e-3, p, sensors=BENCH, rng=rng)
     fit = fit_flow(record.replace(position_m=lagging(record["position_m"], 3e-3)), HEALTHY, 2e8)
     assert fit.reasons == ()

@@ -148,7 +148,7 @@ def test_a_drift_is_not_taken_for_a_time_constant_beyond_the_record() -> None:
     rng = np.random.default_rng(3)
     u = steps(400, 3, hold=5)
     y = filtered([0.0, 0.4], [1.0, -0.6], u) + 1e-2 * np.cumsum(rng.normal(size=400))
-    candidates = linear_candidates(scaled(channels_from([u[:, None]], [y], 1.0, ["u"], "y"))[0], [1, 2, 3], None)
+    candidates = linear_candidates(scaled(channels_from([u[:, None]], [y], 1.0, ["u"], "y"))[0], [1, 2, 3], (1,))
     best = chosen(candidates)
     poles = np.abs(np.roots(best.fit.f))
     assert not best.doubt
