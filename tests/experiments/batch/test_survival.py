@@ -21,10 +21,10 @@ from tests.experiments.batch.conftest import RUNS, rows_in_parts, run_into, smal
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name == "nt", reason="needs SIGKILL and fork")]
 
-KILLS = 8
+STRIKES = 12
 
 LONGER: dict[str, Any] = {**RUNS, "seeds": 96, "duration_s": 0.1}
-"""144 tasks of 4 cases, about a hundredth of a second each: long enough to be killed 8 times on the way."""
+"""144 tasks of 4 cases, about a hundredth of a second each: long enough to be struck 12 times on the way."""
 
 DRIVER = """
 import os, sys
@@ -81,37 +81,6 @@ def end(driver: "subprocess.Popen[str]") -> int:
     return int(line)
 
 
-def test_a_batch_killed_at_random_moments_ends_as_if_undisturbed(
-    tmp_path: Path, driver: "subprocess.Popen[str]"
-) -> None:
-    undisturbed, store = open_store(tmp_path / "undisturbed"), open_store(tmp_path / "store")
-    run_into(undisturbed, small_plan(**LONGER))
-    command = ("batch", study_file(tmp_path, LONGER), "--workers", 1, "--out", store.name)
-    moments = random.Random(2024)  # noqa: S311 -- no secret
-    parts, struck = Path(store.name) / "parts", 0
-    kept: dict[str, bytes] = {}
-    for number in range(KILLS):
-        child = begin(driver, *command)
-        if number % 2:  # at any moment, from the beginning on; else while parts are written
-            time.sleep(moments.uniform(0.02, 0.4))
-        else:
-            before = len(kept)
-            _wait_for(lambda before=before: len(list(parts.glob("*.parquet"))) > before)
-            time.sleep(moments.uniform(0.0, 0.1))
-        os.kill(child, signal.SIGKILL)
-        struck += os.WTERMSIG(end(driver)) == signal.SIGKILL
-        now = {path.name: path.read_bytes() for path in parts.glob("*.parquet")}
-        assert {name: now.get(name) for name in kept} == kept, "a completed part was lost or changed"
-        kept = now
-    assert struck == KILLS
-    assert 0 < len(kept) < len(list((Path(undisturbed.name) / "parts").iterdir())), "kills struck while work was done"
-    begin(driver, *command)
-    assert end(driver) == 0
-    assert store.rows().equals(undisturbed.rows())
-    assert rows_in_parts(store) == len(small_plan(**LONGER))
-    assert not list(parts.glob(".*"))
-
-
 def test_a_batch_struck_at_moments_spread_over_its_parts_loses_and_doubles_no_row(
     tmp_path: Path, driver: "subprocess.Popen[str]"
 ) -> None:
@@ -119,19 +88,31 @@ def test_a_batch_struck_at_moments_spread_over_its_parts_loses_and_doubles_no_ro
     run_into(undisturbed, small_plan(**LONGER))
     command = ("batch", study_file(tmp_path, LONGER), "--workers", 1, "--out", store.name)
     parts, moments = Path(store.name) / "parts", random.Random(7)  # noqa: S311 -- no secret
-    for number in range(12):
+    kept, cut = dict[str, bytes](), set[str]()
+    for number in range(STRIKES):
         child = begin(driver, *command)
-        _wait_for(lambda number=number: len(list(parts.glob("*.parquet"))) > 11 * number)
-        time.sleep(moments.uniform(0.0, 0.02))
+        if number % 2:  # at any moment, from the beginning on; else while parts are written
+            time.sleep(moments.uniform(0.02, 0.2))
+        else:
+            _wait_for(lambda number=number: len(list(parts.glob("*.parquet"))) > 8 * number)
+            time.sleep(moments.uniform(0.0, 0.02))
         os.kill(child, signal.SIGTERM if number % 6 == 1 else signal.SIGKILL)
         end(driver)
+        now = {path.name: path.read_bytes() for path in parts.glob("*.parquet")}
+        assert {name: now.get(name) for name in kept} == kept, "a completed part was lost or changed"
         if number % 3 == 0:  # as when the power fails: a part that was written just then is cut
             last = max(parts.glob("*.parquet"), key=lambda path: path.stat().st_mtime_ns)
             last.write_bytes(last.read_bytes()[: moments.randrange(last.stat().st_size)])
+            cut.add(last.name)
+        kept = {name: now[name] for name in now.keys() - cut}
+    assert len(kept) + len(cut) < len(list((Path(undisturbed.name) / "parts").iterdir())), (
+        "work was done when it was struck"
+    )
     begin(driver, *command)
     assert end(driver) == 0
     assert store.rows().equals(undisturbed.rows())
     assert rows_in_parts(store) == len(small_plan(**LONGER))
+    assert not list(parts.glob(".*"))
 
 
 def test_two_workers_end_with_exit_code_0_every_time(tmp_path: Path) -> None:
