@@ -68,8 +68,13 @@ class Fallback:
         """
         return self.judged(u, y, own)[1]
 
-    def judged(self, u: Array, y: Array, own: Array) -> tuple[Array, tuple[float, float]]:
+    def judged(
+        self, u: Array, y: Array, own: Array, ends: Array | None = None
+    ) -> tuple[Array, tuple[float, float]]:
         """Return the nonlinear run, or the linear one where that errs less, and the errors of both.
+
+        An output that integrates has no range. What the linear run goes beyond the ends at which a nonlinear run is
+        held is an error of the latter that its fits agree on.
 
         Parameters
         ----------
@@ -77,6 +82,8 @@ class Fallback:
             Inputs, scaled.
         y, own : ndarray, shape (n,)
             As `errors` takes them.
+        ends : ndarray, shape (2,), optional
+            Least and greatest output that a nonlinear run can have, scaled.
 
         Returns
         -------
@@ -86,7 +93,9 @@ class Fallback:
         linear = self.linear.run(u, y)
         known = float(np.sqrt(self.share))
         straight = known * jackknife(linear, [one.run(u, y) for one in self.linear_parts])
-        undetermined = float(np.hypot(self.own_error, known * jackknife(own, [one.run(u, y) for one in self.parts])))
+        beyond = 0.0 if ends is None else float(np.sqrt(np.mean((linear - np.clip(linear, *ends)) ** 2)))
+        apart = known * jackknife(own, [one.run(u, y) for one in self.parts])
+        undetermined = float(np.linalg.norm([self.own_error, apart, beyond]))
         left = float(np.hypot(self.error, straight))
         return own if undetermined < left else linear, (undetermined, left)
 

@@ -43,7 +43,7 @@ from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.nonlinear_outputs import absolute, limited, told, without_sign
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
-from estimation.identification.free_run.random_walk import followed_walk, from_changes, wandering
+from estimation.identification.free_run.random_walk import followed_walk, from_changes, still_wanders, wandering
 from estimation.identification.free_run.trend import detrended
 from estimation.identification.free_run.unrelated import bend_explains, polynomial_explains
 from estimation.identification.notes import WARNED, IdentificationCode
@@ -153,7 +153,9 @@ def _identified(
         return walk
     linear = linear_comparison(task)
     if walk is not None:
-        return _or_nonlinear(walk, linear, structure)
+        taken = _or_nonlinear(walk, linear, structure)
+        said = [] if taken is walk else still_wanders(taken.model, data)
+        return replace(taken, notes=(*taken.notes, *said), sound=taken.sound and not said)
     if given and (apart := _of_other_levels(task, linear)) is not None:
         return _or_nonlinear(apart[0], linear, structure, apart[1])
     if structure in ADOPTED:

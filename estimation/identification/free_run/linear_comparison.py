@@ -166,7 +166,8 @@ def fed_back(model: FreeRunModel, data: Channels, *, changes: bool = False) -> l
 def swapped(left: Array, data: Channels, log: int) -> Note | None:
     """Return a note where the input answers the output rather than the other way round, or is logged late; else None.
 
-    Both models of the other direction and of an input logged late look ahead: the one that leaves less is told.
+    Both models of the other direction and of an input logged late look ahead: the one that leaves less is told. Behind
+    slow inputs noise keeps the former from leaving little where an input is late, and the latter leaves noise alone.
 
     Parameters
     ----------
@@ -180,14 +181,13 @@ def swapped(left: Array, data: Channels, log: int) -> Note | None:
     u, y = data.u[log][:, 0], data.y[log]
     back = _left(Channels((data.output,), data.inputs[0], data.sample_time, (bridged(y)[:, None],), (u,)))
     own = float(np.sqrt(np.nanmean(left**2)) / np.nanstd(y))
-    if not back < min(REVERSED * own, FOLLOWED):
-        return None
     moved = [replace(data, u=(data.u[log][lead:],), y=(y[:-lead],)) for lead in LEADS]
     ahead, lead = min((_left(one), lead) for one, lead in zip(moved, LEADS, strict=True))
     names = {"input": data.inputs[0], "output": data.output}
-    if ahead <= back:
+    against = back < min(REVERSED * own, FOLLOWED)
+    if ahead <= back and (against or ahead < REVERSED * min(own, FOLLOWED)):
         return IdentificationCode.INPUT_LOGGED_LATE.note(**names, samples=lead, ahead=ahead, left=own)
-    return IdentificationCode.SWAPPED.note(**names, back=back, left=own)
+    return IdentificationCode.SWAPPED.note(**names, back=back, left=own) if against else None
 
 
 def _left(data: Channels) -> float:

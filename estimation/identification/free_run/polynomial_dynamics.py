@@ -11,7 +11,7 @@ from estimation.identification.free_run.data import Channels, Scaling
 from estimation.identification.free_run.fallback import Fallback
 from estimation.identification.free_run.linear_problem import unanswered
 from estimation.identification.free_run.normal_equations import NormalEquations
-from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs
+from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs, ends_of
 from estimation.identification.free_run.polynomial_variables import Variables, lagged_signals, products
 
 START_STEPS = 12
@@ -92,13 +92,14 @@ class PolynomialDynamics:
         own = self.own_run(u, y)
         if self.fallback is None:
             return own, None
-        told = self.fallback.judged(u, y, own)
+        told = self.fallback.judged(u, y, own, ends_of(self.variables, self.terms))
         single, held = lagged_signals(self.variables, u, own)
         if np.array_equal(single, held):
             return told
         # beyond what was seen, products go on where fits that left out a block agree on that, and not on their ends
         parts = (one._released() if isinstance(one, PolynomialDynamics) else one for one in self.fallback.parts)
-        freed = replace(self.fallback, parts=tuple(parts)).judged(u, y, self._released().own_run(u, y))
+        released, farther = self._released(), replace(self.fallback, parts=tuple(parts))
+        freed = farther.judged(u, y, released.own_run(u, y), ends_of(released.variables, self.terms))
         return freed if freed[1][0] < AGREED * told[1][0] else told
 
     def _released(self) -> "PolynomialDynamics":

@@ -84,6 +84,18 @@ def variables_of(linear: LinearFit, data: Channels) -> tuple[Variables, IntArray
     return Variables(np.array(source, dtype=np.int64), np.array(lag, dtype=np.int64), limits), terms, values
 
 
+def ends_of(variables: Variables, terms: IntArray) -> Array:
+    """Return the ends at which a run's output is held: none where there are no products, shape (2,).
+
+    Parameters
+    ----------
+    terms : ndarray of int, shape (k, 3)
+        Variables that each term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
+    """
+    free = not (terms[:, 1] >= 0).any()
+    return np.array([-1e9, 1e9]) if free else variables.around(FARTHEST)
+
+
 class Runs:
     """Free runs of one set of terms on given data.
 
@@ -130,8 +142,7 @@ class Runs:
     @property
     def ends(self) -> Array:
         """Ends at which the output is held: none where there are no products, shape (2,)."""
-        free = not (self.terms[:, 1] >= 0).any()
-        return np.array([-1e9, 1e9]) if free else self.variables.around(FARTHEST)
+        return ends_of(self.variables, self.terms)
 
     def begun(self, theta: Array, index: int) -> Array:
         """Return the outputs of a log before its run, and zeros behind them.

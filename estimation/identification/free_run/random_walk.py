@@ -169,6 +169,25 @@ def followed_walk(data: Channels, part: Channels, orders: Sequence[int], structu
     return [IdentificationCode.WALK_FOLLOWED.note(output=data.output, structure=structure)]
 
 
+def still_wanders(model: FreeRunModel, data: Channels) -> list[Note]:
+    """Return a note where what a nonlinear model leaves of an output that was held to wander still does.
+
+    What a bend leaves behind a linear model may look like a walk; behind a model that bends nothing is left of it.
+
+    Parameters
+    ----------
+    model : FreeRunModel
+        Fitted to levels.
+    data : Channels
+        Levels, in units of the channels.
+    """
+    left = [y - model.simulate(u, y) for u, y in zip(data.u, data.y, strict=True)]
+    changes = longest([np.diff(one) for one in left])
+    if changes.size < FEWEST or returns(changes) <= COMES_BACK or remembers(changes):
+        return []
+    return [IdentificationCode.WALK_FOLLOWED.note(output=data.output, structure=model.structure)]
+
+
 def changes_of(data: Channels) -> Channels:
     """Return how much each channel changes from the sample before; of the first one, inputs by nothing.
 
@@ -308,11 +327,18 @@ def longest_rest(fit: LinearFit, changes: Channels) -> Array:
     """
     problem = Problem(fit.form, changes)
     left = np.where(problem.used, problem.y - problem.jacobian(fit.theta)[0], np.nan)
-    rows = [
-        part[begin:end]
-        for part in np.split(left, problem.bounds[1:-1])
-        for begin, end in zip(*stretches(np.isfinite(part)), strict=True)
-    ]
+    return longest(np.split(left, problem.bounds[1:-1]))
+
+
+def longest(parts: Sequence[Array]) -> Array:
+    """Return the longest row without gaps; an empty one where there is none.
+
+    Parameters
+    ----------
+    parts : sequence of ndarray, shape (n,)
+        NaN where missing.
+    """
+    rows = [part[begin:end] for part in parts for begin, end in zip(*stretches(np.isfinite(part)), strict=True)]
     return max(rows, key=lambda row: row.size, default=np.zeros(0))
 
 
