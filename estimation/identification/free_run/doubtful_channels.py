@@ -5,6 +5,15 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.random_walk import (
+    COMES_BACK,
+    FEWEST,
+    MATERIAL,
+    longest,
+    remembers,
+    returns,
+    walk_followed,
+)
 from estimation.identification.notes import IdentificationCode
 from estimation.log_checks.outliers import without_outliers
 from plant.notes import Note
@@ -131,6 +140,26 @@ def more_than_noise(model: FreeRunModel, data: Channels) -> list[Note]:
     if not follows(np.concatenate(left), np.concatenate(drives)):
         return []
     return [IdentificationCode.MORE_THAN_NOISE.note(output=data.output, left=share)]
+
+
+def still_wanders(model: FreeRunModel, data: Channels) -> list[Note]:
+    """Return a note where what a nonlinear model leaves of an output wanders.
+
+    What a bend leaves behind a linear model may look like a walk or hide one; nothing of it is left here.
+
+    Parameters
+    ----------
+    model : FreeRunModel
+        Fitted to levels.
+    data : Channels
+        Levels, in units of the channels.
+    """
+    left = [y - run for y, run in zip(data.y, _runs(model, data), strict=True)]
+    large = np.nanstd(np.concatenate(left)) > MATERIAL * np.nanstd(np.concatenate(data.y))
+    changes = longest([np.diff(one) for one in left])
+    if not large or changes.size < FEWEST or returns(changes) <= COMES_BACK or remembers(changes):
+        return []
+    return [walk_followed(data.output, model.structure)]
 
 
 def follows(left: Array, drives: Array) -> bool:

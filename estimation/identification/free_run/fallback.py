@@ -68,9 +68,7 @@ class Fallback:
         """
         return self.judged(u, y, own)[1]
 
-    def judged(
-        self, u: Array, y: Array, own: Array, ends: Array | None = None
-    ) -> tuple[Array, tuple[float, float]]:
+    def judged(self, u: Array, y: Array, own: Array, ends: Array | None = None) -> tuple[Array, tuple[float, float]]:
         """Return the nonlinear run, or the linear one where that errs less, and the errors of both.
 
         An output that integrates has no range. What the linear run goes beyond the ends at which a nonlinear run is

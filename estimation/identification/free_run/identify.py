@@ -27,7 +27,7 @@ from estimation.identification.free_run.data import (
 )
 from estimation.identification.free_run.dead_times import late_answers
 from estimation.identification.free_run.dense_polynomial import Asked
-from estimation.identification.free_run.doubtful_channels import doubtful_channels, more_than_noise
+from estimation.identification.free_run.doubtful_channels import doubtful_channels, more_than_noise, still_wanders
 from estimation.identification.free_run.fallback import Fallback
 from estimation.identification.free_run.fewer_samples import on_fewer
 from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
@@ -43,7 +43,7 @@ from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.nonlinear_outputs import absolute, limited, told, without_sign
 from estimation.identification.free_run.other_structures import ADOPTED, adopt
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
-from estimation.identification.free_run.random_walk import followed_walk, from_changes, still_wanders, wandering
+from estimation.identification.free_run.random_walk import followed_walk, from_changes, wandering
 from estimation.identification.free_run.trend import detrended
 from estimation.identification.free_run.unrelated import bend_explains, polynomial_explains
 from estimation.identification.notes import WARNED, IdentificationCode
@@ -129,6 +129,8 @@ def _with_doubts(found: Identified, data: Channels, structure: str, *, looked_fo
         notes += followed_walk(whole, part, range(1, HIGHEST + 1), structure)
     elif looked_for and not any(note.code == IdentificationCode.RANDOM_WALK for note in found.notes):
         notes += late_answers(part, found.quality.rmse / by.y_std)
+    if structure == "auto" and found.model.structure != "output-error":
+        notes += still_wanders(found.model, data)
     doubtful, walks = bool(notes), any(note.code == IdentificationCode.RANDOM_WALK for note in found.notes)
     fed = any(note.code == IdentificationCode.FEEDBACK for note in found.notes)
     if structure == "output-error" and found.sound and not (doubtful or walks or fed):
@@ -153,9 +155,7 @@ def _identified(
         return walk
     linear = linear_comparison(task)
     if walk is not None:
-        taken = _or_nonlinear(walk, linear, structure)
-        said = [] if taken is walk else still_wanders(taken.model, data)
-        return replace(taken, notes=(*taken.notes, *said), sound=taken.sound and not said)
+        return _or_nonlinear(walk, linear, structure)
     if given and (apart := _of_other_levels(task, linear)) is not None:
         return _or_nonlinear(apart[0], linear, structure, apart[1])
     if structure in ADOPTED:

@@ -164,28 +164,18 @@ def followed_walk(data: Channels, part: Channels, orders: Sequence[int], structu
     structure : str
         What was asked for.
     """
-    if wandering(data, part, orders, None, None) is None:
-        return []
-    return [IdentificationCode.WALK_FOLLOWED.note(output=data.output, structure=structure)]
+    return [] if wandering(data, part, orders, None, None) is None else [walk_followed(data.output, structure)]
 
 
-def still_wanders(model: FreeRunModel, data: Channels) -> list[Note]:
-    """Return a note where what a nonlinear model leaves of an output that was held to wander still does.
-
-    What a bend leaves behind a linear model may look like a walk; behind a model that bends nothing is left of it.
+def walk_followed(output: str, structure: str) -> Note:
+    """Return the note on a structure that is fitted to levels of an output that wanders.
 
     Parameters
     ----------
-    model : FreeRunModel
-        Fitted to levels.
-    data : Channels
-        Levels, in units of the channels.
+    output, structure : str
+        Names.
     """
-    left = [y - model.simulate(u, y) for u, y in zip(data.u, data.y, strict=True)]
-    changes = longest([np.diff(one) for one in left])
-    if changes.size < FEWEST or returns(changes) <= COMES_BACK or remembers(changes):
-        return []
-    return [IdentificationCode.WALK_FOLLOWED.note(output=data.output, structure=model.structure)]
+    return IdentificationCode.WALK_FOLLOWED.note(output=output, structure=structure)
 
 
 def changes_of(data: Channels) -> Channels:

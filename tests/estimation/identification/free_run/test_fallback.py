@@ -103,6 +103,21 @@ def test_a_run_that_has_no_end_is_replaced() -> None:
     assert np.array_equal(sound.judged(u, y, np.full(9, np.nan))[0], np.ones(9))
 
 
+@pytest.mark.parametrize(("level", "taken"), [(1.0, "own"), (1.25, "own"), (1.4, "linear"), (9.0, "linear")])
+def test_what_the_linear_run_goes_beyond_the_ends_of_a_nonlinear_one_is_an_error_of_that(
+    level: float, taken: str
+) -> None:
+    """An output that integrates has no range: all fits stop at the same end, and agree there."""
+    own = np.full(9, min(level, 1.2))
+    one = Fallback(gain(1.0), (gain(1.0),) * 4, (gain(own[0] / level),) * 4, 0.1)
+    u, y = np.full((9, 1), level), np.full(9, np.nan)
+    run, (undetermined, left) = one.judged(u, y, own, np.array([-1.2, 1.2]))
+    assert (undetermined, left) == pytest.approx((max(level - 1.2, 0.0), 0.1))
+    assert run == pytest.approx(own if taken == "own" else np.full(9, level))
+    # a nonlinearity at the input has no such ends
+    assert np.array_equal(one.judged(u, y, own)[0], own)
+
+
 def squared(coefficient: float, end: float) -> PolynomialDynamics:
     """Return ``y = coefficient u[t - 1]^2``, its input held in the square at so much on both sides."""
     limits = np.array([[-9.0, 9.0], [-end, end]])

@@ -187,3 +187,19 @@ def test_a_controller_that_answers_the_noise_is_told_and_no_walk() -> None:
     said = [str(note.code) for note in identify_channels(data, order=1, delay=1).notes]
     assert "feedback" in said
     assert "random_walk" not in said
+
+
+@pytest.mark.parametrize(("seed", "step"), [(16808, 0.03), (16810, 0.0)])
+def test_auto_says_of_a_nonlinear_model_that_the_output_wanders_beside_it(seed: int, step: float) -> None:
+    """A bend hides the walk from the linear models that are asked for it."""
+    rng, y, n = np.random.default_rng(seed), np.zeros(N), 600
+    for t in range(1, N):
+        y[t] = POLE * y[t - 1] + (1.0 - POLE) * (LEVELS[t - 1] + LEVELS[t - 1] ** 2)
+    y += np.cumsum(step * rng.standard_normal(N)) + 0.02 * rng.standard_normal(N)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        data = channels_from([LEVELS[:n, None]], [y[:n]], 0.1, ["u"], "y")
+        found = identify_channels(data, structure="auto", order=1, delay=1)
+    assert found.model.structure == "narx"
+    assert [note.code for note in found.notes] == (["walk_followed"] if step else [])
+    assert found.sound == (not step)
