@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from estimation.arrays import Array
+from estimation.identification.free_run.choose_linear import slowest_pole
 from estimation.identification.free_run.dynamics import Dynamics
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 
@@ -71,8 +72,8 @@ class Fallback:
     def judged(self, u: Array, y: Array, own: Array, ends: Array | None = None) -> tuple[Array, tuple[float, float]]:
         """Return the nonlinear run, or the linear one where that errs less, and the errors of both.
 
-        An output that integrates has no range. What the linear run goes beyond the ends at which a nonlinear run is
-        held is an error of the latter that its fits agree on.
+        An output that integrates over the run has no range. What the linear run goes beyond the ends at which a
+        nonlinear run is held is an error of the latter that its fits agree on.
 
         Parameters
         ----------
@@ -91,7 +92,9 @@ class Fallback:
         linear = self.linear.run(u, y)
         known = float(np.sqrt(self.share))
         straight = known * jackknife(linear, [one.run(u, y) for one in self.linear_parts])
-        beyond = 0.0 if ends is None else float(np.sqrt(np.mean((linear - np.clip(linear, *ends)) ** 2)))
+        beyond = 0.0
+        if ends is not None and slowest_pole(self.linear.f) > np.exp(-1.0 / y.size):
+            beyond = float(np.sqrt(np.mean((linear - np.clip(linear, *ends)) ** 2)))
         apart = known * jackknife(own, [one.run(u, y) for one in self.parts])
         undetermined = float(np.linalg.norm([self.own_error, apart, beyond]))
         left = float(np.hypot(self.error, straight))

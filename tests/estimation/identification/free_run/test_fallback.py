@@ -103,17 +103,35 @@ def test_a_run_that_has_no_end_is_replaced() -> None:
     assert np.array_equal(sound.judged(u, y, np.full(9, np.nan))[0], np.ones(9))
 
 
-@pytest.mark.parametrize(("level", "taken"), [(1.0, "own"), (1.25, "own"), (1.4, "linear"), (9.0, "linear")])
-def test_what_the_linear_run_goes_beyond_the_ends_of_a_nonlinear_one_is_an_error_of_that(
-    level: float, taken: str
+class Held:
+    """Stands in for a polynomial whose output follows a linear one up to its ends."""
+
+    def __init__(self, linear: LinearDynamics) -> None:
+        self.linear = linear
+
+    def run(self, u: Array, y: Array) -> Array:
+        return np.clip(self.linear.run(u, y), *ENDS)
+
+
+ENDS = np.array([-1.2, 1.2])
+
+
+@pytest.mark.parametrize(("decay", "level", "taken"), [(1e-9, 1.0, 0), (1e-9, 2.0, 1), (1e-9, 9.0, 1), (0.2, 9.0, 0)])
+def test_what_integrates_beyond_the_ends_of_a_nonlinear_run_is_an_error_of_that(
+    decay: float, level: float, taken: int
 ) -> None:
-    """An output that integrates has no range: all fits stop at the same end, and agree there."""
-    own = np.full(9, min(level, 1.2))
-    one = Fallback(gain(1.0), (gain(1.0),) * 4, (gain(own[0] / level),) * 4, 0.1)
-    u, y = np.full((9, 1), level), np.full(9, np.nan)
-    run, (undetermined, left) = one.judged(u, y, own, np.array([-1.2, 1.2]))
-    assert (undetermined, left) == pytest.approx((max(level - 1.2, 0.0), 0.1))
-    assert run == pytest.approx(own if taken == "own" else np.full(9, level))
+    """All fits stop at the same end and agree there, and what integrates has no range; what settles may be held."""
+    linear = LinearDynamics(Form(1, (1,), (1,)), np.array([1.0, decay - 1.0, 0.0]))
+    held: Any = Held(linear)
+    one = Fallback(linear, (linear,) * 4, (held,) * 4, 0.1)
+    u, y = np.r_[0.0, np.full(8, level / 7.0)][:, None], np.full(9, np.nan)
+    straight, own = linear.run(u, y), held.run(u, y)
+    integrates = decay < 0.1
+    assert straight[-1] == pytest.approx(level if integrates else level / 7.0 * (1.0 - 0.8**7) / 0.2)
+    run, (undetermined, left) = one.judged(u, y, own, ENDS)
+    beyond = float(np.sqrt(np.mean((straight - own) ** 2))) if integrates else 0.0
+    assert (undetermined, left) == pytest.approx((beyond, 0.1))
+    assert np.array_equal(run, (own, straight)[taken])
     # a nonlinearity at the input has no such ends
     assert np.array_equal(one.judged(u, y, own)[0], own)
 
