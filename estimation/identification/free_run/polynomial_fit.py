@@ -85,12 +85,17 @@ def variables_of(linear: LinearFit, data: Channels) -> tuple[Variables, IntArray
 
 
 def ends_of(variables: Variables, terms: IntArray) -> Array:
-    """Return the ends at which a run's output is held: none where there are no products, shape (2,).
+    """Return the ends at which a run's output is held: none where there are no products.
 
     Parameters
     ----------
     terms : ndarray of int, shape (k, 3)
         Variables that each term multiplies, ahead of as many -1 as there are fewer than three; -1 stands for 1.
+
+    Returns
+    -------
+    ndarray, shape (2,)
+        Least and greatest output, scaled.
     """
     free = not (terms[:, 1] >= 0).any()
     return np.array([-1e9, 1e9]) if free else variables.around(FARTHEST)

@@ -327,6 +327,11 @@ def longest(parts: Sequence[Array]) -> Array:
     ----------
     parts : sequence of ndarray, shape (n,)
         NaN where missing.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        In their unit.
     """
     rows = [part[begin:end] for part in parts for begin, end in zip(*stretches(np.isfinite(part)), strict=True)]
     return max(rows, key=lambda row: row.size, default=np.zeros(0))
