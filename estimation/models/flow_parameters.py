@@ -1,5 +1,6 @@
 """Parameters of the flow form: the actuator's, and those that the form adds."""
 
+from collections.abc import Container
 from dataclasses import dataclass, fields
 
 from plant.eha.model import EhaParameters
@@ -35,3 +36,16 @@ def flow_parameters(p: EhaParameters) -> FlowParameters:
         With the defaults of what the form adds.
     """
     return FlowParameters(**{one.name: getattr(p, one.name) for one in fields(EhaParameters)})
+
+
+def is_single(found: Container[str], area_difference: float) -> bool:
+    """Return whether a rod is single, by its rig or by what is found of its log.
+
+    Parameters
+    ----------
+    found : container of str
+        Parameters that a fit finds.
+    area_difference : float
+        Of the rig [fraction].
+    """
+    return area_difference != 0.0 or "area_difference" in found

@@ -18,7 +18,7 @@ from estimation.fits.flow.asked_hypotheses import (
 from estimation.fits.flow.belief import hopeless_cost, likelier, play_explained, told_by, wanted_cost
 from estimation.fits.flow.log import homed_at_stop, require_flow_channels, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
-from estimation.fits.flow.losses import UNEVEN_OIL, is_single, with_lumped, with_lumped_slopes
+from estimation.fits.flow.losses import UNEVEN_OIL, with_lumped, with_lumped_slopes
 from estimation.fits.flow.misread import UNLIKE_SLIPS, CorrectedLogs
 from estimation.fits.flow.model_steps import with_implicit_steps
 from estimation.fits.flow.motor_course import by_course, with_open_turns
@@ -53,6 +53,7 @@ from estimation.fits.hypothesis_search.speed_offset import speed_offset_instead
 from estimation.fits.hypothesis_search.varying_loss import VaryingLoss, loss_notes, varying_loss
 from estimation.models.completed_flow import CRACKS, balances_mass
 from estimation.models.flow import HELD_FLOW_FORM
+from estimation.models.flow_parameters import is_single
 from estimation.notes import EstimateCode
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -303,7 +304,7 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
         untaken, open_play = plain.play_untaken(one.play, sensed)
         left, shown = float(np.hypot(FILTERED if traits.filtered else STRUCTURE, untaken)), play_left(one.play, sensed)
     doubts = [left, ratio_doubt(strange, plain.log.uncertainties)]
-    doubts += [UNEVEN_OIL] if is_single(strange.values, plain.start.parameters) else []
+    doubts += [UNEVEN_OIL] if is_single(strange.values, plain.start.parameters.area_difference) else []
     doubts += [BUBBLES] if {AIR.name, AIR_MIDWAY.name} & set(strange.names) else []
     left = float(np.linalg.norm(doubts))
     unseen = () if MAKEUP_BLOCKED.name in strange.names else unseen_valve_note(one)
@@ -332,7 +333,7 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     found, correlation = with_lumped(averaged(plain.fits, weights), plain.fits, weights, p, plain.log.measured_rms)
     found = with_shifts(found, best.small_teeth, best.noise_shift)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
-    left = UNEVEN_OIL if is_single({}, p) else DISCRETISED
+    left = UNEVEN_OIL if p.single_rod else DISCRETISED
     untaken, open_play = plain.play_untaken(plain.swinging.play, sensed)
     reasons = (*objections(best, plain.log.passes_on), *play_left(plain.swinging.play, sensed)) or plain.teeth_left
     if begun and not reasons and not told_by(plain, begun=begun)(best):

@@ -12,6 +12,7 @@ import numpy as np
 
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.hypothesis_search.form_fit import DISCRETISED
+from estimation.models.flow_parameters import is_single
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
@@ -72,11 +73,6 @@ def _of(fit: GreyBoxFit) -> tuple[Array, Array]:
     return found, answers @ fit.covariance[np.ix_(places, places)] @ answers.T
 
 
-def is_single(found: Mapping[str, object], p: EhaParameters) -> bool:
-    """Return whether a rod is single, by the rig file or by what was found of its log (a mapping by parameter)."""
-    return p.single_rod or "area_difference" in found
-
-
 def with_lumped(
     found: Mapping[str, tuple[float, float]],
     fits: Sequence[GreyBoxFit],
@@ -109,7 +105,7 @@ def with_lumped(
     if not {LEAKAGE, DRAIN, BIAS} <= set(found):
         return {**found}, 0.0
     values, covariance = losses(fits, weights)
-    single = is_single(found, p)
+    single = is_single(found, p.area_difference)
     left_out = (UNEVEN_SIDES if single else DISCRETISED) * p.rated_flow
     covariance[0, 0] += (left_out / (min(p.relief_pressure, pressure) if single else p.relief_pressure)) ** 2
     if single:

@@ -3,6 +3,7 @@
 from collections.abc import Collection
 
 from estimation.fits.greybox.log import GreyBoxLog
+from estimation.models.flow_parameters import is_single
 from estimation.models.greybox import GreyBoxModel
 from plant.solvers.steps import parameter_names
 
@@ -14,8 +15,6 @@ UNEVEN_NUDGE = 1e-3
 """The same of a single rod [dimensionless]. Its make-up valves open and shut all the time: where the pressures of both
 sides cross, one model step earlier or later is a jump of a third of the noise, which a step of 1e-4 took for slopes ten
 times as steep as they are. Searches stopped above their minimum, and deviations came out up to 100 times too small."""
-
-UNEVEN = ("area_difference", "pilot_share")
 
 
 def nudge_for(log: GreyBoxLog, model: GreyBoxModel, free: Collection[str]) -> float:
@@ -36,5 +35,5 @@ def nudge_for(log: GreyBoxLog, model: GreyBoxModel, free: Collection[str]) -> fl
         In the fitted coordinates [dimensionless].
     """
     names = parameter_names(model.parameters)
-    single = any(name in free or log.parameters[names.index(name)] != 0.0 for name in UNEVEN if name in names)
-    return UNEVEN_NUDGE if single else NUDGE
+    differ = log.parameters[names.index("area_difference")] if "area_difference" in names else 0.0
+    return UNEVEN_NUDGE if is_single(free, differ) else NUDGE

@@ -10,6 +10,7 @@ from estimation.log_checks.flow_balance import flow_balance
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
+from plant.eha.model import piston_areas
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
@@ -74,3 +75,16 @@ def test_a_single_rods_pump_moves_the_side_that_holds_the_pressure(load: float) 
     assert by_mean is not None
     assert abs(found.swept - 1.0) < 0.06
     assert abs(by_mean.swept - 1.0) > 0.1
+
+
+def test_noise_of_pressure_does_not_change_the_side_that_a_single_rods_pump_moves() -> None:
+    """By the sign of each sample a sixth of them were the other side's, and the factor was 0.9."""
+    rng = np.random.default_rng(6)
+    rod = replace(HEALTHY, area_difference=0.35, pilot_share=1.0)
+    speed = np.repeat(rng.uniform(20.0, 120.0, 120) * np.tile([1.0, -1.0], 60), 100)
+    held = np.where(speed > 0.0, *piston_areas(rod))
+    way = 1e-3 * np.cumsum(rod.pump_displacement * speed / held)
+    pressure = 1e5 * np.sign(speed) + rng.normal(0.0, 1e5, len(speed))
+    found = flow_balance(Record(1e-3, {SPEED: speed, POSITION: way, PRESSURE: pressure}), rod, MIDDLE)
+    assert found is not None
+    assert found.swept == pytest.approx(1.0, abs=0.02)
