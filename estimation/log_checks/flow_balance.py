@@ -23,7 +23,7 @@ BIASES = 401
 """Flow biases over which a balance is averaged [count]: a step moves the piston's factor by less than 0.1 %."""
 
 HELD_BEYOND = 3.0
-"""Deviations of a pressure's noise up to which a single rod's other side does not hold the pressure [dimensionless]."""
+"""Deviations of its noise from which one sample of pressure tells a single rod's side that holds it [dimensionless]."""
 
 LEAST_SHARE = 1e-12
 """Share of the flow that counts as left where nothing is, as of a log without noise [fraction]."""
@@ -88,7 +88,7 @@ def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance
     compliance = p.chamber_volume / p.bulk_modulus
     spread = window.of_slope if moved == POSITION else window.of_mean
     flow = p.pump_displacement * window.mean(speed)
-    areas = _pumped_areas(pressure, HELD_BEYOND * np.sqrt(noise_p), p)
+    areas = _pumped_areas(pressure, HELD_BEYOND * np.sqrt(noise_p), size, p)
     parts = [
         window.slope(piston, areas) if moved == POSITION else window.mean(areas * piston),
         compliance * window.slope(pressure),
@@ -101,21 +101,18 @@ def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance
     return _whatever_the_bias(flow, sign, parts, np.array(noises), MOST_LOST * p.rated_flow)
 
 
-def _pumped_areas(pressure: Array, least: float, p: EhaParameters) -> Array:
+def _pumped_areas(pressure: Array, least: float, size: int, p: EhaParameters) -> Array:
     """Return the area whose flow the pump's is, shape (n,) [m^2].
 
     What a single rod's low side takes or gives beside goes through its make-up valve, which the high side holds open.
-    With plain valves that shut, both sides may be high, and the mean counts. A side holds the pressure until the other
-    has more by what is not noise, ``least`` [Pa].
+    With plain valves that shut, both sides may be high, and the mean counts. Below ``least`` a pressure may be noise
+    [Pa], and the mean over ``size`` samples tells the side.
     """
     if not (p.single_rod and p.pilot_share > 0.0):
         return np.full(len(pressure), p.piston_area)
     side_a, side_b = piston_areas(p)
-    sure = np.flatnonzero(np.abs(pressure) > least)
-    if not len(sure):
-        return np.full(len(pressure), p.piston_area)
-    last = np.maximum(np.searchsorted(sure, np.arange(len(pressure)), side="right") - 1, 0)
-    return np.where(pressure[sure[last]] > 0.0, side_a, side_b)
+    lasting = np.convolve(pressure, np.full(size, 1.0 / size), mode="same")
+    return np.where(np.where(np.abs(pressure) > least, pressure, lasting) > 0.0, side_a, side_b)
 
 
 def _noise(values: Array) -> float:
