@@ -127,6 +127,10 @@ class ClassCode(Code):
         "the rig file has the pump or piston of your actuator, but still the leakage and friction of the paper's: "
         "class and severities are counted from these, so enter those of your healthy actuator"
     )
+    MAKEUP_TOO_SMALL = (
+        "by the rig file, the oil by which this single rod's sides differ takes {drop_pa:.2g|bar} bar in the "
+        "make-up valves at rated speed, more than there is: leave makeup_conductance out, or enter that of your valves"
+    )
     PRESSURE_ABSENT_CLASS = (
         "without differential_pressure_pa, friction shows only in velocity: classes are usually told apart less clearly"
     )

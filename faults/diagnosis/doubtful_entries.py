@@ -16,7 +16,7 @@ def doubtful_entries(p: EhaParameters) -> tuple[Note, ...]:
     """Return notes on entries of a rig file that do not go together."""
     larger = with_room(p).chamber_volume / p.chamber_volume - 1.0
     tight = (ClassCode.VOLUME_FOR_STROKE.note(percent=100.0 * larger),) if larger > 0.0 else ()
-    return (*_healthy_of_the_paper(p), *tight)
+    return (*_healthy_of_the_paper(p), *tight, *_makeup_too_small(p))
 
 
 def _healthy_of_the_paper(p: EhaParameters) -> tuple[Note, ...]:
@@ -25,3 +25,10 @@ def _healthy_of_the_paper(p: EhaParameters) -> tuple[Note, ...]:
     another = any(abs(getattr(p, name) / getattr(of_paper, name) - 1.0) > ANOTHER for name in PUMP_AND_PISTON)
     left = all(getattr(p, name) == getattr(of_paper, name) for name in HEALTHY)
     return (ClassCode.HEALTHY_OF_THE_PAPER.note(),) if another and left else ()
+
+
+def _makeup_too_small(p: EhaParameters) -> tuple[Note, ...]:
+    """Return a note where a single rod's own flow through its make-up valves takes more pressure than there is."""
+    share = abs(p.area_difference)
+    flow, most = 2.0 * share / (1.0 + share) * p.rated_flow, p.makeup_conductance * p.accumulator_pressure
+    return (ClassCode.MAKEUP_TOO_SMALL.note(drop_pa=flow / p.makeup_conductance),) if 0.0 < most < flow else ()

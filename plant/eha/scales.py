@@ -71,7 +71,8 @@ def with_valves_sized(p: EhaParameters, given: Container[str]) -> EhaParameters:
     """Return an actuator whose valves, where its rig file says nothing of them, let its own pump's flow through.
 
     A single rod sends half of that through its make-up valves at every stroke. With the paper's valves, a pump of 15
-    times the flow lost 5 bar there, and its friction came out half as large as it was.
+    times the flow lost 5 bar there, and its friction came out half as large as it was. What a file gives is taken at
+    its word, but for the very numbers of the paper: templates used to have them as values.
 
     Parameters
     ----------
@@ -91,7 +92,8 @@ def with_valves_sized(p: EhaParameters, given: Container[str]) -> EhaParameters:
     True
     """
     flow = p.rated_flow / PAPER_RIG.rated_flow
-    return replace(p, **{name: flow * getattr(p, name) for name in SIZED_BY_PUMP if name not in given})
+    left = [name for name in SIZED_BY_PUMP if name not in given or getattr(p, name) == getattr(PAPER_RIG, name)]
+    return replace(p, **{name: flow * getattr(p, name) for name in left})
 
 
 def natural_frequency(p: EhaParameters) -> float:
