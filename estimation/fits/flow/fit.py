@@ -294,7 +294,7 @@ def _elsewhere(plain: PlainFits, strange: Explanation) -> FitStart | None:
 def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, traits: LogTraits) -> FormFit:
     """Return the fit of a log with what is strange about it taken up."""
     strange = strange.in_detail
-    one = strange.fit
+    one, p = strange.fit, plain.start.parameters
     modulus, bound = one.values["bulk_modulus"], bound_told(strange, plain.best)
     if PLAY.name in strange.names:
         moved = abs(modulus / plain.swinging.values["bulk_modulus"] - 1.0)
@@ -304,18 +304,17 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
         untaken, open_play = plain.play_untaken(one.play, sensed)
         left, shown = float(np.hypot(FILTERED if traits.filtered else STRUCTURE, untaken)), play_left(one.play, sensed)
     doubts = [left, ratio_doubt(strange, plain.log.uncertainties)]
-    doubts += [UNEVEN_OIL] if is_single(strange.values, plain.start.parameters.area_difference) else []
+    doubts += [UNEVEN_OIL] if is_single(strange.values, p.area_difference) else []
     doubts += [BUBBLES] if {AIR.name, AIR_MIDWAY.name} & set(strange.names) else []
     left = float(np.linalg.norm(doubts))
     unseen = () if MAKEUP_BLOCKED.name in strange.names else unseen_valve_note(one)
-    most = share_lost(plain.log, one.values, plain.start.parameters.pump_displacement, strange.names)
-    weights, p = weights_of(strange.fits), plain.start.parameters
+    most, weights = share_lost(plain.log, one.values, p.pump_displacement, strange.names), weights_of(strange.fits)
     found, correlation = with_lumped(strange.values, strange.fits, weights, p, plain.log.measured_rms)
     return FormFit(
         parameters=with_structure(with_shifts(found, one.small_teeth, one.noise_shift), left),
         bound=bound,
         chi_square=one.chi_square[0],
-        reasons=(*shown, *contradicted(strange, plain.start.parameters)),
+        reasons=(*shown, *contradicted(strange, p)),
         rig_slopes=with_lumped_slopes(one.rig_slopes),
         explanation=strange,
         remarks=(*plain.teeth, *open_wear_note(strange.delivery_open, most), *unseen, *open_play),
