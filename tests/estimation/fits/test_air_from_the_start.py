@@ -11,7 +11,7 @@ from plant.log.record import Record
 
 
 def test_air_that_gets_in_has_a_time_at_which_it_does() -> None:
-    for onset, told in ((0.0, False), (0.004, False), (0.4, True)):
+    for onset, told in ((0.0, False), (0.004, False), (0.009, False), (0.4, True)):
         values, stds = {"air_softness": 700.0, "air_onset": onset}, {"air_softness": 9.0, "air_onset": 0.005}
         assert AIR_MIDWAY.told(values, stds) == told
 
