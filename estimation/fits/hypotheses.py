@@ -13,9 +13,8 @@ from estimation.models.flow import STIFFNESS
 from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import CROSSED, QUICKEST, QUICKNESS
 
-
 SURELY = 2.0
-"""Deviations from which what a hypothesis needs to be there is there [dimensionless]. Air that was in from the beginning
+"""Deviations from which what a hypothesis needs to be there is there [dimensionless]. Air that was in from the start
 was said to enter at 0.7 ± 0.6 % of a log, and bulk modulus was that without it, 54 % above all that acted."""
 
 
@@ -63,8 +62,8 @@ class Hypothesis:
     lower : bool
         Whether what is freed first is lower than the rig file has it: else it is not what the hypothesis says.
     known : tuple of str
-        What must be larger than `SURELY` of its deviations: a valve that never opens tells no drop, a circuit without air not when
-        it gets in, and air that is in from the beginning gets in at no time.
+        What must be larger than `SURELY` times its deviation: a valve that never opens tells no drop, a circuit without
+        air not when it gets in, and air that is in from the beginning gets in at no time.
     """
 
     name: str

@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO, LEAST_DELIVERY
+from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO, LEAST_DELIVERY, VOLUME, Hypothesis
 from estimation.fits.hypothesis_search.conclusion import Accepted, delivery_beside, is_explained
 from estimation.fits.hypothesis_search.decimation import Decimation
 from estimation.fits.hypothesis_search.explanation import Trial
@@ -50,7 +51,7 @@ def delivery_followed(
     followed = any(one.together == (DELIVERY,) and one.fits for one in finished)
     if not promises or followed or is_explained(finished[0], accepted):
         return []
-    return likeliest(log, [[*screen(log, (DELIVERY,), spared.starts, every=spared.every)]], spared=spared)
+    return _sought(log, (DELIVERY,), spared)
 
 
 def with_zero(log: GreyBoxLog, first: Trial, spared: Decimation, accepted: Accepted) -> list[Trial]:
@@ -72,10 +73,31 @@ def with_zero(log: GreyBoxLog, first: Trial, spared: Decimation, accepted: Accep
     """
     if ENCODER_ZERO in first.together or is_explained(first, accepted):
         return []
-    late = delayed(log, first.delays)
-    tried = [*screen(late, (*first.together, ENCODER_ZERO), spared.starts, every=spared.every)]
-    ended = (one for one in likeliest(late, [tried], spared=spared) if is_explained(one, accepted))
-    return [replace(one, delays={**first.delays, **one.delays}) for one in ended]
+    return _sought(log, (*first.together, ENCODER_ZERO), spared, accepted, first.delays)
+
+
+def rig_and_load(log: GreyBoxLog, load: Hypothesis, best: Trial, spared: Decimation, accepted: Accepted) -> list[Trial]:
+    """Return a load at the start of a log together with a pump and chambers that the rig file has wrong.
+
+    A load is no error of a rig file, so two errors may come beside it. Searched one after the other, each takes up what
+    belongs to the others. They are sought only where no two explain the log, and to their end, whatever two leave.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    load : Hypothesis
+        That at the start of this log.
+    best : Trial
+        The likeliest so far, alone or in a pair.
+    spared : Decimation
+        Samples and starts of the search.
+    accepted : callable
+        ``accepted(fit)``: whether a fit explains the log.
+    """
+    if is_explained(best, accepted):
+        return []
+    return _sought(log, (DELIVERY, VOLUME, load), spared, accepted)
 
 
 def with_delivery(log: GreyBoxLog, best: Trial, spared: Decimation, accepted: Accepted) -> list[Trial]:
@@ -102,6 +124,19 @@ def with_delivery(log: GreyBoxLog, best: Trial, spared: Decimation, accepted: Ac
     promised = delivery_beside(log, best)
     if promised.gain < BESIDE_OTHERS or abs(promised.size) < LEAST_DELIVERY:
         return []
-    late = delayed(log, best.delays)
-    tried = [*screen(late, (*best.together, DELIVERY), [best.coarse or best.values], every=spared.every)]
-    return [one for one in likeliest(late, [tried], spared=spared) if is_explained(one, accepted)]
+    return _sought(log, (*best.together, DELIVERY), spared, accepted, best.delays, [best.coarse or best.values])
+
+
+def _sought(
+    log: GreyBoxLog,
+    together: tuple[Hypothesis, ...],
+    spared: Decimation,
+    accepted: Accepted | None = None,
+    delays: Mapping[str, float] = MappingProxyType({}),
+    starts: Sequence[Mapping[str, float]] = (),
+) -> list[Trial]:
+    """Return the ends of a search for hypotheses together, the best first; if asked, of those that explain the log."""
+    late = delayed(log, delays)
+    tried = [*screen(late, together, starts or spared.starts, every=spared.every)]
+    ended = [replace(one, delays={**delays, **one.delays}) for one in likeliest(late, [tried], spared=spared)]
+    return [one for one in ended if accepted is None or is_explained(one, accepted)]

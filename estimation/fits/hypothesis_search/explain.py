@@ -13,7 +13,7 @@ from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, START_LOAD, VOLUME, Hypothesis
 from estimation.fits.hypothesis_search.coarse_search import coarsened, vanished_values
-from estimation.fits.hypothesis_search.commonly_hidden import delivery_followed, with_delivery, with_zero
+from estimation.fits.hypothesis_search.commonly_hidden import delivery_followed, rig_and_load, with_delivery, with_zero
 from estimation.fits.hypothesis_search.compatible_hypotheses import compatible_hypotheses
 from estimation.fits.hypothesis_search.conclusion import Accepted, conclude, is_explained
 from estimation.fits.hypothesis_search.decimation import FEW, Decimation, cost_over_noise, decimation_for
@@ -123,7 +123,7 @@ def explain(
             pairs += _paired(wide, second, starts[0], accepted, rivalled=min(one.cost for one in (first, *pairs)))
         finished = _distinct([first, *pairs])
         if begun := [one for one in asked if one.from_first_sample and one.free == START_LOAD.free]:
-            finished = _distinct([*finished, *_rig_and_load(wide, begun[0], finished[0], spared, accepted)])
+            finished = _distinct([*finished, *rig_and_load(wide, begun[0], finished[0], spared, accepted)])
         finished = _distinct([behind_filter(wide, finished[0]), *finished])
     if is_explained(finished[0], accepted):
         stuck = [one for one in stuck_instead(wide, finished[0], spared, WORTH) if is_explained(one, accepted)]
@@ -253,21 +253,6 @@ def _paired(
         if more:
             pairs = ranked([*pairs, *likeliest(late, more, known, spared, useful)])
     return _better(first, pairs, least)
-
-
-def _rig_and_load(
-    log: GreyBoxLog, load: Hypothesis, best: Trial, spared: Decimation, accepted: Accepted
-) -> list[Trial]:
-    """Return a load at the start of a log together with a pump and chambers that the rig file has wrong.
-
-    A load is no error of a rig file, so two errors may come beside it. Searched one after the other, each takes up what
-    belongs to the others. They are sought only where no two explain the log, and to their end, whatever two leave.
-    """
-    if is_explained(best, accepted):
-        return []
-    together = DELIVERY, VOLUME, load
-    tried = [*screen(log, together, spared.starts, every=spared.every)]
-    return [one for one in likeliest(log, [tried], spared=spared) if is_explained(one, accepted)]
 
 
 def _better(first: Trial, pairs: Iterable[Trial], least: float) -> list[Trial]:

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO, OFFSET
+from estimation.fits.hypotheses import BEGUN, DELIVERY, ENCODER_ZERO, OFFSET, VOLUME
 from estimation.fits.hypothesis_search import commonly_hidden
-from estimation.fits.hypothesis_search.commonly_hidden import delivery_followed, with_delivery, with_zero
+from estimation.fits.hypothesis_search.commonly_hidden import delivery_followed, rig_and_load, with_delivery, with_zero
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.predicted_gains import PredictedGain
 
@@ -64,6 +64,15 @@ def test_a_zero_is_sought_together_with_what_is_likeliest_alone_unless_that_expl
         assert with_zero(LOG, first, SPARED, explains) == []
     assert with_zero(LOG, tried(90.0, OFFSET), SPARED, lambda fit: fit.cost < 1.0) == []  # both leave too much
     assert len(asked) == 2
+
+
+def test_a_load_a_pump_and_chambers_are_sought_together_only_where_nothing_explains_a_log_and_told_only_if_they_do(
+    asked: list[Any],
+) -> None:
+    assert rig_and_load(LOG, BEGUN, tried(40.0, OFFSET), SPARED, explains) == asked == []
+    (three,) = rig_and_load(LOG, BEGUN, tried(90.0, OFFSET), SPARED, explains)
+    assert three.together == (DELIVERY, VOLUME, BEGUN)
+    assert rig_and_load(LOG, BEGUN, tried(90.0, OFFSET), SPARED, lambda fit: fit.cost < 1.0) == []
 
 
 @pytest.mark.parametrize(
