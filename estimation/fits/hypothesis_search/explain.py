@@ -19,7 +19,7 @@ from estimation.fits.hypothesis_search.conclusion import Accepted, conclude, is_
 from estimation.fits.hypothesis_search.decimation import FEW, Decimation, cost_over_noise, decimation_for
 from estimation.fits.hypothesis_search.decimation_limit import decimation_limit
 from estimation.fits.hypothesis_search.explanation import Explanation, Trial
-from estimation.fits.hypothesis_search.final_fits import ALIKE, REACHED, behind_filter
+from estimation.fits.hypothesis_search.final_fits import ALIKE, REACHED, behind_filter, without_idle
 from estimation.fits.hypothesis_search.predicted_gains import by_predicted_gain, predicted_gain_beside
 from estimation.fits.hypothesis_search.ranking import (
     NEARLY_AS_GOOD,
@@ -126,6 +126,7 @@ def explain(
             finished = _distinct([*finished, *rig_and_load(wide, begun[0], finished[0], spared, accepted)])
         finished = _distinct([behind_filter(wide, finished[0]), *finished])
     if is_explained(finished[0], accepted):
+        finished = [without_idle(wide, finished[0], WORTH), *finished[1:]]
         stuck = [one for one in stuck_instead(wide, finished[0], spared, WORTH) if is_explained(one, accepted)]
         finished = [*stuck, *finished[len(stuck) :]]
     if paired:

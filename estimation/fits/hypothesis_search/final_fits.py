@@ -10,7 +10,7 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play import play_left
 from estimation.fits.greybox.spared_steps import LAST, spared
-from estimation.fits.hypotheses import CHECKS_CRACK, PRESSURE_FILTERED, PRESSURE_LATE
+from estimation.fits.hypotheses import CHECKS_CRACK, PRESSURE_FILTERED, PRESSURE_LATE, SURELY, Hypothesis
 from estimation.fits.hypothesis_search.coarse_search import NEAR, coarsened, descended
 from estimation.fits.hypothesis_search.decimation import FEW, cost_over_noise
 from estimation.fits.hypothesis_search.explanation import Trial
@@ -162,6 +162,45 @@ def behind_filter(log: GreyBoxLog, tried: Trial) -> Trial:
     delays = {channel: one for channel, one in tried.delays.items() if channel != PRESSURE_LATE.late}
     filtered = final_fit(log, replace(tried, together=together, values=values, delays=delays), tried.cost)
     return filtered if filtered.cost < tried.cost else tried
+
+
+def without_idle(log: GreyBoxLog, tried: Trial, worth: float) -> Trial:
+    """Return the final fit of a set without a hypothesis of it that ended where what it says is absent.
+
+    A second one may lead a search out of a valley and end at nothing. Oil with air was explained together with a
+    make-up valve that is stuck shut, whose conductance was 1.02 ± 0.05 times the other's.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    tried : Trial
+        Several hypotheses, fitted to the end.
+    worth : float
+        Gain in log-likelihood below which one more is not believed [dimensionless].
+
+    Returns
+    -------
+    Trial
+        The set as it was where each of it is there, or needed.
+    """
+    if len(tried.together) < 2 or not tried.fits:
+        return tried
+    for one in tried.together:
+        if _is_absent(one, tried):
+            rest = tuple(other for other in tried.together if other != one)
+            values = {**tried.values, **{name: tried.rig[name] for name in one.free}}
+            fewer = final_fit(log, replace(tried, together=rest, values=values), tried.cost + worth)
+            if fewer.cost < tried.cost + worth:
+                return fewer
+    return tried
+
+
+def _is_absent(one: Hypothesis, tried: Trial) -> bool:
+    """Return whether all that a hypothesis frees ended at its absence, as far as the log knows it."""
+    std, delayed_too = tried.fit.std, len(one.delays) > 1 and one.late in tried.delays
+    near = (abs(tried.values[name] - tried.rig[name]) <= SURELY * std.get(name, 0.0) for name in one.free)
+    return not delayed_too and all(near)
 
 
 def _concluded(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxFit:
