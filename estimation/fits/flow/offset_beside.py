@@ -38,7 +38,8 @@ def offset_settled(
     Returns
     -------
     tuple of (PlainFits, Explanation or None)
-        Both as they were where the explanation asks for no other offset, or does not keep what that promises.
+        Both as they were where the explanation asks for no other offset, or does not keep what that promises. Beside
+        the other offset some of what explained the log may not be needed.
     """
     if strange is None or plain.log.gaps.size:
         return plain, strange
@@ -54,7 +55,7 @@ def offset_settled(
     same = [one for one in asked if one.name in strange.names]
     again = explained(other, same) if len(same) == len(strange.names) else None
     kept = again is not None and again.fit.cost <= strange.fit.cost - KEPT * shown.gain
-    if again is None or not kept or set(again.names) != set(strange.names):
+    if again is None or not kept or not set(again.names) <= set(strange.names):
         return plain, strange
     return other, again
 

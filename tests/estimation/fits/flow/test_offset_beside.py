@@ -81,3 +81,12 @@ def test_a_pair_is_the_same_in_either_order_and_is_asked_as_it_was() -> None:
     found, strange = offset_settled(plain, first, (BEGUN, OFFSET, ENCODER_ZERO), explained)
     assert heard == [[BEGUN, OFFSET]]
     assert (found.turning.offset, strange and strange.fit.cost) == (0.0, 420.0)
+
+
+def test_beside_another_offset_fewer_hypotheses_may_be_enough_but_no_others() -> None:
+    """A worn pump passed for a relief valve set low, an offset of pressure and a pump that delivers 150 %."""
+    plain = told(0.2)
+    first = replace(explanation(500.0, -0.2, 80.0), names=(OFFSET.name, ENCODER_ZERO.name))
+    fewer, others = explanation(400.0), replace(explanation(400.0), names=("volume",))
+    assert offset_settled(plain, first, HYPOTHESES, lambda *_: fewer)[1] is fewer
+    assert offset_settled(plain, first, HYPOTHESES, lambda *_: others)[1] is first
