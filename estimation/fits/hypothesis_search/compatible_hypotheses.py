@@ -70,7 +70,11 @@ def _unseen(one: Hypothesis) -> bool:
 
 
 def _all_together(log: GreyBoxLog, tried: Trial, left: float) -> tuple[float, dict[str, float]]:
-    """Return the cost of all hypotheses together over that of noise, and their values [SI]."""
+    """Return the least that all hypotheses together may leave over the noise, and their values [SI].
+
+    A search that finds no step down says nothing: they may leave nothing then. Bubbles, whose slopes are slight where
+    there are none, were not asked beside a lag of the pressure, and explain that log with it.
+    """
     taken = {one.name for one in tried.together}
     more = [replace(one, instead=()) for one in HYPOTHESES if one.name not in taken]
     asked = max(decimation_for(log, left), round(SHORT_STEP / log.sample_time))
@@ -85,4 +89,5 @@ def _all_together(log: GreyBoxLog, tried: Trial, left: float) -> tuple[float, di
     start = problem.model.theta({**usual_values(log), **stepped, **(tried.coarse or tried.values)})
     bounds = flow_bounds(problem.model, [start], log)
     point = descend(problem.at, start, TOGETHER, bounds, radius=NEAR, least_share=SMALL)
-    return cost_over_noise(log, point.cost), dict(problem.model.values(point.theta))
+    unmoved = np.array_equal(point.theta, np.clip(start, *bounds))
+    return 0.0 if unmoved else cost_over_noise(log, point.cost), dict(problem.model.values(point.theta))

@@ -97,3 +97,12 @@ def test_a_pressure_that_is_off_is_within_reach_and_bursts_of_noise_are_not(monk
     left, asked = beside_leakage_that_rises(bursts, monkeypatch)
     assert REACHED < left < UNFINISHED
     assert asked == set()
+
+
+def test_a_search_with_all_hypotheses_that_finds_no_step_down_leaves_all_of_them_to_be_asked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Air beside a pressure that lags was not asked, and the log refused at 4.3 times the noise."""
+    monkeypatch.setattr(module, "descend", lambda at, start, _, bounds, **__: at(np.clip(start, *bounds)))
+    bursts = np.random.default_rng(5).normal(0.0, 1e4, len(log(1.0)))
+    assert beside_leakage_that_rises(bursts, monkeypatch)[1] == {OFFSET.name, DELIVERY.name}
