@@ -2,7 +2,8 @@
 
 Logs are made of the split that is asked for; ``--folder`` scores sets that are there. Silent errors and false unknowns
 are wanted to be none with pressure. A log without pressure takes long, so few of them are scored. ``--pairs`` scores
-logs in which two kinds are at once, drawn at random: log k is number k of its pair.
+logs in which two kinds are at once, drawn at random: log k is number k of its pair; ``--usual-pairs`` those of
+`USUAL_PAIRS`, ``--count`` of each.
 """
 
 import argparse
@@ -20,6 +21,16 @@ from experiments.open_benchmark.score import coverage, score_set, summary
 NONE_WANTED = ("silent_beta", "silent_class", "false_unknown", "false_since")
 """Counts that are wanted to be zero where pressure is logged."""
 
+USUAL_PAIRS = (
+    *("pressure_lags_2_ms+position_zero_at_stop", "pressure_1_bar_off+worn_pump", "clock_jitters+constant_load"),
+    *("pressure_5_ms_late+entrained_air", "pressure_lags_2_ms+single_rod", "rig_volume_wrong+makeup_check_stuck_shut"),
+    *("coarse_converters+leakage_grows", "no_velocity+speed_offset", "closed_loop+entrained_air"),
+    *("logged_at_5_kHz+pressure_behind_30_hz", "position_zero_at_stop+worn_pump", "speed_offset+worn_pump"),
+    *("pressure_1_bar_off+position_zero_at_stop", "pressure_5_ms_late+makeup_check_leaks"),
+)
+"""Two strange things that a bench is likely to have at once: a fault, or what its rig file leaves out, beside what its
+logger adds."""
+
 
 def main(arguments: list[str]) -> int:
     """Print a line a kind, and the counts that shall be none; return how many are not."""
@@ -28,6 +39,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--split", default="validation", choices=SPLITS)
     parser.add_argument("--count", type=int, default=3, help="logs of each kind")
     parser.add_argument("--pairs", type=int, default=0, help="logs of two kinds at once, in place of single ones")
+    parser.add_argument("--usual-pairs", action="store_true", help="those of a usual bench, in place of single kinds")
     parser.add_argument("--without", type=int, default=0, help="of them scored without pressure too")
     parser.add_argument("--folder", nargs="+", type=Path, default=[], help="sets to score in place of made ones")
     parser.add_argument("--coverage", action="store_true", help="also a line a kind and quantity on its intervals")
@@ -68,6 +80,5 @@ def sets(options: argparse.Namespace, made: Path) -> Iterator[tuple[Path, int]]:
         for index, pair in enumerate(drawn_pairs(options.split, options.pairs)):
             yield write_set(pair, options.split, 1, made, first=index).parent, 1
     else:
-        yield from (
-            (write_set(kind, options.split, options.count, made).parent, options.count) for kind in options.kind
-        )
+        kinds = USUAL_PAIRS if options.usual_pairs else options.kind
+        yield from ((write_set(kind, options.split, options.count, made).parent, options.count) for kind in kinds)
