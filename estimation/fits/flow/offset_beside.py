@@ -9,10 +9,11 @@ from dataclasses import replace
 
 from estimation.finding import NORMAL_95
 from estimation.fits.flow.plain import PlainFits
-from estimation.fits.greybox.pump_ripple import MOST_OFFSET, Turning, with_ripple
-from estimation.fits.hypotheses import Hypothesis
+from estimation.fits.greybox.pump_ripple import Turning, with_ripple
+from estimation.fits.hypotheses import DELIVERY, Hypothesis
 from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.fits.hypothesis_search.pump_ripple_fits import KEPT, OFFSET_SETTLED, OFFSET_WORTH, told_offset
+from estimation.fits.hypothesis_search.speed_offset import MOST_SHARE
 from estimation.notes import RigCode
 
 
@@ -39,7 +40,7 @@ def offset_settled(
     -------
     tuple of (PlainFits, Explanation or None)
         Both as they were where the explanation asks for no other offset, or does not keep what that promises. Beside
-        the other offset some of what explained the log may not be needed.
+        the other offset some of what explained the log may not be needed, or a worn pump may explain it instead.
     """
     if strange is None or plain.log.gaps.size:
         return plain, strange
@@ -49,13 +50,14 @@ def offset_settled(
     offset = taken + shown.value
     if taken and abs(offset) < NORMAL_95 * shown.std:
         offset = 0.0
-    if abs(offset) > max(MOST_OFFSET, 2.0 * abs(taken)):
+    if abs(offset) > max(MOST_SHARE * plain.start.parameters.rated_speed, 2.0 * abs(taken)):
         return plain, strange
     other = _turned(plain, offset, shown.std)
-    same = [one for one in asked if one.name in strange.names]
-    again = explained(other, same) if len(same) == len(strange.names) else None
+    same = [one for one in asked if one.name in (*strange.names, DELIVERY.name)]
+    known = {one.name for one in same}
+    again = explained(other, same) if known.issuperset(strange.names) else None
     kept = again is not None and again.fit.cost <= strange.fit.cost - KEPT * shown.gain
-    if again is None or not kept or not set(again.names) <= set(strange.names):
+    if again is None or not kept or not known.issuperset(again.names):
         return plain, strange
     return other, again
 

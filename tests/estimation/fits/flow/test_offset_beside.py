@@ -8,10 +8,11 @@ import pytest
 
 from estimation.fits.flow.offset_beside import offset_settled
 from estimation.fits.flow.plain import FitStart, PlainFits
-from estimation.fits.greybox.pump_ripple import MOST_OFFSET, ShownOffset, Turning, with_ripple
-from estimation.fits.hypotheses import BEGUN, ENCODER_ZERO, HYPOTHESES, OFFSET, Hypothesis
+from estimation.fits.greybox.pump_ripple import ShownOffset, Turning, with_ripple
+from estimation.fits.hypotheses import BEGUN, DELIVERY, ENCODER_ZERO, HYPOTHESES, OFFSET, Hypothesis
 from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.fits.hypothesis_search.pump_ripple_fits import KEPT, OFFSET_SETTLED, OFFSET_WORTH, told_offset
+from estimation.fits.hypothesis_search.speed_offset import MOST_SHARE
 from estimation.notes import RigCode
 from tests.estimation.fits.short_logs import PAPER, log, made_fit, seen
 
@@ -40,7 +41,8 @@ def explanation(cost: float, shown: float = 0.0, gain: float = 0.0) -> Explanati
         (0.2, 0.1, 0.9 * OFFSET_SETTLED, 0.2),
         (0.0, 0.1, 1.1 * OFFSET_WORTH, 0.1),
         (0.0, 0.1, 0.9 * OFFSET_WORTH, 0.0),
-        (0.2, MOST_OFFSET, 80.0, 0.2),
+        (0.0, 1.3, 80.0, 1.3),
+        (0.2, MOST_SHARE * PAPER.rated_speed, 80.0, 0.2),
     ],
 )
 def test_a_log_is_explained_at_the_offset_that_the_explanation_leaves(
@@ -51,7 +53,7 @@ def test_a_log_is_explained_at_the_offset_that_the_explanation_leaves(
     raw = plain.unturned.drives[:, 0]
 
     def explained(other: PlainFits, asked: Sequence[Hypothesis]) -> Explanation:
-        assert [one.name for one in asked] == [ENCODER_ZERO.name]
+        assert [one.name for one in asked] == [ENCODER_ZERO.name, DELIVERY.name]
         assert raw - other.log.drives[:, 0] == pytest.approx(left)
         return again
 
@@ -83,10 +85,12 @@ def test_a_pair_is_the_same_in_either_order_and_is_asked_as_it_was() -> None:
     assert (found.turning.offset, strange and strange.fit.cost) == (0.0, 420.0)
 
 
-def test_beside_another_offset_fewer_hypotheses_may_be_enough_but_no_others() -> None:
+def test_beside_another_offset_fewer_hypotheses_may_be_enough_or_a_worn_pump_but_no_others() -> None:
     """A worn pump passed for a relief valve set low, an offset of pressure and a pump that delivers 150 %."""
     plain = told(0.2)
     first = replace(explanation(500.0, -0.2, 80.0), names=(OFFSET.name, ENCODER_ZERO.name))
     fewer, others = explanation(400.0), replace(explanation(400.0), names=("volume",))
     assert offset_settled(plain, first, HYPOTHESES, lambda *_: fewer)[1] is fewer
+    worn = replace(explanation(400.0), names=(DELIVERY.name,))
+    assert offset_settled(plain, first, HYPOTHESES, lambda *_: worn)[1] is worn
     assert offset_settled(plain, first, HYPOTHESES, lambda *_: others)[1] is first
