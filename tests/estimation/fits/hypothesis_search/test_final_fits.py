@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.greybox.descent import Point
-from estimation.fits.hypotheses import AIR_MIDWAY, CHECKS_CRACK, OFFSET
+from estimation.fits.hypotheses import AIR, AIR_MIDWAY, CHECKS_CRACK, MAKEUP_BLOCKED, OFFSET
 from estimation.fits.hypothesis_search import final_fits
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.final_fits import ALIKE, CLOSE, FAR_BEHIND
@@ -94,3 +94,33 @@ def test_valves_that_a_set_frees_itself_are_not_freed_again(monkeypatch: pytest.
     for own in (CHECKS_CRACK, AIR_MIDWAY):
         tried = Trial((own,), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {}, {}, {})
         assert final_fits.with_details(nothing, tried) is tried
+
+
+@pytest.mark.parametrize(
+    ("share", "cost", "alone"),
+    [
+        (1.02, 95.0, True),
+        (1.02, 101.0, False),  # it is needed
+        (80.0, 95.0, False),  # the valve is stuck
+    ],
+)
+def test_a_hypothesis_that_ended_at_its_absence_is_not_told_beside_another(
+    share: float, cost: float, alone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A sound make-up valve was said to be stuck shut, in oil that holds air."""
+    fit = made_fit(90.0, 2e8, 1e5)
+    fit = replace(fit, std={**fit.std, "air_softness": 3.0, "makeup_share_b": 0.02})
+    absent = {"air_softness": 0.0, "makeup_share_b": 1.0}
+    values = {"air_softness": 2764.0, "makeup_share_b": share}
+    point = Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1))
+    both = Trial((AIR, MAKEUP_BLOCKED), point, values, {}, absent, (fit,))
+
+    def fewer(_: Any, tried: Trial, useful: float) -> Trial:
+        assert useful == 100.0
+        assert tried.values == {**values, "makeup_share_b": 1.0}
+        return replace(tried, point=replace(tried.point, cost=cost))
+
+    monkeypatch.setattr(final_fits, "final_fit", fewer)
+    nothing: Any = None
+    told = final_fits.without_idle(nothing, both, 10.0)
+    assert told.together == ((AIR,) if alone else (AIR, MAKEUP_BLOCKED))
