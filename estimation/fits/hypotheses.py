@@ -7,15 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isfinite
 
+from estimation.finding import NORMAL_95
 from estimation.models.completed_flow import CRACKS, USUAL_CRACK
 from estimation.models.filtered_flow import FILTER_TIME
 from estimation.models.flow import STIFFNESS
 from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import CROSSED, QUICKEST, QUICKNESS
-
-SURELY = 2.0
-"""Deviations from which what a hypothesis needs to be there is there [dimensionless]. Air that was in from the start
-was said to enter at 0.7 ± 0.6 % of a log, and bulk modulus was that without it, 54 % above all that acted."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +59,8 @@ class Hypothesis:
     lower : bool
         Whether what is freed first is lower than the rig file has it: else it is not what the hypothesis says.
     known : tuple of str
-        What must be larger than `SURELY` times its deviation: a valve that never opens tells no drop, a circuit without
-        air not when it gets in, and air that is in from the beginning gets in at no time.
+        What is surely there, in its 95 % interval: a valve that never opens tells no drop, a circuit without air not
+        when it gets in, and air that is in from the beginning gets in at no time.
     """
 
     name: str
@@ -100,7 +97,7 @@ class Hypothesis:
             Whether it does.
         """
         found = not self.lower or isfinite(std.get(self.free[0], 0.0))
-        return found and all(SURELY * std.get(name, 0.0) < abs(values[name]) for name in self.known)
+        return found and all(NORMAL_95 * std.get(name, 0.0) < abs(values[name]) for name in self.known)
 
 
 DELIVERY = Hypothesis("delivery", ("pump_displacement",))
@@ -350,5 +347,4 @@ WORN = 0.9
 """Delivery over the pump's displacement below which the pump is worn, and the rig file not rounded [dimensionless]."""
 
 LEAST_ZERO = 0.5
-"""Least reading of the encoder in the middle position that is sought, in its typical size of 10 mm [dimensionless]:
-5 mm change a chamber of the paper's actuator by 0.3 %."""
+"""Least zero of the encoder that is sought, over 10 mm [dimensionless]: 5 mm change the paper's chambers by 0.3 %."""

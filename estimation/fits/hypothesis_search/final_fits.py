@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation.finding import NORMAL_95
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play import play_left
 from estimation.fits.greybox.spared_steps import LAST, spared
-from estimation.fits.hypotheses import CHECKS_CRACK, PRESSURE_FILTERED, PRESSURE_LATE, SURELY, Hypothesis
+from estimation.fits.hypotheses import CHECKS_CRACK, PRESSURE_FILTERED, PRESSURE_LATE, Hypothesis
 from estimation.fits.hypothesis_search.coarse_search import NEAR, coarsened, descended
 from estimation.fits.hypothesis_search.decimation import FEW, cost_over_noise
 from estimation.fits.hypothesis_search.explanation import Trial
@@ -199,7 +200,7 @@ def without_idle(log: GreyBoxLog, tried: Trial, worth: float) -> Trial:
 def _is_absent(one: Hypothesis, tried: Trial) -> bool:
     """Return whether all that a hypothesis frees ended at its absence, as far as the log knows it."""
     std, delayed_too = tried.fit.std, len(one.delays) > 1 and one.late in tried.delays
-    near = (abs(tried.values[name] - tried.rig[name]) <= SURELY * std.get(name, 0.0) for name in one.free)
+    near = (abs(tried.values[name] - tried.rig[name]) <= NORMAL_95 * std.get(name, 0.0) for name in one.free)
     return not delayed_too and all(near)
 
 
