@@ -72,7 +72,7 @@ def with_valves_sized(p: EhaParameters, given: Container[str]) -> EhaParameters:
 
     A single rod sends half of that through its make-up valves at every stroke. With the paper's valves, a pump of 15
     times the flow lost 5 bar there, and its friction came out half as large as it was. What a file gives is taken at
-    its word, but for the very numbers of the paper: templates used to have them as values.
+    its word.
 
     Parameters
     ----------
@@ -92,8 +92,7 @@ def with_valves_sized(p: EhaParameters, given: Container[str]) -> EhaParameters:
     True
     """
     flow = p.rated_flow / PAPER_RIG.rated_flow
-    left = [name for name in SIZED_BY_PUMP if name not in given or getattr(p, name) == getattr(PAPER_RIG, name)]
-    return replace(p, **{name: flow * getattr(p, name) for name in left})
+    return replace(p, **{name: flow * getattr(p, name) for name in SIZED_BY_PUMP if name not in given})
 
 
 def natural_frequency(p: EhaParameters) -> float:

@@ -39,9 +39,3 @@ def test_valves_of_which_nothing_is_said_let_the_pumps_own_flow_through() -> Non
     assert sized.relief_conductance == pytest.approx(15.0 * PAPER_RIG.relief_conductance)
     own = replace(p, makeup_conductance=2e-9)
     assert with_valves_sized(own, ("makeup_conductance",)).makeup_conductance == 2e-9
-
-
-def test_the_papers_very_valves_beside_another_pump_are_left_from_a_template() -> None:
-    p = replace(PAPER_RIG, pump_displacement=15.0 * PAPER_RIG.pump_displacement)
-    assert with_valves_sized(p, ("makeup_conductance", "relief_conductance")) == with_valves_sized(p, ())
-    assert with_valves_sized(PAPER_RIG, ("makeup_conductance",)) == PAPER_RIG
