@@ -1,15 +1,20 @@
-"""Lost flow between pump and piston, piece by piece: the input of rough searches for its cause."""
+"""Lost flow between pump and piston, piece by piece, and when it likeliest changes: a first guess for searches.
 
-from collections.abc import Mapping
+What the pump delivers and the piston does not sweep leaks, or goes into the oil as its pressure rises. A regression of
+that loss, with a leakage that steps or oil that gives way as bubbles do from some time on, is solved for many times at
+once.
+"""
+
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
+from estimation.arrays import Array, BoolArray
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypothesis_search.wide_log import usual_values
 from estimation.log_checks.channel_names import POSITION, SPEED
 from estimation.models.wide_flow import WIDE_FLOW_FORM
-from plant.arrays import Array
 
 PIECES = 200
 """Pieces of the log in which flows and pressure are averaged [count]: a time is then known to half a percent of it."""
@@ -67,3 +72,110 @@ def lost_flow(log: GreyBoxLog) -> LostFlow:
     means = np.add.reduceat(np.stack([speed, pressure, np.sign(speed)])[:, : ends[-1]], ends[:-1], axis=1) / count
     lost = rig["pump_displacement"] * means[0] - rig["piston_area"] * np.diff(position[ends]) / time
     return LostFlow(lost, means[1], means[2], time, pressure[ends], position[ends], rig)
+
+
+class Change(NamedTuple):
+    """A change of the lost flow within a log.
+
+    Parameters
+    ----------
+    at : float
+        When [fraction of the log].
+    share : float
+        How much it explains of what no change leaves of the lost flow [fraction].
+    before, after : float
+        Leakage before and after it [m^3/(s Pa)].
+    """
+
+    at: float
+    share: float
+    before: float = 0.0
+    after: float = 0.0
+
+
+NO_CHANGE = Change(0.5, 0.0)
+
+
+def likeliest_step(log: GreyBoxLog) -> Change:
+    """Return the most likely step of leakage.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+
+    Returns
+    -------
+    Change
+        `NO_CHANGE` where pressure is missing or still.
+    """
+    lost, always, _ = _regressors(log)
+    return _likeliest(lost, always, always[:, 0], lambda before, more: (before > 0.0) & (before + more > 0.0))
+
+
+def likeliest_entry(log: GreyBoxLog) -> Change:
+    """Return the most likely time at which air enters the oil.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+
+    Returns
+    -------
+    Change
+        `NO_CHANGE` where pressure is missing or still, or no oil becomes softer.
+    """
+    return _likeliest(*_regressors(log), lambda _, more: more > 0.0)
+
+
+def _likeliest(lost: Array, always: Array, then: Array, may_be: Callable[[Array, Array], BoolArray]) -> Change:
+    """Return from when on a loss likeliest goes with a further column, of the times at which its share may be that.
+
+    Both shares are told it: of the first column that is always there, and of the further one.
+    """
+    pieces = len(lost)
+    if pieces < PIECES // 2:
+        return NO_CHANGE
+    splits = np.arange(round(EDGE * pieces), pieces - round(EDGE * pieces) + 1)
+    sizes, size = _largest(always), _largest(then)
+    (basis, upper), then = np.linalg.qr(always / sizes), then / size
+    known = basis.T @ lost
+    left = lost - basis @ known
+    # sums over all pieces after each time: with what is left, with the basis, and with itself
+    columns = np.column_stack([left, basis, then]) * then[:, None]
+    after = np.cumsum(columns[::-1], axis=0)[::-1][splits]
+    across, along, power = after[:, 0], after[:, 1:-1], after[:, -1]
+    own = power - np.sum(along * along, axis=1)
+    told = own > EDGE * EDGE * power
+    more = across / np.where(told, own, 1.0)
+    before = (np.linalg.pinv(upper)[0] @ (known[:, None] - more * along.T)) / sizes[0]
+    explained = np.where(told & may_be(before, more / size), across * more, 0.0)
+    best = int(np.argmax(explained))
+    share = float(explained[best]) / max(float(left @ left), float(np.finfo(float).tiny))
+    first = float(before[best])
+    return (
+        Change(float(splits[best]) / pieces, share, first, first + float(more[best] / size))
+        if share > 0.0
+        else NO_CHANGE
+    )
+
+
+def _regressors(log: GreyBoxLog) -> tuple[Array, Array, Array]:
+    """Return the flow that is lost, what it goes with in any case, and with bubbles, piece by piece.
+
+    In any case that is pressure, the speed's sign and the rise of pressure; bubbles shrink by what the inverse of the
+    loaded chamber's pressure loses.
+    """
+    flow = lost_flow(log)
+    rig, at_ends = flow.rig, flow.ends
+    middle = 0.5 * (flow.positions[1:] + flow.positions[:-1])
+    volume = 1.0 + np.sign(flow.pressure) * rig["piston_area"] * middle / rig["chamber_volume"]
+    bubbles = np.sign(at_ends) * np.abs(at_ends) / (rig["accumulator_pressure"] + np.abs(at_ends))
+    rise, squeezed = volume * np.diff(at_ends) / flow.time, volume * np.diff(bubbles) / flow.time
+    there = np.isfinite(flow.pressure) & np.isfinite(rise)
+    return flow.lost[there], np.column_stack([flow.pressure, flow.sign, rise])[there], squeezed[there]
+
+
+def _largest(columns: Array) -> Array:
+    return np.maximum(np.max(np.abs(columns), axis=0, initial=0.0), float(np.finfo(float).tiny))

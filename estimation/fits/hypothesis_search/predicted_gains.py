@@ -10,8 +10,7 @@ import numpy as np
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import Hypothesis
-from estimation.fits.hypothesis_search.air_entry import likeliest_entry
-from estimation.fits.hypothesis_search.leakage_step import likeliest_step
+from estimation.fits.hypothesis_search.lost_flow import likeliest_entry, likeliest_step
 from estimation.fits.hypothesis_search.wide_log import balanced_by, usual_values, widened
 from estimation.fits.hypothesis_search.wide_problem import freed, freed_at_end
 from plant.arrays import Array

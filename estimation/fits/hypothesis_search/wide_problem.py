@@ -10,9 +10,8 @@ from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import search_bounds
 from estimation.fits.greybox.ridge import Ridge
 from estimation.fits.hypotheses import DELIVERY, LEAKAGE_TURBULENT, LEAST_DELIVERY, LIMITS, Hypothesis
-from estimation.fits.hypothesis_search.air_entry import likeliest_entry
 from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
-from estimation.fits.hypothesis_search.leakage_step import likeliest_step
+from estimation.fits.hypothesis_search.lost_flow import likeliest_entry, likeliest_step
 from estimation.fits.hypothesis_search.wide_log import LEAST_PEAK, START_LEVEL, shut_in, usual_values
 from estimation.log_checks.channel_names import POSITION, SPEED
 from estimation.models.filtered_flow import (
@@ -77,6 +76,9 @@ POSITION_ZERO = "position_zero"
 AIR_ONSET, AIR_WIDTH = "air_onset", "air_width"
 
 STEP_AT, STEP_WIDTH = "step_at", "step_width"
+
+FIRST_WIDTH = 0.02
+"""Length of the step of leakage with which a search begins [fraction of the log]: four pieces."""
 
 START_PRESSURE = "start_pressure"
 
@@ -188,9 +190,13 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
             return [{one.free[0]: begun}]
         return [{START_PRESSURE: begun, START_LEVEL: share * shut_in(log)} for share in LEVELS_TRIED]
     if one.from_change:
-        return [likeliest_step(log).first or one.starts[0]]
+        step = likeliest_step(log)
+        if not step.share:
+            return one.starts
+        first = {"leakage_coefficient": step.after, "leakage_before": step.before / step.after - 1.0}
+        return [{**first, STEP_AT: step.at, STEP_WIDTH: FIRST_WIDTH}]
     if one.from_entry:
-        return [{**start, AIR_ONSET: likeliest_entry(log).onset} for start in one.starts]
+        return [{**start, AIR_ONSET: likeliest_entry(log).at} for start in one.starts]
     if one.from_mid_travel:
         read = log.drives[:, WIDE_FLOW_FORM.drives.index(POSITION)]
         return [*one.starts, {POSITION_ZERO: 0.5 * float(np.min(read) + np.max(read))}]

@@ -11,7 +11,7 @@ from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log, without_strays
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import AIR_MIDWAY, HYPOTHESES
-from estimation.fits.hypothesis_search.air_entry import NO_ENTRY, likeliest_entry
+from estimation.fits.hypothesis_search.lost_flow import NO_CHANGE, likeliest_entry, likeliest_step
 from estimation.fits.hypothesis_search.predicted_gains import AIRED, by_predicted_gain
 from estimation.fits.hypothesis_search.wide_log import usual_values, widened
 from estimation.log_checks.clean import clean_log
@@ -45,7 +45,7 @@ def seen(record: Record) -> GreyBoxLog:
 def test_lost_flow_tells_when_air_gets_in() -> None:
     entry = likeliest_entry(seen(logged(0.03)))
     assert entry.share > AIRED
-    assert entry.onset == pytest.approx(0.45, abs=0.06)  # the middle of what takes half a second
+    assert entry.at == pytest.approx(0.45, abs=0.06)  # the middle of what takes half a second
 
 
 @pytest.mark.parametrize("course", ["none", "throughout"])
@@ -54,9 +54,10 @@ def test_oil_that_stays_as_it_is_shows_none(course: str) -> None:
     assert likeliest_entry(seen(log)).share < AIRED
 
 
-def test_a_dead_pressure_sensor_shows_none() -> None:
+def test_a_dead_pressure_sensor_shows_no_change() -> None:
     log = seen(logged(0.0))
-    assert likeliest_entry(replace(log, measured=np.full_like(log.measured, np.nan))) == NO_ENTRY
+    dead = replace(log, measured=np.full_like(log.measured, np.nan))
+    assert likeliest_entry(dead) == likeliest_step(dead) == NO_CHANGE
 
 
 def test_air_that_lost_flow_shows_is_tried_first() -> None:

@@ -12,7 +12,7 @@ from estimation.fits.flow.log import flow_log, without_strays
 from estimation.fits.greybox.fit import concluded
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import LEAKAGE_STEP
-from estimation.fits.hypothesis_search.leakage_step import NO_STEP, likeliest_step
+from estimation.fits.hypothesis_search.lost_flow import likeliest_step
 from estimation.fits.hypothesis_search.predicted_gains import STEPPED
 from estimation.fits.hypothesis_search.wide_log import widened
 from estimation.fits.hypothesis_search.wide_problem import freed
@@ -48,18 +48,13 @@ def seen(record: Record) -> GreyBoxLog:
 def test_lost_flow_tells_when_leakage_steps_and_by_how_much() -> None:
     step = likeliest_step(seen(stepping(6.0)))
     assert step.share > STEPPED
-    assert step.first["step_at"] == pytest.approx(0.4, abs=0.01)
-    assert step.first["leakage_before"] == pytest.approx(1.0 / 6.0 - 1.0, abs=0.3)
-    assert step.first["leakage_coefficient"] == pytest.approx(6.0 * HEALTHY.leakage_coefficient, rel=0.1)
+    assert step.at == pytest.approx(0.4, abs=0.01)
+    assert step.before / step.after == pytest.approx(1.0 / 6.0, abs=0.3)
+    assert step.after == pytest.approx(6.0 * HEALTHY.leakage_coefficient, rel=0.1)
 
 
 def test_a_leakage_that_stays_is_no_step() -> None:
     assert likeliest_step(seen(stepping(1.0))).share < STEPPED
-
-
-def test_a_dead_pressure_sensor_shows_no_step() -> None:
-    log = seen(stepping(1.0))
-    assert likeliest_step(replace(log, measured=np.full_like(log.measured, np.nan))) == NO_STEP
 
 
 def test_a_seal_that_gives_way_is_named_and_bulk_modulus_is_right() -> None:
