@@ -14,7 +14,6 @@ from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, START_LOAD, VOLUME, Hypothesis
 from estimation.fits.hypothesis_search.coarse_search import coarsened, vanished_values
 from estimation.fits.hypothesis_search.commonly_hidden import delivery_followed, rig_and_load, with_delivery, with_zero
-from estimation.fits.hypothesis_search.compatible_hypotheses import compatible_hypotheses
 from estimation.fits.hypothesis_search.conclusion import Accepted, conclude, is_explained
 from estimation.fits.hypothesis_search.decimation import FEW, Decimation, cost_over_noise, decimation_for
 from estimation.fits.hypothesis_search.decimation_limit import decimation_limit
@@ -201,16 +200,12 @@ def _paired(
 
     What slopes promise most is tried first, and all else where that does not explain the log: slopes are taken where
     the first hypothesis has gone to take up what the second one does. The best of it is fitted to the end in any case.
-    Beside a rival of the best, ``rivalled`` is the cost of what is known. Nothing is tried there where all hypotheses
-    together do not explain the log, and a pair counts only if it comes lower.
+    Beside a rival of the best, ``rivalled`` is the cost of what is known, and a pair counts only if it comes lower.
     """
     late = delayed(log, first.delays)
     taken = {one.name for one in first.together}
     asked = [one for one in HYPOTHESES if one.name not in taken]
-    reached = compatible_hypotheses(log, first, asked)
-    if rivalled < np.inf and len(reached) < len(asked):
-        return []
-    likely, others, gains = by_predicted_gain(late, first.together, first.values, reached)
+    likely, others, gains = by_predicted_gain(late, first.together, first.values, asked)
     begun = [_begun_again(log, first), {**plain, **own_starts(log, first.together[-1])[0]}]
     left = cost_over_noise(log, first.cost)
     every = decimation_limit(log, first.coarse or first.values, decimation_for(log, left), first.together, first.delays)
@@ -218,7 +213,7 @@ def _paired(
     long, useful = len(log.drives) >= FEW, min(first.cost, rivalled) - WORTH
     faint = long and decimation_for(log, left) == 1
     if long:  # none is told that does not explain the log
-        useful = min(useful, (REACHED if len(reached) < len(asked) else NEARLY) * first.cost / left)
+        useful = min(useful, NEARLY * first.cost / left)
     far, rest = [one for one in others if one.far], [one for one in others if not one.far]
     near = [*likely, *far]
     nearer: list[list[Trial]] = []

@@ -34,7 +34,6 @@ LIKELY, FAR, SOME, NONE = hypothesis("likely"), hypothesis("far", far=True), hyp
 
 @pytest.fixture(autouse=True)
 def reached(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(explain, "compatible_hypotheses", lambda _, __, asked: asked)
     monkeypatch.setattr(explain, "decimation_limit", lambda _, __, every, *___: every)
 
 
@@ -132,29 +131,6 @@ def test_where_a_cause_explains_a_log_but_leaves_more_than_noise_what_slopes_do_
     found = explain._alone(LONG, plain, ([LIKELY], [FAR, SOME], gains), Decimation(1, left, [{}]), lambda _: True)  # pyright: ignore[reportPrivateUsage]
     assert told == asked
     assert [one.cost for one in found] == ([700.0, 800.0] if asked else [800.0])
-
-
-@pytest.mark.parametrize(("rivalled", "asked"), [(np.inf, ["far"]), (1700.0, [])])
-def test_beside_a_rival_nothing_is_tried_that_is_out_of_reach(
-    rivalled: float, asked: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    given: list[str] = []
-    monkeypatch.setattr(explain, "compatible_hypotheses", lambda _, __, asked: [one for one in asked if one.far][:1])
-    monkeypatch.setattr(explain, "delayed", lambda log, _: log)
-    monkeypatch.setattr(explain, "by_predicted_gain", lambda *_: ([], [FAR], {}))
-    monkeypatch.setattr(explain, "own_starts", lambda *_: [{}])
-    monkeypatch.setattr(explain, "_begun_again", lambda *_: {})
-    monkeypatch.setattr(explain, "decimation_for", lambda *_: 1)
-    monkeypatch.setattr(explain, "cost_over_noise", lambda _, cost: cost / 1000.0)
-
-    def screened(_: Any, together: Any, *__: Any, **___: Any) -> Any:
-        given.append(together[-1].name)
-        return [tried(9e3, together=together)]
-
-    monkeypatch.setattr(explain, "screen", screened)
-    first = tried(1800.0, together=(hypothesis("first"),))
-    assert not explain._paired(LONG, first, {}, lambda _: False, rivalled=rivalled)  # pyright: ignore[reportPrivateUsage]
-    assert given == asked
 
 
 Pairing = Callable[..., list[Trial]]
