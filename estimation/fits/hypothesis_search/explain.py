@@ -39,10 +39,6 @@ from estimation.fits.hypothesis_search.wide_log import (
 from estimation.fits.hypothesis_search.wide_problem import freed, own_starts
 from plant.eha.model import EhaParameters
 
-DEFERRED = 4.0
-"""What the likeliest hypotheses leave on few samples, over the noise, from which the others are compared before any of
-them is sought with all samples [dimensionless]; judged."""
-
 TRUSTED = 5.0
 """How many times what slopes promise a hypothesis may gain where little is left [dimensionless]."""
 
@@ -148,9 +144,8 @@ def _alone(
 ) -> list[Trial]:
     """Return the hypotheses that explain a log alone, best first: of those of largest predicted gain, else of all.
 
-    Where what promises most leaves much on few samples, the others are compared on few samples too before any is led
-    on, and the better ones are led on first. Where the plain form leaves little, slopes hold far enough: what promises
-    too little is not tried then, nor is a start from which the first hypothesis came nowhere.
+    Where the plain form leaves little, slopes hold far enough: what promises too little is not tried then, nor is a
+    start from which the first hypothesis came nowhere.
     """
     (likely, others, gains), starts, every = asked, spared.starts, spared.every
     faint = decimation_for(log, spared.left) == 1 and len(log.drives) >= FEW
@@ -162,14 +157,6 @@ def _alone(
         starts, begun = [starts[i] for i in places], [[begun[0][i] for i in places]]
     begun += [[*screen(log, (one,), starts, every=every)] for one in likely[1:]]
     ended = ranked_optima(log, begun, spared=spared)
-    if others and every > 1 and cost_over_noise(log, ended[0].cost) > DEFERRED:
-        known = ended[0].cost
-        more = ranked_optima(
-            log, nearing(log, others, starts, promising_starts(starts, begun), known, every), known, spared
-        )
-        first, second = sorted((ended, more), key=lambda each: each[0].cost)
-        finished = refined(log, first, spared=spared)
-        return ranked([*finished, *refined(log, second, finished[0].cost, spared)])
     finished = refined(log, ended, spared=spared._replace(starts=promising_starts(starts, begun)), useful=useful)
     if is_explained(finished[0], accepted) and finished[0].cost < plain - WORTH:
         # a stuck valve was told as a small step of leakage, at 1.1 times the noise
@@ -223,14 +210,6 @@ def _paired(
             begun, nearer = _kept(begun, nearer)
     least = min(first.cost, rivalled)
     ended = ranked_optima(late, nearer, least, spared) if nearer else []
-    if ended and rest and long and not faint and cost_over_noise(log, ended[0].cost) > REACHED:
-        known = min(least, ended[0].cost)
-        wanted, begun = NEARLY_AS_GOOD * known, promising_starts(begun, nearer)
-        more = [screen(late, (*first.together, one), begun, wanted, spared.every) for one in rest]
-        ended, others = sorted((ended, ranked_optima(late, more, known, spared)), key=lambda each: each[0].cost)
-        pairs = refined(late, ended, least, spared, useful)
-        known, useful = min([least, *(one.cost for one in pairs[:1])]), _as_useful(pairs, useful)
-        return _better(first, ranked([*pairs, *refined(late, others, known, spared, useful)]), least)
     pairs = refined(late, ended, least, spared, useful)
     useful = _as_useful(pairs, useful)
     if faint and not (pairs and is_explained(pairs[0], accepted) and cost_over_noise(log, pairs[0].cost) < NOISE):

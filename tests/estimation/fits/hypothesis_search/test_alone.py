@@ -62,26 +62,6 @@ def test_what_promises_too_little_is_not_tried_where_little_is_left(
     assert told == [(asked, ["a"] if left < FAINT else [*ends])]
 
 
-@pytest.mark.parametrize(("likely", "other", "order"), [(500.0, 50.0, [50.0, 500.0]), (50.0, 500.0, [50.0, 500.0])])
-def test_what_leaves_less_on_few_samples_is_led_on_first(
-    likely: float, other: float, order: list[float], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    ends, led = [tried(likely), tried(other)], list[tuple[float, float]]()
-
-    def led_on(_: Any, ended: Any, known: float = np.inf, *__: Any, **___: Any) -> Any:
-        led.append((ended[0].cost, known))
-        return [tried(0.9 * ended[0].cost)]
-
-    monkeypatch.setattr(explain, "screen", lambda *_, **__: [tried(900.0)])
-    monkeypatch.setattr(explain, "nearing", lambda *_, **__: [])
-    monkeypatch.setattr(explain, "ranked_optima", lambda *_, **__: [ends.pop(0)])
-    monkeypatch.setattr(explain, "refined", led_on)
-    monkeypatch.setattr(explain, "cost_over_noise", lambda _, cost: cost / 10.0)
-    found = explain._alone(LONG, 900.0, ([LIKELY], [FAR], {}), Decimation(4, 90.0, [{}]), lambda _: False)  # pyright: ignore[reportPrivateUsage]
-    assert led == [(order[0], np.inf), (order[1], 0.9 * order[0])]
-    assert [one.cost for one in found] == [0.9 * cost for cost in order]
-
-
 def test_beside_what_leaves_little_no_pair_is_tried_that_cannot_explain_the_log(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -156,38 +136,6 @@ def pairing(monkeypatch: pytest.MonkeyPatch) -> Pairing:
         return explain._paired(LONG, first, {}, lambda _: False, rivalled=rivalled)  # pyright: ignore[reportPrivateUsage]
 
     return paired
-
-
-@pytest.mark.parametrize(("near", "swapped"), [(1400.0, False), (1600.0, True)])
-def test_pairs_that_few_samples_leave_unexplained_are_not_led_on_before_all_others_are_compared(
-    near: float, swapped: bool, pairing: Pairing
-) -> None:
-    led: list[str] = []
-
-    def screened(_: Any, together: Any, starts: Any, *__: Any, **___: Any) -> list[Trial]:
-        cost = near if together[-1] in (LIKELY, FAR) else 1500.0
-        return [tried(cost, together=together)] * len(starts)
-
-    def led_on(_: Any, ended: Sequence[Trial], *__: Any) -> list[Trial]:
-        led.append(" ".join(one.together[-1].name for one in ended))
-        return [*ended]
-
-    found = pairing(2, screened, led_on)
-    assert led == (["some none", "likely far"] if swapped else ["likely far", "some none"])
-    assert found[0].cost == min(near, 1500.0)
-
-
-def test_where_no_pair_that_was_compared_first_is_worth_leading_on_the_others_are_led_on(pairing: Pairing) -> None:
-    led: list[int] = []
-
-    def screened(_: Any, together: Any, starts: Any, *__: Any, **___: Any) -> list[Trial]:
-        return [tried(1600.0, together=together)] * len(starts)
-
-    def led_on(_: Any, ended: Sequence[Trial], *__: Any) -> list[Trial]:
-        led.append(len(ended))
-        return [*ended] if len(led) > 1 else []
-
-    assert [one.cost for one in pairing(2, screened, led_on)] == [1600.0, 1600.0]
 
 
 def test_a_pair_beside_a_rival_counts_only_below_what_is_known(pairing: Pairing) -> None:
