@@ -37,8 +37,6 @@ class Hypothesis:
         Unknowns of the plain form that are not told apart from it, and are held.
     far : bool
         Whether what it adds is so far from its absence that the slope there says nothing of it.
-    underrated : bool
-        Whether slopes at its absence promise too little of it, so that it is tried whatever they promise.
     from_first_sample : bool
         Whether the search begins with the differential pressure that the log begins with, and a load's with several
         levels.
@@ -71,7 +69,6 @@ class Hypothesis:
     shares_of_peak: tuple[float, ...] = ()
     instead: tuple[str, ...] = ()
     far: bool = False
-    underrated: bool = False
     from_first_sample: bool = False
     least: float = 0.0
     from_mid_travel: bool = False
@@ -196,7 +193,6 @@ AIR = Hypothesis(
     "air",
     ("air_softness",),
     ({"air_softness": 1e2}, {"air_softness": 1e3}),
-    underrated=True,
     at_end=(QUICKNESS,),
     known=("air_softness",),
 )

@@ -18,7 +18,7 @@ from estimation.fits.hypothesis_search.conclusion import Accepted, conclude, is_
 from estimation.fits.hypothesis_search.decimation import FEW, Decimation, cost_over_noise, decimation_for
 from estimation.fits.hypothesis_search.decimation_limit import decimation_limit
 from estimation.fits.hypothesis_search.explanation import Explanation, Trial
-from estimation.fits.hypothesis_search.final_fits import ALIKE, REACHED, behind_filter, without_idle
+from estimation.fits.hypothesis_search.final_fits import ALIKE, behind_filter, without_idle
 from estimation.fits.hypothesis_search.predicted_gains import by_predicted_gain, predicted_gain_beside
 from estimation.fits.hypothesis_search.ranking import (
     NEARLY_AS_GOOD,
@@ -38,9 +38,6 @@ from estimation.fits.hypothesis_search.wide_log import (
 )
 from estimation.fits.hypothesis_search.wide_problem import freed, own_starts
 from plant.eha.model import EhaParameters
-
-TRUSTED = 5.0
-"""How many times what slopes promise a hypothesis may gain where little is left [dimensionless]."""
 
 NOISE = 1.05
 """What is left over the noise by a pair below which no valve and no air is sought in its place [dimensionless]."""
@@ -102,7 +99,7 @@ def explain(
     likely, others, gains = by_predicted_gain(wide, (), starts[0], asked)
     left = cost_over_noise(wide, plain.cost)
     spared = Decimation(decimation_limit(wide, starts[0], decimation_for(wide, left)), left, starts)
-    finished = _alone(wide, plain.cost, (likely, others, gains), spared, accepted, useful)
+    finished = _alone(wide, plain.cost, (likely, others), spared, accepted, useful)
     if paired and finished[0].cost < hopeless:
         finished = ranked([*finished, *delivery_followed(wide, finished, gains, spared, accepted)])
     finished = _distinct([behind_filter(wide, finished[0]), *finished])
@@ -137,20 +134,18 @@ def explain(
 def _alone(
     log: GreyBoxLog,
     plain: float,
-    asked: tuple[Sequence[Hypothesis], Sequence[Hypothesis], Mapping[str, float]],
+    asked: tuple[Sequence[Hypothesis], Sequence[Hypothesis]],
     spared: Decimation,
     accepted: Accepted,
     useful: float = np.inf,
 ) -> list[Trial]:
     """Return the hypotheses that explain a log alone, best first: of those of largest predicted gain, else of all.
 
-    Where the plain form leaves little, slopes hold far enough: what promises too little is not tried then, nor is a
-    start from which the first hypothesis came nowhere.
+    Where the plain form leaves little, no start is tried again from which the first hypothesis came nowhere.
     """
-    (likely, others, gains), starts, every = asked, spared.starts, spared.every
-    faint = decimation_for(log, spared.left) == 1 and len(log.drives) >= FEW
+    (likely, others), starts, every = asked, spared.starts, spared.every
     begun = [[*screen(log, (likely[0],), starts, every=every)]]
-    if faint:
+    if decimation_for(log, spared.left) == 1 and len(log.drives) >= FEW:
         places = [i for i, start in enumerate(starts) if start in promising_starts(starts, begun)]
         ways = [begun[0][i] for i in places]
         places = [i for n, i in enumerate(places) if all(ended_apart(one, ways[n]) for one in ways[:n])]
@@ -164,20 +159,8 @@ def _alone(
     if not others:
         return finished
     known = finished[0].cost
-    tried = _promising_enough(others, gains, plain - NEARLY_AS_GOOD * known) if faint else others
-    if not tried:
-        return finished
-    more = nearing(log, tried, starts, promising_starts(starts, begun), known, every)
+    more = nearing(log, others, starts, promising_starts(starts, begun), known, every)
     return ranked([*finished, *likeliest(log, more, known, spared)])
-
-
-def _promising_enough(asked: Sequence[Hypothesis], gains: Mapping[str, float], needed: float) -> Sequence[Hypothesis]:
-    """Return the hypotheses that may bring a gain, and those of which slopes say nothing, or too little."""
-
-    def promises(one: Hypothesis) -> bool:
-        return one.far or bool(one.beside) or one.underrated or TRUSTED * gains[one.name] >= needed
-
-    return [one for one in asked if promises(one)]
 
 
 def _paired(
@@ -192,39 +175,24 @@ def _paired(
     late = delayed(log, first.delays)
     taken = {one.name for one in first.together}
     asked = [one for one in HYPOTHESES if one.name not in taken]
-    likely, others, gains = by_predicted_gain(late, first.together, first.values, asked)
+    likely, others, _ = by_predicted_gain(late, first.together, first.values, asked)
     begun = [_begun_again(log, first), {**plain, **own_starts(log, first.together[-1])[0]}]
     left = cost_over_noise(log, first.cost)
     every = decimation_limit(log, first.coarse or first.values, decimation_for(log, left), first.together, first.delays)
     spared = Decimation(every, left, begun)
     long, useful = len(log.drives) >= FEW, min(first.cost, rivalled) - WORTH
-    faint = long and decimation_for(log, left) == 1
     if long:  # none is told that does not explain the log
         useful = min(useful, NEARLY * first.cost / left)
-    far, rest = [one for one in others if one.far], [one for one in others if not one.far]
-    near = [*likely, *far]
-    nearer: list[list[Trial]] = []
-    for one in likely if faint else near:
-        nearer.append([*screen(late, (*first.together, one), begun, every=spared.every)])
-        if faint and min(way.cost for way in nearer[-1]) < NEARLY * first.cost and len(begun) > 1:
-            begun, nearer = _kept(begun, nearer)
+    near = [*likely, *(one for one in others if one.far)]
+    nearer = [[*screen(late, (*first.together, one), begun, every=spared.every)] for one in near]
     least = min(first.cost, rivalled)
     ended = ranked_optima(late, nearer, least, spared) if nearer else []
     pairs = refined(late, ended, least, spared, useful)
     useful = _as_useful(pairs, useful)
-    if faint and not (pairs and is_explained(pairs[0], accepted) and cost_over_noise(log, pairs[0].cost) < NOISE):
-        wanted = NEARLY * min([least, *(one.cost for one in pairs[:1])])
-        distant = [[*screen(late, (*first.together, one), begun, wanted, spared.every)] for one in far]
-        distant = [ways for ways in distant if min(one.cost for one in ways) < wanted]
-        pairs = ranked([*pairs, *likeliest(late, distant, wanted / NEARLY, spared, useful)]) if distant else pairs
-        useful = _as_useful(pairs, useful)
     if not pairs or not is_explained(pairs[0], accepted):
         known = min([least, *(one.cost for one in pairs[:1])])
-        if faint:
-            needed = first.cost - min(NEARLY_AS_GOOD * known, REACHED * first.cost / left)
-            rest = _promising_enough(rest, gains, max(WORTH, needed))
         wanted, begun = NEARLY_AS_GOOD * known, promising_starts(begun, nearer) if long and nearer else begun
-        more = [screen(late, (*first.together, one), begun, wanted, spared.every) for one in rest]
+        more = [screen(late, (*first.together, one), begun, wanted, spared.every) for one in others if not one.far]
         if more:
             pairs = ranked([*pairs, *likeliest(late, more, known, spared, useful)])
     return _better(first, pairs, least)
@@ -234,14 +202,6 @@ def _better(first: Trial, pairs: Iterable[Trial], least: float) -> list[Trial]:
     """Return the pairs that come lower than what is known, with the delays of the first hypothesis."""
     better = (one for one in pairs if one.cost < least - WORTH)
     return [replace(one, delays={**first.delays, **one.delays}) for one in better]
-
-
-def _kept(
-    starts: Sequence[Mapping[str, float]], tried: Sequence[Sequence[Trial]]
-) -> tuple[list[Mapping[str, float]], list[list[Trial]]]:
-    """Return the starts that are used again, and what was tried from these."""
-    kept = promising_starts(starts, tried)
-    return kept, [[way for start, way in zip(starts, each, strict=True) if start in kept] for each in tried]
 
 
 def _as_useful(pairs: Sequence[Trial], useful: float) -> float:

@@ -8,7 +8,7 @@ from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox import nudges
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import AIR, DELIVERY, MAKEUP_BLOCKED, MAY_HIDE, OFFSET
-from estimation.fits.hypothesis_search import conclusion, explain, predicted_gains
+from estimation.fits.hypothesis_search import conclusion, predicted_gains
 from estimation.fits.hypothesis_search.predicted_gains import by_predicted_gain, predicted_gain, predicted_gain_beside
 from estimation.fits.hypothesis_search.wide_log import balances_mass
 from estimation.fits.hypothesis_search.wide_problem import freed
@@ -76,11 +76,6 @@ def test_what_another_delivery_promises_is_asked_where_the_fit_ended(
     best = SimpleNamespace(together=(AIR,), values=values, delays={}, by_mass=by_mass)
     conclusion.delivery_beside(wide(), best)  # type: ignore[arg-type]
     assert asked == [(by_mass, freed_last)]
-
-
-def test_air_is_tried_whatever_its_slopes_promise() -> None:
-    gains = {AIR.name: 0.0, OFFSET.name: 0.0}
-    assert explain._promising_enough([AIR, OFFSET], gains, 10.0) == [AIR]
 
 
 def test_what_a_worn_pump_at_one_speed_promises_does_not_hang_on_the_step_of_its_slopes(
