@@ -127,7 +127,7 @@ def hypotheses_asked(
     if best is not swinging and shows_zero:  # volumes that swing may have led the fit astray: slopes promise nothing
         zero = max(zero, predicted_gain(log, parameters, best.values, ENCODER_ZERO))
     if is_far_stiffer(log, swinging.values):  # else slopes promise what the accumulator leaves of a zero: nothing
-        zero = max(zero, predicted_gain(log, parameters, unheld(swinging.values), ENCODER_ZERO, by_mass=by_mass))
+        zero = max(zero, predicted_gain(log, parameters, _unheld(swinging.values), ENCODER_ZERO, by_mass=by_mass))
     worn = delivery.gain > worth and abs(delivery.size) > LEAST_DELIVERY
     shifted = shows_zero and zero.gain > ZERO_WORTH and abs(zero.size) > LEAST_ZERO
     plays = play_shows(swinging.play, sensed)
@@ -258,20 +258,9 @@ def near_starts(
     usual = [start for start in starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
     lost = fit.values["makeup_conductance"] > TOO_WIDE * MAKEUP_TRIED[0]
     near = [fit.values, fed] if lost else [fit.values]
-    return [*map(unheld, near), *usual]
+    return [*map(_unheld, near), *usual]
 
 
-def unheld(values: Mapping[str, float]) -> dict[str, float]:
-    """Return values without those that a search for what is strange holds, see `HELD`.
-
-    Parameters
-    ----------
-    values : Mapping[str, float]
-        The plain form's [SI].
-
-    Returns
-    -------
-    dict
-        The others [SI].
-    """
+def _unheld(values: Mapping[str, float]) -> dict[str, float]:
+    """Return values without those that a search for what is strange holds, see `HELD`."""
     return {name: value for name, value in values.items() if name not in HELD}

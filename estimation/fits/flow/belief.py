@@ -11,7 +11,7 @@ from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.hypotheses import ENCODER_ZERO, HYPOTHESES, OFFSET, PLAY, PRESSURE_LATE, Hypothesis
 from estimation.fits.hypothesis_search.explain import WORTH
 from estimation.fits.hypothesis_search.explanation import Explanation
-from estimation.fits.hypothesis_search.fit_objections import doubted, fit_explains_all
+from estimation.fits.hypothesis_search.fit_objections import fit_explains_all
 
 LITTLE = 0.01
 """Share of what the plain form leaves beside noise that the best hypothesis must take up before pairs are tried
@@ -85,19 +85,6 @@ def wanted_cost(
     if tuple(names) == (ENCODER_ZERO.name,) and homed:
         return min(best.cost + WORTH, swinging.cost - (0.0 if astray else worth))
     return best.cost - worth
-
-
-def play_explained(names: Sequence[str], fit: GreyBoxFit) -> bool:
-    """Return whether a fit has no play, or one whose crossing by the piston leaves only sensor noise.
-
-    Parameters
-    ----------
-    names : sequence of str
-        The hypotheses.
-    fit : GreyBoxFit
-        The fit under them.
-    """
-    return PLAY.name not in names or not doubted(fit)
 
 
 def told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:

@@ -15,7 +15,7 @@ from estimation.fits.flow.asked_hypotheses import (
     is_astray,
     near_starts,
 )
-from estimation.fits.flow.belief import hopeless_cost, likelier, play_explained, told_by, wanted_cost
+from estimation.fits.flow.belief import hopeless_cost, likelier, told_by, wanted_cost
 from estimation.fits.flow.log import homed_at_stop, require_flow_channels, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import UNEVEN_OIL, with_lumped, with_lumped_slopes
@@ -44,7 +44,7 @@ from estimation.fits.hypotheses import (
 )
 from estimation.fits.hypothesis_search.explain import WORTH, explain
 from estimation.fits.hypothesis_search.explanation import Explanation
-from estimation.fits.hypothesis_search.fit_objections import limits, objections
+from estimation.fits.hypothesis_search.fit_objections import doubted, limits, objections
 from estimation.fits.hypothesis_search.form_fit import DISCRETISED, FormFit, averaged, weights_of, with_structure
 from estimation.fits.hypothesis_search.not_excluded import open_wear_note, share_lost, unseen_valve_note
 from estimation.fits.hypothesis_search.pump_delivery import contradicted
@@ -238,7 +238,8 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
     if strange is None:
         return None
     lower = strange.fit.cost < _wanted(strange.names, plain, traits, strange.fit.chi_square[0])
-    return strange if lower and play_explained(strange.names, strange.fit) and explains(strange.fit) else None
+    crossed = PLAY.name not in strange.names or not doubted(strange.fit)  # a play leaves sensor noise alone
+    return strange if lower and crossed and explains(strange.fit) else None
 
 
 def _wanted(names: Sequence[str], plain: PlainFits, traits: LogTraits, left: float) -> float:
@@ -325,10 +326,9 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
 
 def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *, begun: bool) -> FormFit:
     """Return the result of a log that the plain form is believed to explain."""
-    best = plain.best
+    best, p = plain.best, plain.start.parameters
     beforehand = [BY_MASS if balances_mass(fit.model) else 1.0 for fit in plain.fits]
     weights = weights_of(plain.fits, SURER * plain.log.passes, beforehand)
-    p = plain.start.parameters
     found, correlation = with_lumped(averaged(plain.fits, weights), plain.fits, weights, p, plain.log.measured_rms)
     found = with_shifts(found, best.small_teeth, best.noise_shift)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
