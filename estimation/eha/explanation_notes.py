@@ -14,6 +14,7 @@ from estimation.fits.greybox.play_courses import crossings
 from estimation.fits.greybox.pump_ripple import EVENLY, Turning, delivering
 from estimation.fits.hypotheses import WORN
 from estimation.fits.hypothesis_search.explanation import Explanation
+from estimation.fits.hypothesis_search.not_excluded import blocked_note
 from estimation.log_checks.bridging import bridged
 from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.clean import CleanLog
@@ -194,7 +195,7 @@ def _compresses(found: Explanation, _: EhaParameters) -> Note:
 
 
 def _blocked(found: Explanation, _: EhaParameters) -> Note:
-    return RigCode.MAKEUP_BLOCKED.note(side="B" if found.values["makeup_share_b"][0] < 1.0 else "A")
+    return blocked_note("B" if found.values["makeup_share_b"][0] < 1.0 else "A")
 
 
 def _crack(found: Explanation, _: EhaParameters) -> Note:

@@ -26,6 +26,7 @@ from estimation.fits.flow.offset_beside import offset_settled
 from estimation.fits.flow.other_minimum import lower_minimum
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter, stiffer
 from estimation.fits.flow.search import MAKEUP_TRIED
+from estimation.fits.flow.shut_valves import shut_valves
 from estimation.fits.flow.told_volume import bound_told, ratio_doubt
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, play_left, play_structure, sensed_play
 from estimation.fits.greybox.small_pump_ripple import with_shifts
@@ -158,7 +159,7 @@ def fit_flow(
     if strange is not None:
         fit = _explained_fit(plain, strange, sensed, traits)
     else:
-        fit = _plain_fit(plain, sensed, open_ends, begun=BEGUN in asked)
+        fit = _plain_fit(plain, sensed, (*open_ends, *shut_valves(plain, traits)), begun=BEGUN in asked)
     return replace(fit, reasons=(*fit.reasons, EstimateCode.SEARCH_ENDED.note())) if ended else fit
 
 
@@ -254,8 +255,7 @@ def _uneven(plain: PlainFits, traits: LogTraits) -> VaryingLoss | None:
     log, best = plain.log, plain.best
     if plain.explains(best) or log.gaps.size or log.passes_on or traits.loaded or len(log.drives) > MOST_ASKED:
         return None
-    usual = [start for start in plain.starts if start["makeup_conductance"] == MAKEUP_TRIED[0]]
-    starts = [plain.swinging.values, *usual]
+    starts = [plain.swinging.values, *(one for one in plain.starts if one["makeup_conductance"] == MAKEUP_TRIED[0])]
     largest, _ = limits(log.passes_on, best.seen)
     return varying_loss(log, plain.start.parameters, starts, plain.explains, best.cost, largest)
 

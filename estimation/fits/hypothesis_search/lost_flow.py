@@ -99,6 +99,8 @@ NO_CHANGE = Change(0.5, 0.0)
 def likeliest_step(log: GreyBoxLog) -> Change:
     """Return the most likely step of leakage.
 
+    A seal may be so tight before it that noise makes its leakage negative: then there is none.
+
     Parameters
     ----------
     log : GreyBoxLog
@@ -110,7 +112,13 @@ def likeliest_step(log: GreyBoxLog) -> Change:
         `NO_CHANGE` where pressure is missing or still.
     """
     lost, always, _ = _regressors(log)
-    return _likeliest(lost, always, always[:, 0], lambda before, more: (before > 0.0) & (before + more > 0.0))
+    pressure, others = always[:, 0], always[:, 1:]
+    leaky = _likeliest(lost, always, pressure, lambda before, more: (before > 0.0) & (before + more > 0.0))
+    tight = _likeliest(lost, others, pressure, lambda _, more: more > 0.0)
+    if tight == NO_CHANGE:
+        return leaky
+    share = 1.0 - (1.0 - tight.share) * _left(lost, others) / _left(lost, always)
+    return leaky if leaky.share >= share else Change(tight.at, share, 0.0, tight.after - tight.before)
 
 
 def likeliest_entry(log: GreyBoxLog) -> Change:
@@ -159,6 +167,13 @@ def _likeliest(lost: Array, always: Array, then: Array, may_be: Callable[[Array,
         if share > 0.0
         else NO_CHANGE
     )
+
+
+def _left(lost: Array, columns: Array) -> float:
+    """Return the sum of squares that a regression leaves, no less than the smallest number."""
+    basis, _ = np.linalg.qr(columns / _largest(columns))
+    left = lost - basis @ (basis.T @ lost)
+    return max(float(left @ left), float(np.finfo(float).tiny))
 
 
 def _regressors(log: GreyBoxLog) -> tuple[Array, Array, Array]:

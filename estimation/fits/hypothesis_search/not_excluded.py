@@ -60,6 +60,17 @@ def unseen_valve_note(fit: GreyBoxFit) -> tuple[Note, ...]:
     return (RigCode.MAKEUP_UNSEEN.note(side=unseen[0]),) if len(unseen) == 1 else ()
 
 
+def blocked_note(side: str) -> Note:
+    """Return the note on a make-up valve that stays shut.
+
+    Parameters
+    ----------
+    side : str
+        Its chamber, or both where a log does not show which.
+    """
+    return RigCode.MAKEUP_BLOCKED.note(side=side)
+
+
 def share_lost(
     log: GreyBoxLog, values: Mapping[str, float], displacement: float, strange: Collection[str] = ()
 ) -> float:

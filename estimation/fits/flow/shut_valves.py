@@ -1,0 +1,65 @@
+"""`shut_valves(plain)`: make-up valves that stay shut in a log though sound ones would have opened."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from estimation.fits.flow.log_traits import LogTraits
+from estimation.fits.flow.other_minimum import FINISHING, WITHIN
+from estimation.fits.flow.plain import PlainFits
+from estimation.fits.greybox.descent import descend
+from estimation.fits.greybox.fit import GreyBoxFit
+from estimation.fits.greybox.freed_problem import FreedProblem
+from estimation.fits.hypothesis_search.explain import WORTH
+from estimation.fits.hypothesis_search.not_excluded import blocked_note
+from estimation.fits.hypothesis_search.wide_problem import flow_bounds
+from estimation.models.completed_flow import CRACKS
+from estimation.models.flow import HELD_FLOW_FORM
+from plant.notes import Note
+
+MAKEUP = "makeup_conductance"
+
+
+def shut_valves(plain: PlainFits, traits: LogTraits) -> tuple[Note, ...]:
+    """Return a note if the plain form explains a log without any make-up valve, and does not with sound ones.
+
+    One valve that is stuck shut may then be all that is wrong: the other one opens so seldom in small chambers that the
+    likeliest fit has neither. A sound valve passes the pump's rated flow at a drop of the inner circuit's pressure at
+    most, since no drop can be larger. Held chambers, a lumped plant's, have no valves.
+
+    Parameters
+    ----------
+    plain : PlainFits
+        Fits of a log.
+    traits : LogTraits
+        How it begins: chambers that are shut in under load need no make-up for long.
+
+    Returns
+    -------
+    tuple of Note
+        One at most.
+    """
+    best, p = plain.best, plain.start.parameters
+    unfelt = all(np.isinf(best.std.get(name, 0.0)) for name in CRACKS)
+    if traits.loaded or traits.moving or not (unfelt and plain.explains(best)):
+        return ()
+    narrowest = min(p.makeup_conductance, p.rated_flow / p.accumulator_pressure)
+    held = [fit.cost for fit in plain.fits if fit.model.rates is HELD_FLOW_FORM.rates]
+    if best.values[MAKEUP] >= narrowest or min(held, default=np.inf) < best.cost + WORTH:
+        return ()
+    if any(cost < best.cost + WORTH for cost in _costs_with_sound_ones(plain, best, narrowest)):
+        return ()
+    return (blocked_note("A or B"),)
+
+
+def _costs_with_sound_ones(plain: PlainFits, best: GreyBoxFit, narrowest: float) -> Iterator[float]:
+    """Yield what searches come down to with valves that are no narrower, from the fit and from the rig file."""
+    problem = FreedProblem.of(best.model, replace(plain.log, stiff=True))
+    place = best.model.unknowns.index(MAKEUP)  # fitted as a logarithm
+    for values in (best.values, {**best.values, **plain.starts[0]}):
+        for conductance in (narrowest, plain.start.parameters.makeup_conductance):
+            begun = problem.model.theta({**values, MAKEUP: max(conductance, narrowest)})
+            lower, upper = flow_bounds(problem.model, [begun], problem.log)
+            lower[place] = np.log(narrowest)
+            yield descend(problem.at, np.clip(begun, lower, upper), FINISHING, (lower, upper), radius=WITHIN).cost
