@@ -341,6 +341,3 @@ LEAST_SHARE, MOST_SHARE = 0.6, 1.25
 
 WORN = 0.9
 """Delivery over the pump's displacement below which the pump is worn, and the rig file not rounded [dimensionless]."""
-
-LEAST_ZERO = 0.5
-"""Least zero of the encoder that is sought, over 10 mm [dimensionless]: 5 mm change the paper's chambers by 0.3 %."""

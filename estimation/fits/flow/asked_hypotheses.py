@@ -18,7 +18,6 @@ from estimation.fits.hypotheses import (
     HYPOTHESES,
     LARGE_CRACK,
     LEAST_DELIVERY,
-    LEAST_ZERO,
     MAKEUP_BENDS,
     MAKEUP_HIDDEN,
     MAY_HIDE,
@@ -38,6 +37,7 @@ from estimation.fits.hypothesis_search.predicted_gains import PredictedGain, pre
 from estimation.fits.hypothesis_search.wide_log import HELD
 from estimation.fits.hypothesis_search.wide_problem import widest_makeup
 from estimation.models.completed_flow import CRACKS, balances_mass
+from estimation.models.wide_flow import LINEAR
 from plant.eha.model import EhaParameters
 from plant.notes import Note
 
@@ -60,6 +60,13 @@ pressure that lags by 2 ms went into valves as wide as could be, bulk modulus 1 
 
 ALWAYS_ASKED = (DELIVERY, ENCODER_ZERO, *MAY_HIDE)
 """What a log that the plain form explains is asked all the same, where the slopes promise a gain: each may hide."""
+
+LEAST_ZERO, LEAST_SHIFT = 5e-3, 3.6e-3
+"""Least reading of the encoder in the middle position that is sought [m], and the same over a chamber's length there,
+where that is less [fraction]: 5 mm change a chamber of the paper's actuator by 0.35 %, one of a drone's by a tenth."""
+
+ZERO_SIZE = LINEAR[ENCODER_ZERO.free[0]]
+"""Size in which slopes promise it [m]."""
 
 MOST_ASKED = 70_000
 """A longer log is not asked what is strange about it: the answer takes minutes [samples]."""
@@ -129,7 +136,7 @@ def hypotheses_asked(
     if is_far_stiffer(log, swinging.values):  # else slopes promise what the accumulator leaves of a zero: nothing
         zero = max(zero, predicted_gain(log, parameters, _unheld(swinging.values), ENCODER_ZERO, by_mass=by_mass))
     worn = delivery.gain > worth and abs(delivery.size) > LEAST_DELIVERY
-    shifted = shows_zero and zero.gain > ZERO_WORTH and abs(zero.size) > LEAST_ZERO
+    shifted = shows_zero and zero.gain > ZERO_WORTH and abs(zero.size) * ZERO_SIZE > _least_zero(parameters)
     plays = play_shows(swinging.play, sensed)
     lead = swinging.values.get("speed_lead", 0.0) / log.sample_time
     behind, ahead = lead > FARTHEST_LEAD, lead < -FARTHEST_LEAD
@@ -178,6 +185,12 @@ def is_astray(log: GreyBoxLog, fit: GreyBoxFit, parameters: EhaParameters) -> bo
         The actuator.
     """
     return at_widest(fit, parameters, log) or is_far_stiffer(log, fit.values)
+
+
+def _least_zero(p: EhaParameters) -> float:
+    """Return the least reading of an encoder in the middle position that is sought [m]."""
+    length = 2.0 * p.chamber_volume / p.piston_area
+    return min(LEAST_ZERO, LEAST_SHIFT * length)
 
 
 def _late_valves(fit: GreyBoxFit) -> tuple[Hypothesis, ...]:

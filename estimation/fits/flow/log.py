@@ -216,7 +216,8 @@ def _noisy(log: GreyBoxLog, p: EhaParameters, record: Record) -> GreyBoxLog:
     averaged_over, samples = round(log.sample_time / record.sample_time), max(1, round(NOISY_BLOCK / log.sample_time))
     position, speed = record["position_m"], bridged(record["motor_speed_rad_s"])
     pumped = p.pump_displacement / p.piston_area * record.sample_time * np.cumsum(speed)
-    leaked = encoder_noise(position, pumped, position_variance(position), averaged_over, samples)
+    every = round(1.0 / max(float(np.mean(np.isfinite(log.measured))), 1.0 / samples))
+    leaked = encoder_noise(position, pumped, position_variance(position), averaged_over, samples, every)
     noise = replace(
         log.noise[0],
         passed_over=("chamber_volume", p.chamber_volume),

@@ -20,13 +20,16 @@ from plant.notes import Note
 
 MAKEUP = "makeup_conductance"
 
+BEHIND = 3.0
+"""Log-likelihood by which held chambers must be behind [dimensionless]: twenty to one. A lumped plant has no valves."""
+
 
 def shut_valves(plain: PlainFits, traits: LogTraits) -> tuple[Note, ...]:
     """Return a note if the plain form explains a log without any make-up valve, and does not with sound ones.
 
     One valve that is stuck shut may then be all that is wrong: the other one opens so seldom in small chambers that the
     likeliest fit has neither. A sound valve passes the pump's rated flow at a drop of the inner circuit's pressure at
-    most, since no drop can be larger. Held chambers, a lumped plant's, have no valves.
+    most, since no drop can be larger.
 
     Parameters
     ----------
@@ -46,7 +49,7 @@ def shut_valves(plain: PlainFits, traits: LogTraits) -> tuple[Note, ...]:
         return ()
     narrowest = min(p.makeup_conductance, p.rated_flow / p.accumulator_pressure)
     held = [fit.cost for fit in plain.fits if fit.model.rates is HELD_FLOW_FORM.rates]
-    if best.values[MAKEUP] >= narrowest or min(held, default=np.inf) < best.cost + WORTH:
+    if best.values[MAKEUP] >= narrowest or min(held, default=np.inf) < best.cost + BEHIND:
         return ()
     if any(cost < best.cost + WORTH for cost in _costs_with_sound_ones(plain, best, narrowest)):
         return ()

@@ -77,13 +77,15 @@ class LeakedNoise:
         return gain * variance**0.5, kept / gain - 1.0 + lost * bent
 
 
-def white_noise(samples: int) -> LeakedNoise:
+def white_noise(samples: int, every: int = 1) -> LeakedNoise:
     """Return what losses leave of white noise in means.
 
     Parameters
     ----------
     samples : int
         Samples a mean [count].
+    every : int
+        One in how many of these the output has [count]. Losses even out less of the noise of few.
 
     Returns
     -------
@@ -94,11 +96,15 @@ def white_noise(samples: int) -> LeakedNoise:
     --------
     >>> [round(number, 3) for number in white_noise(10).kept(0.1)]
     [0.795, -0.21]
+    >>> round(white_noise(10, every=5).kept(0.1)[0], 3)
+    0.959
     """
-    return _leaked(np.ones(1), samples)
+    return _leaked(np.ones(1), samples, every)
 
 
-def encoder_noise(position: Array, pumped: Array, variance: float, averaged: int, samples: int) -> LeakedNoise:
+def encoder_noise(
+    position: Array, pumped: Array, variance: float, averaged: int, samples: int, every: int = 1
+) -> LeakedNoise:
     """Return what losses leave of an encoder's noise in means.
 
     At a position that noise before the encoder blurs by ``s``, the ``k``-th harmonic of the error of a step ``q`` has a
@@ -118,6 +124,8 @@ def encoder_noise(position: Array, pumped: Array, variance: float, averaged: int
         Samples that were averaged to one of the driving channel [count].
     samples : int
         Of these, a mean of the output [count].
+    every : int
+        One in how many of these the output has, see `white_noise` [count].
 
     Returns
     -------
@@ -126,7 +134,7 @@ def encoder_noise(position: Array, pumped: Array, variance: float, averaged: int
     """
     step, block = _step(position), averaged * samples
     if not step or len(position) <= 2 * READ * block:
-        return white_noise(samples)
+        return white_noise(samples, every)
     of_steps = min(step**2 / (12.0 * variance), 1.0)  # of the variance
     blurred = (1.0 / of_steps - 1.0) / 12.0
     course = _course(bridged(position), pumped, READ * block) / step
@@ -140,7 +148,7 @@ def encoder_noise(position: Array, pumped: Array, variance: float, averaged: int
     alike[0] = 1.0
     within = np.convolve(np.ones(averaged), np.ones(averaged)) / averaged  # means of samples
     both = np.convolve(np.concatenate([alike[:0:-1], alike]), within)
-    return _leaked(both[len(both) // 2 :: averaged], samples)
+    return _leaked(both[len(both) // 2 :: averaged], samples, every)
 
 
 def _step(position: Array) -> float:
@@ -170,9 +178,11 @@ def _likeness(turned: Array, lags: int) -> Array:
     return np.fft.ifft(spectrum.real**2 + spectrum.imag**2).real[:lags] / (count - np.arange(lags))
 
 
-def _leaked(alike: Array, samples: int) -> LeakedNoise:
+def _leaked(alike: Array, samples: int, every: int) -> LeakedNoise:
     """Return what losses leave of noise whose autocorrelation is given from lag zero on."""
+    count = max(1, round(samples / every))
     frequency = np.pi * (np.arange(FREQUENCIES) + 0.5) / FREQUENCIES
     spectrum = alike[0] + 2.0 * np.cos(np.outer(frequency, np.arange(1, len(alike)))) @ alike[1:]
-    passed = 4.0 * np.sin(0.5 * samples * frequency) ** 2 / (samples * FREQUENCIES)
+    passed = 4.0 * np.sin(0.5 * count * every * frequency) ** 2 / (count * FREQUENCIES)
+    passed *= (np.sin(0.5 * frequency) / np.sin(0.5 * every * frequency)) ** 2
     return LeakedNoise(np.cos(frequency), np.maximum(spectrum, 0.0) * passed)

@@ -141,14 +141,15 @@ def by_predicted_gain(
     Returns
     -------
     tuple of list of Hypothesis, list of Hypothesis, and dict
-        The `LIKELIEST`, the others, and the gain in log-likelihood that each promises, by its name [dimensionless].
+        The `LIKELIEST`, one at least; the others; and the gain in log-likelihood that each promises, by its name
+        [dimensionless].
     """
     promises = _promises(log.coarsened(), together, found, asked)
     stepped = any(one.from_change for one in asked) and likeliest_step(log).share > STEPPED
     aired = any(one.from_entry for one in asked) and likeliest_entry(log).share > AIRED
     first = [(stepped and one.from_change) or (aired and one.from_entry) for one in asked]
     order = sorted(range(len(asked)), key=lambda i: (not first[i], -promises[i].gain))
-    likely = [asked[i] for i in order if first[i] or not asked[i].far][:LIKELIEST]
+    likely = [asked[i] for i in order if first[i] or not asked[i].far][:LIKELIEST] or [asked[i] for i in order[:1]]
     gains = {one.name: each.gain for one, each in zip(asked, promises, strict=True)}
     return likely, [one for one in asked if one not in likely], gains
 

@@ -47,6 +47,10 @@ FASTEST_MAKEUP, FASTEST_FOLLOWED = 0.5 * LONGEST_STEP, 0.02 * LONGEST_STEP
 model step the model may chatter, as at a sharp relief valve: the deviation of bulk modulus came out nine times too
 small. Implicit steps do not; valves of random rigs need 0.013 ms and more."""
 
+FARTHEST_ZERO = 0.3
+"""Share of a chamber's length in mid-stroke that an encoder's zero is sought from at most [fraction]; judged. 60 mm
+are 4 % of the paper's actuator's, and more than a drone's has."""
+
 MOST_VOLUME = 2.0
 """Factor by which a chamber's volume is sought above or below the rig file's [dimensionless]: 4.6 deviations of what is
 presumed. Volumes 4 and 80 times as large took the place of an encoder's zero."""
@@ -199,7 +203,10 @@ def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]
         return [{**start, AIR_ONSET: likeliest_entry(log).at} for start in one.starts]
     if one.from_mid_travel:
         read = log.drives[:, WIDE_FLOW_FORM.drives.index(POSITION)]
-        return [*one.starts, {POSITION_ZERO: 0.5 * float(np.min(read) + np.max(read))}]
+        rig = usual_values(log)
+        farthest = FARTHEST_ZERO * 2.0 * rig["chamber_volume"] / rig["piston_area"]
+        near = [{POSITION_ZERO: float(np.clip(start[POSITION_ZERO], -farthest, farthest))} for start in one.starts]
+        return [*near, {POSITION_ZERO: 0.5 * float(np.min(read) + np.max(read))}]
     if not one.shares_of_peak:
         return one.starts
     peak = max(float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)
