@@ -8,8 +8,9 @@ import numpy as np
 from estimation.fits.greybox.descent import descend
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import LATEST, Hypothesis
-from estimation.fits.hypothesis_search.decimation import decimated
+from estimation.fits.hypothesis_search.decimation import cost_over_noise, decimated
 from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.fit_objections import QUIET
 from estimation.fits.hypothesis_search.wide_log import balanced_by, delayed, usual_values
 from estimation.fits.hypothesis_search.wide_problem import (
     AIR_ONSET,
@@ -64,6 +65,7 @@ def search_coarsely(log: GreyBoxLog, tried: Trial, wanted: float = np.inf, every
         How many samples are one, see `decimated` [count].
     """
     early, known = coarsened(log, tried.delays, tried.together, every), freed_at_end(tried.together[:-1])
+    tried = replace(tried, void=False)
     best = _led_down(early, tried, tried.point.theta, *known, wanted=wanted)
     if (revived := _revived(log, best, *known)) is not None:
         best = min(best, _led_down(early, best, revived, *known, wanted=wanted), key=lambda one: one.cost)
@@ -76,7 +78,22 @@ def search_coarsely(log: GreyBoxLog, tried: Trial, wanted: float = np.inf, every
         at = best.values[STEP_AT]
         times = [(min(max(at + off, 0.0), 1.0), width) for width in STEP_WIDTHS for off in STEP_NEAR]
         best = _timed(early, best, (STEP_AT, STEP_WIDTH), times, wanted)
-    return best
+    return unless_quiet(log, best)
+
+
+def unless_quiet(log: GreyBoxLog, tried: Trial) -> Trial:
+    """Return a trial, void where it leaves far less than the noise of position makes.
+
+    Oil as stiff as steel makes that noise so large that it explains any log. No other explanation would come as low.
+
+    Parameters
+    ----------
+    log : GreyBoxLog
+        The log, widened.
+    tried : Trial
+        The trial.
+    """
+    return replace(tried, void=log.passes_on and cost_over_noise(log, tried.point.cost) < QUIET)
 
 
 def _led_down(log: GreyBoxLog, tried: Trial, start: Array, *more: str, wanted: float) -> Trial:

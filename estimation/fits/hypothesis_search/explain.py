@@ -11,7 +11,7 @@ import numpy as np
 
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.log import GreyBoxLog
-from estimation.fits.hypotheses import DELIVERY, HYPOTHESES, START_LOAD, VOLUME, Hypothesis
+from estimation.fits.hypotheses import DELIVERY, ENCODER_ZERO, HYPOTHESES, START_LOAD, VOLUME, Hypothesis
 from estimation.fits.hypothesis_search.coarse_search import coarsened, vanished_values
 from estimation.fits.hypothesis_search.commonly_hidden import delivery_followed, rig_and_load, with_delivery, with_zero
 from estimation.fits.hypothesis_search.conclusion import Accepted, conclude, is_explained
@@ -97,6 +97,8 @@ def explain(
     wide = balanced_by(widened(log, parameters, starts[0]), 1.0 if by_mass else 0.0)
     plain = _plain_point(wide, starts[0])
     likely, others, gains = by_predicted_gain(wide, (), starts[0], asked)
+    if homed and ENCODER_ZERO in others:  # far from the middle slopes promise nothing of it, nor do a few steps
+        likely, others = [ENCODER_ZERO, *likely], [one for one in others if one is not ENCODER_ZERO]
     left = cost_over_noise(wide, plain.cost)
     spared = Decimation(decimation_limit(wide, starts[0], decimation_for(wide, left)), left, starts)
     finished = _alone(wide, plain.cost, (likely, others), spared, accepted, useful)

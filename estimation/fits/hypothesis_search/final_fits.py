@@ -15,6 +15,7 @@ from estimation.fits.hypotheses import CHECKS_CRACK, PRESSURE_FILTERED, PRESSURE
 from estimation.fits.hypothesis_search.coarse_search import NEAR, coarsened, descended
 from estimation.fits.hypothesis_search.decimation import FEW, cost_over_noise
 from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.fit_objections import is_too_close
 from estimation.fits.hypothesis_search.wide_log import balanced_by, balances_mass, delayed, usual_values
 from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed, freed_at_end
 from estimation.models.completed_flow import CRACKS
@@ -97,7 +98,8 @@ def final_fit(log: GreyBoxLog, tried: Trial, useful: float = np.inf, *details: s
     best = replace(done[0][0], coarse=tried.values)
     count = [one for one in done if one[0].cost <= best.cost + ALIKE]
     first, *rivals = (_concluded(problem, one.point, log) for one, problem in count)
-    if best.meant and all(one.told(best.values, first.std) for one in best.together):
+    sound = best.meant and not is_too_close(first, log.passes_on)
+    if sound and all(one.told(best.values, first.std) for one in best.together):
         return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
     return replace(best, void=True, fits=(replace(first, cost=NEVER),))
 

@@ -10,7 +10,7 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.parallel_descents import Way, descend_in_turn
 from estimation.fits.hypotheses import DELIVERY, Hypothesis
-from estimation.fits.hypothesis_search.coarse_search import NEAR, SLIGHT, coarsened
+from estimation.fits.hypothesis_search.coarse_search import NEAR, SLIGHT, coarsened, unless_quiet
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.wide_log import usual_values
 from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed, freed_at_end, own_starts, worn_start
@@ -46,8 +46,8 @@ def screen(
     """
     absent = usual_values(log)
     asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
-    found = freed_at_end(together[:-1])
-    problems = [(delays, freed(coarsened(log, delays, together, every), together, *found)) for delays in asked]
+    known = freed_at_end(together[:-1])
+    problems = [(delays, freed(coarsened(log, delays, together, every), together, *known)) for delays in asked]
     begun = own_starts(log, together[-1])
     ways: list[Way] = []
     of_way: list[tuple[int, Mapping[str, float], FreedProblem]] = []
@@ -61,7 +61,8 @@ def screen(
 
     def after(way: int, point: Point) -> float:
         place, delays, problem = of_way[way]
-        tried[place].append(Trial(together, point, problem.model.values(point.theta), delays, absent))
+        found = Trial(together, point, problem.model.values(point.theta), delays, absent)
+        tried[place].append(unless_quiet(log, found))
         return NEARLY * tried[place][-1].cost
 
     descend_in_turn(ways, SCREENING, wanted, after, radius=NEAR, least_share=SLIGHT)
