@@ -10,7 +10,14 @@ import pytest
 
 from estimation.fits.flow import asked_hypotheses
 from estimation.fits.flow import fit as flow_fit
-from estimation.fits.flow.asked_hypotheses import ZERO_WORTH, hypotheses_asked, is_astray, near_starts
+from estimation.fits.flow.asked_hypotheses import (
+    LEAST_ZERO,
+    ZERO_SIZE,
+    ZERO_WORTH,
+    hypotheses_asked,
+    is_astray,
+    near_starts,
+)
 from estimation.fits.greybox.chance import LARGEST_CHI_SQUARE
 from estimation.fits.hypotheses import (
     CHECKS_HIDDEN,
@@ -18,7 +25,6 @@ from estimation.fits.hypotheses import (
     ENCODER_ZERO,
     HYPOTHESES,
     LARGE_CRACK,
-    LEAST_ZERO,
     MAKEUP_HIDDEN,
     PRESSURE_LATE,
     SPEED_LATE,
@@ -105,7 +111,7 @@ def test_an_encoder_s_zero_is_asked_for_where_no_held_volumes_fit_better_or_the_
     swinging, held = made_fit(400.0, 2e8, 1e5), made_fit(300.0, 2e8, 1e5)
     record = log(0.2)
     stop = seen(record.replace(position_m=record["position_m"] + 0.12))
-    with all_promise(PredictedGain(2.0 * ZERO_WORTH, 2.0 * LEAST_ZERO, 0.03)):
+    with all_promise(PredictedGain(2.0 * ZERO_WORTH, 2.0 * LEAST_ZERO / ZERO_SIZE, 0.03)):
         for seen_log, best, wanted in ((seen(record), swinging, True), (seen(record), held, False), (stop, held, True)):
             asked, _ = hypotheses_asked(seen_log, PAPER, swinging, best, loaded=False, moving=False)
             assert (ENCODER_ZERO in asked) == wanted
@@ -121,7 +127,7 @@ def test_an_encoder_s_zero_is_asked_for_where_the_accumulator_took_it_up(deviati
 
     def beside_none(*given: Any, **_: Any) -> PredictedGain:
         assert STIFFNESS not in given[2]
-        return PredictedGain(2.0 * ZERO_WORTH, 2.0 * LEAST_ZERO, 0.03)
+        return PredictedGain(2.0 * ZERO_WORTH, 2.0 * LEAST_ZERO / ZERO_SIZE, 0.03)
 
     with all_promise(NO_GAIN), patch.object(asked_hypotheses, "predicted_gain", beside_none):
         asked, _ = hypotheses_asked(plain, PAPER, fit, fit, loaded=False, moving=False)

@@ -18,7 +18,7 @@ from estimation.fits.hypothesis_search.wide_log import widened
 from estimation.fits.hypothesis_search.wide_problem import freed
 from estimation.log_checks.clean import clean_log
 from estimation.models.completed_flow import CRACKS
-from estimation.models.wide_flow import stepped_leakage
+from estimation.models.wide_flow import WideFlowParameters, stepped_leakage
 from estimation.notes import RigCode
 from plant.eha.circuit_parameters import circuit_of
 from plant.eha.drives import make_drive
@@ -27,16 +27,17 @@ from plant.eha.parameter_path import ParameterPath
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
+from plant.solvers.steps import parameter_names
 
 HEALTHY = EhaParameters()
 
 
 @cache
-def stepping(factor: float, at: float = 2.0) -> Record:
-    """Return five seconds in which leakage steps by a factor."""
+def stepping(factor: float, at: float = 2.0, before: float = 1.0) -> Record:
+    """Return five seconds in which leakage steps to so many times a healthy one."""
     rng = np.random.default_rng(7)
-    leaking = replace(HEALTHY, leakage_coefficient=factor * HEALTHY.leakage_coefficient)
-    path = ParameterPath((0.0, at), (circuit_of(HEALTHY), circuit_of(leaking)))
+    first, last = (replace(HEALTHY, leakage_coefficient=n * HEALTHY.leakage_coefficient) for n in (before, factor))
+    path = ParameterPath((0.0, at), (circuit_of(first), circuit_of(last)))
     return simulate(CIRCUIT, make_drive("multisine", 5.0, 1e-3, HEALTHY, rng), 1e-3, path, sensors=BENCH, rng=rng)
 
 
@@ -51,6 +52,17 @@ def test_lost_flow_tells_when_leakage_steps_and_by_how_much() -> None:
     assert step.at == pytest.approx(0.4, abs=0.01)
     assert step.before / step.after == pytest.approx(1.0 / 6.0, abs=0.3)
     assert step.after == pytest.approx(6.0 * HEALTHY.leakage_coefficient, rel=0.1)
+
+
+def test_a_seal_that_was_tight_is_found_where_lost_flow_says_that_it_leaked_less_than_nothing() -> None:
+    """Small rigs lose so little that noise makes it negative, and only times at which it is not were tried."""
+    log = seen(stepping(6.0, before=1e-3))
+    parameters = log.parameters.copy()
+    parameters[parameter_names(WideFlowParameters).index("pump_displacement")] *= 0.7
+    step = likeliest_step(replace(log, parameters=parameters))
+    assert step.share > STEPPED
+    assert step.first["step_at"] == pytest.approx(0.4, abs=0.01)
+    assert step.first["leakage_before"] == -1.0
 
 
 def test_a_leakage_that_stays_is_no_step() -> None:

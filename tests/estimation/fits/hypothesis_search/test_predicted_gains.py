@@ -27,6 +27,12 @@ def test_what_slopes_say_nothing_of_is_not_tried_first() -> None:
     assert gains[OFFSET.name] == pytest.approx(predicted_gain_beside(wide().coarsened(), (), FOUND, OFFSET).gain)
 
 
+def test_a_hypothesis_that_slopes_say_nothing_of_is_tried_where_nothing_else_is_asked() -> None:
+    """A stuck make-up valve beside an offset of speed: with none to try first, the search ended in an error."""
+    likely, others, _ = by_predicted_gain(wide(), (), FOUND, [MAKEUP_BLOCKED])
+    assert (likely, others) == ([MAKEUP_BLOCKED], [])
+
+
 def test_behind_a_plain_form_that_explains_a_log_all_that_may_hide_is_tried_by_its_slopes() -> None:
     assert not any(one.far for one in MAY_HIDE)
     assert MAKEUP_BLOCKED.name in [one.name for one in MAY_HIDE]

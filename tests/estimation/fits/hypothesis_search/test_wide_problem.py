@@ -27,7 +27,7 @@ from estimation.models.flow_parameters import flow_parameters
 from estimation.models.wide_flow import grown_leakage
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
-from tests.estimation.fits.short_logs import PAPER, at_one_speed, lost_in_bias, seen, wide
+from tests.estimation.fits.short_logs import PAPER, at_one_speed, log, lost_in_bias, seen, wide
 
 RIG = EhaParameters()
 VARIANCES = {"differential_pressure_pa": 1e6}
@@ -131,3 +131,10 @@ def test_a_level_that_a_loaded_log_hardly_tells_is_in_the_deviation_of_bulk_modu
     assert found.value is not None
     assert found.std is not None
     assert abs(found.value - bench.true.bulk_modulus) < 2.0 * found.std < 0.01 * bench.true.bulk_modulus
+
+
+@pytest.mark.parametrize(("length", "starts"), [(1.4, (-0.06, 0.06)), (0.05, (-0.015, 0.015))])
+def test_a_search_for_an_encoders_zero_begins_within_the_chambers(length: float, starts: tuple[float, float]) -> None:
+    rig = replace(PAPER, chamber_volume=0.5 * length * PAPER.piston_area)
+    begun = own_starts(widened(seen(log(0.5)), rig), ENCODER_ZERO)
+    assert [one[POSITION_ZERO] for one in begun[:2]] == pytest.approx(starts)

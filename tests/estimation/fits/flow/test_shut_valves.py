@@ -1,0 +1,53 @@
+"""Make-up valves that stay shut in a log though sound ones would have opened."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimation.fits.flow import shut_valves as of_valves
+from estimation.fits.flow.log import without_strays
+from estimation.fits.flow.log_traits import AT_REST, LogTraits
+from estimation.fits.flow.plain import FitStart, Logged, plain_fits
+from estimation.fits.flow.shut_valves import BEHIND, shut_valves
+from estimation.fits.hypothesis_search.explain import WORTH
+from estimation.models.completed_flow import CRACKS
+from estimation.models.flow import HELD_FLOW_FORM
+from estimation.notes import RigCode
+from tests.estimation.fits.short_logs import PAPER, WORN, log, made_fit
+
+
+def fits(makeup: float = 1e-29, std: float = np.inf, held: float = np.inf) -> Any:
+    best = made_fit(100.0, 2e8, 1e5)
+    values, stds = {**best.values, of_valves.MAKEUP: makeup}, {**best.std, **dict.fromkeys(CRACKS, std)}
+    best, other = replace(best, values=values, std=stds), replace(best, model=HELD_FLOW_FORM, cost=held)
+    start = SimpleNamespace(parameters=PAPER)
+    return SimpleNamespace(best=best, fits=[best, other], start=start, explains=lambda _: True)
+
+
+@pytest.mark.parametrize(
+    ("plain", "traits", "sound", "said"),
+    [
+        (fits(), AT_REST, 1.1 * WORTH, True),
+        (fits(), AT_REST, 0.9 * WORTH, False),  # the log does not tell
+        (fits(std=900.0), AT_REST, 1.1 * WORTH, False),
+        (fits(makeup=1e-8), AT_REST, 1.1 * WORTH, False),
+        (fits(held=100.0 + 0.9 * BEHIND), AT_REST, 1.1 * WORTH, False),  # a lumped plant has none
+        (fits(), LogTraits(moving=True), 1.1 * WORTH, False),
+    ],
+)
+def test_a_log_without_any_make_up_has_a_stuck_valve_if_sound_ones_contradict_it(
+    plain: Any, traits: LogTraits, sound: float, *, said: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(of_valves, "_costs_with_sound_ones", lambda *_: iter([100.0 + 2.0 * WORTH, 100.0 + sound]))
+    notes = shut_valves(plain, traits)
+    assert [note.code for note in notes] == [RigCode.MAKEUP_BLOCKED] * said
+
+
+def test_searches_with_sound_valves_explain_a_sound_log_as_well_as_its_fit() -> None:
+    record, variances = without_strays(log(2.0))
+    plain = plain_fits(Logged(record, variances), FitStart(WORN, WORN.bulk_modulus))
+    costs = of_valves._costs_with_sound_ones(plain, plain.best, plain.best.values[of_valves.MAKEUP])
+    assert min(costs) < plain.best.cost + 1.0

@@ -1,0 +1,26 @@
+"""Where hypotheses are brought to their optimum with long model steps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation.fits.greybox.descent import Point
+from estimation.fits.hypotheses import ENCODER_ZERO
+from estimation.fits.hypothesis_search.coarse_search import unless_quiet
+from estimation.fits.hypothesis_search.decimation import cost_over_noise
+from estimation.fits.hypothesis_search.explanation import Trial
+from estimation.fits.hypothesis_search.fit_objections import QUIET
+from tests.estimation.fits.short_logs import wide
+
+
+@pytest.mark.parametrize(("passed_on", "left", "void"), [(1.0, 0.9, True), (1.0, 1.1, False), (0.0, 0.9, False)])
+def test_what_leaves_far_less_than_noise_of_position_is_no_explanation(
+    passed_on: float, left: float, *, void: bool
+) -> None:
+    """Speed that comes late and air left 2 % of the noise of a drone's log, of which its encoder's zero left all."""
+    log = wide()
+    log = replace(log, noise=tuple(replace(one, passed_on=passed_on) for one in log.noise))
+    cost = left * QUIET / cost_over_noise(log, 1.0)
+    tried = Trial((ENCODER_ZERO,), Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), {}, {}, {})
+    assert unless_quiet(log, tried).cost == (np.inf if void else cost)
