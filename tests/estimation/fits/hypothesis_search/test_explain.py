@@ -86,12 +86,15 @@ def test_a_relief_valve_set_above_the_rig_files_is_not_set_low() -> None:
     assert [relieved(setting).cost for setting in (2.9e6, 3e6, 4e6)] == [50.0, np.inf, np.inf]
 
 
-@pytest.mark.parametrize(("setting", "std", "void"), [(2e6, 1e3, False), (2e6, np.inf, True), (4e6, 1e3, True)])
-def test_what_is_set_above_the_rig_files_or_has_no_interval_is_void(
-    setting: float, std: float, void: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("setting", "std", "left", "void"),
+    [(2e6, 1e3, 1.0, False), (2e6, np.inf, 1.0, True), (4e6, 1e3, 1.0, True), (2e6, 1e3, 0.1, True)],
+)
+def test_what_is_set_above_the_rig_files_or_has_no_interval_or_leaves_too_little_is_void(
+    setting: float, std: float, left: float, void: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem = SimpleNamespace(model=SimpleNamespace(theta=lambda _: np.zeros(1)))
-    fit = replace(made_fit(50.0, 2e8, 1e5), std={"bulk_modulus": 1e5, "relief_pressure": std})
+    fit = replace(made_fit(50.0, 2e8, 1e5, chi=left), std={"bulk_modulus": 1e5, "relief_pressure": std})
     monkeypatch.setattr(final_fits, "delayed", lambda log, _: log)
     monkeypatch.setattr(final_fits, "balanced_by", lambda log, _: log)
     monkeypatch.setattr(final_fits, "freed", lambda *_: problem)
@@ -101,8 +104,8 @@ def test_what_is_set_above_the_rig_files_or_has_no_interval_is_void(
     monkeypatch.setattr(final_fits, "concluded", lambda *_, **__: fit)
     monkeypatch.setattr(final_fits, "coarsened", lambda *_: None)
     monkeypatch.setattr(final_fits, "balances_mass", lambda _: False)
-    nothing: Any = None
-    found = final_fits.final_fit(nothing, relieved(setting))
+    noisy: Any = SimpleNamespace(passes_on=True)
+    found = final_fits.final_fit(noisy, relieved(setting))
     assert found.cost == (np.inf if void else 50.0)
     assert found.fit.cost == (NEVER if void else 50.0)
     assert found.void is void

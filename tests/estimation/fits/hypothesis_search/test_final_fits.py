@@ -36,7 +36,7 @@ def test_the_balance_in_which_a_set_was_sought_comes_first_and_the_other_must_co
     monkeypatch.setattr(final_fits, "_to_its_end", to_its_end)
     monkeypatch.setattr(final_fits, "flow_bounds", lambda *_: (np.zeros(1), np.ones(1)))
     monkeypatch.setattr(final_fits, "concluded", lambda *_, **__: made_fit(50.0, 2e8, 1e5))
-    nothing: Any = None
+    nothing: Any = SimpleNamespace(passes_on=False)
     begun = Trial((), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {}, {}, {})
     assert final_fits.final_fit(nothing, begun).cost == 50.0
     assert led == [(order[0], np.inf), (order[1], 50.0 + ALIKE)]
@@ -82,7 +82,7 @@ def test_valves_are_freed_at_the_end_unless_they_chatter_or_the_set_fits_worse(
         return replace(tried, point=replace(tried.point, cost=cost), fits=(made_fit(cost, 2e8, std),))
 
     monkeypatch.setattr(final_fits, "final_fit", further)
-    nothing: Any = None
+    nothing: Any = SimpleNamespace(passes_on=False)
     told = final_fits.with_details(nothing, before)
     assert {*CRACKS} < {*freed}
     assert told.cost == (cost if kept else before.cost)
@@ -90,7 +90,7 @@ def test_valves_are_freed_at_the_end_unless_they_chatter_or_the_set_fits_worse(
 
 def test_valves_that_a_set_frees_itself_are_not_freed_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(final_fits, "final_fit", lambda *_: pytest.fail("fitted again"))
-    nothing: Any = None
+    nothing: Any = SimpleNamespace(passes_on=False)
     for own in (CHECKS_CRACK, AIR_MIDWAY):
         tried = Trial((own,), Point(np.zeros(1), 90.0, np.zeros(1), np.eye(1)), {}, {}, {})
         assert final_fits.with_details(nothing, tried) is tried
