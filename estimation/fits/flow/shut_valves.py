@@ -51,18 +51,33 @@ def shut_valves(plain: PlainFits, traits: LogTraits) -> tuple[Note, ...]:
     held = [fit.cost for fit in plain.fits if fit.model.rates is HELD_FLOW_FORM.rates]
     if best.values[MAKEUP] >= narrowest or min(held, default=np.inf) < best.cost + BEHIND:
         return ()
-    if any(cost < best.cost + WORTH for cost in _costs_with_sound_ones(plain, best, narrowest)):
+    if any(cost < best.cost + WORTH for cost in costs_with_sound_ones(plain, best, narrowest)):
         return ()
     return (blocked_note("A or B"),)
 
 
-def _costs_with_sound_ones(plain: PlainFits, best: GreyBoxFit, narrowest: float) -> Iterator[float]:
-    """Yield what searches come down to with valves that are no narrower, from the fit and from the rig file."""
+def costs_with_sound_ones(plain: PlainFits, best: GreyBoxFit, narrowest: float) -> Iterator[float]:
+    """Yield what searches come down to with valves that are no narrower, from the fit and from the rig file.
+
+    Parameters
+    ----------
+    plain : PlainFits
+        Fits of a log.
+    best : GreyBoxFit
+        The one whose form is searched, in implicit model steps.
+    narrowest : float
+        Least conductance of the valves [m^3/(s Pa)].
+
+    Yields
+    ------
+    float
+        Cost of each search [dimensionless].
+    """
     problem = FreedProblem.of(best.model, replace(plain.log, stiff=True))
     place = best.model.unknowns.index(MAKEUP)  # fitted as a logarithm
     for values in (best.values, {**best.values, **plain.starts[0]}):
         for conductance in (narrowest, plain.start.parameters.makeup_conductance):
             begun = problem.model.theta({**values, MAKEUP: max(conductance, narrowest)})
             lower, upper = flow_bounds(problem.model, [begun], problem.log)
-            lower[place] = np.log(narrowest)
+            lower[place], upper[place] = np.log(narrowest), max(np.log(narrowest), upper[place])
             yield descend(problem.at, np.clip(begun, lower, upper), FINISHING, (lower, upper), radius=WITHIN).cost
