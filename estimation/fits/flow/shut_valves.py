@@ -12,7 +12,7 @@ from estimation.fits.greybox.descent import descend
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.hypothesis_search.explain import WORTH
-from estimation.fits.hypothesis_search.not_excluded import blocked_note
+from estimation.fits.hypothesis_search.not_excluded import blocked_note, unseen_note
 from estimation.fits.hypothesis_search.wide_problem import flow_bounds
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import HELD_FLOW_FORM
@@ -25,11 +25,11 @@ BEHIND = 3.0
 
 
 def shut_valves(plain: PlainFits, traits: LogTraits) -> tuple[Note, ...]:
-    """Return a note if the plain form explains a log without any make-up valve, and does not with sound ones.
+    """Return a note if the plain form explains a log in which no make-up valve is felt: one is stuck shut, or may be.
 
     One valve that is stuck shut may then be all that is wrong: the other one opens so seldom in small chambers that the
-    likeliest fit has neither. A sound valve passes the pump's rated flow at a drop of the inner circuit's pressure at
-    most, since no drop can be larger.
+    likeliest fit has neither. It is, if sound ones do not explain the log; else the log does not tell. A sound valve
+    passes the pump's rated flow at a drop of the inner circuit's pressure at most, since no drop can be larger.
 
     Parameters
     ----------
@@ -47,13 +47,14 @@ def shut_valves(plain: PlainFits, traits: LogTraits) -> tuple[Note, ...]:
     unfelt = all(np.isinf(best.std.get(name, 0.0)) for name in CRACKS)
     if traits.loaded or traits.moving or not (unfelt and plain.explains(best)):
         return ()
-    narrowest = min(p.makeup_conductance, p.rated_flow / p.accumulator_pressure)
     held = [fit.cost for fit in plain.fits if fit.model.rates is HELD_FLOW_FORM.rates]
-    if best.values[MAKEUP] >= narrowest or min(held, default=np.inf) < best.cost + BEHIND:
+    if min(held, default=np.inf) < best.cost + BEHIND:
         return ()
-    if any(cost < best.cost + WORTH for cost in costs_with_sound_ones(plain, best, narrowest)):
-        return ()
-    return (blocked_note("A or B"),)
+    narrowest = min(p.makeup_conductance, p.rated_flow / p.accumulator_pressure)
+    sound = best.values[MAKEUP] >= narrowest or any(
+        cost < best.cost + WORTH for cost in costs_with_sound_ones(plain, best, narrowest)
+    )
+    return (unseen_note("A or B") if sound else blocked_note("A or B"),)
 
 
 def costs_with_sound_ones(plain: PlainFits, best: GreyBoxFit, narrowest: float) -> Iterator[float]:

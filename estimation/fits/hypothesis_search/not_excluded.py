@@ -57,7 +57,18 @@ def unseen_valve_note(fit: GreyBoxFit) -> tuple[Note, ...]:
         One at most.
     """
     unseen = [side for side, name in zip("AB", CRACKS, strict=True) if np.isinf(fit.std.get(name, 0.0))]
-    return (RigCode.MAKEUP_UNSEEN.note(side=unseen[0]),) if len(unseen) == 1 else ()
+    return (unseen_note(unseen[0]),) if len(unseen) == 1 else ()
+
+
+def unseen_note(side: str) -> Note:
+    """Return the note on a make-up valve that a log does not show.
+
+    Parameters
+    ----------
+    side : str
+        Its chamber, or both where a log shows neither.
+    """
+    return RigCode.MAKEUP_UNSEEN.note(side=side)
 
 
 def blocked_note(side: str) -> Note:
