@@ -272,8 +272,8 @@ class RigCode(Code):
     AREAS_VAGUE = "the ratio of the piston's areas is known to ± {percent:.0f} % only: give two areas in the rig file"
     VOLUME_DIFFERS = "the chamber volume is {percent:.1f} ± {half_width:.2g} % of that in the rig file"
     STARTS_UNDER_LOAD = (
-        "the log begins at a differential pressure of {pressure_pa:.3g|bar} bar: the piston moves, or a load of "
-        "{force_n:.3g} N acts"
+        "the log begins at a differential pressure of {pressure_pa:.3g|bar} bar: the piston moves, or friction or "
+        "a load of {force_n:.3g} N holds it"
     )
     AIR_ENTRAINED = (
         "the oil contains {percent:.2g} ± {half_width:.2g} % of air at atmospheric pressure; bulk modulus is given at "

@@ -86,7 +86,7 @@ FIRST_WIDTH = 0.02
 
 START_PRESSURE = "start_pressure"
 
-LEVELS_TRIED = (0.0, 0.3)
+LEVELS_TRIED = (0.0, 0.3, 0.8)
 """Levels over the accumulator's pressure with which both sides may begin, as shares of the most [fraction]."""
 
 MOST_BIASED = 2.0
