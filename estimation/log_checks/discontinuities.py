@@ -46,6 +46,10 @@ STOPS = 0.1
 SOFT_STOP = 1e-3
 """Share of a log's travel by which a stop yields [fraction]; judged."""
 
+YIELDS = 1e-3
+"""Sample time at which a stop has yielded after `NEAR` rows, and `APART` more tell that it holds [s]; judged. Faster
+logs take more rows: a stop yields over milliseconds, and what it yields in one is a large part of what a piston goes."""
+
 SETS_OFF = 0.02, 0.5
 """Shares of the log's highest speed between which a motor sets off from rest [fraction]; judged."""
 
@@ -184,7 +188,8 @@ def _meets_stop(record: Record, row: int) -> bool:
     What the pump delivers, or a load pulls, then goes into pressure at once.
     """
     position = record[POSITION]
-    first, before, after, last = (row + k for k in (-NEAR - APART, -NEAR, NEAR, NEAR + APART))
+    near, apart = (max(rows, round(rows * YIELDS / record.sample_time)) for rows in (NEAR, APART))
+    first, before, after, last = (row + k for k in (-near - apart, -near, near, near + apart))
     if first < 0 or last >= len(position):
         return False
     came, went = abs(position[before] - position[first]), abs(position[last] - position[after])
