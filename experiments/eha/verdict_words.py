@@ -36,6 +36,9 @@ would set them apart, and calibrated probabilities are not known better."""
 NEAREST = "UNKNOWN: none of the nine conditions fits; the nearest is "
 """How a verdict begins that something speaks against."""
 
+OUTSIDE = "none of the nine conditions"
+"""What is left of the probability of all nine: that a fault which the log does not exclude is there."""
+
 
 def verdict_lines(result: Mapping[str, Any]) -> list[str]:
     """Return the lines that a reader gets of a log.
@@ -73,7 +76,8 @@ def headline(result: Mapping[str, Any]) -> str:
     -------
     str
         Condition and probability, or that it is unknown; and since when. Of conditions that the log does not tell
-        apart, what they share, and that the rest cannot be told.
+        apart, what they share, and that the rest cannot be told. A fault outside the nine is named where it is likelier
+        than the second condition.
 
     Examples
     --------
@@ -92,10 +96,15 @@ def headline(result: Mapping[str, Any]) -> str:
         faulty = result["since_s"] is not None or not told[0].startswith(f"{LEVELS_IN_WORDS['none']} ")
         parts = [*told, since(result) if faulty else ""]
         return "; ".join(part for part in parts if part)
+    outside = 1.0 - sum(result["probabilities"].values())
+    if outside > first:
+        likeliest = f"{in_words(best)}, {percent_text(first)} %"
+        return f"{OUTSIDE}, probability {percent_text(outside)} %; the likeliest of them is {likeliest}"
+    runner_up, other = (OUTSIDE, outside) if outside > other else (in_words(second), other)
     parts = [
         f"{in_words(best)}, probability {percent_text(first)} %",
         since(result),
-        f"second most likely {in_words(second)}, {percent_text(other)} %",
+        f"second most likely {runner_up}, {percent_text(other)} %",
     ]
     return "; ".join(part for part in parts if part)
 
