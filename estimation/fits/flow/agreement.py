@@ -62,9 +62,9 @@ def agreed(straight: Answered, read: Answered) -> Answered:
     """Return what a slow log says, asked by straight lines between samples and with its turns read.
 
     What straight lines leave of a turn may pass for a pump that compresses its oil or a pressure that drifts. So
-    nothing is strange that does not show with turns read too, and what shows there alone must gain at each turn. Where
-    both ways agree, straight lines have the numbers: their intervals hold what they leave, those of turns that were
-    read are too narrow for leakage (decision 332).
+    nothing is strange, or left open, that is not with turns read too, and what shows there alone must gain at each
+    turn. Where both ways agree, straight lines have the numbers: their intervals hold what they leave, those of turns
+    that were read are too narrow for leakage (decision 332).
 
     Parameters
     ----------
@@ -79,10 +79,15 @@ def agreed(straight: Answered, read: Answered) -> Answered:
         read = read._replace(strange=None)
     by_lines, by_turns = (one.plain.explains(one.plain.best) for one in (straight, read))
     if straight.names == read.names and (straight.strange or by_lines or not by_turns):
-        return straight
+        return straight if read.strange else _plain(straight, read)
     if read.strange is None and by_lines:
-        return straight._replace(strange=None)
+        return _plain(straight, read)
     return read
+
+
+def _plain(straight: Answered, read: Answered) -> Answered:
+    """Return what straight lines say of a log that has nothing strange: open is what turns leave open too."""
+    return straight._replace(strange=None, open_ends=straight.open_ends and read.open_ends)
 
 
 def _gains_at_each_turn(answer: Answered) -> bool:
