@@ -48,7 +48,7 @@ SOFT_STOP = 1e-3
 
 YIELDS = 1e-3
 """Sample time at which a stop has yielded after `NEAR` rows, and `APART` more tell that it holds [s]; judged. Faster
-logs take more rows: a stop yields over milliseconds, and what it yields in one is a large part of what a piston goes."""
+logs take more rows: a stop yields over milliseconds, and in one it yields a large part of what a piston goes."""
 
 SETS_OFF = 0.02, 0.5
 """Shares of the log's highest speed between which a motor sets off from rest [fraction]; judged."""

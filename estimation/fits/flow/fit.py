@@ -45,7 +45,7 @@ from estimation.fits.hypotheses import (
 )
 from estimation.fits.hypothesis_search.explain import WORTH, explain
 from estimation.fits.hypothesis_search.explanation import Explanation
-from estimation.fits.hypothesis_search.fit_objections import doubted, limits, objections
+from estimation.fits.hypothesis_search.fit_objections import doubted, limits, objections_and_play
 from estimation.fits.hypothesis_search.form_fit import DISCRETISED, FormFit, averaged, weights_of, with_structure
 from estimation.fits.hypothesis_search.not_excluded import open_wear_note, share_lost, unseen_valve_note
 from estimation.fits.hypothesis_search.pump_delivery import contradicted
@@ -334,7 +334,7 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
     left = UNEVEN_OIL if p.single_rod else DISCRETISED
     untaken, open_play = plain.play_untaken(plain.swinging.play, sensed)
-    reasons = (*objections(best, plain.log.passes_on), *play_left(plain.swinging.play, sensed)) or plain.teeth_left
+    reasons = objections_and_play(best, plain.log.passes_on, plain.swinging.play, sensed) or plain.teeth_left
     if begun and not reasons and not told_by(plain, begun=begun)(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
     (value, std), gas = found["bulk_modulus"], () if reasons else gas_contradicted(plain.log, plain.swinging, p)

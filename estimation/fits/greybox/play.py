@@ -141,9 +141,17 @@ def play_shows(shown: ShownPlay, sensed: ShownPlay) -> bool:
     return sensed.gain > PLAY_SENSED or (shown.gain > PLAY_SHOWN and shown.size > LEAST_PLAY)
 
 
-def play_left(shown: ShownPlay, sensed: ShownPlay = NO_PLAY) -> tuple[Note, ...]:
-    """Return the objection to a fit that leaves a play which its residuals or a velocity sensor show."""
-    limits = (shown, PLAY_BELIEVED), (sensed, PLAY_SHOWN)
+def play_left(shown: ShownPlay, sensed: ShownPlay = NO_PLAY, least: float = 0.0) -> tuple[Note, ...]:
+    """Return the objection to a fit that leaves a play which its residuals or a velocity sensor show.
+
+    Parameters
+    ----------
+    shown, sensed : ShownPlay
+        What either shows.
+    least : float
+        What residuals must gain by it in any case: those of a fit that leaves much show anything [dimensionless].
+    """
+    limits = (shown, max(PLAY_BELIEVED, least)), (sensed, PLAY_SHOWN)
     large = [one.size for one, limit in limits if one.gain > limit and one.size > LEAST_PLAY]
     return (EstimateCode.PLAY_LEFT.note(play_um=1e6 * max(large)),) if large else ()
 

@@ -3,6 +3,7 @@
 from estimation.fits.greybox.chance import LARGEST_CHI_SQUARE, alike_by_chance, largest_chi_square
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.greybox.lateness import most_late
+from estimation.fits.greybox.play import ShownPlay, play_left
 from estimation.notes import EstimateCode
 from plant.notes import Note
 
@@ -27,8 +28,8 @@ logs of 18 kinds of strange rigs, and on 18 of a foreign bench, the gain of a ri
 of a position that lags by 3 ms is 390 to 2800. A log is asked from `WORTH` on: half a millisecond may gain 10, and move
 bulk modulus by seven deviations [dimensionless]."""
 
-LATE_SHARE = 0.25
-"""Share of what a log leaves unexplained that this must take up to be named beside it [fraction]."""
+NAMED_SHARE = 0.25
+"""Share of what a log leaves unexplained that a cause must take up to be named beside it [fraction]."""
 
 
 def limits(noisy: bool, samples: float) -> tuple[float, float]:
@@ -85,11 +86,31 @@ def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
     if abs(fit.autocorrelation[0]) > correlated and not _alternates(fit, noisy):
         reasons.append(EstimateCode.PRESSURE_RESIDUALS_CORRELATED.note(correlation=fit.autocorrelation[0]))
     channel, late, gain = most_late(fit.late)
-    wanted = LATE_SHARE * fit.cost * max(1.0 - 1.0 / fit.chi_square[0], 0.0) if reasons else 0.0
-    if gain > max(LATE_WORTH, wanted):
+    if gain > max(LATE_WORTH, _share_left(fit) if reasons else 0.0):
         when = "late" if late > 0.0 else "early"
         reasons.insert(0, EstimateCode.CHANNEL_LATE.note(channel=channel, milliseconds=1e3 * abs(late), when=when))
     return tuple(reasons)
+
+
+def objections_and_play(fit: GreyBoxFit, noisy: bool, shown: ShownPlay, sensed: ShownPlay) -> tuple[Note, ...]:
+    """Return the objections to a fit, and a play that it leaves.
+
+    Parameters
+    ----------
+    fit : GreyBoxFit
+        The fit.
+    noisy : bool
+        Whether the position's noise counts with the slopes.
+    shown, sensed : ShownPlay
+        Play that residuals show, and a velocity sensor.
+    """
+    reasons = objections(fit, noisy)
+    return (*reasons, *play_left(shown, sensed, _share_left(fit) if reasons else 0.0))
+
+
+def _share_left(fit: GreyBoxFit) -> float:
+    """Return the gain in log-likelihood that names a cause beside residuals of a fit that does not explain its log."""
+    return NAMED_SHARE * fit.cost * max(1.0 - 1.0 / fit.chi_square[0], 0.0)
 
 
 def is_too_close(fit: GreyBoxFit, noisy: bool) -> bool:

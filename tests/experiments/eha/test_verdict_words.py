@@ -105,7 +105,7 @@ def test_conditions_that_a_log_does_not_tell_apart_are_not_told_as_one_that_was_
 
 
 def test_a_fault_outside_the_nine_that_is_likelier_than_a_condition_is_in_the_headline() -> None:
-    """It read "minor leakage, probability 1.0 %; second most likely major leakage, < 0.1 %", and the rest was unsaid."""
+    """It read "minor leakage, probability 1.0 %; second most likely major leakage, < 0.1 %", the rest unsaid."""
     result = diagnosis_entries(found_as("minor_leakage"))
     said = headline({**result, "probabilities": {"minor_leakage": 0.9, "major_leakage": 1e-5}})
     assert said.startswith("minor leakage, probability 90.0 %")

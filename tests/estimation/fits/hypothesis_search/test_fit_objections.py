@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from estimation.fits.hypothesis_search.fit_objections import objections
+from estimation.fits.greybox.play import NO_PLAY, ShownPlay
+from estimation.fits.hypothesis_search.fit_objections import objections, objections_and_play
 from estimation.notes import EstimateCode
 
 
@@ -22,3 +23,15 @@ def test_an_encoders_noise_that_leaks_off_alternates_and_objects_to_nothing(
     )
     said = [note.code for note in objections(fit, noisy)]
     assert said == [EstimateCode.PRESSURE_RESIDUALS_CORRELATED] * objected
+
+
+@pytest.mark.parametrize(("chi_square", "gain", "named"), [(28.0, 660.0, False), (1.7, 2270.0, True), (1.0, 9.0, True)])
+def test_a_play_is_named_beside_a_misfit_only_where_it_is_much_of_it(
+    chi_square: float, gain: float, named: bool
+) -> None:
+    """A pressure drop in a hose left 28 times the noise, of which a play of 30 um that is not there took a little."""
+    fit: Any = SimpleNamespace(
+        chi_square=(chi_square,), autocorrelation=(0.0,), seen=8000.0, cost=4000.0 * chi_square, late={}
+    )
+    said = [note.code for note in objections_and_play(fit, False, ShownPlay(3e-5, gain), NO_PLAY)]
+    assert (EstimateCode.PLAY_LEFT in said) == named
