@@ -65,5 +65,6 @@ ADDED = (
         lambda setup, rng: setup.with_logger(stalls=int(rng.integers(5, 16)), stall=rng.uniform(0.01, 0.05)),
         named=r"\bclock\b|\bcatches up|\bstamps\b",
     ),
+    Kind("logged_at_200_Hz", "logged at 200 Hz", lambda setup, _: setup.with_logger(sample_time=5e-3)),
 )
 """Kinds by sensor and logger; the rig file describes their actuator."""
