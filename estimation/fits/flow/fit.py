@@ -181,8 +181,8 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
                 if not start.turns_read and _misread(corrected, plain, asked, traits):
                     return Answered(plain, (), (), None)
                 strange = _strange(plain, asked, traits) if asked else None
-                if len(asked) >= len(HYPOTHESES):
-                    strange = likelier(strange, _strange(plain, (PRESSURE_SIDES,), traits))
+                for one in (PRESSURE_SIDES, BEGUN) if len(asked) >= len(HYPOTHESES) else ():
+                    strange = likelier(strange, _strange(plain, (one,), traits))
                 plain, strange = offset_settled(plain, strange, asked, partial(_strange, traits=traits))
                 if asked and strange is None:
                     plain = with_open_turns(logged, plain)
