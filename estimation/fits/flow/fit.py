@@ -181,15 +181,15 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
                 if not start.turns_read and _misread(corrected, plain, asked, traits):
                     return Answered(plain, (), (), None)
                 strange = _strange(plain, asked, traits) if asked else None
-                for one in (PRESSURE_SIDES, BEGUN) if len(asked) >= len(HYPOTHESES) else ():
+                beside = (PRESSURE_SIDES, BEGUN)[: 1 + is_astray(plain.log, plain.swinging, plain.start.parameters)]
+                for one in beside if len(asked) >= len(HYPOTHESES) else ():
                     strange = likelier(strange, _strange(plain, (one,), traits))
                 plain, strange = offset_settled(plain, strange, asked, partial(_strange, traits=traits))
                 if asked and strange is None:
                     plain = with_open_turns(logged, plain)
         except WorkSpentError:
             return Answered(plain, asked, open_ends, None, ended=True)
-        elsewhere = strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))
-        if elsewhere is None:
+        if (elsewhere := strange and (_elsewhere(plain, strange) or quieter(plain, strange.fit))) is None:
             return Answered(plain, asked, open_ends, strange)
         start = elsewhere  # with the motor's course that was found
 
