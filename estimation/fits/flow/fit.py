@@ -217,7 +217,7 @@ def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequ
 
 
 def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> Explanation | None:
-    """Return the explanation of a log by hypotheses, if it is believed rather than the plain form."""
+    """Return the hypotheses that explain a log, if believed rather than the plain form; at rest `BEGUN` is alone."""
     explains = told_by(plain, begun=BEGUN in asked)
     moving, astray = traits.loaded or traits.moving, is_astray(plain.log, plain.swinging, plain.start.parameters)
     near = near_starts(plain.swinging, plain.starts, explains, in_motion=moving, astray=astray)
@@ -230,7 +230,7 @@ def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -
         near,
         explains,
         asked=asked,
-        paired=any(one not in (*ALWAYS_ASKED, CHECKS_HIDDEN, PLAY, PRESSURE_SIDES) for one in asked),
+        paired=any(one not in (*ALWAYS_ASKED, CHECKS_HIDDEN, PLAY, PRESSURE_SIDES, moving or BEGUN) for one in asked),
         hopeless=hopeless_cost(plain.swinging, asked),
         by_mass=balances_mass(plain.swinging.model),
         homed=homed_at_stop(plain.log),
