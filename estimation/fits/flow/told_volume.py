@@ -13,7 +13,7 @@ from estimation.fits.hypotheses import VOLUME
 from estimation.fits.hypothesis_search.explanation import Explanation
 
 RATIO = ("pump_displacement", "piston_area")
-"""Entries whose ratio scales all flows."""
+"""Entries whose ratio scales all flows: bulk modulus answers to either alike, the other way round."""
 
 
 def is_told(strange: Explanation | None) -> bool:
@@ -56,8 +56,9 @@ def ratio_doubt(strange: Explanation, uncertainties: Mapping[str, float]) -> flo
     float
         Relative; none where the volume is not told, whose total interval holds all of it [fraction].
     """
-    if not is_told(strange):
+    slopes = [strange.fit.rig_slopes[name]["bulk_modulus"] for name in RATIO if name in strange.fit.rig_slopes]
+    if not is_told(strange) or not slopes:
         return 0.0
-    slopes = {name: strange.fit.rig_slopes[name]["bulk_modulus"] for name in RATIO if name in strange.fit.rig_slopes}
-    moved = math.hypot(*(uncertainties.get(name, 0.0) * slope for name, slope in slopes.items()))
-    return moved / strange.fit.values["bulk_modulus"]
+    response = max(map(abs, slopes)) / strange.fit.values["bulk_modulus"]
+    doubt = math.hypot(*(uncertainties.get(name, 0.0) for name in RATIO))
+    return response * min(strange.delivery_open.deviation or 0.0, doubt)

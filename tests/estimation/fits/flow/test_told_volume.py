@@ -13,10 +13,9 @@ from plant.eha.doubts import DOUBTS, PRESSURE_GAIN
 SLOPES = {"pump_displacement": {"bulk_modulus": 4e9}, "chamber_volume": {"bulk_modulus": 2e8}}
 
 
-def explained(*names: str, std: float = 1e7, slopes: Any = SLOPES) -> Any:
-    return SimpleNamespace(
-        names=names, fit=SimpleNamespace(values={"bulk_modulus": 2e8}, std={"bulk_modulus": std}, rig_slopes=slopes)
-    )
+def explained(*names: str, deviation: float = 1e-3, std: float = 1e7, slopes: Any = SLOPES) -> Any:
+    fit = SimpleNamespace(values={"bulk_modulus": 2e8}, std={"bulk_modulus": std}, rig_slopes=slopes)
+    return SimpleNamespace(names=names, fit=fit, delivery_open=SimpleNamespace(deviation=deviation))
 
 
 def test_a_log_that_tells_more_is_no_less_observable_for_it() -> None:
@@ -27,11 +26,18 @@ def test_a_log_that_tells_more_is_no_less_observable_for_it() -> None:
 
 
 def test_what_a_log_leaves_of_displacement_over_area_is_in_the_interval() -> None:
-    slopes = {"pump_displacement": {"bulk_modulus": 6e7}, "piston_area": {"bulk_modulus": -8e7}}
-    assert ratio_doubt(explained(VOLUME.name, slopes=slopes), dict.fromkeys(RATIO, 0.1)) == pytest.approx(0.05)
-    assert ratio_doubt(explained(VOLUME.name, slopes=slopes), {"piston_area": 0.02}) == pytest.approx(0.4 * 0.02)
     usual = {name: DOUBTS[name].usual.up for name in RATIO}
+    assert ratio_doubt(explained(VOLUME.name), usual) == pytest.approx(20.0 * 1e-3)
+    for file in (usual, {"pump_displacement": 0.1}, {"piston_area": 0.02}):
+        doubt = sum(one**2 for one in file.values()) ** 0.5
+        assert ratio_doubt(explained(VOLUME.name, deviation=1.0), file) == pytest.approx(20.0 * doubt)
     assert ratio_doubt(explained("encoder_zero"), usual) == ratio_doubt(explained(VOLUME.name, slopes={}), usual) == 0.0
+
+
+def test_the_area_answers_for_the_ratio_where_displacement_was_measured() -> None:
+    slopes = {"piston_area": {"bulk_modulus": -4e9}}
+    doubt = ratio_doubt(explained(VOLUME.name, deviation=1.0, slopes=slopes), {"piston_area": 0.02})
+    assert doubt == pytest.approx(20.0 * 0.02)
 
 
 @pytest.mark.parametrize(
