@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from estimation.fits.flow.accumulator import is_far_stiffer
 from estimation.fits.flow.log import homed_at_stop
+from estimation.fits.flow.plain import PlainFits
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.flow.wide_valves import outruns_pump
 from estimation.fits.greybox.fit import GreyBoxFit
@@ -24,6 +25,7 @@ from estimation.fits.hypotheses import (
     OFFSET_AT_REST,
     PLAY,
     PRESSURE_LATE,
+    PRESSURE_SIDES,
     SPEED_LATE,
     START_LOAD,
     UNLIKE_CRACKS,
@@ -185,6 +187,22 @@ def is_astray(log: GreyBoxLog, fit: GreyBoxFit, parameters: EhaParameters) -> bo
         The actuator.
     """
     return at_widest(fit, parameters, log) or is_far_stiffer(log, fit.values)
+
+
+def asked_alone(plain: PlainFits, asked: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+    """Return what is asked by itself after all else: gauges that differ, and a beginning in chambers shut in alike.
+
+    Parameters
+    ----------
+    plain : PlainFits
+        Fits of the plain form.
+    asked : sequence of Hypothesis
+        What the log is asked together: less than all is enough, and nothing is asked alone then.
+    """
+    if len(asked) < len(HYPOTHESES):
+        return ()
+    astray = is_astray(plain.log, plain.swinging, plain.start.parameters)
+    return (PRESSURE_SIDES, BEGUN) if astray else (PRESSURE_SIDES,)
 
 
 def _least_zero(p: EhaParameters) -> float:

@@ -11,6 +11,7 @@ from estimation.fits.flow.agreement import Answered, agreed, wanted_of
 from estimation.fits.flow.asked_hypotheses import (
     ALWAYS_ASKED,
     MOST_ASKED,
+    asked_alone,
     hypotheses_asked,
     is_astray,
     near_starts,
@@ -181,8 +182,7 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
                 if not start.turns_read and _misread(corrected, plain, asked, traits):
                     return Answered(plain, (), (), None)
                 strange = _strange(plain, asked, traits) if asked else None
-                beside = (PRESSURE_SIDES, BEGUN)[: 1 + is_astray(plain.log, plain.swinging, plain.start.parameters)]
-                for one in beside if len(asked) >= len(HYPOTHESES) else ():
+                for one in asked_alone(plain, asked):
                     strange = likelier(strange, _strange(plain, (one,), traits))
                 plain, strange = offset_settled(plain, strange, asked, partial(_strange, traits=traits))
                 if asked and strange is None:

@@ -211,7 +211,7 @@ def test_a_linear_model_that_stands_in_is_told(monkeypatch: pytest.MonkeyPatch) 
 
     def judged(*given: Any) -> Any:
         told.append(1)
-        return given[-1], (3.0, 0.1)
+        return given[3], (3.0, 0.1)
 
     monkeypatch.setattr(Fallback, "judged", judged)
     for given in (bent(1, 1.0), bent(1, 1.0)["valve"]):

@@ -61,8 +61,8 @@ def test_a_seal_that_was_tight_is_found_where_lost_flow_says_that_it_leaked_less
     parameters[parameter_names(WideFlowParameters).index("pump_displacement")] *= 0.7
     step = likeliest_step(replace(log, parameters=parameters))
     assert step.share > STEPPED
-    assert step.first["step_at"] == pytest.approx(0.4, abs=0.01)
-    assert step.first["leakage_before"] == -1.0
+    assert step.at == pytest.approx(0.4, abs=0.01)
+    assert step.before == 0.0
 
 
 def test_a_leakage_that_stays_is_no_step() -> None:

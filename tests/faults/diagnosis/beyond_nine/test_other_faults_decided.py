@@ -11,7 +11,7 @@ from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS
 from faults.diagnosis import by_circuits
 from faults.diagnosis.beyond_nine import other_faults, sound_circuit, wear
-from faults.diagnosis.beyond_nine.left_open import WORTH_SAYING
+from faults.diagnosis.beyond_nine.left_open import UNSEEN, WORTH_SAYING
 from faults.diagnosis.beyond_nine.other_faults import Outside, faults_outside
 from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
@@ -131,12 +131,14 @@ def test_a_well_worn_pump_that_is_not_excluded_takes_its_probability_from_the_co
 def test_a_valve_that_is_not_excluded_is_as_likely_as_not_where_it_would_be_believed(
     gain: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """One that a log does not tell from a sound one keeps what is presumed of it."""
+
     def score(one: CircuitParameters) -> float:
         stuck = getattr(one, "makeup_shut_b", 0.0) == 1.0
         return gain if stuck else 0.0 if type(one) is type(SOUND) and worn(one) == 1.0 else -9.0
 
     found, _ = looked(monkeypatch, score, np.nan)
-    odds = np.exp(gain - 4.0)
+    odds = max(np.exp(gain - 4.0), np.exp(min(gain, 0.0)) * UNSEEN / (1.0 - UNSEEN))
     assert found.faulty == pytest.approx(odds / (1.0 + odds))
     said = f" ({100.0 * found.faulty:.0f} %)" if gain >= 0.0 else ""
     assert found.open[0].data["faults"] == f"a make-up valve that is stuck shut{said}"
