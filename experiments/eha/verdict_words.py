@@ -97,9 +97,6 @@ def headline(result: Mapping[str, Any]) -> str:
         parts = [*told, since(result) if faulty else ""]
         return "; ".join(part for part in parts if part)
     outside = 1.0 - sum(result["probabilities"].values())
-    if outside > first:
-        likeliest = f"{in_words(best)}, {percent_text(first)} %"
-        return f"{OUTSIDE}, probability {percent_text(outside)} %; the likeliest of them is {likeliest}"
     runner_up, other = (OUTSIDE, outside) if outside > other else (in_words(second), other)
     parts = [
         f"{in_words(best)}, probability {percent_text(first)} %",

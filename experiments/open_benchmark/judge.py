@@ -68,8 +68,7 @@ def judge_class(said: Entries, truth: Entries) -> dict[str, Any]:
     Returns
     -------
     dict[str, Any]
-        ``verdict`` is right, wrong, unknown, none or failed; ``right`` also where unknown is acceptable. What is told
-        as surely none of the nine, by what they lack of all probability, is as unknown.
+        ``verdict`` is right, wrong, unknown, none or failed; ``right`` also where unknown is acceptable.
         ``false_since``: a condition is said to have begun within a log that has one from end to end.
         ``since``: what did begin is dated within its interval; None where nothing did.
     """
@@ -78,13 +77,12 @@ def judge_class(said: Entries, truth: Entries) -> dict[str, Any]:
     if got is None:
         verdict = "none" if said["outcome"] == "not_observable" else "failed"
         return {"verdict": verdict, "right": False, "silent_class": False, "false_unknown": False, **dated}
-    unknown, shares = bool(said.get("unknown")), said.get("probabilities") or {}
-    outside = bool(shares) and 1.0 - sum(shares.values()) > SURE
-    sure, told = outside or shares.get(got, 0.0) > SURE, "unknown" if unknown or outside else got
-    verdict = "unknown" if unknown else "right" if told in accept else "wrong"
+    unknown = bool(said.get("unknown"))
+    sure = (said.get("probabilities") or {}).get(got, 0.0) > SURE
+    verdict = "unknown" if unknown else "right" if got in accept else "wrong"
     return {
         "verdict": verdict,
-        "right": told in accept,
+        "right": ("unknown" if unknown else got) in accept,
         "silent_class": verdict == "wrong" and sure,
         "false_unknown": unknown and "unknown" not in accept,
         **dated,

@@ -223,7 +223,7 @@ def _work_on(fault: Note) -> Note | None:
             return AdviceCode.HOLD_LOAD.note()
         case RigCode.LEAKAGE_LIFTS | RigCode.LEAKS_ONE_WAY:
             return AdviceCode.CHECK_VALVES.note()
-        case RigCode.PUMP_WORN | AgainstCode.PUMP_DELIVERS_LESS:
+        case RigCode.PUMP_WORN | AgainstCode.PUMP_DELIVERS_LESS | ClassCode.WEAR_NOT_TOLD:
             return AdviceCode.CHECK_PUMP.note()
         case RigCode.MAKEUP_BLOCKED | RigCode.PORT_DRAINS | AgainstCode.MAKEUP_STUCK:
             return AdviceCode.CHECK_MAKEUP.note(side=fault.data["side"])

@@ -28,7 +28,7 @@ from faults.diagnosis.beyond_nine.accumulator import whatever_accumulator
 from faults.diagnosis.beyond_nine.another_oil import whatever_the_oil
 from faults.diagnosis.beyond_nine.balance_refused import class_without_balance
 from faults.diagnosis.beyond_nine.drift import over_drift
-from faults.diagnosis.beyond_nine.left_open import beside_unseen_valve
+from faults.diagnosis.beyond_nine.left_open import beside_unseen_valve, likelier_fault
 from faults.diagnosis.beyond_nine.load import Loaded, under_load
 from faults.diagnosis.beyond_nine.near_enough import BESIDE
 from faults.diagnosis.beyond_nine.wear import whatever_the_pump_delivers
@@ -143,7 +143,8 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     against = distinct((*still, *left, *follow))
     if against and not still:  # nominal models are no judges of another oil, but say what is off if a piston moves
         against = distinct((*against, *verdict.against))
-    return _with_class(found, case, diagnosis, against)
+    likelier = likelier_fault(diagnosis.probabilities, diagnosis.not_told)
+    return _with_class(found, case, diagnosis, distinct((*against, *likelier)))
 
 
 class _Case(NamedTuple):

@@ -209,6 +209,23 @@ def beside_unseen_valve(
     return left, (ClassCode.STUCK_NOT_TOLD.note(percent=100.0 * UNSEEN * sum(probabilities.values())),)
 
 
+def likelier_fault(probabilities: Mapping[str, float], not_told: Sequence[Note]) -> tuple[Note, ...]:
+    """Return the notes on faults that a log does not exclude, where these are likelier than each of the nine conditions.
+
+    They speak against all nine then: a verdict would name one of what is less likely.
+
+    Parameters
+    ----------
+    probabilities : Mapping[str, float]
+        Of each condition; what they lack to 1 is that of such faults [probability].
+    not_told : sequence of Note
+        What the log does not determine.
+    """
+    if not probabilities or 1.0 - sum(probabilities.values()) <= max(probabilities.values()):
+        return ()
+    return tuple(note for note in not_told if note.code in (ClassCode.WEAR_NOT_TOLD, ClassCode.NOT_EXCLUDED))
+
+
 def _share(scores: Array, place: int) -> float:
     return float(np.exp(scores[place] - np.logaddexp.reduce(scores)))
 
