@@ -129,7 +129,8 @@ class ClassCode(Code):
     )
     MAKEUP_TOO_SMALL = (
         "by the rig file, the oil by which this single rod's sides differ takes {drop_pa:.2g|bar} bar in the "
-        "make-up valves at rated speed, more than there is: leave makeup_conductance out, or enter that of your valves"
+        "make-up valves at rated speed, and the inner circuit has {has_pa:.2g|bar} bar: leave makeup_conductance out, "
+        "or enter that of your valves"
     )
     PRESSURE_ABSENT_CLASS = (
         "without differential_pressure_pa, friction shows only in velocity: classes are usually told apart less clearly"

@@ -116,7 +116,7 @@ class IdentificationCode(Code):
     )
     WALK_FOLLOWED = (
         "{output!r} wanders by itself (random walk or drift), and {structure} follows this with its poles: do not rely "
-        "on poles and gain; use --structure output-error, which is then fitted to changes (of a linear plant)"
+        "on poles and gain; for a linear plant use --structure output-error, which is then fitted to changes"
     )
     OFFSETS_DIFFER = (
         "the offset of {output!r} differs from log to log ({above} from their mean): each log was fitted with its own, "

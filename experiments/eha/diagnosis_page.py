@@ -46,7 +46,10 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         Entries of the diagnosis, and ``file``.
     """
     name = Path(result["file"]).name
-    shares = sorted(found.probabilities.items(), key=lambda item: -item[1])
+    whole = (
+        sum(found.probabilities.values()) if found.unknown else 1.0
+    )  # of an unknown one: if it had to be of the nine
+    shares = sorted(((name, share / whole) for name, share in found.probabilities.items()), key=lambda item: -item[1])
     facts = {
         "result": result,
         "file": name,

@@ -9,6 +9,7 @@ from experiments.log_pages.screens import NEXT_LINE
 from experiments.page.condition_names import in_words
 from experiments.page.numbers import decimals_of, percent_text, shop_unit
 from experiments.page.sentences import sentence
+from faults.diagnosis.beyond_nine.left_open import WORTH_SAYING
 
 SHOWN = {
     "leakage_flow": "leakage at rated pressure",
@@ -97,7 +98,7 @@ def headline(result: Mapping[str, Any]) -> str:
         parts = [*told, since(result) if faulty else ""]
         return "; ".join(part for part in parts if part)
     outside = 1.0 - sum(result["probabilities"].values())
-    runner_up, other = (OUTSIDE, outside) if outside > other else (in_words(second), other)
+    runner_up, other = (OUTSIDE, outside) if outside > max(other, WORTH_SAYING) else (in_words(second), other)
     parts = [
         f"{in_words(best)}, probability {percent_text(first)} %",
         since(result),

@@ -31,4 +31,6 @@ def _makeup_too_small(p: EhaParameters) -> tuple[Note, ...]:
     """Return a note where a single rod's own flow through its make-up valves takes more pressure than there is."""
     share = abs(p.area_difference)
     flow, most = 2.0 * share / (1.0 + share) * p.rated_flow, p.makeup_conductance * p.accumulator_pressure
-    return (ClassCode.MAKEUP_TOO_SMALL.note(drop_pa=flow / p.makeup_conductance),) if 0.0 < most < flow else ()
+    if not 0.0 < most < flow:
+        return ()
+    return (ClassCode.MAKEUP_TOO_SMALL.note(drop_pa=flow / p.makeup_conductance, has_pa=p.accumulator_pressure),)

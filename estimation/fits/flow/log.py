@@ -19,6 +19,7 @@ from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
 from estimation.log_checks.bridging import bridged, within_gaps
 from estimation.log_checks.dropout import LONG_GAP, without_pauses
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance, struck_variance
+from estimation.log_checks.order import median
 from estimation.log_checks.outliers import without_outliers
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import FLOW_FORM
@@ -216,7 +217,8 @@ def _noisy(log: GreyBoxLog, p: EhaParameters, record: Record) -> GreyBoxLog:
     averaged_over, samples = round(log.sample_time / record.sample_time), max(1, round(NOISY_BLOCK / log.sample_time))
     position, speed = record["position_m"], bridged(record["motor_speed_rad_s"])
     pumped = p.pump_displacement / p.piston_area * record.sample_time * np.cumsum(speed)
-    every = round(1.0 / max(float(np.mean(np.isfinite(log.measured))), 1.0 / samples))
+    rows = np.flatnonzero(np.isfinite(log.measured[:, 0]))
+    every = min(round(float(median(np.diff(rows)))), samples) if rows.size > 1 else 1  # a hole thins nothing
     leaked = encoder_noise(position, pumped, position_variance(position), averaged_over, samples, every)
     noise = replace(
         log.noise[0],

@@ -1,6 +1,5 @@
 """`shut_valves(plain)`: make-up valves that stay shut in a log though sound ones would have opened."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -51,34 +50,35 @@ def shut_valves(plain: PlainFits, traits: LogTraits) -> tuple[Note, ...]:
     if min(held, default=np.inf) < best.cost + BEHIND:
         return ()
     narrowest = min(p.makeup_conductance, p.rated_flow / p.accumulator_pressure)
-    sound = best.values[MAKEUP] >= narrowest or any(
-        cost < best.cost + WORTH for cost in costs_with_sound_ones(plain, best, narrowest)
-    )
+    sound = best.values[MAKEUP] >= narrowest or cost_of_sound_ones(plain, best, narrowest) < WORTH
     return (unseen_note("A or B") if sound else blocked_note("A or B"),)
 
 
-def costs_with_sound_ones(plain: PlainFits, best: GreyBoxFit, narrowest: float) -> Iterator[float]:
-    """Yield what searches come down to with valves that are no narrower, from the fit and from the rig file.
+def cost_of_sound_ones(plain: PlainFits, best: GreyBoxFit, narrowest: float) -> float:
+    """Return how much more valves leave that are no narrower, searched from the fit and from the rig file.
 
     Parameters
     ----------
     plain : PlainFits
         Fits of a log.
     best : GreyBoxFit
-        The one whose form is searched, in implicit model steps.
+        The one whose form is searched, in implicit model steps; what it leaves in these is compared.
     narrowest : float
         Least conductance of the valves [m^3/(s Pa)].
 
-    Yields
-    ------
+    Returns
+    -------
     float
-        Cost of each search [dimensionless].
+        In log-likelihood; may be negative [dimensionless].
     """
     problem = FreedProblem.of(best.model, replace(plain.log, stiff=True))
     place = best.model.unknowns.index(MAKEUP)  # fitted as a logarithm
+    costs = list[float]()
     for values in (best.values, {**best.values, **plain.starts[0]}):
-        for conductance in (narrowest, plain.start.parameters.makeup_conductance):
-            begun = problem.model.theta({**values, MAKEUP: max(conductance, narrowest)})
+        for conductance in dict.fromkeys((narrowest, max(plain.start.parameters.makeup_conductance, narrowest))):
+            begun = problem.model.theta({**values, MAKEUP: conductance})
             lower, upper = flow_bounds(problem.model, [begun], problem.log)
             lower[place], upper[place] = np.log(narrowest), max(np.log(narrowest), upper[place])
-            yield descend(problem.at, np.clip(begun, lower, upper), FINISHING, (lower, upper), radius=WITHIN).cost
+            ended = descend(problem.at, np.clip(begun, lower, upper), FINISHING, (lower, upper), radius=WITHIN)
+            costs.append(ended.cost)
+    return min(costs) - problem.at(problem.model.theta(best.values)).cost

@@ -40,7 +40,8 @@ from estimation.fits.hypothesis_search.wide_problem import freed, own_starts
 from plant.eha.model import EhaParameters
 
 NOISE = 1.05
-"""What is left over the noise by a pair below which no valve and no air is sought in its place [dimensionless]."""
+"""What is left over the noise by what explains a log, below which no other set is sought in its place
+[dimensionless]."""
 
 BESIDE = 50.0
 """Gain in log-likelihood that slopes promise another volume beside a pump that delivers less, from which the two are
@@ -120,7 +121,7 @@ def explain(
             finished = _distinct([*finished, *rig_and_load(wide, begun[0], finished[0], spared, accepted)])
         finished = _distinct([behind_filter(wide, finished[0]), *finished])
     if is_explained(finished[0], accepted):
-        finished = [without_idle(wide, finished[0], WORTH), *finished[1:]]
+        finished = _leaner(without_idle(wide, finished[0], WORTH), finished, accepted)
         stuck = [one for one in stuck_instead(wide, finished[0], spared, WORTH) if is_explained(one, accepted)]
         finished = [*stuck, *finished[len(stuck) :]]
     if paired:
@@ -215,6 +216,13 @@ def _plain_point(log: GreyBoxLog, plain: Mapping[str, float]) -> Point:
     """Return the end of the plain form's search, with one model step per sample."""
     problem = freed(coarsened(log, {}, ()), ())
     return problem.at(problem.model.theta({**usual_values(log), **plain}))
+
+
+def _leaner(fewer: Trial, finished: Sequence[Trial], accepted: Accepted) -> list[Trial]:
+    """Return what is finished with a set of fewer hypotheses in place of all that hold it and more, if it explains."""
+    if fewer is finished[0] or not is_explained(fewer, accepted):
+        return [*finished]
+    return [fewer, *(one for one in finished[1:] if not set(fewer.together) <= set(one.together))]
 
 
 def _by_itself(log: GreyBoxLog, tried: Trial, accepted: Accepted) -> bool:

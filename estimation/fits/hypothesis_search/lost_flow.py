@@ -96,6 +96,20 @@ class Change(NamedTuple):
 NO_CHANGE = Change(0.5, 0.0)
 
 
+class _Split(NamedTuple):
+    """The piece from which on a further column is likeliest there, how much that explains, and both coefficients."""
+
+    piece: int | None = None
+    share: float = 0.0
+    first: float = 0.0
+    more: float = 0.0
+
+
+def _time(split: _Split, begins: Array) -> float:
+    """Return when a piece begins, of those that are there [fraction of the log]."""
+    return NO_CHANGE.at if split.piece is None else float(begins[split.piece])
+
+
 def likeliest_step(log: GreyBoxLog) -> Change:
     """Return the most likely step of leakage.
 
@@ -111,14 +125,15 @@ def likeliest_step(log: GreyBoxLog) -> Change:
     Change
         `NO_CHANGE` where pressure is missing or still.
     """
-    lost, always, _ = _regressors(log)
+    lost, always, _, begins = _regressors(log)
     pressure, others = always[:, 0], always[:, 1:]
-    leaky = _likeliest(lost, always, pressure, lambda before, more: (before > 0.0) & (before + more > 0.0))
+    steps = _likeliest(lost, always, pressure, lambda before, more: (before > 0.0) & (before + more > 0.0))
+    leaky = Change(_time(steps, begins), steps.share, steps.first, steps.first + steps.more)
     tight = _likeliest(lost, others, pressure, lambda _, more: more > 0.0)
-    if tight == NO_CHANGE:
+    if not tight.share:
         return leaky
     share = 1.0 - (1.0 - tight.share) * _left(lost, others) / _left(lost, always)
-    return leaky if leaky.share >= share else Change(tight.at, share, 0.0, tight.after - tight.before)
+    return leaky if leaky.share >= share else Change(_time(tight, begins), share, 0.0, tight.more)
 
 
 def likeliest_entry(log: GreyBoxLog) -> Change:
@@ -134,17 +149,20 @@ def likeliest_entry(log: GreyBoxLog) -> Change:
     Change
         `NO_CHANGE` where pressure is missing or still, or no oil becomes softer.
     """
-    return _likeliest(*_regressors(log), lambda _, more: more > 0.0)
+    lost, always, bubbles, begins = _regressors(log)
+    entry = _likeliest(lost, always, bubbles, lambda _, more: more > 0.0)
+    return Change(_time(entry, begins), entry.share)
 
 
-def _likeliest(lost: Array, always: Array, then: Array, may_be: Callable[[Array, Array], BoolArray]) -> Change:
-    """Return from when on a loss likeliest goes with a further column, of the times at which its share may be that.
+def _likeliest(lost: Array, always: Array, then: Array, may_be: Callable[[Array, Array], BoolArray]) -> _Split:
+    """Return from which piece on a loss likeliest goes with a further column too.
 
-    Both shares are told it: of the first column that is always there, and of the further one.
+    Only pieces count at which ``may_be(first, more)`` holds of the coefficients of the first column that is always
+    there, and of the further one.
     """
     pieces = len(lost)
     if pieces < PIECES // 2:
-        return NO_CHANGE
+        return _Split()
     splits = np.arange(round(EDGE * pieces), pieces - round(EDGE * pieces) + 1)
     sizes, size = _largest(always), _largest(then)
     (basis, upper), then = np.linalg.qr(always / sizes), then / size
@@ -161,12 +179,9 @@ def _likeliest(lost: Array, always: Array, then: Array, may_be: Callable[[Array,
     explained = np.where(told & may_be(before, more / size), across * more, 0.0)
     best = int(np.argmax(explained))
     share = float(explained[best]) / max(float(left @ left), float(np.finfo(float).tiny))
-    first = float(before[best])
-    return (
-        Change(float(splits[best]) / pieces, share, first, first + float(more[best] / size))
-        if share > 0.0
-        else NO_CHANGE
-    )
+    if not share > 0.0:
+        return _Split()
+    return _Split(int(splits[best]), share, float(before[best]), float(more[best] / size))
 
 
 def _left(lost: Array, columns: Array) -> float:
@@ -176,8 +191,8 @@ def _left(lost: Array, columns: Array) -> float:
     return max(float(left @ left), float(np.finfo(float).tiny))
 
 
-def _regressors(log: GreyBoxLog) -> tuple[Array, Array, Array]:
-    """Return the flow that is lost, what it goes with in any case, and with bubbles, piece by piece.
+def _regressors(log: GreyBoxLog) -> tuple[Array, Array, Array, Array]:
+    """Return the flow that is lost, what it goes with in any case, and with bubbles, and when each piece begins.
 
     In any case that is pressure, the speed's sign and the rise of pressure; bubbles shrink by what the inverse of the
     loaded chamber's pressure loses.
@@ -189,7 +204,8 @@ def _regressors(log: GreyBoxLog) -> tuple[Array, Array, Array]:
     bubbles = np.sign(at_ends) * np.abs(at_ends) / (rig["accumulator_pressure"] + np.abs(at_ends))
     rise, squeezed = volume * np.diff(at_ends) / flow.time, volume * np.diff(bubbles) / flow.time
     there = np.isfinite(flow.pressure) & np.isfinite(rise)
-    return flow.lost[there], np.column_stack([flow.pressure, flow.sign, rise])[there], squeezed[there]
+    always = np.column_stack([flow.pressure, flow.sign, rise])
+    return flow.lost[there], always[there], squeezed[there], np.flatnonzero(there) / len(there)
 
 
 def _largest(columns: Array) -> Array:

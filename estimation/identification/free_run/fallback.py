@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.free_run.choose_linear import slowest_pole
 from estimation.identification.free_run.dynamics import Dynamics
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 
@@ -93,7 +92,7 @@ class Fallback:
         known = float(np.sqrt(self.share))
         straight = known * jackknife(linear, [one.run(u, y) for one in self.linear_parts])
         beyond = 0.0
-        if ends is not None and slowest_pole(self.linear.f) > np.exp(-1.0 / y.size):
+        if ends is not None and _integrates(self.linear.f, y.size):
             beyond = float(np.sqrt(np.mean((linear - np.clip(linear, *ends)) ** 2)))
         apart = known * jackknife(own, [one.run(u, y) for one in self.parts])
         undetermined = float(np.linalg.norm([self.own_error, apart, beyond]))
@@ -150,3 +149,9 @@ def jackknife(whole: Array, parts: Sequence[Array]) -> float:
     squares = [float(np.mean((one - whole) ** 2)) for one in parts]
     found = float(np.sqrt(len(squares) * np.mean(squares))) if squares else float("inf")
     return found if np.isfinite(found) else float("inf")
+
+
+def _integrates(f: Array, rows: int) -> bool:
+    """Return whether a denominator has a pole that neither settles nor swings within so many rows."""
+    roots = np.roots(f)
+    return bool(np.any((np.abs(roots) > np.exp(-1.0 / rows)) & (np.abs(np.angle(roots)) < 1.0 / rows)))

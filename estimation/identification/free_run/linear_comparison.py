@@ -166,8 +166,8 @@ def fed_back(model: FreeRunModel, data: Channels, *, changes: bool = False) -> l
 def swapped(left: Array, data: Channels, log: int) -> Note | None:
     """Return a note where the input answers the output rather than the other way round, or is logged late; else None.
 
-    Both models of the other direction and of an input logged late look ahead: the one that leaves less is told. Behind
-    slow inputs noise keeps the former from leaving little where an input is late, and the latter leaves noise alone.
+    A model of the other direction looks ahead, and so does one of an input that is logged late: the one that leaves
+    less is told. An input that is late is told too where the other direction leaves much, as behind noise.
 
     Parameters
     ----------

@@ -210,7 +210,7 @@ def beside_unseen_valve(
 
 
 def likelier_fault(probabilities: Mapping[str, float], not_told: Sequence[Note]) -> tuple[Note, ...]:
-    """Return the notes on faults that a log does not exclude, where these are likelier than each of the nine conditions.
+    """Return the notes on faults that a log does not exclude, where these are likelier than each of the nine.
 
     They speak against all nine then: a verdict would name one of what is less likely.
 

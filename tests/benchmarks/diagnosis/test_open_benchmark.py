@@ -4,7 +4,7 @@ from benchmarks.diagnosis.open_benchmark import USUAL_PAIRS
 from experiments.open_benchmark.kinds import kind_of
 
 
-def test_each_usual_pair_is_a_kind_of_its_own_that_names_what_either_names() -> None:
+def test_each_usual_pair_can_be_drawn() -> None:
     kinds = [kind_of(name) for name in USUAL_PAIRS]
     assert len({kind.name for kind in kinds}) == len(USUAL_PAIRS)
     assert all(kind.conditions and kind.drives for kind in kinds)

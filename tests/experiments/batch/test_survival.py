@@ -96,8 +96,10 @@ def test_a_batch_struck_at_moments_spread_over_its_parts_loses_and_doubles_no_ro
         else:
             _wait_for(lambda number=number: len(list(parts.glob("*.parquet"))) > 8 * number)
             time.sleep(moments.uniform(0.0, 0.02))
-        os.kill(child, signal.SIGTERM if number % 6 == 1 else signal.SIGKILL)
-        end(driver)
+        sent = signal.SIGTERM if number in (4, 7) else signal.SIGKILL  # of either kind of moment
+        os.kill(child, sent)
+        status = end(driver)
+        assert sent is signal.SIGTERM or os.WTERMSIG(status) == signal.SIGKILL, "it had ended before"
         now = {path.name: path.read_bytes() for path in parts.glob("*.parquet")}
         assert {name: now.get(name) for name in kept} == kept, "a completed part was lost or changed"
         if number % 3 == 0:  # as when the power fails: a part that was written just then is cut

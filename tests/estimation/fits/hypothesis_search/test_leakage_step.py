@@ -65,6 +65,14 @@ def test_a_seal_that_was_tight_is_found_where_lost_flow_says_that_it_leaked_less
     assert step.before == 0.0
 
 
+def test_a_step_behind_a_hole_is_told_at_its_time_in_the_log() -> None:
+    """With three pieces of ten missing it was told at 0.2 for 0.4."""
+    log = seen(stepping(6.0))
+    measured = log.measured.copy()
+    measured[round(0.1 * len(measured)) : round(0.3 * len(measured))] = np.nan
+    assert likeliest_step(replace(log, measured=measured)).at == pytest.approx(0.4, abs=0.02)
+
+
 def test_a_leakage_that_stays_is_no_step() -> None:
     assert likeliest_step(seen(stepping(1.0))).share < STEPPED
 

@@ -186,11 +186,12 @@ def test_of_models_that_do_as_well_the_most_probable_is_taken_and_a_dead_time_co
     assert candidate(late, data).bic == pytest.approx(n * np.log(late.cost / n) + (theta + 1) * np.log(n))
 
 
-def test_a_model_no_better_than_the_mean_is_not_sound() -> None:
+@pytest.mark.parametrize("form", [{"order": 1, "delay": 1}, pytest.param({}, marks=pytest.mark.slow)], ids=str)
+def test_a_model_no_better_than_the_mean_is_not_sound(form: dict[str, Any]) -> None:
     rng = np.random.default_rng(5)
     data = channels_from([rng.normal(size=(300, 1))], [rng.normal(size=300)], 1.0, ["u"], "y")
     with pytest.warns(LogWarning) as said:
-        found = identify_channels(data, order=1, delay=1)
+        found = identify_channels(data, **form)
     assert not found.sound
     places = {one.message.note.code: one.filename for one in said}  # type: ignore[union-attr]
     assert places[IdentificationCode.NO_FIT] == __file__

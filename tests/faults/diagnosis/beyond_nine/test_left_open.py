@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from estimation.notes import RigCode
-from faults.diagnosis.beyond_nine.left_open import DELIVERIES, beside_unseen_valve, odds_of_wear, presumed_of_wear
+from faults.diagnosis.beyond_nine.left_open import (
+    DELIVERIES,
+    beside_unseen_valve,
+    likelier_fault,
+    odds_of_wear,
+    presumed_of_wear,
+)
 from faults.notes import ClassCode
 
 
@@ -37,3 +43,12 @@ def test_a_valve_that_never_opened_may_be_stuck_as_likely_as_each_of_the_nine() 
     worn, (beside,) = beside_unseen_valve({"normal": 0.0, "major_friction": 0.7}, unseen)  # a worn pump has 0.3
     assert sum(worn.values()) + 0.01 * beside.data["percent"] == pytest.approx(0.7)
     assert beside_unseen_valve({}, unseen) == ({}, ())
+
+
+def test_a_fault_that_is_likelier_than_each_condition_speaks_against_all_nine() -> None:
+    """The headline said 94 % for none of the nine, and the rest of the page that a condition holds the log."""
+    wear = ClassCode.WEAR_NOT_TOLD.note(percent=94.0, limit=90.0)
+    unseen = ClassCode.STUCK_NOT_TOLD.note(percent=10.0)
+    assert likelier_fault({"normal": 0.04, "minor_leakage": 0.02}, (unseen, wear)) == (wear,)
+    assert likelier_fault({"normal": 0.5, "minor_leakage": 0.1}, (unseen, wear)) == ()
+    assert likelier_fault({}, (wear,)) == ()
