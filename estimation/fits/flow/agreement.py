@@ -86,7 +86,7 @@ def agreed(straight: Answered, read: Answered) -> Answered:
 
 
 def _plain(straight: Answered, read: Answered) -> Answered:
-    """Return what straight lines say of a log that has nothing strange: open is what both leave open, as turns tell it."""
+    """Return what straight lines say of a log that has nothing strange: open is what both leave open."""
     open_too = {note.code for note in straight.open_ends}
     ends = tuple(note for note in read.open_ends if note.code in open_too)
     return straight._replace(strange=None, open_ends=ends)
