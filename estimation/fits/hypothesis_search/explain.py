@@ -102,7 +102,7 @@ def explain(
         likely, others = [ENCODER_ZERO, *likely], [one for one in others if one is not ENCODER_ZERO]
     left = cost_over_noise(wide, plain.cost)
     spared = Decimation(decimation_limit(wide, starts[0], decimation_for(wide, left)), left, starts)
-    finished = _alone(wide, plain.cost, (likely, others), spared, accepted, useful)
+    finished = _alone(wide, plain.cost, likely, others, spared, accepted, useful)
     if paired and finished[0].cost < hopeless:
         finished = ranked([*finished, *delivery_followed(wide, finished, gains, spared, accepted)])
     finished = _distinct([behind_filter(wide, finished[0]), *finished])
@@ -137,7 +137,8 @@ def explain(
 def _alone(
     log: GreyBoxLog,
     plain: float,
-    asked: tuple[Sequence[Hypothesis], Sequence[Hypothesis]],
+    likely: Sequence[Hypothesis],
+    others: Sequence[Hypothesis],
     spared: Decimation,
     accepted: Accepted,
     useful: float = np.inf,
@@ -146,7 +147,7 @@ def _alone(
 
     Where the plain form leaves little, no start is tried again from which the first hypothesis came nowhere.
     """
-    (likely, others), starts, every = asked, spared.starts, spared.every
+    starts, every = spared.starts, spared.every
     begun = [[*screen(log, (likely[0],), starts, every=every)]]
     if decimation_for(log, spared.left) == 1 and len(log.drives) >= FEW:
         places = [i for i, start in enumerate(starts) if start in promising_starts(starts, begun)]
@@ -171,8 +172,9 @@ def _paired(
 ) -> list[Trial]:
     """Return the pairs of hypotheses that explain a log better than the first one alone, best first.
 
-    What slopes promise most is tried first, and all else where that does not explain the log: slopes are taken where
-    the first hypothesis has gone to take up what the second one does. The best of it is fitted to the end in any case.
+    What slopes promise most, and what they do not see, is tried first, and all else where that does not explain the
+    log. Slopes are taken where the first hypothesis has gone to take up what the second one does. The best of it is
+    fitted to the end in any case.
     Beside a rival of the best, ``rivalled`` is the cost of what is known, and a pair counts only if it comes lower.
     """
     late = delayed(log, first.delays)
@@ -186,8 +188,8 @@ def _paired(
     long, useful = len(log.drives) >= FEW, min(first.cost, rivalled) - WORTH
     if long:  # none is told that does not explain the log
         useful = min(useful, NEARLY * first.cost / left)
-    near = [*likely, *(one for one in others if one.far)]
-    nearer = [[*screen(late, (*first.together, one), begun, every=spared.every)] for one in near]
+    at_first = [*likely, *(one for one in others if one.far)]
+    nearer = [[*screen(late, (*first.together, one), begun, every=spared.every)] for one in at_first]
     least = min(first.cost, rivalled)
     ended = ranked_optima(late, nearer, least, spared) if nearer else []
     pairs = refined(late, ended, least, spared, useful)

@@ -56,7 +56,7 @@ def test_a_start_that_leads_nowhere_is_not_used_again_where_little_is_left(
     monkeypatch.setattr(explain, "cost_over_noise", lambda *_: 1.5)
     starts: Any = [*ends]
     spared = Decimation(1, left, starts)
-    explain._alone(LONG, 1000.0, ([LIKELY], [FAR, SOME]), spared, lambda _: False)  # pyright: ignore[reportPrivateUsage]
+    explain._alone(LONG, 1000.0, [LIKELY], [FAR, SOME], spared, lambda _: False)  # pyright: ignore[reportPrivateUsage]
     assert told == [["a"] if left < FAINT else [*ends]]
 
 
@@ -79,7 +79,7 @@ def test_where_a_cause_explains_a_log_but_leaves_more_than_noise_what_slopes_do_
     monkeypatch.setattr(explain, "refined", lambda *_, **__: [replace(tried(800.0), fits=(LONG,))])
     monkeypatch.setattr(explain, "likeliest", lambda *_, **__: [tried(700.0)])
     monkeypatch.setattr(explain, "cost_over_noise", lambda *_: left)
-    found = explain._alone(LONG, plain, ([LIKELY], [FAR, SOME]), Decimation(1, left, [{}]), lambda _: True)  # pyright: ignore[reportPrivateUsage]
+    found = explain._alone(LONG, plain, [LIKELY], [FAR, SOME], Decimation(1, left, [{}]), lambda _: True)  # pyright: ignore[reportPrivateUsage]
     assert told == asked
     assert [one.cost for one in found] == ([700.0, 800.0] if asked else [800.0])
 
