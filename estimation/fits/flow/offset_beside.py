@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from estimation.finding import NORMAL_95
 from estimation.fits.flow.plain import PlainFits
-from estimation.fits.greybox.pump_ripple import Turning, with_ripple
+from estimation.fits.greybox.pump_ripple import MOST_OFFSET, Turning, with_ripple
 from estimation.fits.hypotheses import DELIVERY, Hypothesis
 from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.fits.hypothesis_search.pump_ripple_fits import KEPT, OFFSET_SETTLED, OFFSET_WORTH, told_offset
@@ -50,7 +50,10 @@ def offset_settled(
     offset = taken + shown.value
     if taken and abs(offset) < NORMAL_95 * shown.std:
         offset = 0.0
-    if abs(offset) > max(MOST_SHARE * plain.start.parameters.rated_speed, 2.0 * abs(taken)):
+    # an offset of pressure looks like one of speed: `speed_offset_instead` tells a large one from it
+    alike = "pressure_offset" in strange.names
+    most = MOST_OFFSET if alike else MOST_SHARE * plain.start.parameters.rated_speed
+    if abs(offset) > max(most, 2.0 * abs(taken)):
         return plain, strange
     other = _turned(plain, offset, shown.std)
     same = [one for one in asked if one.name in (*strange.names, DELIVERY.name)]

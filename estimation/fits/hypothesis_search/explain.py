@@ -224,7 +224,7 @@ def _leaner(fewer: Trial, finished: Sequence[Trial], accepted: Accepted) -> list
     """Return what is finished with a set of fewer hypotheses in place of all that hold it and more, if it explains."""
     if fewer is finished[0] or not is_explained(fewer, accepted):
         return [*finished]
-    return [fewer, *(one for one in finished[1:] if not set(fewer.together) <= set(one.together))]
+    return [fewer, *(one for one in finished[1:] if not all(each in one.together for each in fewer.together))]
 
 
 def _by_itself(log: GreyBoxLog, tried: Trial, accepted: Accepted) -> bool:

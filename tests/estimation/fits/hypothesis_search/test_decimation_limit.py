@@ -40,7 +40,7 @@ def test_hypotheses_are_compared_by_steps_that_the_rig_allows(monkeypatch: pytes
     assert len(wide.drives) >= FEW
 
     def asked(*given: Any) -> None:
-        raise AskedError(given[3].every)
+        raise AskedError(given[4].every)
 
     monkeypatch.setattr(explain, "_alone", asked)
     with pytest.raises(AskedError) as found:

@@ -235,3 +235,20 @@ def test_a_flow_that_no_worn_pump_and_no_rounded_rig_file_gives_is_objected_to(s
     assert [note.data["percent"] for note in objections] == pytest.approx([100.0 * share] * said)
     other: Any = SimpleNamespace(values={"pressure_offset": (1e5, 1e3)})
     assert contradicted(other, HEALTHY) == ()
+
+
+def test_a_set_of_fewer_hypotheses_stands_in_place_of_all_that_hold_it_and_more() -> None:
+    """Another pair that held it came lower, by less than a hypothesis is worth, and was told in its place."""
+
+    def ended(cost: float, *together: Hypothesis) -> Trial:
+        return Trial(
+            together, Point(np.zeros(1), cost, np.zeros(1), np.eye(1)), {}, {}, {}, (made_fit(cost, 2e8, 1e5),)
+        )
+
+    air, leak, late = HYPOTHESES[:3]
+    finished = [ended(100.0, air, leak), ended(101.0, air, late), ended(130.0, leak)]
+    fewer = ended(105.0, air)
+    leaner = explain._leaner  # pyright: ignore[reportPrivateUsage]
+    assert leaner(fewer, finished, lambda _: True) == [fewer, finished[2]]
+    assert leaner(fewer, finished, lambda _: False) == finished
+    assert leaner(finished[0], finished, lambda _: True) == finished
