@@ -15,7 +15,7 @@ from experiments.eha.plain_verdict import (
     verdict,
     what_to_do,
 )
-from experiments.eha.verdict_words import SHOWN, amount, library_sentence
+from experiments.eha.verdict_words import SHOWN, amount, library_sentence, ranked_shares
 from experiments.log_pages.channel_charts import channel_charts
 from experiments.page.charts import Charts
 from experiments.page.numbers import MINUS, percent_text
@@ -46,10 +46,7 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         Entries of the diagnosis, and ``file``.
     """
     name = Path(result["file"]).name
-    whole = (
-        sum(found.probabilities.values()) if found.unknown else 1.0
-    )  # of an unknown one: if it had to be of the nine
-    shares = sorted(((name, share / whole) for name, share in found.probabilities.items()), key=lambda item: -item[1])
+    shares = ranked_shares(found.probabilities, unknown=found.unknown)
     facts = {
         "result": result,
         "file": name,

@@ -86,10 +86,8 @@ def headline(result: Mapping[str, Any]) -> str:
     >>> headline({"probabilities": alike, "unknown": False, "condition": "normal", "since_s": None})
     'normal leakage, probability 94.2 %; friction cannot be told: normal, minor or major friction equally likely'
     """
-    ranked = sorted(result["probabilities"].items(), key=lambda item: -item[1])
-    (best, first), (second, other) = ranked[:2]
+    (best, first), (second, other) = ranked_shares(result["probabilities"], unknown=result["unknown"])[:2]
     if result["unknown"]:
-        first, other = (share / sum(result["probabilities"].values()) for share in (first, other))
         nearest = f"{in_words(best)} ({percent_text(first)} % if it had to be one of them)"
         return f"{NEAREST}{nearest}, then {in_words(second)} ({percent_text(other)} %)"
     if len(as_likely := equally_likely(result)) > 1:
@@ -105,6 +103,25 @@ def headline(result: Mapping[str, Any]) -> str:
         f"second most likely {runner_up}, {percent_text(other)} %",
     ]
     return "; ".join(part for part in parts if part)
+
+
+def ranked_shares(probabilities: Mapping[str, float], *, unknown: bool) -> list[tuple[str, float]]:
+    """Return conditions with their probabilities, the likeliest first.
+
+    Parameters
+    ----------
+    probabilities : Mapping[str, float]
+        Of each condition [probability].
+    unknown : bool
+        Whether none of them holds the log: then it is how likely each is if it had to be one of them.
+
+    Returns
+    -------
+    list of tuple of str and float
+        Name and share [probability].
+    """
+    whole = sum(probabilities.values()) if unknown else 1.0
+    return sorted(((name, share / whole) for name, share in probabilities.items()), key=lambda item: -item[1])
 
 
 def equally_likely(result: Mapping[str, Any]) -> list[str]:

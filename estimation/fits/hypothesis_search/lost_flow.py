@@ -23,6 +23,10 @@ EDGE = 0.05
 """Share of the log before and after which no change is sought [fraction]."""
 
 
+TINY = float(np.finfo(float).tiny)
+"""What stands for nothing in a divisor [in the divisor's unit]."""
+
+
 class LostFlow(NamedTuple):
     """Flow that the pump delivers and the piston does not sweep, with its possible regressors.
 
@@ -97,8 +101,12 @@ NO_CHANGE = Change(0.5, 0.0)
 
 
 class _Split(NamedTuple):
-    """The piece from which on a further column is likeliest there, how much that explains, and both coefficients."""
+    """The piece from which on a further column is likeliest there, and how much it explains of what none leaves.
 
+    With both coefficients, and the sum of squares that none leaves, which is no less than the smallest number.
+    """
+
+    left: float
     piece: int | None = None
     share: float = 0.0
     first: float = 0.0
@@ -126,13 +134,13 @@ def likeliest_step(log: GreyBoxLog) -> Change:
         `NO_CHANGE` where pressure is missing or still.
     """
     lost, always, _, begins = _regressors(log)
-    pressure, others = always[:, 0], always[:, 1:]
+    pressure = always[:, 0]
     steps = _likeliest(lost, always, pressure, lambda before, more: (before > 0.0) & (before + more > 0.0))
     leaky = Change(_time(steps, begins), steps.share, steps.first, steps.first + steps.more)
-    tight = _likeliest(lost, others, pressure, lambda _, more: more > 0.0)
+    tight = _likeliest(lost, always[:, 1:], pressure, lambda _, more: more > 0.0)
     if not tight.share:
         return leaky
-    share = 1.0 - (1.0 - tight.share) * _left(lost, others) / _left(lost, always)
+    share = 1.0 - (1.0 - tight.share) * tight.left / steps.left
     return leaky if leaky.share >= share else Change(_time(tight, begins), share, 0.0, tight.more)
 
 
@@ -162,7 +170,7 @@ def _likeliest(lost: Array, always: Array, then: Array, may_be: Callable[[Array,
     """
     pieces = len(lost)
     if pieces < PIECES // 2:
-        return _Split()
+        return _Split(TINY)
     splits = np.arange(round(EDGE * pieces), pieces - round(EDGE * pieces) + 1)
     sizes, size = _largest(always), _largest(then)
     (basis, upper), then = np.linalg.qr(always / sizes), then / size
@@ -178,17 +186,11 @@ def _likeliest(lost: Array, always: Array, then: Array, may_be: Callable[[Array,
     before = (np.linalg.pinv(upper)[0] @ (known[:, None] - more * along.T)) / sizes[0]
     explained = np.where(told & may_be(before, more / size), across * more, 0.0)
     best = int(np.argmax(explained))
-    share = float(explained[best]) / max(float(left @ left), float(np.finfo(float).tiny))
+    unexplained = max(float(left @ left), TINY)
+    share = float(explained[best]) / unexplained
     if not share > 0.0:
-        return _Split()
-    return _Split(int(splits[best]), share, float(before[best]), float(more[best] / size))
-
-
-def _left(lost: Array, columns: Array) -> float:
-    """Return the sum of squares that a regression leaves, no less than the smallest number."""
-    basis, _ = np.linalg.qr(columns / _largest(columns))
-    left = lost - basis @ (basis.T @ lost)
-    return max(float(left @ left), float(np.finfo(float).tiny))
+        return _Split(unexplained)
+    return _Split(unexplained, int(splits[best]), share, float(before[best]), float(more[best] / size))
 
 
 def _regressors(log: GreyBoxLog) -> tuple[Array, Array, Array, Array]:
@@ -209,4 +211,4 @@ def _regressors(log: GreyBoxLog) -> tuple[Array, Array, Array, Array]:
 
 
 def _largest(columns: Array) -> Array:
-    return np.maximum(np.max(np.abs(columns), axis=0, initial=0.0), float(np.finfo(float).tiny))
+    return np.maximum(np.max(np.abs(columns), axis=0, initial=0.0), TINY)
