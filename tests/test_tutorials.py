@@ -16,8 +16,9 @@ from tests.c_compiler import compiler
 ROOT = Path(__file__).resolve().parents[1]
 TUTORIALS = ROOT / "docs" / "tutorials"
 PAGES = sorted(path.stem for path in TUTORIALS.glob("*.md"))
-WORKED = {**{name: TUTORIALS / f"{name}.md" for name in PAGES}, "severities": ROOT / "docs" / "severities.md"}
-"""Pages whose blocks run: the tutorials, and the one that explains an interval."""
+EXPLAINED = ("method", "severities")
+WORKED = {name: TUTORIALS / f"{name}.md" for name in PAGES} | {name: ROOT / "docs" / f"{name}.md" for name in EXPLAINED}
+"""Pages whose blocks run: the tutorials, and those that explain an answer and an interval."""
 
 BLOCK = re.compile(r"```(sh|python)\n(.*?)```", re.DOTALL)
 
