@@ -39,11 +39,6 @@ class ResidualTest:
         ----------
         level : float
             Significance level [probability].
-
-        Returns
-        -------
-        bool
-            True where the statistic is no surprise.
         """
         return self.p_value >= level
 

@@ -85,13 +85,7 @@ def absolute_candidates(data: Channels, by: Scaling, asked: Asked) -> list[Absol
 
 
 def chosen_absolute(candidates: list[AbsoluteCandidate]) -> AbsoluteCandidate:
-    """Return, of the models that do nearly as well on held-back blocks as the best one, that of the least BIC.
-
-    Parameters
-    ----------
-    candidates : list of AbsoluteCandidate
-        One at least.
-    """
+    """Return, of the models that do nearly as well on held-back blocks as the best one, that of the least BIC."""
     return smallest(candidates, min(one.held_back for one in candidates))
 
 

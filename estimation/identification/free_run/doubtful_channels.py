@@ -74,18 +74,6 @@ def outputs_that_stand_out(model: FreeRunModel, data: Channels) -> list[Note]:
 
     They hold most of the model's error, or have taken it farther from the others than their mean is. Outputs that stand
     out because the inputs drive them are followed by the model, and take it from no others.
-
-    Parameters
-    ----------
-    model : FreeRunModel
-        Fitted to the logs.
-    data : Channels
-        In units of the channels.
-
-    Returns
-    -------
-    list of Note
-        One at most.
     """
     y, sound = np.concatenate(data.y), np.concatenate([without_outliers(one) for one in data.y])
     outside = np.isfinite(y) & np.isnan(sound)
@@ -110,18 +98,6 @@ def more_than_noise(model: FreeRunModel, data: Channels) -> list[Note]:
 
     Sensor noise that is filtered or held is no noise from sample to sample either, so what is left must follow the
     inputs too.
-
-    Parameters
-    ----------
-    model : FreeRunModel
-        Fitted to the logs.
-    data : Channels
-        In units of the channels.
-
-    Returns
-    -------
-    list of Note
-        One at most.
     """
     runs = _runs(model, data)
     begins = [model.dynamics.unanswered(y.size) for y in data.y]

@@ -133,13 +133,6 @@ def channels_to_run(record: Record, inputs: Sequence[str], output: str, sample_t
 def sent_once(record: Record, names: Sequence[str]) -> Record:
     """Return a log without rows that its logger wrote a second time, whatever its columns are.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-    names : sequence of str
-        Columns that are used.
-
     Returns
     -------
     Record

@@ -41,13 +41,7 @@ class Identified:
     gain_std: tuple[float, ...] = ()
 
     def at_one_offset(self, data: Channels) -> Channels:
-        """Return the fitted logs with the model's offset, where each has its own or drifts.
-
-        Parameters
-        ----------
-        data : Channels
-            In units of the channels.
-        """
+        """Return the fitted logs with the model's offset, where each has its own or drifts."""
         if len(self.above) != len(data.y):  # one offset, or logs that were split at gaps for the fit
             return data
         return replace(data, y=tuple(y - one for y, one in zip(data.y, self.above, strict=True)))

@@ -92,11 +92,6 @@ def identify_channels(
     order, delay, n_numerator : int, optional
         Of every input; chosen by the free run on blocks held back where not given.
 
-    Returns
-    -------
-    Identified
-        Model, quality and candidates.
-
     Raises
     ------
     HydrostateError

@@ -15,13 +15,7 @@ from estimation.identification.free_run.linear_problem import Form, LinearFit
 
 @dataclass(frozen=True, eq=False)
 class LimitedDynamics(LinearDynamics):
-    """Transfer functions with one denominator, an offset, and limits of the output.
-
-    Parameters
-    ----------
-    limits : Limits
-        Where the output ends, and how.
-    """
+    """Transfer functions with one denominator, an offset, and limits of the output."""
 
     limits: Limits
     kind: ClassVar[str] = "limited"

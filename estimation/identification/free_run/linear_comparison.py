@@ -119,13 +119,7 @@ class LinearComparison:
 
 
 def linear_comparison(task: Task) -> LinearComparison:
-    """Compare linear models of all orders that are asked for.
-
-    Parameters
-    ----------
-    task : Task
-        What is to be identified.
-    """
+    """Compare linear models of all orders that are asked for."""
     candidates = linear_candidates(task.part, task.orders, task.delays, task.asked.n_numerator)
     best, notes = believable(candidates, task.part, task.by)
     related = not best.outlasts_block(task.part) or linear_explains(best.fit, task.part)
@@ -144,11 +138,6 @@ def fed_back(model: FreeRunModel, data: Channels, *, changes: bool = False) -> l
         Levels, in units of the channels.
     changes : bool
         Whether changes from sample to sample are asked, of an output whose noise is a random walk.
-
-    Returns
-    -------
-    list of Note
-        One note or none.
     """
     if len(data.inputs) != 1:
         return []

@@ -46,11 +46,6 @@ def fit_linear(
         Whether every time constant must stay within the record.
     least_gain : float
         As `levenberg` takes it [dimensionless].
-
-    Returns
-    -------
-    LinearFit
-        The lowest minimum found.
     """
     problem = Problem(form, data)
     tried = list(starts) or [*steiglitz_mcbride(problem), *_searched(problem)]

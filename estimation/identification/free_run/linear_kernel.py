@@ -72,11 +72,6 @@ def settles(coefficients: Array) -> bool:
     coefficients : ndarray, shape (n,)
         Behind the leading 1.
 
-    Returns
-    -------
-    bool
-        Whether a run can begin at rest.
-
     Examples
     --------
     >>> settles(np.array([-0.9])), settles(np.array([-1.9999999999999947, 0.9999999999999947]))

@@ -102,13 +102,5 @@ def believed(own: LinearComparison, one: LinearComparison) -> bool:
 
 
 def lasts(best: Candidate, of: LinearComparison) -> bool:
-    """Return whether a pole is slower than a held-back block.
-
-    Parameters
-    ----------
-    best : Candidate
-        A model.
-    of : LinearComparison
-        That it was compared in.
-    """
+    """Return whether a pole is slower than a held-back block."""
     return bool(best.doubt) or best.fit.integrates or best.outlasts_block(of.task.part)

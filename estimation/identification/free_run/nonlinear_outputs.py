@@ -86,15 +86,7 @@ def absolute(taken: AbsoluteCandidate, linear: LinearComparison, most: int, *, a
 
 
 def limited(taken: LimitedCandidate, linear: LinearComparison) -> Identified:
-    """Return a linear model whose output has limits, fitted to all data.
-
-    Parameters
-    ----------
-    taken : LimitedCandidate
-        What was chosen.
-    linear : LinearComparison
-        Models without limits.
-    """
+    """Return a linear model whose output has limits, fitted to all data."""
     data, whole, by, limits = linear.task.data, linear.task.whole, linear.task.by, taken.limits
     fit = refitted_limited(taken, whole)
     kind = "stops" if limits.stops else "cut-off"

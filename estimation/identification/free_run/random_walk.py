@@ -168,13 +168,7 @@ def followed_walk(data: Channels, part: Channels, orders: Sequence[int], structu
 
 
 def walk_followed(output: str, structure: str) -> Note:
-    """Return the note on a structure that is fitted to levels of an output that wanders.
-
-    Parameters
-    ----------
-    output, structure : str
-        Names.
-    """
+    """Return the note on a structure that is fitted to levels of an output that wanders."""
     return IdentificationCode.WALK_FOLLOWED.note(output=output, structure=structure)
 
 

@@ -13,13 +13,6 @@ from plant.errors import HydrostateError
 def save_models(models: Sequence[FreeRunModel], path: str | Path) -> None:
     """Write models as JSON, whole or not at all.
 
-    Parameters
-    ----------
-    models : sequence of FreeRunModel
-        One an output.
-    path : str or Path
-        Where to.
-
     Raises
     ------
     HydrostateError

@@ -123,11 +123,6 @@ def experiments_from(u: Signals, y: Signals, names: tuple[str, str], *, n_excite
     u, y : array_like of shape (n,), or a sequence of them
         Input, no gaps; output, NaN where missing.
 
-    Returns
-    -------
-    Experiments
-        One after the other.
-
     Raises
     ------
     HydrostateError

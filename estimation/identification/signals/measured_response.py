@@ -69,11 +69,6 @@ def measured_response(u: Array, y: Array, sample_time: float) -> MeasuredRespons
     sample_time : float
         Seconds between samples [s].
 
-    Returns
-    -------
-    MeasuredResponse
-        With its method.
-
     Raises
     ------
     HydrostateError

@@ -30,11 +30,6 @@ def find_period(u: ArrayLike) -> int | None:
     u : array_like, shape (n,)
         Input [any unit].
 
-    Returns
-    -------
-    int or None
-        The period [samples].
-
     Examples
     --------
     >>> find_period(np.tile([0.0, 1.0, 3.0, 2.0], 5)), find_period(np.arange(20.0))
