@@ -131,18 +131,7 @@ def _whole() -> typer.Typer:
 
 
 def app_for(words: Sequence[str]) -> typer.Typer:
-    """Return the command line that understands what was typed.
-
-    Parameters
-    ----------
-    words : sequence of str
-        What stands behind the program's name.
-
-    Returns
-    -------
-    typer.Typer
-        With all verbs, or with the one of a single log that is asked for.
-    """
+    """Return the command line that understands what was typed."""
     alone = ALONE.get(words[0]) if words else None
     return _whole() if alone is None else _of({"": [alone]})
 

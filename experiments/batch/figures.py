@@ -87,18 +87,7 @@ def _draw_errors(table: pd.DataFrame) -> Figure:
 
 
 def draw_classes(table: pd.DataFrame) -> Figure:
-    """Draw how many logs belong to which class.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        The table ``classes``.
-
-    Returns
-    -------
-    Figure
-        A bar a class [count].
-    """
+    """Draw how many logs belong to which class."""
     margins = Margins(left=2.3, top=0.45)
     figure, (axis,) = panels("Logs by the class that was found", 1, 1, 1.0 + ROW_INCHES * len(table), margins)
     shown = table.iloc[::-1]

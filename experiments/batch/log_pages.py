@@ -67,13 +67,6 @@ def write_log_pages(plan: Plan, store: PartStore, most: int) -> list[str]:
 def pages_in(folder: Folder, files: Collection[str]) -> dict[str, str]:
     """Return the pages of logs that a folder has.
 
-    Parameters
-    ----------
-    folder : Folder
-        Of a report.
-    files : collection of str
-        Logs, as the store names them.
-
     Returns
     -------
     dict[str, str]

@@ -58,11 +58,6 @@ def simulated_run(kind: ActuatorKind, series: Simulated, rig: Rig) -> Record:
 def found_of(kind: ActuatorKind, verb: str, record: Record, rig: Rig) -> Row:
     """Estimate or diagnose a log, and return what was found as entries of a row.
 
-    Parameters
-    ----------
-    verb : str
-        ``estimate`` or ``diagnose``.
-
     Returns
     -------
     Row

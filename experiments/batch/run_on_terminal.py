@@ -166,11 +166,6 @@ def _shown(total: int, before: int) -> "Generator[Callable[[int, Part], None]]":
 def in_sentences(failures: "Sequence[Failure]") -> list[str]:
     """Return a sentence per failure: a log that failed for one reason is named once, with all its verbs.
 
-    Parameters
-    ----------
-    failures : sequence of Failure
-        Of one part.
-
     Examples
     --------
     >>> from experiments.batch.rows import Failure

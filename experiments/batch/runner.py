@@ -217,11 +217,6 @@ def _commit() -> str | None:
 def sources(root: Path) -> str:
     """Return a hash of the code that makes numbers, and of the numbers that ship with it: an edit changes no version.
 
-    Parameters
-    ----------
-    root : Path
-        Folder of the packages.
-
     Returns
     -------
     str

@@ -46,13 +46,7 @@ def standing_of(rows: pa.Table) -> list[LogRow]:
 
 
 def standing_in_words(logs: Sequence[LogRow]) -> tuple[str, str]:
-    """Return how many logs are past a limit, and with which to begin; empty where there are none.
-
-    Parameters
-    ----------
-    logs : sequence of LogRow
-        Of `standing_of`.
-    """
+    """Return how many logs are past a limit, and with which to begin; empty where there are none."""
     if not logs:
         return "", ""
     counts = Counter(one.state for one in logs)

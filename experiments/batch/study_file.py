@@ -234,11 +234,6 @@ def read_study(path: str | Path) -> Study:
 def parse_study(content: Mapping[str, Any], source: str) -> Study:
     """Return a study from a study file's content.
 
-    Parameters
-    ----------
-    content : Mapping[str, Any]
-        As TOML or JSON gives it.
-
     Raises
     ------
     StudyError

@@ -54,11 +54,6 @@ def frame_of(rows: pa.Table) -> pd.DataFrame:
 def summary_tables(frame: pd.DataFrame) -> Mapping[str, pd.DataFrame]:
     """Return the tables of a batch study.
 
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        From `frame_of`.
-
     Returns
     -------
     Mapping[str, pandas.DataFrame]
@@ -89,11 +84,6 @@ def _outcome_table(frame: pd.DataFrame) -> pd.DataFrame:
 
 def bulk_modulus_table(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the errors of estimates against the known truth.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        From `frame_of`.
 
     Returns
     -------

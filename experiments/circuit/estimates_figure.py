@@ -27,11 +27,6 @@ FORM_COLOURS = {"flow": BLUE, "pressure": ORANGE, "acceleration": VERMILION}
 def draw_bulk_modulus(tables: Mapping[str, pd.DataFrame]) -> Figure:
     """Draw estimates of bulk modulus on the circuit, in place of Figure 11.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The circuit's tables.
-
     Returns
     -------
     Figure

@@ -192,11 +192,6 @@ def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
     """Return Table 3 refitted from steady points by equations 5.7 and 5.8, beside the plant's and the published values.
 
     What went in is the circuit's settled leakage: with make-up open the drain counts whole (errata E17).
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row a level and coefficient.
     """
     published = load("leakage").set_index("leakage")
     for level in LEVELS:
@@ -211,13 +206,7 @@ def leakage_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
 
 @tabled
 def friction_refit(rig: CircuitParameters, rng: np.random.Generator) -> Rows:
-    """Return Table 4 refitted from steady points by equation 5.11, beside the plant's and the published values.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row a level and coefficient.
-    """
+    """Return Table 4 refitted from steady points by equation 5.11, beside the plant's and the published values."""
     published = load("friction").set_index("friction")
     names = ("friction_quadratic", "friction_linear", "friction_coulomb")
     columns = [column for column in published.columns if column.startswith("a")]

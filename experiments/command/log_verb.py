@@ -86,13 +86,6 @@ class _Question:
 def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[str, Any]) -> NoReturn:
     """Find what logs say, print it, and leave with the exit code.
 
-    Parameters
-    ----------
-    verb : str
-        ``estimate`` or ``diagnose``.
-    asked : Mapping[str, Any]
-        The verb's arguments by name.
-
     Raises
     ------
     HydrostateError

@@ -42,13 +42,7 @@ Screen: TypeAlias = Callable[[Sequence[Result]], Iterable["RenderableType"]]
 
 @dataclass(frozen=True)
 class Batch:
-    """The results of several logs.
-
-    Parameters
-    ----------
-    results : tuple of Mapping
-        One object a log, in order.
-    """
+    """The results of several logs."""
 
     results: tuple[Result, ...]
     total: int
@@ -119,20 +113,7 @@ def _level_of_the_reader() -> int:
 
 
 def noted(source: str, read: Callable[[], T]) -> T:
-    """Return the log that is read; remarks on it go to standard error.
-
-    Parameters
-    ----------
-    source : str
-        What the log or the stream is called.
-    read : callable
-        Reads it.
-
-    Returns
-    -------
-    object
-        What `read` returned.
-    """
+    """Return the log that is read; remarks on it go to standard error."""
     with caught() as said:
         found = read()
     for one in distinct(warning.note for warning in said):
@@ -274,11 +255,6 @@ def with_rig_columns(
         Reads by a mapping of channels to foreign columns.
     rig_columns, columns : Mapping[str, str]
         Foreign column by channel, from the rig file and from the command line.
-
-    Returns
-    -------
-    object
-        What `read` returned.
 
     Raises
     ------

@@ -166,11 +166,6 @@ def with_page_ending(what: str, page: Path) -> Path:
 def pages_sentence(written: Sequence[Path]) -> str:
     """Return a sentence that names the files of the pages.
 
-    Parameters
-    ----------
-    written : sequence of Path
-        At least one.
-
     Examples
     --------
     >>> pages_sentence([Path("page.html")])

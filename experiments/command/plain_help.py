@@ -9,13 +9,7 @@ from typing import Any
 
 
 def read_plainly(command: Any) -> None:
-    """Let the help of a command be plain lines without types of Python; that of a group stays a panel of its commands.
-
-    Parameters
-    ----------
-    command : click.Command
-        It is changed.
-    """
+    """Change a command so that its help is plain lines without Python types; a group keeps its panel of commands."""
     if not hasattr(command, "commands"):
         command.rich_markup_mode = None
     for parameter in command.params:
@@ -24,13 +18,7 @@ def read_plainly(command: Any) -> None:
 
 
 def hide_bool(parameters: Iterable[Any]) -> None:
-    """Let panels show no type beside options that are given or not.
-
-    Parameters
-    ----------
-    parameters : iterable of click.Parameter
-        They are changed.
-    """
+    """Change parameters so that panels show no type beside flags."""
     for parameter in parameters:
         if getattr(parameter, "is_flag", False):
             parameter.metavar = ""

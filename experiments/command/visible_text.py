@@ -52,22 +52,10 @@ def visible(text: str) -> str:
 
 
 def visible_name(file: object) -> str:
-    """Return the name of a file as `visible` does, on one line.
-
-    Parameters
-    ----------
-    file : str or Path
-        The name, with its folders or without.
-    """
+    """Return the name of a file as `visible` does, on one line."""
     return visible(str(file)).replace("\n", "\\x0a")
 
 
 def visible_page(page: str) -> str:
-    """Return a page as `visible` does, its lines and tabs as they are.
-
-    Parameters
-    ----------
-    page : str
-        HTML.
-    """
+    """Return a page as `visible` does, its lines and tabs as they are."""
     return _UNPRINTED.sub(lambda found: _CONTROLS[ord(found.group())], page)

@@ -106,11 +106,6 @@ def root_efficiency(p: DiaphragmMotorParameters, sweep: pd.DataFrame) -> pd.Data
 def reproduced(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Return the claims of sections 7.1 to 7.3 that physics can bear, beside ours.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
     Returns
     -------
     pandas.DataFrame
@@ -154,11 +149,6 @@ def _turned(course: pd.DataFrame) -> str:
 
 def not_reproduced(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Return the claims that the plant does not bear, with what it gives in their place (errata M17, M25, M26, M31).
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
 
     Returns
     -------

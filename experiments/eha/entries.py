@@ -167,13 +167,7 @@ def _no_class_message(found: "Finding") -> str:
 
 
 def estimate_message(found: "Finding") -> str:
-    """Return what `estimate` says of a log, as one sentence.
-
-    Parameters
-    ----------
-    found : Finding
-        What was found.
-    """
+    """Return what `estimate` says of a log, as one sentence."""
     from estimation.finding import NOT_OBSERVABLE_WITH_PRESSURE, OUTCOMES, Outcome
     from estimation.log_checks.channel_names import PRESSURE
     from estimation.log_checks.notes import LoggerCode

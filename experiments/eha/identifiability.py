@@ -48,11 +48,6 @@ class ExperimentCard(NamedTuple):
 def cards_of(rig: "Rig[Any]", options: Mapping[str, Any]) -> "list[Finding]":
     """Look at one experiment, or at all drives, the one that tells most first.
 
-    Parameters
-    ----------
-    options : Mapping[str, Any]
-        Of `hydrostate identifiability`.
-
     Returns
     -------
     list of Finding
@@ -199,13 +194,7 @@ def driven(
 
 
 def experiment_entries(found: "Finding") -> dict[str, Any]:
-    """Return the identifiability of an experiment, for JSON.
-
-    Parameters
-    ----------
-    found : Finding
-        From `cards_of`.
-    """
+    """Return the identifiability of an experiment, for JSON."""
     from estimation.trust.card import sentences
 
     drive, rank, card, about = found.evidence

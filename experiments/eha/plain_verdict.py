@@ -1,4 +1,7 @@
-"""A diagnosis for a mechanic: the verdict in one sentence, and what to do about it."""
+"""A diagnosis for a mechanic: the verdict in one sentence, and what to do about it.
+
+`result` always holds the entries of a diagnosis with probabilities.
+"""
 
 import math
 from collections.abc import Mapping
@@ -84,16 +87,6 @@ OUTSIDE: Mapping[str, str] = {
 
 def verdict(result: Mapping[str, Any]) -> str:
     """Return the verdict in one sentence.
-
-    Parameters
-    ----------
-    result : Mapping
-        Entries of a diagnosis with probabilities.
-
-    Returns
-    -------
-    str
-        For a mechanic.
 
     Examples
     --------
@@ -187,35 +180,17 @@ def _raised(result: Mapping[str, Any]) -> dict[str, float]:
 
 
 def is_doubted(result: Mapping[str, Any]) -> bool:
-    """Return whether no number of a diagnosis is to be relied on: they are those of a model that does not fit the log.
-
-    Parameters
-    ----------
-    result : Mapping
-        Entries of a diagnosis.
-    """
+    """Return whether no number of a diagnosis is to be relied on: its model does not fit the log."""
     return bool(result["unknown"]) and not of_another_size(result)
 
 
 def of_another_size(result: Mapping[str, Any]) -> bool:
-    """Return whether a circuit fits the log and only the size of its faults differs from the nine conditions.
-
-    Parameters
-    ----------
-    result : Mapping
-        Entries of a diagnosis with probabilities.
-    """
+    """Return whether a circuit fits the log and only the size of its faults differs from the nine conditions."""
     return result["unknown"] and len(result["reasons"]) == 1 and not _outside(result) and bool(_raised(result))
 
 
 def sureness(result: Mapping[str, Any]) -> str:
-    """Return the confidence of the verdict, the cost of the fault, and its onset.
-
-    Parameters
-    ----------
-    result : Mapping
-        Entries of a diagnosis with probabilities.
-    """
+    """Return the confidence of the verdict, the cost of the fault, and its onset."""
     if result["unknown"]:
         told = causes(result)
         reasons = f": {told[0]}." if len(told) == 1 else ":" if told else "."
@@ -234,36 +209,19 @@ def sureness(result: Mapping[str, Any]) -> str:
 
 
 def reasons_apart(result: Mapping[str, Any]) -> list[str]:
-    """Return the reasons against a verdict as sentences, where there are several; one stands in `sureness`.
-
-    Parameters
-    ----------
-    result : Mapping
-        Entries of a diagnosis.
-    """
+    """Return the reasons against a verdict as sentences, where there are several; one stands in `sureness`."""
     told = causes(result) if is_doubted(result) else []
     return [sentence(one) for one in told] if len(told) > 1 else []
 
 
 def causes(result: Mapping[str, Any]) -> list[str]:
-    """Return the reasons against a verdict, without those that may follow from a sensor or column that is wrong.
-
-    Parameters
-    ----------
-    result : Mapping
-        Entries of a diagnosis.
-    """
+    """Return the reasons against a verdict, without those that may follow from a sensor or column that is wrong."""
     first = [one["text"] for one in result["notes"] if one["code"] in WRONG_INPUT and one["text"] in result["reasons"]]
     return first or list(result["reasons"])
 
 
 def how_sure(result: Mapping[str, Any]) -> str:
     """Return the confidence of the verdict, in one sentence.
-
-    Parameters
-    ----------
-    result : Mapping
-        Entries of a diagnosis with probabilities that is not unknown.
 
     Examples
     --------
@@ -305,11 +263,6 @@ def _since(result: Mapping[str, Any]) -> str:
 def what_to_do(result: Mapping[str, Any]) -> list[str]:
     """Return what to do, the most important first.
 
-    Parameters
-    ----------
-    result : Mapping
-        Entries of a diagnosis with probabilities.
-
     Returns
     -------
     list[str]
@@ -324,11 +277,6 @@ def what_to_do(result: Mapping[str, Any]) -> list[str]:
 
 def work_on(result: Mapping[str, Any]) -> list[str]:
     """Return what to check on the actuator itself, as sentences.
-
-    Parameters
-    ----------
-    result : Mapping
-        Entries of a diagnosis with probabilities.
 
     Returns
     -------

@@ -28,13 +28,6 @@ class RunCode(Code):
 def simulated(rig: "Rig[Any]", options: Options) -> Run:
     """Run a plant under a drive, in a condition, and return what sensors log.
 
-    Parameters
-    ----------
-    rig : Rig
-        The actuator.
-    options : Options
-        Of the command line.
-
     Returns
     -------
     Run

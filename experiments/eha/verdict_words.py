@@ -127,11 +127,6 @@ def ranked_shares(probabilities: Mapping[str, float], *, unknown: bool) -> list[
 def equally_likely(result: Mapping[str, Any]) -> list[str]:
     """Return the conditions that are as likely as the likeliest, which no log tells apart that shows no more.
 
-    Parameters
-    ----------
-    result : Mapping
-        Entries of a diagnosis with probabilities.
-
     Returns
     -------
     list[str]
@@ -300,11 +295,6 @@ def margin_word(margin: float) -> str:
     margin : float
         Ratio of its error to the best [dimensionless].
 
-    Returns
-    -------
-    str
-        Of `MARGINS`.
-
     Examples
     --------
     >>> margin_word(1.1)
@@ -314,18 +304,7 @@ def margin_word(margin: float) -> str:
 
 
 def models_sentence(result: Mapping[str, Any]) -> str:
-    """Return the verdict of the nine nominal models alone, in one sentence.
-
-    Parameters
-    ----------
-    result : Mapping
-        Entries with a condition and without probabilities.
-
-    Returns
-    -------
-    str
-        The condition and by what margin.
-    """
+    """Return the verdict of the nine nominal models alone, in one sentence."""
     best, second, margin = result["condition"], result["runner_up"], result["margin"]
     if margin < MARGINS[0][0]:
         named = (

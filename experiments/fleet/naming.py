@@ -302,16 +302,6 @@ def by_table(files: Iterable[str], table: Path) -> dict[str, Named]:
 def table_rows(table: Path, wanted: Iterable[str]) -> list[dict[str, str]]:
     """Return the rows of a small CSV table.
 
-    Parameters
-    ----------
-    wanted : iterable of str
-        Columns that it must have.
-
-    Returns
-    -------
-    list of dict
-        By column.
-
     Raises
     ------
     HydrostateError

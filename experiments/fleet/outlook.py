@@ -20,15 +20,7 @@ LEAST_STD = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Outlook:
-    """One severity of an actuator over its logs.
-
-    Parameters
-    ----------
-    name : str
-        The severity.
-    logs : tuple of LogRow
-        Those that tell it.
-    """
+    """One severity of an actuator over its logs."""
 
     name: str
     unit: str

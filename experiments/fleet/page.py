@@ -147,13 +147,7 @@ def _past(log: LogRow) -> bool:
 
 
 def title_of(rows: Sequence[ActuatorRow]) -> str:
-    """Return a title with the number of sick actuators, among those with readable logs.
-
-    Parameters
-    ----------
-    rows : sequence of ActuatorRow
-        In any order.
-    """
+    """Return a title with the number of sick actuators, among those with readable logs."""
     known, alone = ([row for row in rows if bool(row.last.named.actuator) is each] for each in (True, False))
     if len(known) < len(alone):
         known, alone = list(rows), []

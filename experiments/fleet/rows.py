@@ -133,11 +133,6 @@ def log_rows(
         ``against`` too, where it is known.
     limits : Mapping[str, float]
         That replace those of the store, by severity [its unit].
-
-    Returns
-    -------
-    list of LogRow
-        In the order of the store.
     """
     return [
         _row(row, names.get(row["file"], UNNAMED), limits) for row in rows if row["file"] and row["verb"] == "diagnose"

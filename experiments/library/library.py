@@ -152,11 +152,5 @@ def described(model: LinearModel) -> dict[str, Any]:
 
 
 def library_text(library: Mapping[str, Any]) -> str:
-    """Return a library as the text of its file.
-
-    Parameters
-    ----------
-    library : Mapping
-        As `build_library` returns it.
-    """
+    """Return a library as the text of its file."""
     return json.dumps(library, indent=1, allow_nan=False) + "\n"

@@ -31,11 +31,6 @@ def published_model(condition: str) -> LinearModel:
 def library_table(models: Mapping[str, LinearModel]) -> Rows:
     """Return the library beside Table 6, condition by condition.
 
-    Parameters
-    ----------
-    models : Mapping[str, LinearModel]
-        By condition.
-
     Returns
     -------
     pandas.DataFrame
@@ -65,11 +60,6 @@ def library_table(models: Mapping[str, LinearModel]) -> Rows:
 def root_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
     """Return poles and zeros of the library beside those of Table 6.
 
-    Parameters
-    ----------
-    models : Mapping[str, LinearModel]
-        By condition.
-
     Returns
     -------
     pandas.DataFrame
@@ -91,11 +81,6 @@ def root_table(models: Mapping[str, LinearModel]) -> pd.DataFrame:
 @stacked
 def response_table(models: Mapping[str, LinearModel]) -> Frames:
     """Return the gain of the library's models over frequency, with 95 % bands, beside Table 6's.
-
-    Parameters
-    ----------
-    models : Mapping[str, LinearModel]
-        By condition.
 
     Returns
     -------

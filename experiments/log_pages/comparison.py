@@ -68,13 +68,7 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
 
 
 def quantities_shown(rows: Sequence[Mapping[str, Any]]) -> "pd.DataFrame":
-    """Return the quantities of two logs in a reader's units, with what is said of each.
-
-    Parameters
-    ----------
-    rows : sequence of Mapping
-        From `compared`.
-    """
+    """Return the quantities of two logs in a reader's units, with what is said of each."""
     import pandas as pd
 
     shown = [
@@ -111,11 +105,6 @@ def _probabilities_shown(first: Mapping[str, float] | None, second: Mapping[str,
 def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the quantities of two logs with their differences.
 
-    Parameters
-    ----------
-    first, second : Mapping
-        Their entries of the JSON contract.
-
     Returns
     -------
     list of dict
@@ -142,11 +131,6 @@ def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[s
 
 def differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> "pd.DataFrame":
     """Return the quantities of two logs with their differences, as a table for programs.
-
-    Parameters
-    ----------
-    first, second : Mapping
-        Their entries of the JSON contract.
 
     Returns
     -------
@@ -221,13 +205,7 @@ def _in_a_readers_unit(row: Mapping[str, Any]) -> dict[str, str]:
 
 
 def plain_words(result: Mapping[str, Any]) -> str:
-    """Return the verdict of a diagnosis as its page has it, empty for any other result.
-
-    Parameters
-    ----------
-    result : Mapping
-        Entries of the JSON contract.
-    """
+    """Return the verdict of a diagnosis as its page has it, empty for any other result."""
     from experiments.eha.plain_verdict import how_sure, verdict
     from faults.conditions import CONDITIONS
 
@@ -267,13 +245,7 @@ def _found(result: Mapping[str, Any]) -> str:
 
 
 def title_of(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return which quantities the second log has more of, and less, in one sentence.
-
-    Parameters
-    ----------
-    rows : sequence of Mapping
-        From `compared`.
-    """
+    """Return which quantities the second log has more of, and less, in one sentence."""
     changed = [row for row in rows if row["changed"]]
     if not any(row["interval"] for row in rows):
         return "The two logs cannot be compared: no quantity has an interval in both."

@@ -27,13 +27,7 @@ from experiments.page.tables import Column, right
 
 
 def identified_page(view: IdentifiedView) -> str:
-    """Return the page of an identified model.
-
-    Parameters
-    ----------
-    view : IdentifiedView
-        The model on its log.
-    """
+    """Return the page of an identified model."""
     result, stem = view.result, Path(str(view.result["file"]).split(", ")[0]).stem
     measured = measured_curve(view)
     good, bad = uses_of(view, measured)
@@ -189,13 +183,7 @@ def _address(text: str, kind: str) -> str:
 
 
 def control_text(view: IdentifiedView) -> str:
-    """Return a Python file that makes the model as an object of python-control.
-
-    Parameters
-    ----------
-    view : IdentifiedView
-        Of a linear model.
-    """
+    """Return a Python file that makes the model as an object of python-control."""
     linear, names = view.linear, view.names
     if linear is not None and linear.continuous:
         numerators, denominators, clock = [linear.numerator], [linear.denominator], "0"

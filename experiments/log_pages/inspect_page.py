@@ -24,15 +24,7 @@ MOST_COLUMNS, MOST_POINTS = 24, 2000
 
 
 def inspect_page(result: Mapping[str, Any], tables: "Sequence[TableFacts]") -> str:
-    """Return the page on what a log holds.
-
-    Parameters
-    ----------
-    result : Mapping
-        Entries of `hydrostate inspect`.
-    tables : sequence of TableFacts
-        The tables of the log.
-    """
+    """Return the page on what a log holds."""
     from experiments.log_pages.inspected import block_of, clock_sentence, without_unit
 
     rows = [row for one in result["tables"] for row in one["columns"]]

@@ -163,11 +163,6 @@ def block_of(columns: Mapping[str, str], guessed: Collection[tuple[str, str]] = 
         Column with its unit, by channel.
     guessed : collection of tuple of str
         Channels and columns whose unit the file does not give.
-
-    Returns
-    -------
-    str
-        TOML.
     """
     lines = [
         f"{channel} = {json.dumps(spec, ensure_ascii=True)}{GUESSED if _is_one_of(channel, spec, guessed) else ''}"
@@ -182,13 +177,7 @@ def _is_one_of(channel: str, spec: str, guessed: Collection[tuple[str, str]]) ->
 
 
 def without_unit(tables: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
-    """Return channel and column of each unit that was guessed, since the file gives none.
-
-    Parameters
-    ----------
-    tables : sequence of Mapping
-        Entries of ``tables``.
-    """
+    """Return channel and column of each unit that was guessed, since the file gives none."""
     from estimation.log_checks.notes import GuessCode
 
     rows = [row for one in tables for row in one["columns"]]
@@ -197,13 +186,7 @@ def without_unit(tables: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
 
 
 def clock_sentence(one: Mapping[str, Any]) -> str:
-    """Return what is known of the time of a table, as one sentence.
-
-    Parameters
-    ----------
-    one : Mapping
-        An entry of ``tables``.
-    """
+    """Return what is known of the time of a table, as one sentence."""
     clock = one["clock"]
     if clock is None:
         step = one["step_s"]

@@ -38,13 +38,6 @@ def compare_logs(
 ) -> None:
     """Diagnose two logs, and print their quantities with the differences.
 
-    Parameters
-    ----------
-    logs : sequence of Path
-        Two of them.
-    out : Path or None
-        Where a page is written too.
-
     Raises
     ------
     HydrostateError

@@ -115,11 +115,6 @@ def response_table(p: VibrationParameters) -> pd.DataFrame:
 def response_rows(name: str, model: Any) -> pd.DataFrame:
     """Return the frequency response of one model over its own gain at rest (equation 13).
 
-    Parameters
-    ----------
-    model : control.StateSpace or control.TransferFunction
-        With one input and one output.
-
     Returns
     -------
     pandas.DataFrame

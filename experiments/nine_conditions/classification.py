@@ -66,11 +66,6 @@ def draw_confusion(matrix: pd.DataFrame, share: float) -> Figure:
         One row a true condition, one column a found one [count].
     share : float
         Share that is right, between 0 and 1 [fraction].
-
-    Returns
-    -------
-    Figure
-        The matrix with its counts.
     """
     title = f"Class found against true class: {100.0 * share:.1f} % right"
     figure, (axis,) = panels(title, 1, 1, 5.6, Margins(left=2.2, bottom=1.45))

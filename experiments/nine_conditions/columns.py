@@ -46,13 +46,7 @@ SETTING_UNITS: Mapping[str, str] = {
 
 
 def report_frames(tables: Tables, settings: StudySettings) -> Tables:
-    """Return the tables that the report alone shows: what several of the study's amount to.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-    """
+    """Return the tables that the report alone shows: what several of the study's amount to."""
     named = {f"{spaced(name)}{SETTING_UNITS.get(name, '')}": value for name, value in asdict(settings).items()}
     return {
         "filterpy by experiment": _filterpy_by_experiment(tables["filterpy"]),

@@ -19,11 +19,6 @@ DEFINED: Mapping[str, Mapping[str, str]] = {
 def draw_definitions(conditions: pd.DataFrame) -> Figure:
     """Draw steady velocity and pressure of every condition, with the published definitions.
 
-    Parameters
-    ----------
-    conditions : pandas.DataFrame
-        The table ``conditions``.
-
     Returns
     -------
     Figure

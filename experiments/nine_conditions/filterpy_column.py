@@ -90,13 +90,7 @@ def compared(ours: Estimate, theirs: Estimate) -> Mapping[str, object]:
 
 
 def verdict_counts(frame: pd.DataFrame) -> Mapping[str, int]:
-    """Return the number of runs that are equal, differ, or fail.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        Of `filterpy_study`.
-    """
+    """Return the number of runs that are equal, differ, or fail."""
     verdicts = frame["verdict"]
     return {
         "equal": int((verdicts == "equal").sum()),

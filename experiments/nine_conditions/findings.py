@@ -94,11 +94,6 @@ class ClassAccuracy:
 def truth_of(tables: Tables) -> float:
     """Return the simulated bulk modulus.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
     Returns
     -------
     float
@@ -109,11 +104,6 @@ def truth_of(tables: Tables) -> float:
 
 def by_experiment(estimates: pd.DataFrame) -> Iterator[tuple[Experiment, pd.DataFrame]]:
     """Split the table of estimates into its experiments, in the study's order.
-
-    Parameters
-    ----------
-    estimates : pandas.DataFrame
-        The table ``bulk_modulus``.
 
     Yields
     ------
@@ -146,11 +136,6 @@ def experiment_in_words(key: Experiment) -> str:
 
 def recoveries(estimates: pd.DataFrame) -> Mapping[Experiment, Recovery]:
     """Sum up every experiment on bulk modulus.
-
-    Parameters
-    ----------
-    estimates : pandas.DataFrame
-        The table ``bulk_modulus``.
 
     Returns
     -------
@@ -205,18 +190,7 @@ def _covered(rows: pd.DataFrame) -> int:
 
 
 def class_accuracies(tables: Tables) -> tuple[ClassAccuracy, ...]:
-    """Sum up the classification, bank by bank.
-
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
-    Returns
-    -------
-    tuple of ClassAccuracy
-        One a row of the table ``classification``.
-    """
+    """Sum up the classification, bank by bank."""
     rows = tables["classification"][["bank", "variant", "runs", "accuracy"]].itertuples(index=False, name=None)
     return tuple(
         ClassAccuracy(bank, variant, runs, 100.0 * share, _likeliest_error(tables[f"confusion {bank} {variant}"]))

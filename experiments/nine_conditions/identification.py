@@ -23,13 +23,6 @@ LEVEL_COLOURS = {"none": BLUE, "minor": ORANGE, "major": VERMILION}
 def draw_bode(responses: pd.DataFrame, conditions: pd.DataFrame) -> Figure:
     """Draw the nine transfer functions over the empirical frequency responses, as Figures 5 and 6 do.
 
-    Parameters
-    ----------
-    responses : pandas.DataFrame
-        The series ``responses``.
-    conditions : pandas.DataFrame
-        The table ``conditions``, for each condition's levels.
-
     Returns
     -------
     Figure
@@ -69,11 +62,6 @@ def _response(gain: Axes, phase: Axes, rows: pd.DataFrame, friction: str) -> Non
 def draw_order(order: pd.DataFrame) -> Figure:
     """Draw singular values with their noise floor, as Figure 7 does.
 
-    Parameters
-    ----------
-    order : pandas.DataFrame
-        The series ``order``.
-
     Returns
     -------
     Figure
@@ -99,13 +87,7 @@ def draw_order(order: pd.DataFrame) -> Figure:
 
 
 def draw_gains(models: pd.DataFrame) -> Figure:
-    """Draw steady gains with their intervals over those that the rounding of Table 6 leaves open (errata E14).
-
-    Parameters
-    ----------
-    models : pandas.DataFrame
-        The table ``transfer_functions``.
-    """
+    """Draw steady gains with their intervals over those that the rounding of Table 6 leaves open (errata E14)."""
     figure, (axis,) = panels("Steady gain from motor speed to velocity", 1, 1, 3.9, BESIDE_CONDITIONS)
     level = condition_levels(axis, models["condition"])
     low, high = (MILLI * models[f"published_dc_gain_{end}"] for end in ("low", "high"))

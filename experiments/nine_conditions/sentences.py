@@ -18,11 +18,6 @@ from experiments.page.frames import Tables
 def verdict(tables: Tables) -> tuple[str, str, str]:
     """Say in three sentences what a study found.
 
-    Parameters
-    ----------
-    tables : Mapping[str, pandas.DataFrame]
-        The study's tables.
-
     Returns
     -------
     tuple of str

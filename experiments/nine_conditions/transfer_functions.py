@@ -57,11 +57,6 @@ def identification_study(
 def transfer_function_table(models: Mapping[str, LinearModel]) -> Rows:
     """Return the library beside Table 6.
 
-    Parameters
-    ----------
-    models : Mapping[str, LinearModel]
-        Identified transfer functions by condition.
-
     Returns
     -------
     pandas.DataFrame
@@ -90,11 +85,6 @@ def transfer_function_table(models: Mapping[str, LinearModel]) -> Rows:
 
 def jump_ratio(model: LinearModel) -> float:
     """Return the share of a model's gain that acts within the sample of a step: 0 where output follows a mass (E15).
-
-    Parameters
-    ----------
-    model : LinearModel
-        A transfer function.
 
     Returns
     -------
@@ -139,13 +129,6 @@ def printed_gain_interval(printed: list[str]) -> tuple[float, float]:
 @stacked
 def response_curves(models: Mapping[str, LinearModel], records: Mapping[str, Record]) -> Frames:
     """Return the models' frequency responses and the empirical ones, in long form.
-
-    Parameters
-    ----------
-    models : Mapping[str, LinearModel]
-        Transfer functions by condition.
-    records : Mapping[str, Record]
-        The tests they were fitted to.
 
     Returns
     -------

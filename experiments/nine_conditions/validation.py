@@ -45,11 +45,6 @@ def validation_study(
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Compare both kinds of model on the nine steps in their own condition, as Table 5 does.
 
-    Parameters
-    ----------
-    library : Mapping[str, LinearModel]
-        Transfer functions by condition.
-
     Returns
     -------
     tuple of pandas.DataFrame
@@ -89,11 +84,6 @@ def classification_study(
 
     Spread draws leakage, flow bias and friction uniformly within 10 % and bulk modulus within 20 %; geometry and pump
     stay.
-
-    Parameters
-    ----------
-    library : Mapping[str, LinearModel]
-        Transfer functions by condition.
 
     Returns
     -------

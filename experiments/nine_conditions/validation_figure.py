@@ -25,11 +25,6 @@ LINES = (
 def draw_validation_run(runs: pd.DataFrame, condition: str) -> Figure:
     """Draw a validation run: the drive of Figure 10, the velocities, and a reversal enlarged.
 
-    Parameters
-    ----------
-    runs : pandas.DataFrame
-        The series ``validation_runs``.
-
     Returns
     -------
     Figure
@@ -75,11 +70,6 @@ def _mark_sticking(axis: Axes, near: pd.DataFrame) -> None:
 
 def draw_rmse(rmse: pd.DataFrame) -> Figure:
     """Draw the errors of both kinds of model beside the published ones, as in Table 5.
-
-    Parameters
-    ----------
-    rmse : pandas.DataFrame
-        The table ``validation_rmse``.
 
     Returns
     -------

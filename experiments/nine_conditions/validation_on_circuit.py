@@ -42,11 +42,6 @@ def validation_on_circuit(
 
     Leakage, flow bias and friction of a circuit are drawn within 10 %, bulk modulus within 20 %.
 
-    Parameters
-    ----------
-    library : Mapping[str, LinearModel]
-        Transfer functions by condition.
-
     Returns
     -------
     pandas.DataFrame

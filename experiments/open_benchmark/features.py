@@ -44,13 +44,6 @@ def random_kernels(count: int, samples: int, rng: np.random.Generator) -> list[t
 
     Source: Dempster, Petitjean and Webb, Data Mining and Knowledge Discovery 34 (2020), section 3.1.
 
-    Parameters
-    ----------
-    count, samples : int
-        Of kernels, and of a series.
-    rng : numpy.random.Generator
-        Source of all.
-
     Returns
     -------
     list of tuple

@@ -21,13 +21,6 @@ RIG = "rig.toml"
 def truth_of(made: MadeLog, split: str, index: int) -> dict[str, Any]:
     """Return the row of `truth.csv` for a log: coefficients are those in the middle of it.
 
-    Parameters
-    ----------
-    split : str
-        One of `SPLITS`.
-    index : int
-        Which log of its kind and split.
-
     Returns
     -------
     dict[str, Any]

@@ -17,11 +17,6 @@ from plant.errors import HydrostateError
 def read_truth(folder: Path) -> pd.DataFrame:
     """Return the truth of a set, a row a log; what is not said is an empty text.
 
-    Parameters
-    ----------
-    folder : Path
-        With `truth.csv`.
-
     Raises
     ------
     HydrostateError
@@ -39,13 +34,7 @@ def rows_of(truth: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def read_logs(folder: Path) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
-    """Yield the truth of each log of a set, and the log as its file has it.
-
-    Parameters
-    ----------
-    folder : Path
-        With `truth.csv`.
-    """
+    """Yield the truth of each log of a set, and the log as its file has it."""
     for truth in rows_of(read_truth(folder)):
         yield truth, pd.read_csv(folder / str(truth["file"]))
 

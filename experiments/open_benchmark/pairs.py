@@ -60,11 +60,6 @@ def collide(first: Kind, second: Kind) -> bool:
 
     They cannot where both change one and the same thing of machine, sensor, logger or rig file, where both are driven
     in ways of their own, where no condition is in both, and where one changes nothing.
-
-    Parameters
-    ----------
-    first, second : Kind
-        Single kinds.
     """
     changes = touched(first), touched(second)
     return not all(changes) or bool(changes[0] & changes[1]) or not _shared(first, second)
@@ -85,13 +80,7 @@ def _accepted(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
 
 @cache
 def touched(kind: Kind) -> frozenset[str]:
-    """Return the parts of a plain log that a kind changes, its own drives included.
-
-    Parameters
-    ----------
-    kind : Kind
-        A single kind.
-    """
+    """Return the parts of a plain log that a kind changes, its own drives included."""
     plain = draw_plain(kind.conditions[0], kind.drives[0], np.random.default_rng(0))
     before, after = _parts(plain), _parts(kind.draw(plain, np.random.default_rng(1)))
     changed = {name for name in {*before, *after} if before.get(name) != after.get(name)}

@@ -138,11 +138,6 @@ def _beyond(ci: Sequence[float], truths: tuple[float, float]) -> float:
 def coverage(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     """Return a line a set and quantity: how often 95 % intervals given the rig cover, and whether they are too narrow.
 
-    Parameters
-    ----------
-    rows : sequence of Mapping
-        As `score_set` yields them.
-
     Returns
     -------
     pandas.DataFrame
@@ -162,13 +157,7 @@ def coverage(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
 
 
 def summary(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    """Return one line a set and sensors: counts, errors [%] and processor time a log [s].
-
-    Parameters
-    ----------
-    rows : sequence of Mapping
-        As `score_set` yields them.
-    """
+    """Return one line a set and sensors: counts, errors [%] and processor time a log [s]."""
     lines: list[dict[str, Any]] = []
     for (name, pressure), part in pd.DataFrame(rows).groupby(["set", "pressure"], sort=False):
         sizes = 100.0 * part["error"].dropna().astype(float).abs()

@@ -51,15 +51,7 @@ class BaselineSettings:
 
 
 def find(settings: BaselineSettings, track: Track) -> Found:
-    """Return the share of right verdicts, by method and kind.
-
-    Parameters
-    ----------
-    settings : BaselineSettings
-        How much.
-    track : callable
-        Shows progress.
-    """
+    """Return the share of right verdicts, by method and kind."""
     with TemporaryDirectory() as place:
         home = Path(place)
         seen = write_set("plain", "training", settings.training, home / "training").parent
@@ -78,18 +70,7 @@ def find(settings: BaselineSettings, track: Track) -> Found:
 
 
 def learnt(seen: Sequence[Path], judged: Sequence[Path]) -> dict[str, Names]:
-    """Return the verdicts of every learner that is installed, on the logs of the sets in their order.
-
-    Parameters
-    ----------
-    seen, judged : sequence of Path
-        Sets to learn from, and to judge.
-
-    Returns
-    -------
-    dict of ndarray, shape (logs,)
-        Conditions by learner.
-    """
+    """Return the verdicts of every learner that is installed, on the logs of the sets in their order."""
     X, y, _ = read_arrays(seen, *SERIES)
     other = _series(read_arrays(judged, *SERIES)[0])
     found: dict[str, Names] = {}
@@ -107,18 +88,7 @@ def _series(X: Array) -> Array:
 
 
 def by_rmse(judged: Iterable[Path]) -> Names:
-    """Return the condition whose lumped model misses each log least, as in the paper's Table 5.
-
-    Parameters
-    ----------
-    judged : iterable of Path
-        Sets.
-
-    Returns
-    -------
-    ndarray, shape (logs,)
-        Conditions.
-    """
+    """Return the condition whose lumped model misses each log least, as in the paper's Table 5."""
     bank = mathematical_bank(EhaParameters())
     files = [folder / str(row["file"]) for folder in judged for row in rows_of(read_truth(folder))]
     return np.array([score_mathematical(read_record(file), bank).condition for file in files])

@@ -31,13 +31,6 @@ TALL = 0.7
 def figure_files(drawings: Drawings, tables: Tables) -> dict[str, bytes]:
     """Return figures as SVG and PNG files.
 
-    Parameters
-    ----------
-    drawings : Mapping[str, callable]
-        The figures, by name.
-    tables : Mapping[str, pandas.DataFrame]
-        What they are drawn from.
-
     Returns
     -------
     dict[str, bytes]

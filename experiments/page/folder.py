@@ -98,11 +98,6 @@ def csv_files(place: str, frames: Tables, float_format: str | None = None) -> di
         By name; rows that have a name are conditions.
     float_format : str, optional
         How numbers are written; all their digits unless told.
-
-    Returns
-    -------
-    dict[str, bytes]
-        By path within the result folder.
     """
     files: dict[str, bytes] = {}
     for name, frame in frames.items():
@@ -114,13 +109,7 @@ def csv_files(place: str, frames: Tables, float_format: str | None = None) -> di
 
 
 def json_file(values: Mapping[str, Any]) -> bytes:
-    """Return values as a JSON file.
-
-    Parameters
-    ----------
-    values : Mapping[str, Any]
-        Plain values, all finite.
-    """
+    """Return plain, finite values as a JSON file."""
     return (json.dumps(values, indent=2, allow_nan=False) + "\n").encode()
 
 

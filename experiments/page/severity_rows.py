@@ -115,11 +115,6 @@ def severity_rows(
         The same of the healthy actuator, and where it stops being sound [each in the same unit].
     words : Mapping[str, str]
         What each is called.
-
-    Returns
-    -------
-    list of SeverityRow
-        In the order of the severities.
     """
     rows = [
         severity_row(name, words.get(name, name.replace("_", " ")), one, healthy.get(name, 0.0), limits.get(name))

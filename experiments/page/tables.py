@@ -106,11 +106,6 @@ def as_given(value: float) -> Cell:
     ----------
     value : float
         The number [any unit].
-
-    Returns
-    -------
-    Cell
-        As `exact` writes it.
     """
     return right(exact(float(value)))
 
@@ -132,13 +127,7 @@ def spaced(name: str) -> str:
 
 
 def interval(low: str, high: str, digits: int = 4) -> Callable[[Row], str]:
-    """Return a writer of cells with both ends of an interval.
-
-    Returns
-    -------
-    callable
-        From a row to its cell.
-    """
+    """Return a writer of cells with both ends of an interval."""
     return lambda row: f"{number(row[low], digits)} to {number(row[high], digits)}"
 
 

@@ -50,11 +50,6 @@ FILTER_NOTE = (
 def all_rows(found: Evidence) -> list[Row]:
     """Return every row of the tables and claims of the three papers.
 
-    Parameters
-    ----------
-    found : Evidence
-        Tables of every part.
-
     Raises
     ------
     HydrostateError
@@ -111,11 +106,6 @@ def _filter_rows(found: Evidence) -> Iterator[Row]:
 @tabled
 def row_table(rows: list[Row]) -> Rows:
     """Return the rows as a table, each with the verdict that the rule gives it.
-
-    Parameters
-    ----------
-    rows : list of Row
-        From `all_rows`.
 
     Returns
     -------

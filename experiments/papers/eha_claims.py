@@ -32,13 +32,7 @@ RIG = EhaParameters()
 
 
 def eha_ours(found: Evidence) -> Mapping[str, Ours]:
-    """Return our figure beside each claim of the gear-pump paper.
-
-    Parameters
-    ----------
-    found : Evidence
-        Tables of every part.
-    """
+    """Return our figure beside each claim of the gear-pump paper."""
     return {
         **_rig(),
         **_settings(),
@@ -198,11 +192,6 @@ def _modelled_chambers(estimates: pd.DataFrame) -> Mapping[str, Ours]:
 def settled_by_condition(estimates: pd.DataFrame) -> Mapping[str, Ours]:
     """Return the final value of a filter in each condition, with its 95 % interval, gate and coverage.
 
-    Parameters
-    ----------
-    estimates : pandas.DataFrame
-        The study's table of bulk modulus.
-
     Returns
     -------
     Mapping[str, Ours]
@@ -214,11 +203,6 @@ def settled_by_condition(estimates: pd.DataFrame) -> Mapping[str, Ours]:
 
 def printed_by_condition(estimates: pd.DataFrame) -> Mapping[str, Ours]:
     """Return the final error of the filter with equation 7.3 as printed.
-
-    Parameters
-    ----------
-    estimates : pandas.DataFrame
-        Of `printed_equations`.
 
     Returns
     -------

@@ -57,13 +57,7 @@ _predicted = partial(number_row, PAPER, basis="model", shown_by="hydrostate stud
 
 
 def eha_table_rows(found: Evidence) -> Iterator[Row]:
-    """Yield a row for every cell of Tables 1 to 6.
-
-    Parameters
-    ----------
-    found : Evidence
-        Tables of every part.
-    """
+    """Yield a row for every cell of Tables 1 to 6."""
     yield from _throttles()
     yield from _sizes()
     for title, levels, names, key in (("Table 3", "leakage", LEAKAGE, "8"), ("Table 4", "friction", FRICTION, "9")):

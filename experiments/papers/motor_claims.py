@@ -21,13 +21,7 @@ OPTIMA = (0.01378, 0.004562, 0.003384)
 
 
 def motor_ours(found: Evidence) -> Mapping[str, Ours]:
-    """Return our figure beside each claim of the diaphragm-motor paper.
-
-    Parameters
-    ----------
-    found : Evidence
-        Tables of every part.
-    """
+    """Return our figure beside each claim of the diaphragm-motor paper."""
     motor, paper = found["diaphragm-motor"], found["motor-paper"]
     return {
         **_settings(),

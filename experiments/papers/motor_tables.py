@@ -22,13 +22,7 @@ ACTUATORS = "Another device, of which we have no model."
 
 
 def motor_table_rows(found: Evidence) -> Iterator[Row]:
-    """Yield a row for every cell of the tables that something here computes, or was given.
-
-    Parameters
-    ----------
-    found : Evidence
-        Tables of every part.
-    """
+    """Yield a row for every cell of the tables that something here computes, or was given."""
     paper = found["motor-paper"]
     yield from _sizes(paper["table_1"])
     yield from _relations(paper["table_2"])

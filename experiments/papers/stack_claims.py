@@ -13,13 +13,7 @@ from plant.units import LITRE_PER_MINUTE
 
 
 def stack_ours(found: Tables) -> Mapping[str, Ours]:
-    """Return our figure beside each claim of the piezo-stack paper.
-
-    Parameters
-    ----------
-    found : Mapping[str, pandas.DataFrame]
-        Tables of the part ``piezo-stack``.
-    """
+    """Return our figure beside each claim of the piezo-stack paper."""
     return {**figures_ours(found), **_hysteresis(found), **_left_out(found), **_settings(), "nothing": Ours(None)}
 
 

@@ -51,13 +51,7 @@ def papers_study(parts: Path) -> Study[PapersSettings]:
 
 @tabled
 def verdict_counts(rows: pd.DataFrame) -> Rows:
-    """Return the number of rows per verdict, for each paper.
-
-    Parameters
-    ----------
-    rows : pandas.DataFrame
-        Of `row_table`.
-    """
+    """Return the number of rows per verdict, for each paper."""
     for paper, of_one in rows.groupby("paper", sort=False):
         counts = of_one["verdict"].value_counts()
         yield {

@@ -188,13 +188,7 @@ def stack_loops(p: PiezoStackParameters) -> Frames:
 
 @tabled
 def loop_widths(loops: pd.DataFrame) -> Rows:
-    """Return stroke and width of each loop of `stack_loops`.
-
-    Parameters
-    ----------
-    loops : pandas.DataFrame
-        Of `stack_loops`.
-    """
+    """Return stroke and width of each loop of `stack_loops`."""
     for frequency, loop in loops.groupby("frequency_hz"):
         yield {
             "frequency_hz": frequency,

@@ -53,13 +53,7 @@ class SerialExecutor(Executor):
     """Runs what is submitted at once, in this process."""
 
     def submit(self, fn: Callable[..., Found], /, *args: Any, **kwargs: Any) -> Future[Found]:
-        """Run a function and return its finished future.
-
-        Returns
-        -------
-        Future
-            Its result, or what it raised.
-        """
+        """Run a function and return its finished future."""
         future: Future[Found] = Future()
         try:
             future.set_result(fn(*args, **kwargs))

@@ -205,13 +205,7 @@ class _Exchange:
 
 
 class FreeSpace:
-    """Space left in the folder of a server.
-
-    Parameters
-    ----------
-    settings : Settings
-        Folder and limits.
-    """
+    """Space left in the folder of a server."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings

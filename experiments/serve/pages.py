@@ -65,13 +65,7 @@ def home_page(settings: Settings) -> str:
 
 
 def live_page(names: Sequence[str], name: str) -> str:
-    """Return the page of a stream.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Of all streams.
-    """
+    """Return the page of a stream."""
     return _rendered("serve/live.html", (("streams", tuple(names)), ("name", name)))
 
 

@@ -9,13 +9,7 @@ LOOKED_AFTER = 1.0
 
 
 def bind_to_server(server: int) -> None:
-    """Bind this process to its server's life, before it loads what computes.
-
-    Parameters
-    ----------
-    server : int
-        Process identity of the server.
-    """
+    """Bind this process to its server's life, before it loads what computes."""
     for name in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{name}_NUM_THREADS", "1")
     threading.Thread(target=_end_with, args=(server,), daemon=True).start()

@@ -23,13 +23,7 @@ LOCK = "in-use"
 
 
 class Service:
-    """A server's folder and what is done in it.
-
-    Parameters
-    ----------
-    settings : Settings
-        What the server is told.
-    """
+    """A server's folder and what is done in it."""
 
     store: Store
     jobs: Jobs

@@ -81,11 +81,6 @@ class StoredLog:
 class Store:
     """The database of a server.
 
-    Parameters
-    ----------
-    path : Path
-        Its file, made where there is none.
-
     Raises
     ------
     HydrostateError

@@ -25,11 +25,6 @@ class EventSource(Protocol):
 def end_told(told: EventSource) -> Generator[None]:
     """Follow a stream; whatever ends it, the last line says so.
 
-    Parameters
-    ----------
-    told : EventSource
-        What tells of it.
-
     Raises
     ------
     HydrostateError

@@ -20,13 +20,7 @@ Sink = Callable[[Mapping[str, Any]], None]
 
 
 class Watched(WatchEvents):
-    """Sends the events of a watch to every output, and knows its state.
-
-    Parameters
-    ----------
-    source : str
-        Where the rows come from.
-    """
+    """Sends the events of a watch to every output, and knows its state."""
 
     def __init__(self, source: str) -> None:
         self._lock = threading.Lock()
@@ -37,13 +31,7 @@ class Watched(WatchEvents):
         super().__init__(self._send)
 
     def to(self, sink: Sink) -> None:
-        """Send every event from here on to one more output, before those that were there.
-
-        Parameters
-        ----------
-        sink : callable
-            Takes the entries of an event.
-        """
+        """Send every event from here on to one more output, before those that were there."""
         with self._lock:
             self._sinks.insert(0, sink)
 

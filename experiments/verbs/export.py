@@ -253,18 +253,6 @@ def _simulated_bench(bench: "Rig", sample_time: float) -> "Record":
 def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[str]:
     """Write files into a folder, each whole or not at all.
 
-    Parameters
-    ----------
-    folder : Path
-        Which exists.
-    files : Mapping[str, str or bytes]
-        Contents by file name.
-
-    Returns
-    -------
-    list of str
-        The names.
-
     Raises
     ------
     HydrostateError
