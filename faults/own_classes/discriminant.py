@@ -98,11 +98,6 @@ def learn(x: Array, places: IntArray, count: int, shares: Sequence[float] = (1.0
         Classes; one may be without runs.
     shares : sequence of float
         How much of the rule's shrinkage is taken [fraction].
-
-    Returns
-    -------
-    list of Discriminant
-        What was learnt, for each share.
     """
     from sklearn.covariance import ledoit_wolf_shrinkage
 

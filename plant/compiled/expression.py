@@ -220,11 +220,6 @@ def ordered(outputs: Iterable[Expression], *, by_slopes: bool = False) -> list[E
         What is wanted in the end.
     by_slopes : bool
         Whether a node needs what its derivatives are by, rather than what it is computed from.
-
-    Returns
-    -------
-    list of Expression
-        A topological order.
     """
     order: list[Expression] = []
     seen: set[int] = set()

@@ -37,18 +37,7 @@ def gathered(outputs: Mapping[str, Expression], fixed: Collection[str]) -> dict[
 
     Numbers are multiplied exactly, so a scale and its inverse leave nothing. What serves several times is one node, its
     factors gathered within; only the number of an output stays apart, for other outputs to do without.
-
-    Parameters
-    ----------
-    outputs : Mapping[str, Expression]
-        What is computed, by name.
-    fixed : collection of str
-        Symbols that change seldom.
-
-    Returns
-    -------
-    dict[str, Expression]
-        The same values to rounding, by the same names.
+    `fixed` are symbols that seldom change; values stay the same to rounding.
 
     Examples
     --------

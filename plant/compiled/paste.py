@@ -82,11 +82,6 @@ def bare_text(function: Callable[..., object]) -> str:
     A keyword-only parameter without default becomes a name of the file, and so does what a parameter ``kernel`` has;
     no call hands them on any more.
 
-    Parameters
-    ----------
-    function : callable
-        A function of a module.
-
     Examples
     --------
     >>> def middle(low: float, high: float) -> float:

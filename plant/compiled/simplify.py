@@ -1,7 +1,8 @@
 """Rewrites a graph so that it costs less, where the last digits do not matter; a kernel asks for it.
 
 Factors are gathered, divisions by one divisor share its reciprocal (a division takes as long as five to ten products),
-and sums of products are rounded once.
+and sums of products are rounded once. Each function takes what is computed, by name, and the symbols that seldom change;
+it returns the same values, to rounding, under the same names.
 """
 
 from collections import Counter
@@ -20,37 +21,12 @@ FUSED = ("fma", "fnma", "fms")
 
 
 def simplified(outputs: Mapping[str, Expression], fixed: Collection[str]) -> dict[str, Expression]:
-    """Gather factors, then share reciprocals.
-
-    Parameters
-    ----------
-    outputs : Mapping[str, Expression]
-        What is computed, by name.
-    fixed : collection of str
-        Symbols that change seldom.
-
-    Returns
-    -------
-    dict[str, Expression]
-        The same values to rounding, by the same names.
-    """
+    """Gather factors, then share reciprocals."""
     return share_reciprocals(gathered(outputs, fixed), fixed)
 
 
 def share_reciprocals(outputs: Mapping[str, Expression], fixed: Collection[str]) -> dict[str, Expression]:
     """Replace divisions by products with a reciprocal, wherever it serves twice or changes seldom.
-
-    Parameters
-    ----------
-    outputs : Mapping[str, Expression]
-        What is computed, by name.
-    fixed : collection of str
-        Symbols that change seldom.
-
-    Returns
-    -------
-    dict[str, Expression]
-        The same values to rounding, by the same names.
 
     Examples
     --------
@@ -81,16 +57,6 @@ def share_reciprocals(outputs: Mapping[str, Expression], fixed: Collection[str])
 
 def share_ratios(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
     """Let a ratio and its reverse take one division, by the product of the two; neither may be zero.
-
-    Parameters
-    ----------
-    outputs : Mapping[str, Expression]
-        What is computed, by name.
-
-    Returns
-    -------
-    dict[str, Expression]
-        The same values to rounding, by the same names.
 
     Examples
     --------
@@ -126,16 +92,7 @@ def fused(outputs: Mapping[str, Expression]) -> dict[str, Expression]:
     """Round a sum with a product once, where the product serves nothing else: ``fma``, as `source` spells it.
 
     Written out, it is the same on every machine and in every shape of kernel, which is not so where a compiler chooses.
-
-    Parameters
-    ----------
-    outputs : Mapping[str, Expression]
-        What is computed, by name.
-
-    Returns
-    -------
-    dict[str, Expression]
-        The same values to rounding, by the same names; they cannot be differentiated any more.
+    The result cannot be differentiated any more.
 
     Examples
     --------

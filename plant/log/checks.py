@@ -49,11 +49,6 @@ def trusted(
     most_missing : float
         Share of a channel's samples, or of the clock's, that may be missing [dimensionless].
 
-    Returns
-    -------
-    Checked
-        Clock, channels, and notes.
-
     Raises
     ------
     LogError

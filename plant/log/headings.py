@@ -99,11 +99,6 @@ def cleaned(names: Sequence["str | Heading"]) -> list[Heading]:
     ----------
     names : sequence of str or Heading
         As the file gives them.
-
-    Returns
-    -------
-    list of Heading
-        One a column, in order.
     """
     given = [one if isinstance(one, Heading) else Heading(one) for one in names]
     return [replace(one, name=one.name.strip().removeprefix("\ufeff").strip()) for one in given]

@@ -99,13 +99,7 @@ class TableFacts:
 
 
 def inspect_table(table: Table) -> TableFacts:
-    """Return the facts of a table: its rows and columns.
-
-    Parameters
-    ----------
-    table : Table
-        As `plant.log.formats.detect.open_tables` opens it.
-    """
+    """Return the facts of a table: its rows and columns."""
     found = table.numbers()
     columns: list[ColumnFacts] = []
     for place, heading in enumerate(table.headings):

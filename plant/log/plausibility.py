@@ -106,11 +106,6 @@ def implausible(sample_time: float, channels: Mapping[str, Array]) -> list[Note]
     channels : Mapping[str, ndarray, shape (n,)]
         Values in SI, NaN where a sample is missing.
 
-    Returns
-    -------
-    list[Note]
-        The notes; none for a plausible log.
-
     Examples
     --------
     >>> speed = 100.0 * np.sin(np.arange(100.0))

@@ -30,14 +30,7 @@ class Block:
 
 
 def blocks_of(order: Sequence[Expression], kept: Sequence[Expression]) -> dict[int, Block]:
-    """Find choices that are worth a block.
-
-    Parameters
-    ----------
-    order : sequence of Expression
-        All nodes, operands before results.
-    kept : sequence of Expression
-        Nodes that are wanted whatever is chosen.
+    """Find choices that are worth a block; `kept` are nodes that are wanted whatever is chosen.
 
     Returns
     -------

@@ -54,11 +54,6 @@ def c_files(package: str, kind: str, name: str, real: Precision, facts: Mapping[
         What its files, types and functions are called.
     facts : Mapping[str, Any]
         What the templates ask for, by name, beside name, version, and what spells numbers.
-
-    Returns
-    -------
-    dict[str, str]
-        Texts by file name.
     """
     templates = {
         f"{name}.h": f"own/{kind}.h",

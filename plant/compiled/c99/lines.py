@@ -34,11 +34,6 @@ KINDS: Mapping[str, str] = {
 def spelt_in_c(item: Expression, operands: list[str], precision: Precision) -> str:
     """Return one operation in C.
 
-    Parameters
-    ----------
-    operands : list of str
-        Names of what it works on.
-
     Examples
     --------
     >>> from plant.compiled.c99.precision import DOUBLE

@@ -34,13 +34,7 @@ class Lines:
         self._truth = "i1" if width == 1 else f"<{width} x i1>"
 
     def results(self, node: ast.FunctionDef) -> dict[str, str]:
-        """Write all lines of a function.
-
-        Returns
-        -------
-        dict[str, str]
-            Registers of what it returns, by name.
-        """
+        """Write all lines of a function."""
         for line in node.body:
             match line:
                 case ast.Assign(targets=[ast.Name(id=name)], value=value):

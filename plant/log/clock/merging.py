@@ -68,13 +68,6 @@ def merged(parts: Sequence[Timed], source: str) -> Merged:
 
     Stamps with dates are laid beside each other as they are; seconds are taken to count from one moment in all.
 
-    Parameters
-    ----------
-    parts : sequence of Timed
-        One a logger.
-    source : str
-        What messages call the log.
-
     Returns
     -------
     Merged

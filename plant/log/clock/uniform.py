@@ -88,11 +88,6 @@ def on_uniform_clock(
     most_missing : float
         Share of the samples that rows of an even clock may leave out [dimensionless].
 
-    Returns
-    -------
-    Checked
-        Clock and channels.
-
     Raises
     ------
     LogError
@@ -287,13 +282,6 @@ def _spread(channels: Channels, slots: NDArray[np.int64]) -> Channels:
 
 def long_enough(columns: Channels, source: str) -> None:
     """Refuse columns of several lengths, or too short.
-
-    Parameters
-    ----------
-    columns : Mapping[str, ndarray, shape (n,)]
-        ``time_s`` and the channels.
-    source : str
-        What messages call the log.
 
     Raises
     ------

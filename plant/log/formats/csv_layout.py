@@ -80,15 +80,7 @@ class Layout:
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
-    """Return the cells of a line.
-
-    Parameters
-    ----------
-    line : str
-        Without its end.
-    delimiter : str
-        One of `DELIMITERS`.
-    """
+    """Return the cells of a line."""
     if delimiter == BLANKS:
         return line.split()
     if line.count('"') % 2 or '"' not in line:  # a quote that is never closed is none

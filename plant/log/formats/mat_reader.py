@@ -78,11 +78,6 @@ class _Reader:
 def read_variables(content: bytes, source: str = "the file") -> dict[str, Value]:
     """Return the variables of a MAT file of version 5 to 7.
 
-    Parameters
-    ----------
-    source : str
-        What messages call it.
-
     Returns
     -------
     dict[str, Value]
