@@ -1,8 +1,8 @@
 """Rewrites a graph so that it costs less, where the last digits do not matter; a kernel asks for it.
 
 Factors are gathered, divisions by one divisor share its reciprocal (a division takes as long as five to ten products),
-and sums of products are rounded once. Each function takes what is computed, by name, and the symbols that seldom change;
-it returns the same values, to rounding, under the same names.
+and sums of products are rounded once. Each function takes what is computed, by name, and the symbols that seldom
+change; it returns the same values, to rounding, under the same names.
 """
 
 from collections import Counter
