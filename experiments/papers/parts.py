@@ -4,7 +4,7 @@ import hashlib
 import json
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -41,39 +41,20 @@ Evidence: TypeAlias = Mapping[str, Tables]
 
 
 @dataclass(frozen=True)
-class PapersSettings:
+class PapersSettings(StudySettings):
     """Size of the studies that the rows are read from.
 
     Parameters
     ----------
-    starts : tuple of float
-        First guesses of bulk modulus [Pa], as in Figure 11.
-    duration : float
-        Length of the runs for estimation and validation [s].
-    sample_time : float
-        Their sample time, section 7 [s].
-    identification_duration : float
-        Length of the runs for identification [s].
-    seeds : int
-        Runs a condition for classification [count].
     calibrations, turns : int
         Calibrations of the piezo-stack plant without Figure 12, and most steps of each [count].
     """
 
-    seed: int = 2024
-    starts: tuple[float, ...] = (0.0, 0.5e8, 1e8, 2e8, 3e8, 4e8, 5e8)
-    duration: float = 10.0
-    sample_time: float = 1e-4
-    identification_duration: float = 20.0
-    seeds: int = 20
+    filterpy_samples: int = 2
+    """Of a comparison that no row reads [count]."""
+
     calibrations: int = 3
     turns: int = TURNS
-
-    @property
-    def study(self) -> StudySettings:
-        """The same for the studies of the gear-pump actuator."""
-        shared = {one.name for one in fields(StudySettings)} & set(asdict(self))
-        return StudySettings(**{name: getattr(self, name) for name in shared}, filterpy_samples=2)  # which no row reads
 
 
 def quick_papers(seed: int) -> PapersSettings:
@@ -84,13 +65,13 @@ def quick_papers(seed: int) -> PapersSettings:
 
 
 def _nine(settings: PapersSettings, track: Track) -> Tables:
-    found = NINE_CONDITIONS.find(settings.study, track).frames
-    make = partial(printed_equations, NINE_RIG, settings.study)
+    found = NINE_CONDITIONS.find(settings, track).frames
+    make = partial(printed_equations, NINE_RIG, settings)
     return {**found, "printed equations": in_one_piece(track, "the published filter as printed", make)}
 
 
 def _circuit(settings: PapersSettings, track: Track) -> Tables:
-    studies = circuit_studies(CIRCUIT_RIG, settings.seed, settings.study)
+    studies = circuit_studies(CIRCUIT_RIG, settings.seed, settings)
     return {name: run() for name, run in track(studies.items(), description="the circuit's experiments")}
 
 

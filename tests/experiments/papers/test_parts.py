@@ -136,11 +136,11 @@ def test_every_row_has_a_verdict_and_none_is_without_its_number(
     motor_paper_tables: Tables,
 ) -> None:
     chambers = {"value_pa": 2.071e8, "std_pa": 1e5, "error_percent": 0.05, "z": 1.0, "gate_passed": True}
-    circuit = {**circuit_studies(parts.CIRCUIT_RIG, SMALL.seed, SMALL.study)}
+    circuit = {**circuit_studies(parts.CIRCUIT_RIG, SMALL.seed, SMALL)}
     circuit["figure 11 modelled chambers"] = lambda: pd.DataFrame(
         [{"condition": condition, **chambers} for condition in CONDITIONS]
     )
-    printed = printed_equations(parts.NINE_RIG, SMALL.study)
+    printed = printed_equations(parts.NINE_RIG, SMALL)
     made: Mapping[str, Callable[[], Tables]] = {
         "study": lambda: {**study.frames, "printed equations": printed},
         "circuit": lambda: {name: make() for name, make in circuit.items()},
