@@ -2,7 +2,8 @@
 
 The rules, each shown to fire on a made-up offender: whatever is public has a docstring; floats and arrays, and no
 strangers, stand under Parameters with unit or shape; more than one line about a function that returns floats or arrays
-has Returns. Protocol members with a body of ``...`` need one line only, and commands are checked by their help.
+has Returns. Protocol members with a body of ``...`` and methods that override another of ours need no sections, and
+commands are checked by their help.
 """
 
 import ast
@@ -108,6 +109,7 @@ class Page:
     floats: frozenset[str] = FLOATS
     arrays: frozenset[str] = ARRAYS
     pasted: frozenset[str] = frozenset()
+    methods: frozenset[tuple[str, str]] = frozenset()
 
     def offence(self, node: ast.AST, name: str, problem: str) -> str:
         return f"{self.path}:{getattr(node, 'lineno', 1)}: {name} {problem}"
@@ -133,7 +135,9 @@ def pages(texts: dict[str, str]) -> list[Page]:
     arrays = ARRAYS.union(*(_aliases(tree, ARRAYS) for tree in trees.values()))
     public = {path: tree for path, tree in trees.items() if not re.search(r"/_(?!_init__)", path)}
     pasted = frozenset(name for path, tree in trees.items() if "pasted(" in texts[path] for name in _pasted(tree))
-    return [Page(path, tree, floats, arrays, pasted) for path, tree in public.items()]
+    classes = [node for tree in trees.values() for node in tree.body if isinstance(node, ast.ClassDef)]
+    methods = frozenset((one.name, item.name) for one in classes for item in one.body if isinstance(item, Function))
+    return [Page(path, tree, floats, arrays, pasted, methods) for path, tree in public.items()]
 
 
 def _pasted(tree: ast.Module) -> Iterator[str]:
@@ -222,7 +226,9 @@ def _function_offences(page: Page, node: Function, name: str, owner: ast.ClassDe
         return
     inside = page.path.startswith(("experiments/cli.py", "experiments/verbs/")) or page.path.endswith("/command.py")
     command = inside and bool(decorators & {"command", "callback"})
-    if node.name in page.pasted or command or (owner is not None and "Protocol" in _bases(owner) and _is_stub(node)):
+    bases = set() if owner is None else _bases(owner)
+    overrides = any((base, node.name) in page.methods for base in bases)
+    if node.name in page.pasted or command or overrides or ("Protocol" in bases and _is_stub(node)):
         return
     yield from _argument_offences(page, node, name, _arguments(node, method=owner is not None))
     numbers = _mentions(node.returns, page.floats | page.arrays) and not decorators & {"property", "cached_property"}
@@ -327,6 +333,7 @@ def test_numbers_say_their_unit_or_shape(signature: str, entry: str, description
         "def _f(x): ...",
         "class _A:\n    def f(self, x): ...",
         'class A(Protocol):\n    """A."""\n    def f(self, x: float):\n        """Do it."""\n        ...',
+        'class _A:\n    def f(self, x: float): ...\n\nclass B(_A):\n    """B."""\n    def f(self, x: float):\n        """F."""',
         '@app.command()\ndef f(x: float):\n    """Do it."""',
         '@dataclass\nclass A:\n    """A."""\n    x: Annotated[float, SI("m", "length", "Table 1")]',
         'class A:\n    """A."""\n    @property\n    def f(self) -> float:\n        """F.\n\n        More."""',

@@ -52,17 +52,7 @@ class Gauges(WatchEvents):
         self._peaks |= {event.balance: event.score for event in events if isinstance(event, Alarm)}
 
     def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
-        """Take notice of samples; every `EVERY` the range of each channel since then is told.
-
-        Parameters
-        ----------
-        channels : Mapping[str, ndarray], shape (n,) each
-            Samples by channel [SI].
-        last : float
-            Time of the last one [s].
-        gap : bool
-            Whether rows are missing before them.
-        """
+        """Take notice of samples; every `EVERY` the range of each channel since then is told."""
         import numpy as np
 
         super().saw(channels, last, gap)

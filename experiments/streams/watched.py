@@ -46,17 +46,7 @@ class Watched(WatchEvents):
                 sink(told)
 
     def saw(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
-        """Take notice of samples: they are counted, and the last of each channel is kept.
-
-        Parameters
-        ----------
-        channels : Mapping[str, ndarray], shape (n,) each
-            Samples by channel [SI].
-        last : float
-            Time of the last one [s].
-        gap : bool
-            Whether rows are missing before them.
-        """
+        """Take notice of samples: they are counted, and the last of each channel is kept."""
         super().saw(channels, last, gap)
         self._seen = last, time.time(), {name: float(values[-1]) for name, values in channels.items() if len(values)}
 

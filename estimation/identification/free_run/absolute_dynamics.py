@@ -49,20 +49,7 @@ class AbsoluteDynamics(OutputErrorDynamics):
         return self.linear.form.unanswered(length)
 
     def run(self, u: Array, y: Array) -> Array:
-        """Return the free run, its initial state by least squares of the outputs that are there.
-
-        Parameters
-        ----------
-        u : ndarray, shape (n, m)
-            Inputs, scaled.
-        y : ndarray, shape (n,)
-            Output, scaled; NaN where missing.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Output, scaled.
-        """
+        """Return the free run, its initial state by least squares of the outputs that are there."""
         form, size = self.linear.form, y - self.zero
         columns = Problem(form, Channels((), "", 1.0, (u,), (y,))).linear_columns(self.linear.f)
         driven = columns[:, : form.n_b + 1] @ np.concatenate([self.linear.theta[: form.n_b], self.linear.theta[-1:]])

@@ -51,20 +51,7 @@ class HammersteinDynamics(OutputErrorDynamics):
         return self.linear.form.unanswered(length)
 
     def run(self, u: Array, y: Array) -> Array:
-        """Return the free run, or that of the linear model where it stands in.
-
-        Parameters
-        ----------
-        u : ndarray, shape (n, 1)
-            Input, scaled.
-        y : ndarray, shape (n,)
-            Output, scaled; NaN where missing.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Output, scaled.
-        """
+        """Return the free run, or that of the linear model where it stands in."""
         return self.judged_run(u, y)[0]
 
     def judged_run(self, u: Array, y: Array) -> tuple[Array, tuple[float, float] | None]:

@@ -26,20 +26,7 @@ class LimitedDynamics(LinearDynamics):
         return self.theta.size + self.limits.count
 
     def run(self, u: Array, y: Array) -> Array:
-        """Return the free run, its initial state by least squares of the outputs that are there.
-
-        Parameters
-        ----------
-        u : ndarray, shape (n, m)
-            Inputs, scaled.
-        y : ndarray, shape (n,)
-            Output, scaled; NaN where missing.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Output, scaled.
-        """
+        """Return the free run, its initial state by least squares of the outputs that are there."""
         problem = LimitedProblem(self.form, Channels((), "", 1.0, (u,), (y,)), self.limits)
         if np.count_nonzero(np.isfinite(y)) > self.form.order:
             return problem.jacobian(problem.begun(self.theta))[0]

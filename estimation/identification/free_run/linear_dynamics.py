@@ -58,18 +58,6 @@ class LinearDynamics(OutputErrorDynamics):
 
         Behind a long dead time it begins with the first output that answers the log's inputs; that one stands for those
         before it too.
-
-        Parameters
-        ----------
-        u : ndarray, shape (n, m)
-            Inputs, scaled.
-        y : ndarray, shape (n,)
-            Output, scaled; NaN where missing.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Output, scaled.
         """
         form, n_b = self.form, self.form.n_b
         columns = Problem(form, Channels((), "", 1.0, (u,), (y,))).linear_columns(self.f)

@@ -50,18 +50,6 @@ class StateSpaceDynamics(OutputErrorDynamics):
 
         Where there are too few of them it begins at rest under the first inputs. Behind a long dead time it begins with
         the first output that answers the log's inputs; that one stands for those before it too.
-
-        Parameters
-        ----------
-        u : ndarray, shape (n, m)
-            Inputs, scaled.
-        y : ndarray, shape (n,)
-            Output, scaled; NaN where missing.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Output, scaled.
         """
         one, n, known = self.system, self.system.order, np.isfinite(y)
         late, a = delayed(u, one.delays), np.ascontiguousarray(one.a)
