@@ -333,7 +333,7 @@ def test_numbers_say_their_unit_or_shape(signature: str, entry: str, description
         "def _f(x): ...",
         "class _A:\n    def f(self, x): ...",
         'class A(Protocol):\n    """A."""\n    def f(self, x: float):\n        """Do it."""\n        ...',
-        'class _A:\n    def f(self, x: float): ...\n\nclass B(_A):\n    """B."""\n    def f(self, x: float):\n        """F."""',
+        'class _A:\n  def f(self, x: float): ...\nclass B(_A):\n  """B."""\n  def f(self, x: float):\n    """F."""',
         '@app.command()\ndef f(x: float):\n    """Do it."""',
         '@dataclass\nclass A:\n    """A."""\n    x: Annotated[float, SI("m", "length", "Table 1")]',
         'class A:\n    """A."""\n    @property\n    def f(self) -> float:\n        """F.\n\n        More."""',

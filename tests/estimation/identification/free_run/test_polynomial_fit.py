@@ -20,7 +20,7 @@ from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.normal_equations import NormalEquations
 from estimation.identification.free_run.other_orders import is_wild
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
-from estimation.identification.free_run.polynomial_fit import Runs
+from estimation.identification.free_run.polynomial_fit import PolynomialFit, Runs
 from estimation.identification.free_run.polynomial_terms import (
     STEPS,
     TRIED,
@@ -48,6 +48,14 @@ def log(n: int = 400, seed: int = 1) -> Channels:
     return channels_from([u[:, None]], [y], 0.01, ["force"], "deflection")
 
 
+def grown(of: Channels) -> tuple[Channels, PolynomialFit]:
+    """Return scaled data, and the polynomial model that a linear one of them begins."""
+    data, _ = scaled(of)
+    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
+    assert start is not None
+    return data, start
+
+
 def test_the_free_run_begins_as_the_linear_model_that_it_grows_from() -> None:
     data, _ = scaled(log())
     linear = fit_linear(Form(2, (1,), (1,)), data)
@@ -57,9 +65,7 @@ def test_the_free_run_begins_as_the_linear_model_that_it_grows_from() -> None:
 
 
 def test_sensitivities_are_the_derivatives_of_the_free_run() -> None:
-    data, _ = scaled(log(150))
-    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
-    assert start is not None
+    data, start = grown(log(150))
     fit = one_more(start, candidate_terms(start.variables), data)
     assert fit is not None
     runs = Runs(fit.variables, fit.terms, data)
@@ -75,9 +81,7 @@ def test_sensitivities_are_the_derivatives_of_the_free_run() -> None:
 
 
 def test_the_product_that_the_plant_has_is_the_first_one_added() -> None:
-    data, _ = scaled(log())
-    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
-    assert start is not None
+    data, start = grown(log())
     fit = one_more(start, candidate_terms(start.variables), data)
     assert fit is not None
     lags = [(int(fit.variables.source[v]), int(fit.variables.lag[v])) for v in fit.terms[-1]]
@@ -120,9 +124,7 @@ def test_a_saved_model_simulates_as_before(tmp_path: object) -> None:
 
 
 def test_a_model_that_leaves_the_range_when_the_inputs_come_in_another_order_is_wild() -> None:
-    data, _ = scaled(log())
-    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
-    assert start is not None
+    data, start = grown(log())
     fit = one_more(start, candidate_terms(start.variables), data)
     assert fit is not None
     assert not is_wild(fit, data)
@@ -137,9 +139,7 @@ def test_a_run_beyond_what_was_seen_does_not_run_away() -> None:
 
 
 def test_products_are_held_at_the_ends_of_what_was_seen_and_single_terms_are_not() -> None:
-    data, _ = scaled(log())
-    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
-    assert start is not None
+    _, start = grown(log())
     far = 100.0 * np.ones((5, 1))
     terms = np.array([[2, -1, -1], [2, 2, -1]])
     single, square = products(start.variables, terms, far, np.zeros(5))[-1]
@@ -148,9 +148,7 @@ def test_products_are_held_at_the_ends_of_what_was_seen_and_single_terms_are_not
 
 
 def test_pruning_takes_out_a_product_that_explains_nothing_and_keeps_the_plants_own() -> None:
-    data, _ = scaled(log())
-    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
-    assert start is not None
+    data, start = grown(log())
     own = one_more(start, candidate_terms(start.variables), data)
     assert own is not None
     assert np.array_equal(_pruned(own, data).terms, own.terms)
@@ -177,9 +175,7 @@ def test_products_are_of_single_signals_as_they_are_and_of_several_as_they_are_h
 
 
 def test_a_rejected_step_is_not_asked_for_its_slopes(monkeypatch: pytest.MonkeyPatch) -> None:
-    data, _ = scaled(log(200))
-    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
-    assert start is not None
+    data, start = grown(log(200))
     runs, costs, asked = Runs(start.variables, start.terms, data), list[float](), list[int]()
     outputs, sums = NormalEquations.outputs, NormalEquations.sums
 
@@ -202,9 +198,7 @@ def test_a_rejected_step_is_not_asked_for_its_slopes(monkeypatch: pytest.MonkeyP
 
 
 def test_a_fit_that_runs_away_is_wild_takes_no_product_and_predicts_nothing() -> None:
-    data, _ = scaled(log())
-    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
-    assert start is not None
+    data, start = grown(log())
     away = replace(start, theta=5.0 * start.theta)
     runs = Runs(away.variables, away.terms, data)
     assert runs.outputs(away.theta) is None
@@ -216,9 +210,7 @@ def test_a_fit_that_runs_away_is_wild_takes_no_product_and_predicts_nothing() ->
 
 
 def test_no_product_is_added_where_none_explains_anything_or_none_runs_free(monkeypatch: pytest.MonkeyPatch) -> None:
-    data, _ = scaled(log())
-    start = begun(fit_linear(Form(2, (1,), (1,)), data), data)
-    assert start is not None
+    data, start = grown(log())
     pool = candidate_terms(start.variables)
     explained = replace(start, cost=1e9 * start.cost)
     assert one_more(explained, pool, data) is None
