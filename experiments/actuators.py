@@ -176,5 +176,5 @@ def offered(kind: "ActuatorKind", verb: str) -> Any:
     """
     found = getattr(kind, verb)
     if found is None:
-        raise HydrostateError(f"{verb} is not there for {kind.name}, {kind.description}")
+        raise HydrostateError(f"{verb} is not available for {kind.name}, {kind.description}")
     return found

@@ -63,7 +63,7 @@ def compare_studies(first: pd.DataFrame, second: pd.DataFrame, seed: int = 2024)
                     rows.append({**head, **_difference(both, column, better, rng)})
     if not rows:
         raise HydrostateError(
-            "the two studies must have cases in common: the same series, and alike what is done with them"
+            "the two studies must have cases in common: the same series, estimated or diagnosed in the same way"
         )
     return pd.DataFrame(rows)
 

@@ -120,7 +120,7 @@ def require_folder(folder: Path | None) -> None:
     if folder.exists():
         raise HydrostateError(f"--out must be a folder, got the file {str(folder)!r}")
     if folder.suffix.lower() in (*OF_FILES, ".json"):
-        raise HydrostateError(f"--out must be a folder, got {str(folder)!r}, a name as a file has it")
+        raise HydrostateError(f"--out must be a folder, got {str(folder)!r}, which looks like the name of a file")
 
 
 def page_place(report: Path | None) -> Path | None:

@@ -126,7 +126,7 @@ class Store:
             )
         found = self.get(identity)
         if found is None:
-            raise HydrostateError(f"{name}: was deleted while it came")
+            raise HydrostateError(f"{name}: was deleted during the upload")
         return found
 
     def get(self, identity: str) -> StoredLog | None:

@@ -190,7 +190,7 @@ def test_a_verb_that_a_kind_has_not_says_so(monkeypatch: pytest.MonkeyPatch, tmp
     monkeypatch.setattr(registry, "actuator", lambda _: bare)
     done = CliRunner().invoke(app, ["estimate", "--plant", "piezo-stack", str(tmp_path / "log.csv")])
     assert done.exit_code == 2
-    assert "estimate is not there for piezo-stack" in done.stderr
+    assert "estimate is not available for piezo-stack" in done.stderr
 
 
 def test_an_unknown_kind_is_refused_with_those_that_are_known() -> None:

@@ -30,7 +30,7 @@ def test_a_kind_that_is_registered_under_another_name_than_its_own_is_refused(mo
 def test_a_verb_that_a_kind_does_not_offer_is_refused_by_both_names() -> None:
     kind = replace(actuator("piezo-stack"), estimate=None)
     assert offered(kind, "diagnose") is kind.diagnose
-    with pytest.raises(HydrostateError, match="estimate is not there for piezo-stack, "):
+    with pytest.raises(HydrostateError, match="estimate is not available for piezo-stack, "):
         offered(kind, "estimate")
 
 

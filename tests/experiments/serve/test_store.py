@@ -92,7 +92,7 @@ def test_a_log_that_goes_while_it_is_added_is_said_to_be_gone(tmp_path: Path, op
     with sqlite3.connect(tmp_path / "a.sqlite") as connection:
         connection.execute("CREATE TRIGGER gone AFTER INSERT ON logs BEGIN DELETE FROM logs WHERE id = new.id; END")
     connection.close()
-    with pytest.raises(HydrostateError, match=r"run\.csv: was deleted while it came"):
+    with pytest.raises(HydrostateError, match=r"run\.csv: was deleted during the upload"):
         store.add("a", "run.csv", "diagnose", 10)
 
 
