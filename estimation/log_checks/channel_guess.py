@@ -176,15 +176,12 @@ def _alike(one: Array, other: Array) -> float:
     return float(x @ y) / size if size > 0.0 else 0.0
 
 
-def _middle(values: Array) -> Array:
-    return 0.5 * (values[1:] + values[:-1])
-
-
 def _by_motion(points: dict[str, dict[int, float]], means: Mapping[int, Array], why: dict[Any, list[Note]]) -> None:
     """Find the column whose slope others are: position, of which velocity is the slope and the pump's speed follows."""
     followers: dict[int, list[tuple[float, int]]] = {}
     places = np.array(list(means), dtype=np.int64)
-    middles = _unit_rows(np.array([_middle(one) for one in means.values()])) if means else np.empty((0, 0))
+    halves = [0.5 * (one[1:] + one[:-1]) for one in means.values()]
+    middles = _unit_rows(np.array(halves)) if means else np.empty((0, 0))
     for place in points.get(POSITION, {}).keys() & means.keys():
         like = middles @ _unit_rows(np.diff(means[place])[None])[0]
         near = np.flatnonzero((np.abs(like) > FOLLOWS) & (places != place))

@@ -169,17 +169,14 @@ def _motions_disagree(short: ChannelBlocks, long: ChannelBlocks, p: EhaParameter
         too_far = p.piston_area * abs(with_pump[large][1]) > FARTHEST
         guilty, other = (large, small) if too_far else (small, large)
         times = abs(ratio) if guilty == POSITION else 1.0 / abs(ratio)
-        found.append(_unit(guilty, other, times, LENGTHS[factor if guilty == POSITION else _inverse(factor)]))
+        slip = factor if guilty == POSITION else min(LENGTHS, key=lambda one: abs(np.log(one * factor)))
+        found.append(_unit(guilty, other, times, LENGTHS[slip]))
     elif not 1.0 / APART <= abs(ratio) <= APART:  # a furlong read as a metre: which is wrong only a pump can tell
         large, small = (POSITION, VELOCITY) if abs(ratio) > 1.0 else (VELOCITY, POSITION)
         too_far = p.piston_area * abs(with_pump[large][1]) > FARTHEST
         guilty = large if too_far else f"{large} or {small}"
         found.append(_unit(guilty, small, max(abs(ratio), 1.0 / abs(ratio)), UNKNOWN_UNIT))
     return tuple(found)
-
-
-def _inverse(factor: float) -> float:
-    return min(LENGTHS, key=lambda one: abs(np.log(one * factor)))
 
 
 def _unit(channel: str, against: str, factor: float, slip: str) -> Note:
@@ -269,7 +266,7 @@ def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: 
         believed, alike = (True, True), {one for one in TURNS if LOST <= gone / one <= NEAR}
         if length is not None and length < 100.0 and " and " in _moved(record):
             length = None  # two that agree: a piston that drifts as it sticks makes as much of a slip of the speed
-    fast = _over_limit(record, p)
+    fast = float(np.nanmax(np.abs(record[SPEED]))) / p.motor_speed_limit if SPEED in record else 0.0
     too_fast = fast > FARTHEST and least < NEAR * min(TURNS)
     if too_fast and (together > FOLLOWS or length is not None or degrees):
         turn, believed = min(TURNS), (True, believed[1])
@@ -306,11 +303,6 @@ def _slides(record: Record, p: EhaParameters) -> bool:
     """Return whether pressure is ever high enough to move the piston; a stuck one only yields on its seals."""
     highest = float(np.nanmax(np.abs(record[PRESSURE]))) if PRESSURE in record else np.inf
     return highest * p.piston_area > HELD * p.friction_coulomb
-
-
-def _over_limit(record: Record, p: EhaParameters) -> float:
-    """Return the highest speed over the motor's limit [dimensionless]; 0 where none is logged."""
-    return float(np.nanmax(np.abs(record[SPEED]))) / p.motor_speed_limit if SPEED in record else 0.0
 
 
 def _resolved(record: Record, long: ChannelBlocks) -> bool:

@@ -76,18 +76,13 @@ def moved_by_drives(problem: Problem, theta: Array, undisturbed: Array | None = 
     """
     log, rough = problem.log, problem.coarse
     if undisturbed is None:
-        undisturbed = _undisturbed(problem, theta)
+        (undisturbed,) = rough.disturbed(theta, [log.drives])  # by the kernel of the draws: no other is compiled
     if len(log.drives) <= SAMPLES_KEPT:
         moved = rough.disturbed_together(theta, _noisy_drives(log)) - undisturbed[..., None]
         return moved.reshape(-1, DRAWS)
     rng, spread = np.random.default_rng(0), np.array(log.drive_std)
     draws = (log.drives + spread * rng.standard_normal(log.drives.shape) for _ in range(DRAWS))
     return np.column_stack([(errors - undisturbed).ravel() for errors in rough.disturbed(theta, draws)])
-
-
-def _undisturbed(problem: Problem, theta: Array) -> Array:
-    """Return the residuals under the log's drives, by the kernel of the draws: no other is compiled for this run."""
-    return next(iter(problem.coarse.disturbed(theta, [problem.log.drives])))
 
 
 @lru_cache(maxsize=1)

@@ -5,7 +5,6 @@ it turns and crosses, or springs back on its seals and comes again. So where it 
 chooses (`crossings`).
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -60,7 +59,8 @@ def crossings(position: Array, pressure: Array, sample_time: float) -> Array:
     [0.0, 1.0, 0.9, -1.0, -1.0]
     """
     stands = standings(position)
-    late, early = (_crossed(stands, crossed) for crossed in (lambda share: share**2, lambda share: share * (2 - share)))
+    across, share = stands.next_side - stands.side, stands.share
+    late, early = stands.side + across * share**2, stands.side + across * (share * (2 - share))
     force = smoothed(bridged(pressure), round(SMOOTHED / sample_time))
     before, after = force[stands.first], force[stands.last]
     turned = np.divide(force - before, after - before, out=np.ones_like(force), where=after != before)
@@ -152,10 +152,6 @@ def cell(position: Array) -> float:
         Width [m].
     """
     return max(CELLS * position_variance(position) ** 0.5, FINEST)
-
-
-def _crossed(stands: Standings, course: Callable[[Array], Array]) -> Array:
-    return stands.side + (stands.next_side - stands.side) * course(stands.share)
 
 
 def smoothed(values: Array, samples: int) -> Array:

@@ -229,7 +229,7 @@ def _with_teeth(log: GreyBoxLog, begun: RippleFits, fitted: Fitted) -> RippleFit
     found, taken, offset = None, [first.teeth], begun.log.speed_offset + first.offset
     for _ in range(ROUNDS):
         count = taken[0].count
-        if not _believable(taken, offset - begun.log.speed_offset):
+        if abs(offset - begun.log.speed_offset) > MOST_OFFSET or any(one.amplitude >= MOST_TEETH for one in taken):
             return None
         tried = with_ripple(replace(log, counts=(count, 2 * count)), taken, offset)
         held = RippleFits(tried, fitted(tried))
@@ -245,10 +245,6 @@ def _with_teeth(log: GreyBoxLog, begun: RippleFits, fitted: Fitted) -> RippleFit
             break
         taken, offset = new, offset + (left[count].offset if offset != 0.0 else 0.0)
     return found
-
-
-def _believable(teeth: Sequence[Ripple], offset: float) -> bool:
-    return abs(offset) <= MOST_OFFSET and all(one.amplitude < MOST_TEETH for one in teeth)
 
 
 def _felt(fit: GreyBoxFit) -> float:

@@ -4,7 +4,6 @@ Piston and bristle then chatter, each step on the other side of rest. That is no
 pits a few thousandths apart, and in which of them a descent ends hangs on the last digit of the noise.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from math import ceil, sqrt
 
@@ -60,12 +59,8 @@ def without_chatter(problem: FreedProblem, theta: Array) -> FreedProblem:
         The same one where its steps do.
     """
     log, values = problem.log, problem.model.values(theta)
-    times = min(ceil(_over(log, values, parameter_names(problem.model.parameters))), MOST_SHORTENED)
+    followed_at_most = followed(log, parameter_names(problem.model.parameters))["bristle_stiffness"][1]
+    times = min(ceil(sqrt(values["bristle_stiffness"] / followed_at_most)), MOST_SHORTENED)
     if times <= 1:
         return problem
     return problem.on(replace(log, steps=np.where(log.steps == np.max(log.steps), times * log.steps, log.steps)))
-
-
-def _over(log: GreyBoxLog, values: Mapping[str, float], names: tuple[str, ...]) -> float:
-    """Return the ratio of a bristle's natural frequency to the highest that the steps follow."""
-    return sqrt(values["bristle_stiffness"] / followed(log, names)["bristle_stiffness"][1])

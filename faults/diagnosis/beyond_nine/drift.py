@@ -75,7 +75,9 @@ def over_drift(diagnosed: Callable[[CleanLog], Loaded], log: CleanLog, notes: Se
     if drift is not None:
         actuator = actuator_of(last.parameters)
         found[0] = _followed(found, [1.0, *there], actuator, calibration)
-        likeliest = max(range(len(found)), key=lambda place: _likely(found[place], calibration))
+        # first whether the circuit lies in a condition there, then its evidence
+        ranks = [(_is_placed(one), _evidence(one.scoreboard, calibration)) for one in found]
+        likeliest = ranks.index(max(ranks))
         placed = found[likeliest] = whatever_fault(found[likeliest], actuator, calibration)
     diagnosis = replace(
         found[0],
@@ -85,11 +87,6 @@ def over_drift(diagnosed: Callable[[CleanLog], Loaded], log: CleanLog, notes: Se
         not_told=placed.not_told if drift is not None else found[0].not_told,
     )
     return last._replace(diagnosis=diagnosis)
-
-
-def _likely(one: Diagnosis, calibration: Calibration) -> tuple[bool, float]:
-    """Return what a place is chosen by: whether the circuit lies in a condition there, then its evidence."""
-    return _is_placed(one), _evidence(one.scoreboard, calibration)
 
 
 def _is_placed(one: Diagnosis) -> bool:

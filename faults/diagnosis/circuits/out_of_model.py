@@ -25,7 +25,6 @@ from faults.diagnosis.circuits.not_shown import FRICTION_LAW, not_shown
 from faults.diagnosis.circuits.region_scores import region_scores
 from faults.diagnosis.circuits.yielding import UNEXPLAINED, follows, yielding_velocity
 from faults.notes import AgainstCode
-from plant.eha.circuit_parameters import CircuitParameters
 from plant.notes import Note
 
 EARLIER = 0.1
@@ -219,7 +218,8 @@ def _one_step(
     rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
     nudge = 0.01 * sizes["motor_speed_rad_s"]
     faster = predicted(replace(blocks, speed=blocks.speed + nudge), rows)[0]
-    larger = predicted(blocks, parameter_rows(fit.coordinates[None], _larger_pump(actuator.circuit), actuator.rated))[0]
+    pumping = replace(actuator.circuit, pump_displacement=actuator.circuit.pump_displacement * math.exp(STEP))
+    larger = predicted(blocks, parameter_rows(fit.coordinates[None], pumping, actuator.rated))[0]
     columns = [*fit.slopes, (larger - fit.fitted) / STEP, (faster - fit.fitted) / nudge]
     if blocks.pressure is not None:
         columns.append(np.column_stack([np.zeros(len(blocks.velocity)), np.ones(len(blocks.velocity))]))
@@ -232,10 +232,6 @@ def _one_step(
     found = covariance @ (trust * weighted @ left)
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return {name: (float(found[at]), float(errors[at])) for at, name in enumerate(sizes, start=pump)}
-
-
-def _larger_pump(circuit: CircuitParameters) -> CircuitParameters:
-    return replace(circuit, pump_displacement=circuit.pump_displacement * math.exp(STEP))
 
 
 def _bias(name: str, value: float) -> Note:
