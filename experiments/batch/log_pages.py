@@ -53,7 +53,13 @@ def write_log_pages(plan: Plan, store: PartStore, most: int) -> list[str]:
         options = {**chosen.options, "seed": 0} | ({} if work.pressure else {"no_pressure": True})
         try:
             with caught():
-                record = read_log(Path(series.path), rig.columns, dict(series.columns), kind.required)
+                record = read_log(
+                    Path(series.path),
+                    rig.columns,
+                    dict(series.columns),
+                    kind.required,
+                    sample_time=series.sample_time_s,
+                )
                 found = chosen.run(record, *chosen.prepare(rig, options))
             result = {**chosen.blank, "file": one.file, "rig": rig.name, **chosen.entries(found)}
             page = page_of(chosen, result, found, record).encode()

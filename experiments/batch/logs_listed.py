@@ -56,8 +56,7 @@ def listed_logs(logs: Logs, place: int, folder: Path, rigs: Mapping[str, Rig[Any
         raise StudyError(
             f"logs[{place}].glob must match at least one file, got {logs.glob!r}: {said} {folder / logs.glob}"
         )
-    columns = tuple(sorted(logs.columns.items()))
-    there = [_log(Path(name), folder, columns, rigs) for name in found]
+    there = [_log(Path(name), folder, logs, rigs) for name in found]
     itself = folder.resolve()
     there.sort(key=lambda one: one.path != str(itself / one.file))  # the file's own name before any link to it
     counted: dict[tuple[object, ...], Log] = {}
@@ -69,14 +68,15 @@ def listed_logs(logs: Logs, place: int, folder: Path, rigs: Mapping[str, Rig[Any
     return Listed(tuple(sorted(counted.values(), key=lambda one: one.file)), links)
 
 
-def _log(path: Path, folder: Path, columns: tuple[tuple[str, str], ...], rigs: Mapping[str, Rig[Any]]) -> Log:
+def _log(path: Path, folder: Path, logs: Logs, rigs: Mapping[str, Rig[Any]]) -> Log:
     relative = path.relative_to(folder) if path.is_relative_to(folder) else path
     file, itself = spelt(relative.as_posix()), path.resolve()
     try:
         size = itself.stat().st_size
     except OSError:  # it has just gone, which becomes a failed case
         size = 0
-    return Log(file, str(itself), content_of(itself), size, columns, nearest_folder(file, rigs))
+    columns = tuple(sorted(logs.columns.items()))
+    return Log(file, str(itself), content_of(itself), size, columns, logs.sample_time_s, nearest_folder(file, rigs))
 
 
 def _identity(path: str) -> object:

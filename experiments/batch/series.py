@@ -55,6 +55,8 @@ class Log:
         Hash of its bytes, see `content_of`.
     size : int
         Its length [byte].
+    sample_time_s : float or None
+        Time between rows [s] where times do not tell it.
     folder : str
         The folder whose rig file is the log's, as the study names it; empty for the study's own rig file.
     """
@@ -64,6 +66,7 @@ class Log:
     content: str
     size: int
     columns: tuple[tuple[str, str], ...]
+    sample_time_s: float | None = None
     folder: str = ""
 
     @property

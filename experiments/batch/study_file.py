@@ -166,11 +166,14 @@ class Logs(_Table):
         Foreign column by channel, beside the rig's: ``{ position_m = "POS_MM:mm" }``.
     starts_pa : tuple of float
         First guesses of bulk modulus [Pa]; the rig's own where there are none.
+    sample_time_s : float or None
+        Time between rows [s] of logs without time, or with times that do not increase.
     """
 
     glob: Annotated[str, Field(min_length=1)]
     columns: dict[str, str] = {}
     starts_pa: tuple[NotNegative, ...] = ()
+    sample_time_s: Positive | None = None
     methods: Annotated[tuple[Method, ...], Field(min_length=1)]
 
 

@@ -182,7 +182,9 @@ def _prepared(series: Series, task: Task) -> _Prepared:
     other = None if kind.name == DEFAULT else kind
     if isinstance(series, Log):
         with _one_at_a_time, caught() as said:
-            record = read_log(Path(series.path), rig.columns, dict(series.columns), kind.required)
+            record = read_log(
+                Path(series.path), rig.columns, dict(series.columns), kind.required, sample_time=series.sample_time_s
+            )
         if content_of(Path(series.path)) != series.content:
             raise LogError(f"{series.path}: was changed after the study began; run the same command again")
         known = record.metadata.get("condition")

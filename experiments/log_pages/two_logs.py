@@ -10,7 +10,7 @@ import typer
 from experiments.actuators import offered
 from experiments.command.json_output import json_text, write_whole
 from experiments.command.logs import read_log, run_logs
-from experiments.command.options import load_actuator, load_columns
+from experiments.command.options import load_actuator, load_columns, require_positive
 from experiments.command.output_paths import require_no_log
 from experiments.command.terminal import emit, note, rendered, short_names, table
 from experiments.log_pages.comparison import (
@@ -33,6 +33,7 @@ def compare_logs(
     plant: str | None,
     rig: Path | None,
     columns: Sequence[str] | None,
+    sample_time: float | None,
     seed: int,
     as_json: bool,
 ) -> None:
@@ -47,10 +48,12 @@ def compare_logs(
     """
     if len({str(log) for log in logs}) < 2:
         raise HydrostateError(f"two logs are compared, got {logs[0]} twice")
+    require_positive("--sample-time", sample_time, "s")
     kind, bench = load_actuator(plant, rig)
     chosen = offered(kind, "diagnose")
     actual, prepared = chosen.prepare(bench, {**chosen.options, "seed": seed})
-    read = partial(read_log, rig_columns=bench.columns, columns=load_columns(columns), required=kind.required)
+    named = load_columns(columns)
+    read = partial(read_log, rig_columns=bench.columns, columns=named, required=kind.required, sample_time=sample_time)
     about = {"plant": kind.name, "rig": bench.name, "seed": seed}
 
     def work(log: Path) -> dict[str, Any]:

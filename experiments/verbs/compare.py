@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from experiments.command.json_output import json_text, write_whole
-from experiments.command.options import SEED, Columns, Json, Plant, RigFile, Seed, argument, option
+from experiments.command.options import SEED, Columns, Json, Plant, RigFile, SampleTime, Seed, argument, option
 from experiments.command.output_paths import with_page_ending
 from experiments.command.terminal import emit, note, rendered, table
 
@@ -21,6 +21,7 @@ def compare(
     plant: Plant = None,
     rig: RigFile = None,
     columns: Columns = None,
+    sample_time: SampleTime = None,
     seed: Seed = SEED,
     as_json: Json = False,
 ) -> None:
@@ -42,8 +43,8 @@ def compare(
     if len(files) == 2:
         from experiments.log_pages.two_logs import compare_logs
 
-        chosen: dict[str, Any] = {"plant": plant, "rig": rig, "columns": columns, "seed": seed, "as_json": as_json}
-        compare_logs([Path(first), Path(second)], out, **chosen)
+        chosen: dict[str, Any] = {"plant": plant, "rig": rig, "columns": columns, "sample_time": sample_time}
+        compare_logs([Path(first), Path(second)], out, **chosen, seed=seed, as_json=as_json)
         return
     if files:
         other = second if files[0] == first else first

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from experiments.command.json_output import write_whole
-from experiments.command.options import Columns, Plant, RigFile, argument, load_actuator, load_columns, option
+from experiments.command.options import (
+    Columns,
+    Plant,
+    RigFile,
+    SampleTime,
+    argument,
+    load_actuator,
+    load_columns,
+    option,
+    require_positive,
+)
 from experiments.command.output_paths import require_folder
 from experiments.command.terminal import INTERRUPTED, SOME_FAILED, USAGE, emit, note
 from experiments.command.visible_text import spelt
@@ -57,6 +67,7 @@ def fleet(
     plant: Plant = None,
     rig: RigFile = None,
     columns: Columns = None,
+    sample_time: SampleTime = None,
     workers: Annotated[
         int | None, option("N", "Number of processes; by default the number of cores.", "--workers", min=1)
     ] = None,
@@ -75,6 +86,7 @@ def fleet(
     from experiments.fleet.rows import log_rows
 
     require_folder(out)
+    require_positive("--sample-time", sample_time, "s")
     limits, repairs = limits_of_options(limit or []), read_maintenance(maintenance)
     _names((), pattern, names)  # what is wrong there, and in names of files, is said before any log is diagnosed
     if Path(place).is_file():
@@ -86,7 +98,7 @@ def fleet(
         _names([spelt(one.relative_to(place).as_posix()) for one in logs], pattern, names)
         rigs = rigs_of_folders(Path(place), logs, rig)
         rig = rigs.pop("", None)
-        store = _diagnosed(Path(place), logs, out, plant, rig, rigs, load_columns(columns), workers)
+        store = _diagnosed(Path(place), logs, out, plant, rig, rigs, load_columns(columns), sample_time, workers)
     table = store.rows(["file", "verb", "outcome", "found_condition", "reason", "quantities", "against"]).to_pylist()
     files = [row["file"] for row in table if row["file"]]
     named, unnamed = _names(files, pattern, names, Path(place).name if from_logs else "")
@@ -97,7 +109,7 @@ def fleet(
         raise HydrostateError(f"{place}: must contain logs that were diagnosed (verb diagnose), but there are none")
     base = Path(place) if from_logs else Path()
     paths = {spelt(one.relative_to(base).as_posix()): one for one in logs}
-    links = write_pages(rows, out, pages, _page_writer(base, paths, plant, rig, rigs, columns))
+    links = write_pages(rows, out, pages, _page_writer(base, paths, plant, rig, rigs, columns, sample_time))
     write_whole(out / PAGE, fleet_page(rows, links, Path(place).name), "--out", parents=True)
     _warn(rows, repairs, unnamed)
     failed = sum(one.state == "failed" for row in rows for one in row.logs)
@@ -217,6 +229,7 @@ def _diagnosed(
     rig: Path | None,
     rigs: Mapping[str, Path],
     columns: Mapping[str, str],
+    sample_time: float | None,
     workers: int | None,
 ) -> "PartStore":
     """Diagnose the logs of a folder into a store; Ctrl-C ends without a page, which would lack actuators."""
@@ -228,7 +241,8 @@ def _diagnosed(
     kind, _ = load_actuator(plant, rig)
     ends = sorted({one.suffix for one in logs})
     methods = [{"verb": "diagnose"}]
-    globs = [{"glob": f"**/*{end}", "columns": dict(columns), "methods": methods} for end in ends]
+    how = {"columns": dict(columns), "sample_time_s": sample_time, "methods": methods}
+    globs = [{"glob": f"**/*{end}", **how} for end in ends]
     content: dict[str, Any] = {
         "name": "fleet",
         "plant": kind.name,
@@ -283,6 +297,7 @@ def _page_writer(
     rig: Path | None,
     rigs: Mapping[str, Path],
     columns: Any,
+    sample_time: float | None,
 ) -> Callable[[str, Path], bool]:
     """Return what writes the page of a log, and says whether the log is still there."""
     from experiments.actuators import kind_of_rig, offered, read_own_rig
@@ -303,7 +318,7 @@ def _page_writer(
         kind = kind_of_rig(bench, usual.name)
         chosen = offered(kind, "diagnose")
         with caught():
-            record = read_log(log, bench.columns, mapping, kind.required)
+            record = read_log(log, bench.columns, mapping, kind.required, sample_time=sample_time)
             found = chosen.run(record, *chosen.prepare(bench, {**chosen.options, "seed": 0}))
         result = {**chosen.blank, "file": file, "rig": bench.name, **chosen.entries(found)}
         write_whole(path, page_of(chosen, result, found, record), "--out", parents=True)

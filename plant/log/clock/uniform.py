@@ -201,8 +201,7 @@ def _not_increasing(time: Array, source: str) -> ClockError:
     got = f"{time[row + 1]:.12g} in row {row + 2} after {time[row]:.12g}"
     return ClockError(
         f"{TIME} must increase, got {got}; if the clock was set there, or another test begins, keep one side of it; "
-        "if its steps are too coarse, or it runs over, `estimate --sample-time S` takes the rows as evenly spaced by "
-        "S seconds",
+        "if its steps are too coarse, or it runs over, --sample-time S takes the rows as evenly spaced by S seconds",
         source,
     )
 

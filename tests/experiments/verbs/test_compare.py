@@ -78,3 +78,19 @@ def test_a_log_that_is_not_there_is_told_as_such(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["compare", str(tmp_path / "before.csv"), str(tmp_path / "after.csv")])
     assert done.exit_code == 2
     assert "after.csv: there is no such file" in " ".join(done.stderr.split())
+
+
+def test_logs_without_time_are_compared_with_the_time_between_rows_given(tmp_path: Path) -> None:
+    logs = [tmp_path / f"{name}.csv" for name in ("before", "after")]
+    for log in logs:
+        how = ["--duration", "0.5", "--sample-time", "2e-3", "--out", str(log)]
+        assert CliRunner().invoke(app, ["simulate", *how]).exit_code == 0
+        rows = log.read_text("utf-8").splitlines()
+        log.write_text("\n".join(row.partition(",")[2] for row in rows), encoding="utf-8")
+    words = ["compare", *map(str, logs), "--json"]
+    refused = CliRunner().invoke(app, words)
+    assert (refused.exit_code, "give --sample-time" in " ".join(refused.stderr.split())) == (2, True), refused.stderr
+    (told,) = json.loads(CliRunner().invoke(app, [*words, "--sample-time", "2e-3"]).stdout)
+    assert (told["outcome"], bool(told["differences"])) == ("ok", True)
+    wrong = CliRunner().invoke(app, [*words, "--sample-time", "0"])
+    assert (wrong.exit_code, "--sample-time must be positive and finite" in wrong.stderr) == (2, True), wrong.stderr

@@ -222,3 +222,18 @@ def test_rig_files_that_lie_among_logs_are_found_and_told(tmp_path: Path, capsys
     given = tmp_path / "other.toml"
     assert rigs_of_folders(tmp_path, logs, given) == {"": given, "large": tmp_path / "large" / "rig.toml"}
     assert "logs in no folder" not in capsys.readouterr().err
+
+
+def test_a_fleet_of_logs_whose_stamps_are_too_coarse_takes_the_time_between_rows(tmp_path: Path) -> None:
+    (logs := tmp_path / "logs").mkdir()
+    assert invoke("simulate", "--duration", 0.5, "--sample-time", 2e-3, "--out", tmp_path / "run.csv")[0] == 0
+    heading, *rows = (tmp_path / "run.csv").read_text("utf-8").splitlines()
+    cells = [row.split(",") for row in rows]
+    coarse = [",".join([f"{float(one):.0f}", *more]) for one, *more in cells]
+    (logs / "A_1.csv").write_text("\n".join([heading, *coarse]), encoding="utf-8")
+    words = ("fleet", logs, "--pattern", "{actuator}_{date}.csv", "--out", tmp_path / "fleet", "--workers", 1)
+    code, _, said = invoke(*words)
+    assert (code, "--sample-time S takes the rows as evenly spaced" in " ".join(said.split())) == (2, True), said
+    code, _, said = invoke(*words, "--pages", 1, "--sample-time", 2e-3)
+    assert (code, "The actuator is past no limit." in said) == (0, True), said
+    assert len(list((tmp_path / "fleet" / "pages").iterdir())) == 1

@@ -287,7 +287,7 @@ def test_stamps_of_whole_seconds_are_read_with_the_sample_time_that_the_refusal_
     """The refusal named --sample-time, and the same refusal came again with it."""
     rows = (f"2026-11-29 10:00:0{k // 20},{k}.5,0.{k:03d}" for k in range(60))
     (tmp_path / "log.csv").write_text("\n".join(["time,motor_speed_rad_s,position_m", *rows]))
-    with pytest.raises(ClockError, match="`estimate --sample-time S` takes the rows as evenly spaced by S seconds"):
+    with pytest.raises(ClockError, match="--sample-time S takes the rows as evenly spaced by S seconds"):
         read_record(tmp_path / "log.csv")
     with pytest.warns(
         LogWarning,
