@@ -55,7 +55,9 @@ def scores_in_forces(fit: PointFit, told: Array, actuator: Actuator) -> Array:
         Log-likelihoods [dimensionless] up to a constant.
     """
     off, sizes = _in_forces(fit, actuator)
-    return np.array([_held(one, told, size[:, None] * WITHIN * size) for one, size in zip(off, sizes, strict=True)])
+    blurred, usual = (np.eye(len(told)) + within @ told for within in (_within(sizes), WITHIN))
+    volumes = np.linalg.slogdet(blurred)[1] - np.linalg.slogdet(usual)[1]  # a wide region counts less
+    return -0.5 * (np.einsum("ci,cij,cj->c", off, told @ np.linalg.inv(blurred), off) + volumes)
 
 
 def told_apart(spread: Array, actuator: Actuator) -> Array:
@@ -95,7 +97,7 @@ def apart_in_forces(fit: PointFit, spread: Array, actuator: Actuator) -> Array:
         Half the squared distance of their regions, each blurred by the log, in deviations [dimensionless].
     """
     off, sizes = _in_forces(fit, actuator)
-    within = sizes[:, :, None] * WITHIN * sizes[:, None, :]
+    within = _within(sizes)
     between = off[:, None] - off
     blurred = np.linalg.inv(0.5 * (within[:, None] + within) + spread)
     return np.asarray(0.5 * np.einsum("abi,abij,abj->ab", between, blurred, between), dtype=np.float64)
@@ -110,8 +112,6 @@ def _in_forces(fit: PointFit, actuator: Actuator) -> tuple[Array, Array]:
     return off, sizes
 
 
-def _held(off: Array, told: Array, within: Array) -> float:
-    """Return the log-likelihood of a region at an offset; a wide one counts less."""
-    blurred, usual = (np.eye(len(told)) + one @ told for one in (within, WITHIN))
-    volumes = float(np.linalg.slogdet(blurred)[1] - np.linalg.slogdet(usual)[1])
-    return -0.5 * float(off @ told @ np.linalg.inv(blurred) @ off) - 0.5 * volumes
+def _within(sizes: Array) -> Array:
+    """Return the covariance of each region with friction as forces, shape (9, 7, 7)."""
+    return sizes[:, :, None] * WITHIN * sizes[:, None, :]
