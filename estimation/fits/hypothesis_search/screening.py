@@ -13,7 +13,14 @@ from estimation.fits.hypotheses import DELIVERY, Hypothesis
 from estimation.fits.hypothesis_search.coarse_search import NEAR, SLIGHT, coarsened, unless_quiet
 from estimation.fits.hypothesis_search.explanation import Trial
 from estimation.fits.hypothesis_search.wide_log import usual_values
-from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed, freed_at_end, own_starts, worn_start
+from estimation.fits.hypothesis_search.wide_problem import (
+    flow_bounds,
+    freed,
+    freed_at_end,
+    misread_start,
+    own_starts,
+    worn_start,
+)
 
 SCREENING = 7
 """Evaluations of the model for a start [count]."""
@@ -55,8 +62,9 @@ def screen(
         worn = worn_start(log, {**absent, **start}) if together[-1] == DELIVERY else ()
         for (delays, problem), own in product(problems, (*begun, *worn)):
             guess = problem.model.theta({**absent, **start, **own})
-            ways.append(Way(problem.at_each, guess, flow_bounds(problem.model, [guess], log)))
-            of_way.append((place, delays, problem))
+            for begin in (guess, *misread_start(problem, guess, together[-1])):
+                ways.append(Way(problem.at_each, begin, flow_bounds(problem.model, [begin], log)))
+                of_way.append((place, delays, problem))
     tried: list[list[Trial]] = [[] for _ in starts]
 
     def after(way: int, point: Point) -> float:

@@ -86,6 +86,9 @@ FIRST_WIDTH = 0.02
 
 START_PRESSURE = "start_pressure"
 
+MISREAD = {"pressure_offset", "pressure_drift", "pressure_sides"}
+"""Parameters with which the pressure that is shown goes evenly."""
+
 LEVELS_TRIED = (0.0, 0.3, 0.8)
 """Levels over the accumulator's pressure with which both sides may begin, as shares of the most [fraction]."""
 
@@ -177,6 +180,34 @@ def worn_start(log: GreyBoxLog, plain: Mapping[str, float]) -> Sequence[Mapping[
     if lost <= LEAST_DELIVERY:
         return []
     return [{DELIVERY.free[0]: (1.0 - lost) * displacement, FLOW_BIAS: bias - lost * full}]
+
+
+def misread_start(problem: FreedProblem, guess: Array, one: Hypothesis) -> Sequence[Array]:
+    """Return a second start of the search for what a gauge reads wrong: as much of it as explains most beside a guess.
+
+    The model's pressure goes evenly with it, so that one evaluation tells. Step by step, valves that switch hold a
+    search up long before it comes to a drift of some bar.
+
+    Parameters
+    ----------
+    problem : FreedProblem
+        The problem.
+    guess : ndarray, shape (unknowns,)
+        First guess [dimensionless].
+    one : Hypothesis
+        What is asked.
+
+    Returns
+    -------
+    sequence of ndarray, shape (unknowns,)
+        One first guess, none where another hypothesis is asked [dimensionless].
+    """
+    if not set(one.free) <= MISREAD:
+        return []
+    point, begun = problem.at(guess), guess.copy()
+    places = [problem.model.unknowns.index(name) for name in one.free]
+    begun[places] -= np.linalg.lstsq(point.gram[np.ix_(places, places)], point.gradient[places])[0]
+    return [begun]
 
 
 def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]]:
