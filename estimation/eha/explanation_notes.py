@@ -20,6 +20,7 @@ from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOC
 from estimation.log_checks.clean import CleanLog
 from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import CROSSED, GROWTH, TURBULENT_AT
+from estimation.models.wrong_pressure import SETTLING, drifted
 from estimation.notes import RigCode
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
@@ -118,8 +119,11 @@ def _offset(found: Explanation, _: EhaParameters) -> Note:
 
 
 def _drift(found: Explanation, _: EhaParameters) -> Note:
-    value = found.values["pressure_drift"][0]
-    return RigCode.PRESSURE_DRIFTS.note(drift_pa=value, half_width_pa=_half_width(found, "pressure_drift"))
+    (first, _), (settling, _) = found.values["pressure_drift"], found.values.get(SETTLING, (0.0, 0.0))
+    gone = float(drifted(1.0, settling))
+    return RigCode.PRESSURE_DRIFTS.note(
+        drift_pa=first * gone, half_width_pa=_half_width(found, "pressure_drift") * gone
+    )
 
 
 def _sides(found: Explanation, _: EhaParameters) -> Note:
@@ -277,7 +281,7 @@ def set_right(log: CleanLog, found: Explanation) -> CleanLog:
         changed[POSITION] = record[POSITION] - zero + 0.5 * play * side
     elapsed = np.arange(len(record)) / len(record)
     late, drift = lateness(found, PRESSURE), value.get("pressure_drift", 0.0)
-    offset = value.get("pressure_offset", 0.0) + drift * elapsed
+    offset = value.get("pressure_offset", 0.0) + drift * drifted(elapsed, value.get(SETTLING, 0.0))
     if any(name in value for name in GROWTH):
         grown = leakage_over(found, elapsed)
         changed[LEAKAGE_COURSE] = grown / grown[-1]

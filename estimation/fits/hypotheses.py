@@ -13,6 +13,7 @@ from estimation.models.filtered_flow import FILTER_TIME
 from estimation.models.flow import STIFFNESS
 from estimation.models.inner_circuit import BEND
 from estimation.models.wide_flow import CROSSED, QUICKEST, QUICKNESS
+from estimation.models.wrong_pressure import MOST_SETTLING, SETTLING
 
 
 @dataclass(frozen=True)
@@ -131,7 +132,8 @@ MAKEUP_BENDS = Hypothesis("makeup_bends", (BEND,), ({BEND: 3e-5},), least=LEAST_
 """Wide open, a make-up valve is an orifice. Asked where a load pulls the piston faster than the pump feeds it."""
 
 OFFSET = Hypothesis("pressure_offset", ("pressure_offset",))
-PRESSURE_DRIFT = Hypothesis("pressure_drift", ("pressure_drift",))
+PRESSURE_DRIFT = Hypothesis("pressure_drift", ("pressure_drift",), at_end=(SETTLING,))
+"""A zero that warms up after the sensor is switched on drifts less and less."""
 
 PRESSURE_SIDES = Hypothesis("pressure_sides", ("pressure_sides",))
 """Two chamber gauges have a gain each, and one gauge of a difference may have two, one a direction. Asked by itself:
@@ -298,7 +300,8 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "speed_lag": (0.0, 0.05),
     "position_lag": (0.0, 0.05),
     "pressure_offset": (-1e7, 1e7),
-    "pressure_drift": (-1e7, 1e7),
+    "pressure_drift": (-1e8, 1e8),
+    SETTLING: (0.0, MOST_SETTLING),
     "pressure_sides": (-0.1, 0.1),
     "position_zero": (-1.0, 1.0),
     "position_play": (0.0, 2e-3),

@@ -4,7 +4,8 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-from estimation.models.wide_flow import WIDE_FLOW_FORM, misread, wide_rates
+from estimation.models.wide_flow import WIDE_FLOW_FORM, wide_rates
+from estimation.models.wrong_pressure import misread
 from plant.compiled.functions import Scalar
 
 FILTER_TIME = "filter_time"

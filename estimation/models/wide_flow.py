@@ -14,6 +14,7 @@ from estimation.models.flow import delivered_flow, leaked_flow, port_flows
 from estimation.models.flow_parameters import FlowParameters
 from estimation.models.greybox import GreyBoxModel
 from estimation.models.inner_circuit import BEND, USUAL_BEND, accumulator_rate, narrowed
+from estimation.models.wrong_pressure import SETTLING, misread
 from plant.compiled.functions import Scalar, maximum, minimum, sqrt, where
 from plant.components.check_valve import make_up_flow
 from plant.eha.circuit import chamber_volumes
@@ -55,7 +56,8 @@ class WideFlowParameters(FlowParameters):
     play_at_once: float = si(0.0, "1", "share of the play that is crossed at first", "fitted")
     play_sprung: float = si(0.0, "1", "half plays that the piston springs back as pressure is lost", "fitted")
     pressure_offset: float = si(0.0, "Pa", "offset of the differential pressure", "fitted")
-    pressure_drift: float = si(0.0, "Pa", "what that offset gains over the log, evenly", "fitted")
+    pressure_drift: float = si(0.0, "Pa", "what that offset gains over the log, at first", "fitted")
+    drift_settling: float = si(0.0, "1", "time constants within the log by which that drift settles", "fitted last")
     pressure_sides: float = si(0.0, "1", "half of what the gauge of side A reads more of a pressure than B's", "fitted")
     position_zero: float = si(0.0, "m", "encoder's reading in the middle position", "fitted")
     start_pressure: float = si(0.0, "Pa", "differential pressure before the first sample", "fitted")
@@ -146,27 +148,6 @@ def wide_rates(
     # how far the sensor is behind stays small where its lag is short, which a stiff step resolves
     lagging = rise - fall - (behind + misread((p1, p2), elapsed, p)) / (p.pressure_lag + SHORTEST_LAG)
     return rise, fall, lagging, accumulator_rate(into_1 + into_2, supply, p)
-
-
-def misread(pressures: tuple[Scalar, Scalar], elapsed: Scalar, p: SimpleNamespace) -> Scalar:
-    """Return what the pressure sensor reads too much, once it has settled [Pa].
-
-    Parameters
-    ----------
-    pressures : tuple of float or Expression
-        Of the chambers, absolute [Pa].
-    elapsed : float
-        Share of the log that has gone [fraction].
-    p : SimpleNamespace
-        The form's parameters [SI].
-
-    Returns
-    -------
-    float
-        Pressure [Pa].
-    """
-    above = pressures[0] + pressures[1] - 2.0 * p.accumulator_pressure
-    return p.pressure_offset + p.pressure_drift * elapsed + p.pressure_sides * above
 
 
 def _sides(courses: Any, p: SimpleNamespace) -> tuple[Scalar, Scalar]:
@@ -321,7 +302,7 @@ LINEAR = {
     "speed_lead": 1e-5,
     **dict.fromkeys(("pressure_lag", "speed_lag", "position_lag"), 1e-3),
     "position_play": 1e-5,
-    **dict.fromkeys((*CROSSED, *GROWTH, "leakage_before", "pump_compression", "pilot_share"), 1.0),
+    **dict.fromkeys((*CROSSED, *GROWTH, "leakage_before", "pump_compression", "pilot_share", SETTLING), 1.0),
     "pressure_sides": 0.01,
     **dict.fromkeys(("pressure_offset", "pressure_drift", "start_level", "crack_pressure", "crack_difference"), 1e4),
     "position_zero": 1e-2,

@@ -1,0 +1,58 @@
+"""`misread(pressures, elapsed, p)`: what a pressure sensor reads too much, once it has settled."""
+
+from types import SimpleNamespace
+from typing import Any
+
+from plant.compiled.functions import Scalar
+
+SETTLING = "drift_settling"
+"""Parameter that says how far an offset that drifts settles within the log."""
+
+MOST_SETTLING = 12.0
+"""Most time constants within a log with which an offset is sought to settle [1]: `drifted` is within 0.002 there."""
+
+
+def misread(pressures: tuple[Scalar, Scalar], elapsed: Scalar, p: SimpleNamespace) -> Scalar:
+    """Return what the pressure sensor reads too much, once it has settled [Pa].
+
+    Parameters
+    ----------
+    pressures : tuple of float or Expression
+        Of the chambers, absolute [Pa].
+    elapsed : float
+        Share of the log that has gone [fraction].
+    p : SimpleNamespace
+        The wide flow form's parameters [SI].
+
+    Returns
+    -------
+    float
+        Pressure [Pa].
+    """
+    above = pressures[0] + pressures[1] - 2.0 * p.accumulator_pressure
+    return p.pressure_offset + p.pressure_drift * drifted(elapsed, p.drift_settling) + p.pressure_sides * above
+
+
+def drifted(elapsed: Any, settling: Any) -> Any:
+    """Return how far an offset has drifted, over what it would over the log at its first rate.
+
+    A sensor that warms up after it is switched on settles by ``(1 - exp(-k x)) / k``; of 0 the drift is even. The
+    exponential is taken as the eighth power of ``u = (1 - k x / 16) / (1 + k x / 16)``, and ``1 - u^8`` is written as
+    a product, which has no gap at 0.
+
+    Parameters
+    ----------
+    elapsed : float, ndarray or Expression
+        Share of the log [fraction].
+    settling : float or Expression
+        k: time constants within the log [1].
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Dimensionless.
+    """
+    gone = settling * elapsed
+    root = (16.0 - gone) / (16.0 + gone)
+    squared = root * root
+    return 2.0 * elapsed / (16.0 + gone) * (1.0 + root) * (1.0 + squared) * (1.0 + squared * squared)
