@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.finding import NORMAL_95
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, concluded
 from estimation.fits.greybox.freed_problem import FreedProblem
@@ -190,7 +189,7 @@ def without_idle(log: GreyBoxLog, tried: Trial, worth: float) -> Trial:
     if len(tried.together) < 2 or not tried.fits:
         return tried
     for one in tried.together:
-        if _is_absent(one, tried):
+        if _is_absent(one, tried, (2.0 * worth) ** 0.5):
             rest = tuple(other for other in tried.together if other != one)
             values = {**tried.values, **{name: tried.rig[name] for name in one.free}}
             fewer = final_fit(log, replace(tried, together=rest, values=values), tried.cost + worth)
@@ -199,10 +198,10 @@ def without_idle(log: GreyBoxLog, tried: Trial, worth: float) -> Trial:
     return tried
 
 
-def _is_absent(one: Hypothesis, tried: Trial) -> bool:
-    """Return whether all that a hypothesis frees ended at its absence, as far as the log knows it."""
+def _is_absent(one: Hypothesis, tried: Trial, deviations: float) -> bool:
+    """Return whether all that a hypothesis frees ended within so many deviations of its absence."""
     std, delayed_too = tried.fit.std, len(one.delays) > 1 and one.late in tried.delays
-    near = (abs(tried.values[name] - tried.rig[name]) <= NORMAL_95 * std.get(name, 0.0) for name in one.free)
+    near = (abs(tried.values[name] - tried.rig[name]) <= deviations * std.get(name, 0.0) for name in one.free)
     return not delayed_too and all(near)
 
 
