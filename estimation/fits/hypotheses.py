@@ -300,7 +300,7 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "speed_lag": (0.0, 0.05),
     "position_lag": (0.0, 0.05),
     "pressure_offset": (-1e7, 1e7),
-    "pressure_drift": (-1e8, 1e8),
+    "pressure_drift": (-1e7, 1e7),
     SETTLING: (0.0, MOST_SETTLING),
     "pressure_sides": (-0.1, 0.1),
     "position_zero": (-1.0, 1.0),

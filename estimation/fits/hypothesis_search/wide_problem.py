@@ -9,6 +9,7 @@ from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import search_bounds
 from estimation.fits.greybox.ridge import Ridge
+from estimation.fits.greybox.side_by_side import LANES
 from estimation.fits.hypotheses import DELIVERY, LEAKAGE_TURBULENT, LEAST_DELIVERY, LIMITS, Hypothesis
 from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
 from estimation.fits.hypothesis_search.lost_flow import likeliest_entry, likeliest_step
@@ -88,6 +89,9 @@ START_PRESSURE = "start_pressure"
 
 MISREAD = {"pressure_offset", "pressure_drift", "pressure_sides"}
 """Parameters with which the pressure that is shown goes evenly."""
+
+SHARES = 0.7 ** np.arange(8)
+"""Of what slopes promise of these, how much is tried [fraction]: side by side as quick as once."""
 
 LEVELS_TRIED = (0.0, 0.3, 0.8)
 """Levels over the accumulator's pressure with which both sides may begin, as shares of the most [fraction]."""
@@ -183,10 +187,10 @@ def worn_start(log: GreyBoxLog, plain: Mapping[str, float]) -> Sequence[Mapping[
 
 
 def misread_start(problem: FreedProblem, guess: Array, one: Hypothesis) -> Sequence[Array]:
-    """Return a second start of the search for what a gauge reads wrong: as much of it as explains most beside a guess.
+    """Return a second start of the search for what a gauge reads wrong: so much of it as explains most beside a guess.
 
-    The model's pressure goes evenly with it, so that one evaluation tells. Step by step, valves that switch hold a
-    search up long before it comes to a drift of some bar.
+    The pressure that is shown goes evenly with it. Step by step, valves that switch hold a search up long before it
+    comes to a drift of some bar. What is far off counts less than its square, so that slopes promise too much.
 
     Parameters
     ----------
@@ -200,14 +204,16 @@ def misread_start(problem: FreedProblem, guess: Array, one: Hypothesis) -> Seque
     Returns
     -------
     sequence of ndarray, shape (unknowns,)
-        One first guess, none where another hypothesis is asked [dimensionless].
+        One first guess, none where another hypothesis is asked, or nothing of it explains more [dimensionless].
     """
     if not set(one.free) <= MISREAD:
         return []
-    point, begun = problem.at(guess), guess.copy()
+    point, step = problem.at(guess), np.zeros(len(guess))
     places = [problem.model.unknowns.index(name) for name in one.free]
-    begun[places] -= np.linalg.lstsq(point.gram[np.ix_(places, places)], point.gradient[places])[0]
-    return [begun]
+    step[places] = np.linalg.lstsq(point.gram[np.ix_(places, places)], point.gradient[places])[0]
+    begun = [guess - share * step for share in SHARES]
+    costs = problem.costs(begun, LANES)
+    return [begun[int(np.argmin(costs))]] if np.min(costs) < point.cost else []
 
 
 def own_starts(log: GreyBoxLog, one: Hypothesis) -> Sequence[Mapping[str, float]]:

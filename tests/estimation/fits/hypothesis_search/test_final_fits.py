@@ -100,6 +100,7 @@ def test_valves_that_a_set_frees_itself_are_not_freed_again(monkeypatch: pytest.
     ("share", "cost", "alone"),
     [
         (1.02, 95.0, True),
+        (1.07, 95.0, True),  # its 3.5 deviations gain less than is asked of a hypothesis
         (1.02, 101.0, False),  # it is needed
         (80.0, 95.0, False),  # the valve is stuck
     ],
