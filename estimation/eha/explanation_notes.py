@@ -119,7 +119,7 @@ def _offset(found: Explanation, _: EhaParameters) -> Note:
 
 
 def _drift(found: Explanation, _: EhaParameters) -> Note:
-    first, (settling, *_) = found.values["pressure_drift"][0], found.values.get(SETTLING, (0.0, 0.0))
+    first, settling = (found.values.get(name, (0.0, 0.0))[0] for name in ("pressure_drift", SETTLING))
     gone = float(drifted(1.0, settling))
     return RigCode.PRESSURE_DRIFTS.note(
         drift_pa=first * gone, half_width_pa=_half_width(found, "pressure_drift") * gone
