@@ -19,6 +19,7 @@ from estimation.fits.hypothesis_search.wide_log import balanced_by, balances_mas
 from estimation.fits.hypothesis_search.wide_problem import flow_bounds, freed, freed_at_end
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import STIFFNESS
+from estimation.models.wrong_pressure import SETTLING
 from plant.arrays import Array
 
 FINISHING = 12
@@ -51,6 +52,9 @@ freed makes nothing surer. Of 58 logs two had 0.06 and 0.26, one of them 9 devia
 
 LITTLE = 1e-3
 """Share of the cost below which a gain tells nothing of what leaves far more than noise [fraction]; judged."""
+
+EVEN = 10.0
+"""Gain in log-likelihood below which a drift of pressure is even [dimensionless]: the worth of a hypothesis."""
 
 CLOSE = 60.0
 """Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""
@@ -98,6 +102,11 @@ def final_fit(log: GreyBoxLog, tried: Trial, useful: float = np.inf, *details: s
     count = [one for one in done if one[0].cost <= best.cost + ALIKE]
     first, *rivals = (_concluded(problem, one.point, log) for one, problem in count)
     sound = best.meant and not is_too_close(first, log.passes_on)
+    if SETTLING in last:  # an even drift is better known as one
+        even = tuple(replace(one, at_end=()) if one.at_end == (SETTLING,) else one for one in tried.together)
+        evenly = final_fit(log, replace(tried, together=even), best.cost + EVEN, *details)
+        if evenly.cost < best.cost + EVEN:
+            return replace(evenly, together=tried.together)
     if sound and all(one.told(best.values, first.std) for one in best.together):
         return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
     return replace(best, void=True, fits=(replace(first, cost=NEVER),))
