@@ -115,7 +115,7 @@ def _led(
     first = _searched(forms[0], log, afar, [guess], alone=True)
     others = _others(forms[1:], log, afar, first, alone=True)
     if _explains(first) or _explains(others[0]):
-        return [first, *others]
+        return _brought_near([first, *others], forms, log, afar)
     first = _searched(forms[0], log, afar, [*starts, first.values], screen=screen)
     return [first, *_others(forms[1:], log, afar, first)]
 
@@ -126,6 +126,24 @@ def _others(
     """Return the optima of other forms, searched from that of the first, as far as they may count beside it."""
     wanted = first.point.cost + RIVAL
     return each(lambda form: _searched(form, log, afar, [first.values], alone=alone, wanted=wanted), forms)
+
+
+def _brought_near(
+    rough: Sequence[RoughOptimum], forms: Sequence[GreyBoxModel], log: GreyBoxLog, afar: GreyBoxLog
+) -> list[RoughOptimum]:
+    """Return optima of which those far behind the second are searched from there too.
+
+    The first may end in a wrong valley, and the third with it, where the second leaves it and explains the log.
+    """
+    second = rough[1]
+    lost = [at for at, one in enumerate(rough) if one.point.cost > second.point.cost + RIVAL]
+    again = _others([forms[at] for at in lost], log, afar, second, alone=True)
+    nearer = dict(zip(lost, again, strict=True))
+    return [min(one, nearer.get(at, one), key=_cost) for at, one in enumerate(rough)]
+
+
+def _cost(one: RoughOptimum) -> float:
+    return one.point.cost
 
 
 def _explains(one: RoughOptimum) -> bool:
