@@ -6,7 +6,7 @@ sees a slow sensor, and finds the filter's lag as any other.
 
 import numpy as np
 
-from estimation.log_checks.channel_names import PRESSURE, PRESSURES, SPEED
+from estimation.log_checks.channel_names import PRESSURE, PRESSURES
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE
 from estimation.notes import SensorCode
 from plant.arrays import Array
@@ -36,12 +36,14 @@ correlation of 0.15 between neighbours shows in 20 s."""
 SLOWEST = 150.0
 """Rate below which no sensor is made slower [Hz]."""
 
-SLOW = 0.25
-"""Share of the windows in which the motor counts as slow, those of least speed [fraction]: a drive of steps has it a
-third as fast there as at most, so 15 teeth at 1500 rpm pass 125 times a second."""
+QUIET = 0.25
+"""Share of the windows that count as quiet, those of least power in the bands [fraction]: a drive of steps turns a
+third as fast in as many as at most, so 15 teeth at 1500 rpm pass 125 times a second."""
 
 NEARER = 0.5
-"""How far from white noise is at slow speed at most, over how far it is at all speeds [dimensionless]; judged."""
+"""How far from white noise is in quiet windows at most, over how far it is in all [dimensionless]; judged. To pick by
+power favours what is white: of 60 logs with averages of 2 or 4 rows at most one passes so, of 60 with a correlation of
+0.15 or a filter at 0.3 cycles/sample, 10 at most."""
 
 MOST_ROWS = 40
 """Rows over which noise may be alike [count]."""
@@ -70,8 +72,8 @@ def without_correlated_noise(record: Record, rings_at: float = 0.0) -> tuple[Rec
             continue
         if (independent_variance(record[name]) or 0.0) <= SMALLEST_VARIANCE[PRESSURE]:
             continue  # a simulation without noise, whose spectrum is the actuator's
-        if SPEED in record and is_white_when_slow(record[name], record[SPEED]):
-            continue  # the teeth of a pump that turns fast, and no filter: that one is there at any speed
+        if is_white_when_quiet(record[name]):
+            continue  # the teeth of a pump that turns fast, or a chirp, and no filter: that one is there at any time
         values = np.full(len(record), np.nan)
         values[::rows] = record[name][::rows]
         changed[name] = values
@@ -120,28 +122,25 @@ def is_white(values: Array) -> bool:
     return len(windows) < FEWEST_WINDOWS or flatness(windows) > _white(len(windows))
 
 
-def is_white_when_slow(values: Array, speed: Array) -> bool:
-    """Return whether the noise of a channel is white at low motor speed, but not over all speeds.
+def is_white_when_quiet(values: Array) -> bool:
+    """Return whether the noise of a channel is white where it is quietest, but not over the whole log.
 
-    A filter or an average is there at any speed. The teeth of a pump are slower than the bands while it turns slowly.
+    A filter or an average is there at any time. What the actuator does is not: the teeth of a pump are slower than the
+    bands while it turns slowly, a loop rests between moves, a chirp is slow for a while.
     A few windows show a filter less surely than all do, so they must also be nearer to white by `NEARER`.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
         The channel [any unit]; NaN where missing.
-    speed : ndarray, shape (n,)
-        Speed of the motor [rad/s]; NaN where missing.
     """
-    turned, windows = np.mean(_cut(np.abs(speed)), axis=1), _cut(values)
-    there = np.isfinite(turned) & np.isfinite(windows).all(axis=1)
-    if not np.any(there):
+    windows = _windows(values)
+    if len(windows) * QUIET < FEWEST_WINDOWS:
         return False
-    slow = windows[there & (turned <= np.quantile(turned[there], SLOW))]
-    if len(slow) < FEWEST_WINDOWS:
-        return False
-    found = flatness(slow)
-    return found > _white(len(slow)) and 1.0 - found < NEARER * (1.0 - flatness(windows[there]))
+    loud = np.sum(_spectra(windows)[:, np.arange(WINDOW // 2 + 1) >= BANDS[0] * WINDOW], axis=1)
+    quiet = windows[loud <= np.sort(loud)[int(QUIET * (len(loud) - 1))]]  # np.quantile imports numpy.ma
+    found = flatness(quiet)
+    return found > _white(len(quiet)) and 1.0 - found < NEARER * (1.0 - flatness(windows))
 
 
 def _white(windows: int) -> float:
@@ -208,12 +207,17 @@ def independent_variance(values: Array) -> float | None:
     return _powers(windows)[-1] / float(np.log(2.0) * np.sum(_TAPER**2))
 
 
-def _powers(windows: Array) -> list[float]:
-    """Return the usual power of windows in each of the bands [unit squared]."""
+def _spectra(windows: Array) -> Array:
+    """Return the power of windows without their straight lines, shape (windows, `WINDOW` / 2 + 1) [unit squared]."""
     line = np.linspace(-1.0, 1.0, WINDOW)
     level = windows - np.mean(windows, axis=1, keepdims=True)
     level -= np.outer(level @ line / (line @ line), line)
-    ordered = np.sort(np.abs(np.fft.rfft(level * _TAPER, axis=1)) ** 2, axis=0)
+    return np.abs(np.fft.rfft(level * _TAPER, axis=1)) ** 2
+
+
+def _powers(windows: Array) -> list[float]:
+    """Return the usual power of windows in each of the bands [unit squared]."""
+    ordered = np.sort(_spectra(windows), axis=0)
     power = 0.5 * (ordered[(len(windows) - 1) // 2] + ordered[len(windows) // 2])  # np.median imports numpy.ma
     place = np.searchsorted(BANDS, np.arange(len(power)) / WINDOW, side="right")
     return [float(np.mean(power[place == band])) for band in range(1, len(BANDS))]

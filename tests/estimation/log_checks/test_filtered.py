@@ -9,7 +9,7 @@ from estimation.log_checks.filtered import (
     flatness,
     independent_rows,
     is_white,
-    is_white_when_slow,
+    is_white_when_quiet,
     without_correlated_noise,
 )
 from estimation.notes import SensorCode
@@ -110,18 +110,24 @@ def test_the_teeth_of_a_fast_pump_are_no_filter_and_an_average_is_seen_beside_th
     assert note.code is SensorCode.FILTERED
 
 
-def test_noise_is_judged_where_the_motor_is_slow_and_not_where_little_is_there() -> None:
+def test_noise_is_judged_where_it_is_quiet_and_not_where_little_is_there() -> None:
     rng = np.random.default_rng(3)
-    white, speed = rng.normal(size=6400), np.repeat([9.0, 1.0, 5.0, 7.0], 1600)
-    alike, slowly = averaged(white, 3), speed == 1.0
-    assert is_white_when_slow(np.where(slowly, white, alike), speed)
-    assert is_white_when_slow(np.where(slowly, white, alike), -speed)
-    assert not is_white_when_slow(np.where(slowly, alike, white), speed)
-    assert not is_white_when_slow(alike, speed)
-    assert not is_white_when_slow(np.where(slowly, white, alike), np.full(6400, np.nan))
-    rising, few = np.arange(14.0 * WINDOW), slice(0, 14 * WINDOW)  # 27 windows, of which seven are slow
-    assert not is_white_when_slow(np.where(rising < 4 * WINDOW, white[few], alike[few]), rising)
-    assert not is_white_when_slow(white[: WINDOW - 1], speed[: WINDOW - 1])
+    white, struck = rng.normal(size=(2, 6400))
+    rests = np.repeat([False, True, False, False], 1600)
+    moved = np.where(rests, 0.0, 3.0 * averaged(struck, 3))
+    assert not is_white(white + moved)
+    assert is_white_when_quiet(white + moved)
+    assert not is_white_when_quiet(averaged(white, 3) + moved)
+    assert not is_white_when_quiet(averaged(white, 3))
+    few = slice(0, 14 * WINDOW)  # 27 windows, of which seven are quiet
+    assert not is_white_when_quiet((white + moved)[few])
+    assert not is_white_when_quiet(white[: WINDOW - 1])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_filter_is_seen_where_a_log_is_quiet_too(seed: int) -> None:
+    noise = np.random.default_rng(seed).normal(size=10_000)
+    assert not any(is_white_when_quiet(one) for one in (averaged(noise, 2), averaged(noise, 4), lagged(noise, 0.1)))
 
 
 def test_what_no_distance_makes_independent_is_left_as_it_is() -> None:
