@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.fits.flow.log import carried
+from estimation.fits.flow.pumped import pumped_evenly_at
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.models.flow import FLOW_FORM
 from plant.eha.model import EhaParameters
@@ -58,7 +59,7 @@ def swept_evenly(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str
 def with_first_fit(
     log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float], stiffest: float
 ) -> GreyBoxLog:
-    """Return a log as the flow form sees it once a first fit is known: the motor's noise that it keeps, even positions.
+    """Return a log as the flow form sees it once a first fit is known: noise of speed, even positions.
 
     Parameters
     ----------
@@ -71,4 +72,5 @@ def with_first_fit(
     stiffest : float
         As of `carried` [Pa].
     """
+    log = pumped_evenly_at(log, parameters, values["flow_bias"])
     return swept_evenly(carried(log, parameters, values, stiffest), parameters, values)

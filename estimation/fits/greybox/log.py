@@ -144,6 +144,8 @@ class GreyBoxLog:
         How many residuals of a longer log each one stands for, by `FreedProblem` [count].
     stiff : bool
         Whether model steps are implicit, as where a valve opens that fills a chamber in less time than a step takes.
+    sampled : tuple of (ndarray, float), optional
+        Motor speed of an averaged log before it was averaged, and its sample time [rad/s, s].
     """
 
     drives: Array
@@ -165,6 +167,7 @@ class GreyBoxLog:
     course: "IntersampleDoubt | None" = None
     stands_for: float = 1.0
     stiff: bool = False
+    sampled: tuple[Array, float] | None = None
 
     def beginning(self, samples: int) -> "GreyBoxLog":
         """Return the log's first part.
