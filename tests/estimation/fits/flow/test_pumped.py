@@ -1,11 +1,15 @@
 """Straight lines between means of a fast log pump what its samples do."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from estimation.arrays import Array
 from estimation.fits.flow.log import flow_log
+from estimation.fits.flow.pumped import pumped_evenly_at
 from estimation.fits.greybox.block_averages import block_means
+from estimation.fits.greybox.log import GreyBoxLog
 from plant.components.valves import pumped_flow
 from plant.eha.model import EhaParameters
 from plant.log.record import Record
@@ -17,13 +21,18 @@ def turning(time: Array) -> Array:
     return 60.0 * np.sin(2.0 * np.pi * 23.0 * time)
 
 
-def drives(sample_time: float) -> Array:
-    """Motor speed and position, as the flow form sees a piston at rest whose pressure sensor is noisy."""
+def seen(sample_time: float, parameters: EhaParameters = P) -> GreyBoxLog:
+    """A piston at rest whose pressure sensor is noisy, as the flow form sees it."""
     still = dict.fromkeys(("position_m", "differential_pressure_pa"), np.zeros(3000))
     record = Record(
         sample_time, {"motor_speed_rad_s": turning(sample_time * np.arange(3000, dtype=np.float64)), **still}
     )
-    return flow_log(record, P, {}, dict.fromkeys(record.channels, 1e10)).drives
+    return flow_log(record, parameters, {}, dict.fromkeys(record.channels, 1e10))
+
+
+def drives(sample_time: float) -> Array:
+    """Motor speed and position."""
+    return seen(sample_time).drives
 
 
 def pumped(speed: Array, sample_time: float, bias: float) -> Array:
@@ -43,5 +52,13 @@ def test_straight_lines_between_means_pump_and_sweep_what_the_motor_does(bias: f
     assert np.std(led) < left * np.std(straight)
 
 
+def test_a_flow_bias_that_a_fit_has_found_takes_the_place_of_the_rig_files() -> None:
+    biased = 6.0 * P.flow_bias
+    wanted = seen(SAMPLE, replace(P, flow_bias=biased)).drives
+    np.testing.assert_allclose(pumped_evenly_at(seen(SAMPLE), P, biased).drives, wanted, atol=1e-12)
+    assert np.std(wanted - seen(SAMPLE).drives) > 1e-8
+
+
 def test_a_log_that_is_not_averaged_is_what_it_was() -> None:
     assert np.all(drives(1e-3)[:, 1] == 0.0)
+    assert np.all(pumped_evenly_at(seen(1e-3), P, 6.0 * P.flow_bias).drives[:, 1] == 0.0)
