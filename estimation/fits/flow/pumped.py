@@ -3,7 +3,7 @@
 See decisions 343 and 430.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -46,7 +46,7 @@ def pumped_evenly(means: GreyBoxLog, log: GreyBoxLog, p: EhaParameters) -> GreyB
     return _led(replace(means, sampled=(sampled, log.sample_time)), p, ((1.0, p.flow_bias),))
 
 
-def pumped_evenly_at(means: GreyBoxLog, p: EhaParameters, flow_bias: float) -> GreyBoxLog:
+def pumped_evenly_at(means: GreyBoxLog, p: EhaParameters, values: Mapping[str, float]) -> GreyBoxLog:
     """Return means with positions led as a pump of another flow bias asks for than that of the rig file.
 
     A worn pump may have seven times the bias. Where its dead zone ends within a mean depends on it, and what is pumped
@@ -58,15 +58,15 @@ def pumped_evenly_at(means: GreyBoxLog, p: EhaParameters, flow_bias: float) -> G
         The log, as `pumped_evenly` returns it.
     p : EhaParameters
         The actuator.
-    flow_bias : float
-        As a first fit has found it [m^3/s].
+    values : Mapping[str, float]
+        What a first fit has found [SI].
 
     Returns
     -------
     GreyBoxLog
         The same one where the log was not averaged.
     """
-    return means if means.sampled is None else _led(means, p, ((1.0, flow_bias), (-1.0, p.flow_bias)))
+    return means if means.sampled is None else _led(means, p, ((1.0, values["flow_bias"]), (-1.0, p.flow_bias)))
 
 
 def _led(means: GreyBoxLog, p: EhaParameters, biases: Sequence[tuple[float, float]]) -> GreyBoxLog:

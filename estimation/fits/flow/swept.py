@@ -72,5 +72,5 @@ def with_first_fit(
     stiffest : float
         As of `carried` [Pa].
     """
-    log = pumped_evenly_at(log, parameters, values["flow_bias"])
+    log = pumped_evenly_at(log, parameters, values)
     return swept_evenly(carried(log, parameters, values, stiffest), parameters, values)

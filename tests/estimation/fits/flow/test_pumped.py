@@ -53,12 +53,12 @@ def test_straight_lines_between_means_pump_and_sweep_what_the_motor_does(bias: f
 
 
 def test_a_flow_bias_that_a_fit_has_found_takes_the_place_of_the_rig_files() -> None:
-    biased = 6.0 * P.flow_bias
-    wanted = seen(SAMPLE, replace(P, flow_bias=biased)).drives
-    np.testing.assert_allclose(pumped_evenly_at(seen(SAMPLE), P, biased).drives, wanted, atol=1e-12)
+    found = {"flow_bias": 6.0 * P.flow_bias}
+    wanted = seen(SAMPLE, replace(P, **found)).drives
+    np.testing.assert_allclose(pumped_evenly_at(seen(SAMPLE), P, found).drives, wanted, atol=1e-12)
     assert np.std(wanted - seen(SAMPLE).drives) > 1e-8
 
 
 def test_a_log_that_is_not_averaged_is_what_it_was() -> None:
     assert np.all(drives(1e-3)[:, 1] == 0.0)
-    assert np.all(pumped_evenly_at(seen(1e-3), P, 6.0 * P.flow_bias).drives[:, 1] == 0.0)
+    assert np.all(pumped_evenly_at(seen(1e-3), P, {"flow_bias": 6.0 * P.flow_bias}).drives[:, 1] == 0.0)
