@@ -275,16 +275,9 @@ OFFENDERS = {
     "returns": ('def f() -> float:\n    """F.\n\n    More.\n    """', "under Returns what its float is"),
 }
 
-DESCRIBED = '''
-def f({signature}):
-    """F.
-
-    Parameters
-    ----------
-    {entry}
-        {description}
-    """
-'''
+DESCRIBED = (
+    'def f({signature}):\n    """F.\n\n    Parameters\n    ----------\n    {entry}\n        {description}\n    """\n'
+)
 
 
 @pytest.mark.parametrize(("text", "problem"), OFFENDERS.values(), ids=OFFENDERS)

@@ -39,6 +39,11 @@ def compare_logs(
 ) -> None:
     """Diagnose two logs, and print their quantities with the differences.
 
+    Parameters
+    ----------
+    sample_time : float or None
+        Time between rows, in place of the logs' own times [s].
+
     Raises
     ------
     HydrostateError

@@ -124,7 +124,6 @@ def slips_of_units() -> dict[str, Any]:
         "of a length, from": edge(lambda size: near(size, LENGTHS), 5.0, 10.0),
         "of a length, to": edge(lambda size: near(size, LENGTHS), 10.0, 20.0),
         "of lengths": [near(1.02 * size, LENGTHS) for size in (10.0, 100.0, 1e3, 1e6, 0.1, 0.01, 1e-3, 1e-6, 1.0)],
-        "the other way": [channel_physics._inverse(size) for size in LENGTHS],  # pyright: ignore[reportPrivateUsage]
         "of what is wide": near(3.0, LENGTHS, 0.1, 10.0),
         "the names": [TURNS[near(0.1, TURNS) or 0.0], TURNS[near(9.6, TURNS) or 0.0]],
     }

@@ -13,7 +13,7 @@ from faults.diagnosis.changes.split import likeliest_split
 from faults.diagnosis.circuits import class_fit, out_of_model
 from faults.diagnosis.circuits.class_fit import _at, _step, fit_freely
 from faults.diagnosis.circuits.class_regions import fit_classes
-from faults.diagnosis.circuits.out_of_model import _bias, _biases, _larger_pump, _least, _nearest_severity, _one_step
+from faults.diagnosis.circuits.out_of_model import _bias, _biases, _least, _nearest_severity, _one_step
 from plant.arrays import Array
 from plant.log.record import Record
 from tests.faults.diagnosis.short_logs import ACTUATOR, OFF, blocks, classes, log, made_classes, noted
@@ -88,7 +88,6 @@ def one_step_of_a_bias() -> dict[str, Any]:
     told["in part"] = {of: list(pair) for of, pair in _one_step(part, fit, 0.1, ACTUATOR, SIZES).items()}
     told["least that matters"] = {of: [_least(of, error, SIZES) for error in (0.0, SIZES[of])] for of in SIZES}
     told["told as"] = noted([_bias(of, 0.2) for of in SIZES])
-    told["larger pump [m^3/rad]"] = _larger_pump(ACTUATOR.circuit).pump_displacement
     return told
 
 

@@ -330,3 +330,13 @@ def test_blanks_between_columns_are_read_and_a_short_row_is_refused(tmp_path: Pa
     path.write_text("\n".join(["time_s   motor_speed_rpm  position_mm", *rows[:15], "0.015  3", *rows[16:]]) + "\n")
     with pytest.raises(LogError, match="row 16"):
         read_record(path)
+
+
+def test_where_an_object_lies_in_memory_is_not_told_of_a_damaged_file(tmp_path: Path) -> None:
+    np.save(tmp_path / "run.npy", np.zeros(20, [(one, float) for one in ("time_s", "motor_speed_rad_s", "position_m")]))
+    content = (tmp_path / "run.npy").read_bytes().replace(b"'fortran_order': False", b"'fortran_order': Falke")
+    (tmp_path / "run.npy").write_bytes(content)
+    with pytest.raises(LogError) as caught:
+        read_record(tmp_path / "run.npy")
+    assert "malformed" in str(caught.value)
+    assert "0x" not in str(caught.value)
