@@ -144,7 +144,7 @@ class GreyBoxLog:
         How many residuals of a longer log each one stands for, by `FreedProblem` [count].
     stiff : bool
         Whether model steps are implicit, as where a valve opens that fills a chamber in less time than a step takes.
-    sampled : tuple of (ndarray, float), optional
+    sampled : tuple of (ndarray, shape (samples,), and float), optional
         Motor speed of an averaged log before it was averaged, and its sample time [rad/s, s].
     """
 
