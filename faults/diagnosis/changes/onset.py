@@ -146,7 +146,8 @@ def _last_of(window: Record, actuator: Actuator) -> LastPart:
     if drift is not None and (two is None or drift.gain > two.gain):
         return LastPart(window, window, blocks, fits, None, drift=drift)
     against = () if two is None else softened(two)
-    found = None if two is None or against else find_onset(blocks, two, actuator)
+    drifts = blocks.pressure is None and blocks.course is not None  # which explained more than a change did
+    found = None if two is None or against or drifts else find_onset(blocks, two, actuator)
     if found is None:
         return LastPart(window, window, blocks, fits, None, against)
     onset, blocks, fits = found

@@ -10,6 +10,7 @@ from scipy.special import chdtri
 
 from benchmarks.diagnosis.population import TEST, draw_logs
 from benchmarks.watching.watching import CircuitStream
+from estimation.eha.explanation_notes import LEAKAGE_COURSE
 from estimation.log_checks.clean import clean_log
 from experiments.open_benchmark.kinds import make
 from faults.conditions import CONDITIONS, parameters_for
@@ -90,6 +91,14 @@ def test_a_log_is_judged_from_where_its_condition_changed(condition: str, *, pre
     assert found.blocks.earlier[0] * found.blocks.sample_time == pytest.approx(2.2, abs=0.02)
     assert np.flatnonzero(np.isfinite(found.blocks.velocity))[0] == pytest.approx(220, abs=2)
     assert list(CONDITIONS)[int(np.argmax(found.fits.scores))] == condition
+
+
+def test_without_pressure_a_log_whose_leakage_drifts_is_not_asked_for_a_change_again() -> None:
+    record = short_log("major_leakage")
+    course = np.exp(0.01 * np.linspace(-1.0, 0.0, len(record)))
+    drifts = record.replace(**{LEAKAGE_COURSE: course})
+    assert last_part(drifts, ACTUATOR).onset is not None, "the balance of flows told the drift"
+    assert last_part(drifts.replace(differential_pressure_pa=None), ACTUATOR).onset is None
 
 
 def test_without_pressure_oil_that_softens_within_a_log_is_in_no_condition() -> None:
