@@ -294,7 +294,7 @@ def _fitted(ended: list[Ended], *, sparing: bool = False) -> tuple[list[GreyBoxF
     told = best.cost < explained(whole) and not disagree([bulk_modulus(whole, best), *others])
     if told and not hopeful:
         best = descend(whole.at, best.theta, FINISHING, bounds)
-    if told and (finer := without_chatter(whole, best.theta)) is not whole:
+    if told and not spared and (finer := without_chatter(whole, best.theta)) is not whole:
         whole, best = finer, descend(finer.at, best.theta, RETURNING, bounds)
         told = best.cost < explained(whole) and not disagree([bulk_modulus(whole, best), *others])
     return [concluded(whole, best), *_rival(second, whole, best, told=told)], others, spared
