@@ -73,10 +73,15 @@ def test_what_bulk_modulus_was_on_the_way_stands_for_the_scales_that_are_spared(
     sparing: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ends: list[list[float]] = []
+    followed: list[Any] = []
 
     def noted(moduli: list[float]) -> bool:
         ends.append(moduli)
         return False
+
+    def shortened(problem: Any, _: Any) -> Any:
+        followed.append(problem)
+        return problem
 
     monkeypatch.setattr(motion_fit, "explained", lambda _: 1.0)
     monkeypatch.setattr(motion_fit, "far_too_weak", lambda *_: True)
@@ -86,9 +91,10 @@ def test_what_bulk_modulus_was_on_the_way_stands_for_the_scales_that_are_spared(
     monkeypatch.setattr(motion_fit, "concluded", lambda *_: "concluded")
     monkeypatch.setattr(motion_fit, "_rival", lambda *_, **__: [])
     monkeypatch.setattr(motion_fit, "disagree", noted)
-    monkeypatch.setattr(motion_fit, "without_chatter", lambda problem, _: problem)
+    monkeypatch.setattr(motion_fit, "without_chatter", shortened)
     search: Any = SimpleNamespace(part=problem_of(10), whole=problem_of(10), bounds=None)
     ended = [Ended(search, at(0.5), explains=True)] * 2
     others = [2e8] if sparing else [3e8]
     assert motion_fit._fitted(ended, sparing=sparing) == (["concluded"], others, sparing)
     assert ends == [[2e8, *others]] * 2
+    assert bool(followed) is not sparing, "what is hardly believed is not followed in shorter steps"
