@@ -42,8 +42,8 @@ def pumped_evenly(means: GreyBoxLog, log: GreyBoxLog, p: EhaParameters) -> GreyB
     """
     if means is log:
         return means
-    sampled = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
-    return _led(replace(means, sampled=(sampled, log.sample_time)), p, ((1.0, p.flow_bias),))
+    sampled = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")], log.sample_time
+    return _led(replace(means, sampled=sampled), sampled, p, ((1.0, p.flow_bias),))
 
 
 def pumped_evenly_at(means: GreyBoxLog, p: EhaParameters, values: Mapping[str, float]) -> GreyBoxLog:
@@ -66,14 +66,16 @@ def pumped_evenly_at(means: GreyBoxLog, p: EhaParameters, values: Mapping[str, f
     GreyBoxLog
         The same one where the log was not averaged.
     """
-    return means if means.sampled is None else _led(means, p, ((1.0, values["flow_bias"]), (-1.0, p.flow_bias)))
-
-
-def _led(means: GreyBoxLog, p: EhaParameters, biases: Sequence[tuple[float, float]]) -> GreyBoxLog:
-    """Return means with positions led by what lines pump beyond the samples, added over flow biases times factors."""
     if means.sampled is None:
         return means
-    sampled, sample_time = means.sampled
+    return _led(means, means.sampled, p, ((1.0, values["flow_bias"]), (-1.0, p.flow_bias)))
+
+
+def _led(
+    means: GreyBoxLog, samples: tuple[Array, float], p: EhaParameters, biases: Sequence[tuple[float, float]]
+) -> GreyBoxLog:
+    """Return means with positions led by what lines pump beyond the samples, added over flow biases times factors."""
+    sampled, sample_time = samples
     block = round(means.sample_time / sample_time)
     speed, position = (FLOW_FORM.drives.index(name) for name in FLOW_FORM.drives)
     every, turned = block * np.arange(len(means.drives)), sampled - means.speed_offset

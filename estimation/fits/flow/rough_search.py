@@ -139,11 +139,7 @@ def _brought_near(
     lost = [at for at, one in enumerate(rough) if one.point.cost > second.point.cost + RIVAL]
     again = _others([forms[at] for at in lost], log, afar, second, alone=True)
     nearer = dict(zip(lost, again, strict=True))
-    return [min(one, nearer.get(at, one), key=_cost) for at, one in enumerate(rough)]
-
-
-def _cost(one: RoughOptimum) -> float:
-    return one.point.cost
+    return [min(one, nearer.get(at, one), key=lambda found: found.point.cost) for at, one in enumerate(rough)]
 
 
 def _explains(one: RoughOptimum) -> bool:
