@@ -1,16 +1,16 @@
 """Pages of the worst logs of a batch study, to which its report leads."""
 
 from collections.abc import Collection
-from pathlib import Path
 
 from experiments.actuators import kind_of_rig, offered
 from experiments.batch.cases import Plan
 from experiments.batch.folder import Folder
+from experiments.batch.logs_listed import read_listed
 from experiments.batch.part_store import PartStore
 from experiments.batch.series import Log
 from experiments.batch.standing import READ, standing_of
 from experiments.command.log_verb import page_of
-from experiments.command.logs import caught, read_log
+from experiments.command.logs import caught
 from experiments.fleet.log_pages import file_name
 from experiments.running.refusal import refused
 from plant.errors import HydrostateError
@@ -53,13 +53,7 @@ def write_log_pages(plan: Plan, store: PartStore, most: int) -> list[str]:
         options = {**chosen.options, "seed": 0} | ({} if work.pressure else {"no_pressure": True})
         try:
             with caught():
-                record = read_log(
-                    Path(series.path),
-                    rig.columns,
-                    dict(series.columns),
-                    kind.required,
-                    sample_time=series.sample_time_s,
-                )
+                record = read_listed(series, rig, kind.required)
                 found = chosen.run(record, *chosen.prepare(rig, options))
             result = {**chosen.blank, "file": one.file, "rig": rig.name, **chosen.entries(found)}
             page = page_of(chosen, result, found, record).encode()

@@ -9,8 +9,10 @@ from typing import Any, NamedTuple
 from experiments.batch.log_files import matching
 from experiments.batch.series import Log, content_of
 from experiments.batch.study_file import Logs, StudyError
+from experiments.command.logs import read_log
 from experiments.command.visible_text import spelt
 from plant.eha.rig import Rig
+from plant.log.record import Record
 
 
 class Listed(NamedTuple):
@@ -102,3 +104,19 @@ def nearest_folder(file: str, folders: Collection[str]) -> str:
     ('a/b', '')
     """
     return max((one for one in folders if file.startswith(f"{one.rstrip('/')}/")), key=len, default="")
+
+
+def read_listed(log: Log, rig: Rig[Any], required: Collection[str]) -> Record:
+    """Return the run that a listed log holds, as its study says that it is read.
+
+    Parameters
+    ----------
+    required : collection of str
+        Channels that the actuator's kind needs.
+
+    Raises
+    ------
+    LogError
+        If it is no log, or lacks a channel.
+    """
+    return read_log(Path(log.path), rig.columns, dict(log.columns), required, sample_time=log.sample_time_s)

@@ -33,10 +33,11 @@ from experiments.actuators import DEFAULT, kind_of_rig
 from experiments.batch.cases import Task
 from experiments.batch.diagnosis import diagnosed
 from experiments.batch.lanes import Lanes, Waiting, write_filtered
+from experiments.batch.logs_listed import read_listed
 from experiments.batch.other_actuators import found_of, simulated_run
 from experiments.batch.rows import NIS, TRUTH, Failure, Row, Rows, error_percent
 from experiments.batch.series import Log, Series, Simulated, Work, content_of
-from experiments.command.logs import caught, read_log
+from experiments.command.logs import caught
 from experiments.command.visible_text import spelt
 from experiments.eha.entries import estimate_message
 from experiments.running.random_streams import stream
@@ -182,9 +183,7 @@ def _prepared(series: Series, task: Task) -> _Prepared:
     other = None if kind.name == DEFAULT else kind
     if isinstance(series, Log):
         with _one_at_a_time, caught() as said:
-            record = read_log(
-                Path(series.path), rig.columns, dict(series.columns), kind.required, sample_time=series.sample_time_s
-            )
+            record = read_listed(series, rig, kind.required)
         if content_of(Path(series.path)) != series.content:
             raise LogError(f"{series.path}: was changed after the study began; run the same command again")
         known = record.metadata.get("condition")
