@@ -1,10 +1,10 @@
 """`presumed_stiffness(p, ...)`: what is known of the inner circuit's accumulator before a log is seen.
 
-The pressure that feeds the lower side of a piston rises and falls with the oil that chambers take and give back. How
-stiff it is depends on the accumulator's gas, which a rig file may state, with an uncertainty. A file that says nothing
-leaves what designers choose: some times the oil that comes and goes. Either is a belief, and the log may say better:
-the logarithm of the stiffness is normal before the log is seen. So what it leaves open is in the interval given the
-rig, and in the total one. See decision 389.
+The accumulator feeds the lower side of the piston. Its pressure rises and falls with the oil that the chambers take and
+return, and its stiffness depends on its gas. A rig file may state the gas, with an uncertainty. If it does not, the
+range that designers choose is assumed: a few times the oil that comes and goes. Both are priors: the logarithm of the
+stiffness is normally distributed before the log is seen, and the log may correct it. The uncertainty that remains is
+part of both intervals, the one given the rig and the total one. See decision 389.
 """
 
 import math
@@ -20,15 +20,15 @@ from plant.notes import Note
 GAS, CHARGE = "accumulator_gas", "accumulator_pressure"
 
 SLOWEST, QUICKEST = 1.0, 1.4
-"""Exponents of nitrogen that is compressed slowly, at its wall's temperature, and quickly [dimensionless]."""
+"""Polytropic exponents of nitrogen: slow (isothermal) and quick (adiabatic) compression [dimensionless]."""
 
 LEAST_GAS, MOST_GAS = 1.0, 100.0
-"""Gas of an accumulator, over the oil that it gives and takes [dimensionless]; judged. With as much as that it loses
-half of its pressure, and a designer gives it more; with the most its pressure stays as it is. Evenly likely between, in
-ratios."""
+"""Gas volume of an accumulator over the oil that it gives and takes [dimensionless]; judged. At the lower end the
+pressure falls by half, so designers choose more gas; at the upper end the pressure is constant. All ratios in between
+are equally likely on a logarithmic scale."""
 
 SOFT = 2.0
-"""Deviations below what is presumed at which searches begin [dimensionless]; judged, see decision 389."""
+"""Deviations below the presumed stiffness at which searches begin [dimensionless]; judged, see decision 389."""
 
 
 def oil_taken(p: EhaParameters) -> float:
@@ -42,8 +42,8 @@ def oil_taken(p: EhaParameters) -> float:
     Returns
     -------
     float
-        What both chambers take up from rest to relief pressure, half of what one holds at most, and what a single
-        rod displaces [m^3].
+        Oil that both chambers take up from rest to relief pressure, plus half of one chamber's largest volume, plus
+        what a single rod displaces [m^3].
     """
     compressed = p.chamber_volume * min(4.0 * p.relief_pressure / p.bulk_modulus, 1.0)
     swept = p.piston_area * p.stroke if p.stroke else 2.0 * p.chamber_volume
@@ -53,8 +53,8 @@ def oil_taken(p: EhaParameters) -> float:
 def presumed_stiffness(p: EhaParameters, uncertainties: Mapping[str, float]) -> dict[str, tuple[float, float]]:
     """Return what is known of the accumulator's stiffness before a log is seen.
 
-    ``n p / V`` for gas of volume ``V`` at the pressure ``p``. Its exponent lies anywhere between those of slow and
-    quick compression.
+    The stiffness is ``n p / V`` for gas of volume ``V`` at the pressure ``p``. The exponent ``n`` lies anywhere between
+    slow and quick compression.
 
     Parameters
     ----------
@@ -87,10 +87,10 @@ def _even(least: float, most: float) -> float:
 
 
 def first_stiffness(log: GreyBoxLog) -> float:
-    """Return the accumulator's stiffness from which searches begin: as soft as it may well be.
+    """Return the accumulator's stiffness from which searches begin: the soft end of what is presumed.
 
-    What is strange is sought with it held where no plain form has found it, and a rod that the file does not know
-    displaces oil to which an accumulator of the usual size would be too stiff.
+    Searches for unusual effects hold the stiffness at this value if no plain fit has found one. A rod that the rig file
+    does not mention displaces so much oil that an accumulator of the usual stiffness would not fit it.
 
     Parameters
     ----------
@@ -107,20 +107,20 @@ def first_stiffness(log: GreyBoxLog) -> float:
 
 
 FAR_STIFFER = 2.0
-"""Deviations over what is presumed from which an accumulator has taken up something else [dimensionless]."""
+"""Deviations above the presumed stiffness from which the accumulator has absorbed another effect [dimensionless]."""
 
 
 def is_far_stiffer(log: GreyBoxLog, values: Mapping[str, float]) -> bool:
-    """Return whether a fit's accumulator is so much stiffer than presumed that it has taken up something else.
+    """Return whether a fit's accumulator is so much stiffer than presumed that it has absorbed another effect.
 
-    The level that it holds follows the piston, as do the volumes of an encoder that was homed elsewhere.
+    Its pressure then follows the piston, as do the chamber volumes of an encoder with another zero.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, with what is presumed.
     values : Mapping[str, float]
-        The fit's [SI].
+        Parameters of the fit [SI].
     """
     if STIFFNESS not in values or values[STIFFNESS] <= 0.0 or STIFFNESS not in log.presumed:
         return False
@@ -129,14 +129,14 @@ def is_far_stiffer(log: GreyBoxLog, values: Mapping[str, float]) -> bool:
 
 
 CONTRADICTS = 3.0
-"""Deviations of what a log may move a stated accumulator by, from which it contradicts the rig file [dimensionless]."""
+"""Deviations by which a log must move a stated accumulator before it contradicts the rig file [dimensionless]."""
 
 
 def gas_contradicted(log: GreyBoxLog, fit: GreyBoxFit, p: EhaParameters) -> tuple[Note, ...]:
-    """Return a note where a log contradicts the accumulator that a rig file states.
+    """Return a note if a log contradicts the accumulator that a rig file states.
 
-    A log that tells nothing leaves the stiffness where it is presumed. What it moves it by has the variance that was
-    presumed less the one that is left, if the file is right; its charge is doubted too.
+    A log without information leaves the stiffness at its prior value. If the file is right, the shift from the prior
+    has the prior variance less the posterior variance. The precharge is uncertain too.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def gas_contradicted(log: GreyBoxLog, fit: GreyBoxFit, p: EhaParameters) -> tupl
     Returns
     -------
     tuple of Note
-        One at most; none where the file states no gas.
+        One at most; none if the file states no gas.
     """
     found = fit.values.get(STIFFNESS, 0.0)
     if p.accumulator_gas is None or found <= 0.0 or STIFFNESS not in log.presumed:

@@ -1,4 +1,4 @@
-"""`agreed(straight, read)`: what is strange about a slow log, by straight lines between samples and with turns read."""
+"""`agreed(straight, read)`: effects in a slow log that hold for straight lines and for turns read from the log."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -12,20 +12,20 @@ from plant.notes import Note
 
 
 class Answered(NamedTuple):
-    """What a log says, asked what is strange about it.
+    """What a fit of a log says, after the search for unusual effects.
 
     Parameters
     ----------
     plain : PlainFits
         The plain form's fits.
     asked : sequence of Hypothesis
-        What it was asked.
+        The hypotheses that were tested.
     open_ends : sequence of Note
-        What it leaves open.
+        What the log leaves undecided.
     strange : Explanation, optional
-        What is strange about it, if it is believed rather than the plain form.
+        The effect that explains the log, if it is believed rather than the plain form.
     ended : bool
-        Whether the search for it was ended before it was done, see `estimation.fits.greybox.work_limit`.
+        Whether the search was stopped early, see `estimation.fits.greybox.work_limit`.
     """
 
     plain: PlainFits
@@ -36,12 +36,12 @@ class Answered(NamedTuple):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of what is strange."""
+        """Names of the effects found."""
         return () if self.strange is None else self.strange.names
 
 
 def wanted_of(plain: PlainFits, left: float = 1.0) -> float:
-    """Return what a hypothesis must gain: at each turn of a slow log, unless it must gain with turns read as well.
+    """Return the gain that a hypothesis must reach: at each turn of a slow log, unless turns are read as well.
 
     Parameters
     ----------
@@ -59,19 +59,19 @@ def wanted_of(plain: PlainFits, left: float = 1.0) -> float:
 
 
 def agreed(straight: Answered, read: Answered) -> Answered:
-    """Return what a slow log says, asked by straight lines between samples and with its turns read.
+    """Return what a slow log says, from fits with straight lines between samples and with turns read from the log.
 
-    What straight lines leave of a turn may pass for a pump that compresses its oil or a pressure that drifts. So
-    nothing is strange, or left open, that is not with turns read too, and what shows there alone must gain at each
-    turn. Where both ways agree, straight lines have the numbers: their intervals hold what they leave, those of turns
-    that were read are too narrow for leakage (decision 332).
+    The error of straight lines at a turn may look like oil that the pump compresses, or like a drift of pressure. So an
+    effect counts, or is left undecided, only if it also shows with turns read; and one that shows only there must gain
+    at each turn. If both fits agree, the numbers are those of straight lines: their intervals include the error of the
+    lines, while intervals with turns read are too narrow for leakage (decision 332).
 
     Parameters
     ----------
     straight : Answered
-        By straight lines.
+        From straight lines.
     read : Answered
-        With what each turn pumps read off the samples after it, see `with_turns_read`.
+        With the volume pumped in each turn read from the samples after it, see `with_turns_read`.
     """
     if read.ended:
         return straight._replace(strange=None, ended=True)
@@ -86,14 +86,14 @@ def agreed(straight: Answered, read: Answered) -> Answered:
 
 
 def _plain(straight: Answered, read: Answered) -> Answered:
-    """Return what straight lines say of a log that has nothing strange: open is what both leave open."""
+    """Return what straight lines say of a log without unusual effects; undecided is what both fits leave undecided."""
     open_too = {note.code for note in straight.open_ends}
     ends = tuple(note for note in read.open_ends if note.code in open_too)
     return straight._replace(strange=None, open_ends=ends)
 
 
 def _gains_at_each_turn(answer: Answered) -> bool:
-    """Return whether what is strange gains `WORTH` over the plain form at each turn."""
+    """Return whether the effect gains `WORTH` over the plain form at each turn."""
     if answer.strange is None:
         return False
     gain = answer.plain.best.cost - answer.strange.fit.cost

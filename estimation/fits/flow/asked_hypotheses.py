@@ -44,34 +44,36 @@ from plant.eha.model import EhaParameters
 from plant.notes import Note
 
 ZERO_WORTH = 30.0
-"""Gain in log-likelihood that the slopes must promise before a log that the plain form explains is asked for its
-encoder's zero [dimensionless]. They promise 100 at least where one is off by 60 mm or more, 2.5 at most on logs of 30
-other kinds, and 14 on one of a play, which a zero would explain wrongly."""
+"""Gain in log-likelihood that slopes must promise before an encoder's zero is tested in a log that the plain form
+explains [dimensionless]. They promise at least 100 if the zero is off by 60 mm or more. They promise at most 2.5 in
+logs of 30 other kinds, and 14 in a log with encoder play, which a zero would explain wrongly."""
 
 FARTHEST_LEAD = 0.99
-"""Lead of the motor on the line between samples from which its speed may lag instead [sample times]: one is most. The
-other way, which slow logs may have, the pressure may be late: 2.5 ms at 500 Hz put bulk modulus 5.6 % too high."""
+"""Lead of the motor on the line between samples, from which the speed may lag instead [sample times]: the lead is at
+most one sample time. A lead the other way, which slow logs may have, may be a late pressure: 2.5 ms at 500 Hz put bulk
+modulus 5.6 % too high."""
 
 TOO_WIDE = 20.0
-"""Conductance of make-up valves over the first guess from which a search begins with the guess too [dimensionless]."""
+"""Conductance of make-up valves over its first guess, from which a search also begins at the guess [dimensionless]."""
 
 WIDEST = 0.9
-"""Conductance of make-up valves over the most that model steps resolve, from which a log is asked all that is strange
-though the plain form explains it [fraction]. Of 48 sound logs it is 0.42 at most, 0.09 where oil is not stiff. A
-pressure that lags by 2 ms went into valves as wide as could be, bulk modulus 1 % too low at 1.07 times the noise."""
+"""Conductance of make-up valves over the largest that model steps resolve, from which all effects are tested though the
+plain form explains the log [fraction]. In 48 sound logs it is at most 0.42, and 0.09 if the oil is not stiff. A
+pressure that lagged by 2 ms was fitted by valves at the limit, with bulk modulus 1 % too low and residuals of 1.07
+times the noise."""
 
 ALWAYS_ASKED = (DELIVERY, ENCODER_ZERO, *MAY_HIDE)
-"""What a log that the plain form explains is asked all the same, where the slopes promise a gain: each may hide."""
+"""Effects that are tested even if the plain form explains the log, where slopes promise a gain: each may be hidden."""
 
 LEAST_ZERO, LEAST_SHIFT = 5e-3, 3.6e-3
-"""Least reading of the encoder in the middle position that is sought [m], and the same over a chamber's length there,
-where that is less [fraction]: 5 mm change a chamber of the paper's actuator by 0.35 %, one of a drone's by a tenth."""
+"""Smallest encoder zero that is searched for [m], and the same over the length of a chamber in mid-stroke, if that is
+smaller [fraction]. 5 mm change a chamber of the paper's actuator by 0.35 %, and one of a drone's by a tenth."""
 
 ZERO_SIZE = LINEAR[ENCODER_ZERO.free[0]]
-"""Size in which slopes promise it [m]."""
+"""Size of an encoder zero for which slopes predict the gain [m]."""
 
 MOST_ASKED = 70_000
-"""A longer log is not asked what is strange about it: the answer takes minutes [samples]."""
+"""Length of a log from which no effects are tested, since that would take minutes [samples]."""
 
 
 def hypotheses_asked(
@@ -87,7 +89,7 @@ def hypotheses_asked(
 ) -> tuple[tuple[Hypothesis, ...], tuple[Note, ...]]:
     """Return the hypotheses to test on a log, given its best fits with varying and with held volumes.
 
-    Held volumes may explain a log whose encoder was homed at a stop: it is asked all the same.
+    Held volumes may also fit a log whose encoder was homed at a stop, so such a log is tested all the same.
 
     Parameters
     ----------
@@ -96,15 +98,15 @@ def hypotheses_asked(
     parameters : EhaParameters
         The actuator.
     swinging, best : GreyBoxFit
-        Its likelier fit with volumes that swing, and its likeliest.
+        The best fit with varying volumes, and the best fit of all.
     sensed : ShownPlay
-        The play that two channels of motion show.
+        The play between two motion channels.
     loaded : bool
         Whether the log begins under load, and not at rest.
     moving : bool
         Whether the motor turns when it begins.
     worth : float, optional
-        Gain in log-likelihood that slopes must promise where the plain form explains the log [dimensionless].
+        Gain in log-likelihood that slopes must promise if the plain form explains the log [dimensionless].
 
     Returns
     -------
@@ -159,7 +161,9 @@ def hypotheses_asked(
 
 
 def at_widest(fit: GreyBoxFit, parameters: EhaParameters, log: GreyBoxLog) -> bool:
-    """Return whether the make-up valves of a plain fit are as wide as may be: no valve is, so they took something up.
+    """Return whether a plain fit's make-up valves are at their upper limit.
+
+    No real valve is so wide, so they absorbed another effect.
 
     Parameters
     ----------
@@ -175,7 +179,7 @@ def at_widest(fit: GreyBoxFit, parameters: EhaParameters, log: GreyBoxLog) -> bo
 
 
 def is_astray(log: GreyBoxLog, fit: GreyBoxFit, parameters: EhaParameters) -> bool:
-    """Return whether a plain fit took up what is strange, and so is at a wrong minimum though it explains its log.
+    """Return whether a plain fit absorbed another effect, and so ended in a wrong minimum though it explains its log.
 
     Parameters
     ----------
@@ -190,14 +194,14 @@ def is_astray(log: GreyBoxLog, fit: GreyBoxFit, parameters: EhaParameters) -> bo
 
 
 def asked_alone(plain: PlainFits, asked: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
-    """Return what is asked by itself after all else: gauges that differ, and a beginning in chambers shut in alike.
+    """Return the hypotheses that are tested after all others: unequal gauges, and equal pressure locked in at first.
 
     Parameters
     ----------
     plain : PlainFits
         Fits of the plain form.
     asked : sequence of Hypothesis
-        What the log is asked together: less than all is enough, and nothing is asked alone then.
+        The hypotheses that are tested together. If these are not all, nothing is tested alone.
     """
     if len(asked) < len(HYPOTHESES):
         return ()
@@ -206,24 +210,25 @@ def asked_alone(plain: PlainFits, asked: Sequence[Hypothesis]) -> tuple[Hypothes
 
 
 def _least_zero(p: EhaParameters) -> float:
-    """Return the least reading of an encoder in the middle position that is sought [m]."""
+    """Return the smallest encoder zero that is searched for [m]."""
     length = 2.0 * p.chamber_volume / p.piston_area
     return min(LEAST_ZERO, LEAST_SHIFT * length)
 
 
 def _late_valves(fit: GreyBoxFit) -> tuple[Hypothesis, ...]:
-    """Return what is asked of make-up valves that a plain fit has open late: slopes do not tell that one never does."""
+    """Return what is tested if make-up valves open late in a plain fit: slopes cannot tell that a valve never opens."""
     first, second = (fit.values.get(name, 0.0) for name in CRACKS)
     late, unlike = max(abs(first), abs(second)) > LARGE_CRACK, abs(first - second) > UNLIKE_CRACKS
     return (CHECKS_HIDDEN,) * late + (MAKEUP_HIDDEN,) * unlike
 
 
 def worth_in(log: GreyBoxLog, left: float = 1.0) -> float:
-    """Return what a hypothesis must gain: `WORTH` at each turn of a slow log.
+    """Return the gain that a hypothesis must reach: `WORTH` at each turn of a slow log.
 
-    The motor passes turns alike, and what straight lines leave of one they leave of all: what a hypothesis gains there
-    it gains once. What is strange is seen at each. Noise that is read off a slow log holds some of what the actuator
-    does; where a hypothesis leaves less, it must gain as much of what it leaves.
+    The motor passes all turns alike, so straight lines err alike in all of them: a hypothesis that repairs that error
+    gains at all turns at once. A real effect must be seen at each turn. The noise of a slow log is read from the log
+    and includes some of the actuator's motion; if a hypothesis leaves less than this noise, its gain counts in
+    proportion to what it leaves.
 
     Parameters
     ----------
@@ -241,10 +246,10 @@ def worth_in(log: GreyBoxLog, left: float = 1.0) -> float:
 
 
 def _possible(promises: Sequence[PredictedGain], fit: GreyBoxFit) -> Sequence[PredictedGain]:
-    """Return promises of what can be gained: none where one is of more than a fit leaves.
+    """Return the predicted gains; none if a prediction exceeds all that the fit leaves.
 
-    Slopes were then taken where a chamber that nothing feeds is below vapour pressure, as no oil can be; how far they
-    would move what is freed is as wrong.
+    Slopes were then taken where an unfed chamber of the model is below vapour pressure, which no oil can be. The
+    predicted shifts are just as wrong.
     """
     if max(one.gain for one in promises) > fit.cost:
         return [one._replace(gain=0.0, size=0.0) for one in promises]
@@ -259,16 +264,16 @@ def near_starts(
     in_motion: bool,
     astray: bool = False,
 ) -> Sequence[Mapping[str, float]]:
-    """Return the starts of the search for hypotheses: a fit that explains the log is at no wrong minimum.
+    """Return the starts of the search for hypotheses: only the fit, if it explains the log.
 
-    One that begins at rest may be where the log does not (``in_motion``): without make-up, which is then tried too.
-    So it is where make-up valves ended far wider than any, since the model is too rough there to find a way back, and
-    where the accumulator took up what is strange.
+    If the log does not begin at rest (``in_motion``), that fit may be in a wrong minimum without make-up flow, so the
+    other starts are tried too. They are also tried if make-up valves ended far too wide, where the model is too coarse
+    to find its way back, and if the accumulator absorbed another effect.
 
     Parameters
     ----------
     fit : GreyBoxFit
-        The plain form's.
+        The fit of the plain form.
     starts : sequence of Mapping[str, float]
         Where its search began [SI].
     explains : callable
@@ -276,7 +281,7 @@ def near_starts(
     in_motion : bool
         Whether the log begins under load, or while the motor turns.
     astray : bool, optional
-        Whether it is at a wrong minimum all the same, see `is_astray`.
+        Whether the fit is in a wrong minimum although it explains the log, see `is_astray`.
 
     Returns
     -------
@@ -293,5 +298,5 @@ def near_starts(
 
 
 def _unheld(values: Mapping[str, float]) -> dict[str, float]:
-    """Return values without those that a search for what is strange holds, see `HELD`."""
+    """Return values without those that a search for unusual effects holds, see `HELD`."""
     return {name: value for name, value in values.items() if name not in HELD}

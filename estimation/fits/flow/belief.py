@@ -1,4 +1,4 @@
-"""From which cost on hypotheses about a log are hopeless, and below which they are believed."""
+"""Costs of hypotheses: above which they are hopeless, and below which they are believed."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -14,22 +14,21 @@ from estimation.fits.hypothesis_search.explanation import Explanation
 from estimation.fits.hypothesis_search.fit_objections import fit_explains_all
 
 LITTLE = 0.01
-"""Share of what the plain form leaves beside noise that the best hypothesis must take up before pairs are tried
+"""Share of the plain form's misfit beyond noise that the best hypothesis must remove before pairs are tried
 [fraction]."""
 
 
 def hopeless_cost(swinging: GreyBoxFit, asked: Sequence[Hypothesis]) -> float:
-    """Return the cost from which the best of all hypotheses gains so little that no two of them explain a log.
+    """Return the cost above which even the best hypothesis gains so little that no pair can explain the log.
 
-    What they all leave alone is then no actuator's: bursts of a few samples that a cable picks up, or a noise that
-    varies.
+    What remains is then not caused by an actuator: short bursts picked up by a cable, or noise that varies.
 
     Parameters
     ----------
     swinging : GreyBoxFit
-        The plain form's fit with volumes that swing.
+        Fit of the plain form with varying volumes.
     asked : sequence of Hypothesis
-        What the log was asked.
+        The hypotheses that were tested.
 
     Returns
     -------
@@ -54,29 +53,30 @@ def wanted_cost(
 ) -> float:
     """Return the cost below which hypotheses are believed rather than the plain form.
 
-    No actuator holds its chambers' volumes. So the zero of an encoder that may have been homed at a stop need explain a
-    log no better than held volumes do, and the lag of a filter no better than none. How a play is crossed is not known:
-    with a second hypothesis it may explain a log that has neither.
+    No real actuator holds its chamber volumes constant. So the zero of an encoder that may have been homed at a stop
+    must only explain the log as well as held volumes do. In the same way the lag of a filtered pressure must only
+    explain it as well as no lag does. How encoder play is crossed is unknown: together with a second hypothesis it may
+    explain a log that has neither.
 
     Parameters
     ----------
     names : sequence of str
         The hypotheses.
     best, swinging : GreyBoxFit
-        The plain form's best fit, and that with volumes that swing.
+        The plain form's best fit, and its best fit with varying volumes.
     homed : bool
         Whether the encoder may have been homed at a stop.
     late : bool
         Whether the pressure was filtered.
     astray : bool
-        Whether the accumulator of the fit with volumes that swing is far too stiff.
+        Whether the accumulator of the fit with varying volumes is far too stiff.
     worth : float
-        What they must gain in log-likelihood [dimensionless].
+        Required gain in log-likelihood [dimensionless].
 
     Returns
     -------
     float
-        Half the sum of squares, as the fits have it [dimensionless].
+        Half the sum of squared normalised residuals [dimensionless].
     """
     if PLAY.name in names and len(names) > 1:
         return -np.inf
@@ -88,18 +88,19 @@ def wanted_cost(
 
 
 def told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:
-    """Return the test of whether a fit explains the log, stricter if its initial conditions are asked for.
+    """Return the test of whether a fit explains the log. It is stricter if initial conditions are fitted.
 
-    That has so many valleys that one is believed only where sensors' noise is all that it leaves. An offset of a log
-    that begins at rest is no such beginning. An encoder's zero explains nothing beside an accumulator far stiffer than
-    presumed: a make-up valve that was stuck shut passed for one of 0.85 m, in oil half as stiff as it was.
+    Initial conditions have many minima, so they are believed only if the sensors' noise is all that remains. A pressure
+    offset in a log that begins at rest is not an initial condition. An encoder zero explains nothing beside an
+    accumulator far stiffer than presumed: a make-up valve that was stuck shut looked like a zero of 0.85 m, with bulk
+    modulus half its true value.
 
     Parameters
     ----------
     plain : PlainFits
-        The log's plain fits.
+        The plain fits of the log.
     begun : bool
-        Whether initial conditions are asked for.
+        Whether initial conditions are fitted.
     """
     strictly = partial(fit_explains_all, noisy=plain.log.passes_on) if begun else plain.explains
     zero = ENCODER_ZERO.free[0]
@@ -112,12 +113,12 @@ def told_by(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:
 
 
 def likelier(one: Explanation | None, other: Explanation | None) -> Explanation | None:
-    """Return the likelier of two explanations of a log, the first where they are alike; either may be none.
+    """Return the likelier of two explanations, the first if they are equal; either may be None.
 
     Parameters
     ----------
     one, other : Explanation or None
-        What explains it.
+        Explanations of a log.
     """
     if one is None or other is None:
         return one or other

@@ -62,31 +62,30 @@ from plant.log.record import Record
 from plant.notes import Note
 
 REPORTED = ("leakage_coefficient", "flow_bias")
-"""What is worth telling of the parameters found along with bulk modulus."""
+"""Parameters reported along with bulk modulus."""
 
 STRUCTURE = 2e-4
-"""Relative standard deviation of bulk modulus from what the balance leaves out where no make-up valve may crack: in a
-log that the plain form does not explain. Likeliest on 71 validation logs [fraction]."""
+"""Relative standard deviation of bulk modulus due to what the balance omits if make-up valves have no cracking range,
+as in a log that the plain form does not explain. The most likely value on 71 validation logs [fraction]."""
 
 FILTERED = 1e-3
-"""The same of a log whose pressure was filtered: the filter is fitted as a lag of first order. 16 training logs with a
-moving average of 2 to 6 ms have their bulk modulus 0.1 % too low."""
+"""The same if pressure was filtered, since the filter is fitted as a first-order lag: bulk modulus is 0.1 % too low in
+16 training logs with a moving average of 2 to 6 ms."""
 
 BUBBLES = 2e-3
-"""The same where the oil holds air: bubbles that get in within a log are taken to yield as slow ones do (exponent 1),
-quick ones reach 1.4, and others have one exponent at any speed and pressure. 16 training logs with the former, whose
-exponent is 1.3, are 0.15 % off by root mean square, up to 0.4 % (decision 249); with the latter see decision 362."""
+"""The same if the oil contains air. Bubbles that enter within a log are modelled as isothermal (exponent 1), and quick
+compression reaches 1.4. In 16 training logs with a true exponent of 1.3 the error is 0.15 % root mean square, 0.4 % at
+most (decision 249). All other air has one exponent at any speed and pressure, see decision 362."""
 
 UNEVEN = 3e-3
-"""The same where a loss goes with what is measured: its course has the shape that is assumed of it, and a real one not
-quite [fraction]; judged."""
+"""The same if a loss depends on a measured signal, whose assumed shape is not quite the real one [fraction]; judged."""
 
 SURER = 1.4
-"""What a difference of log-likelihood between balances is divided by [dimensionless]: they leave out less than the
-motion form does. With `BY_MASS` the likeliest on 876 logs of our plants and of the open benchmark."""
+"""Divisor of log-likelihood differences between balances [dimensionless]: balances omit less than the motion form does.
+Together with `BY_MASS` the most likely value on 876 logs of our plants and of the open benchmark."""
 
 BY_MASS = 2.0
-"""Weight of the balance by mass before a log is seen, that of each other being 1 [dimensionless]: oil is denser under
+"""Prior weight of the balance by mass, if that of each other balance is 1 [dimensionless]. Oil is denser under
 pressure, but simulators and textbooks balance volumes."""
 
 
@@ -100,13 +99,15 @@ def fit_flow(
 ) -> FormFit:
     """Fit the flow form to a log, balanced by volume, by mass, and by volume in held chambers, and weigh the three.
 
-    The pump's flow ripple is taken up first (`estimation.fits.hypothesis_search.pump_ripple_fits`). A log that the
-    plain form does not explain is tested for effects of rig, oil and logger (`explain`). Gross outliers are taken out,
-    and what the pump delivered while its speed is missing is read off the pressure after. Where oil is so much stiffer
-    than the rig file's that noise of position counts, a log is fitted anew from there; so it is where what is strange
-    leads to a lower valley, or is an offset of speed. A slow log that looks strange is asked with its turns read off
-    later samples too (`agreed`), one that is none of the rig's for wrong signs and units (`CorrectedLogs`). A fit is
-    not believed if the search did more than it may (`greybox.work_limit`).
+    1. Gross outliers are removed. The volume pumped in a gap of motor speed is found from the pressure after it.
+    2. The pump's flow ripple is fitted (`estimation.fits.hypothesis_search.pump_ripple_fits`).
+    3. If the plain form does not explain the log, effects of rig, oil and logger are tested (`explain`).
+    4. If an effect leads to a lower minimum, or the oil is so stiff that position noise matters, the log is fitted
+       again.
+    5. A slow log with an effect is also fitted with its turns read from later samples (`agreed`); a log that does not
+       match the rig is tested for wrong signs and units (`CorrectedLogs`).
+
+    A fit is not believed if its search reached the limit of work (`greybox.work_limit`).
 
     Parameters
     ----------
@@ -119,8 +120,7 @@ def fit_flow(
     uncertainties : Mapping[str, float], optional
         Relative standard deviation of the actuator's parameters [fraction]; none by default.
     variances : Mapping[str, float], optional
-        Measurement variances of the channels of a log whose gross outliers are missing already [SI squared]; both are
-        done here if not given.
+        Measurement variances of the channels of a log without gross outliers [SI squared]; found here if not given.
     traits : LogTraits
         How the log begins, and how it was logged.
 
@@ -165,7 +165,7 @@ def fit_flow(
 
 
 def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, traits: LogTraits, work: Work) -> Answered:
-    """Return what a log says, fitted anew for as long as that leads elsewhere; nothing is asked of one misread."""
+    """Return what a log says, fitted again for as long as that leads elsewhere; a misread log is not tested further."""
     logged = corrected.logged
     while True:
         plain = plain_fits(logged, start)
@@ -195,7 +195,7 @@ def _answered(corrected: CorrectedLogs, start: FitStart, sensed: ShownPlay, trai
 
 
 def _misread(corrected: CorrectedLogs, plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> bool:
-    """Return whether slips explain a log, and nothing strange that no slip looks like does."""
+    """Return whether slips of sign or unit explain a log, and no effect that cannot be such a slip does."""
     if corrected.misread(plain, plain.best, paired=not corrected.is_kin(plain, plain.best)) is None:
         return False
     unlike = [one for one in asked if one.name in UNLIKE_SLIPS]
@@ -204,7 +204,7 @@ def _misread(corrected: CorrectedLogs, plain: PlainFits, asked: Sequence[Hypothe
 
 
 def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequence[Hypothesis], Sequence[Note]]:
-    """Return the hypotheses to test on a log beside the plain form, and notes on what it leaves open."""
+    """Return the hypotheses to test beside the plain form, and notes on what the log leaves undecided."""
     loaded, moving, worth = traits.loaded, traits.moving, wanted_of(plain)
     asked, open_ends = hypotheses_asked(
         plain.log, plain.start.parameters, plain.swinging, plain.best, sensed, loaded=loaded, moving=moving, worth=worth
@@ -217,7 +217,7 @@ def _asked(plain: PlainFits, sensed: ShownPlay, traits: LogTraits) -> tuple[Sequ
 
 
 def _strange(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> Explanation | None:
-    """Return the hypotheses that explain a log, if believed rather than the plain form; at rest `BEGUN` is alone."""
+    """Return the hypotheses that explain a log, if believed; a log that begins at rest has `BEGUN` tested alone."""
     explains = told_by(plain, begun=BEGUN in asked)
     moving, astray = traits.loaded or traits.moving, is_astray(plain.log, plain.swinging, plain.start.parameters)
     near = near_starts(plain.swinging, plain.starts, explains, in_motion=moving, astray=astray)
@@ -251,7 +251,7 @@ def _wanted(names: Sequence[str], plain: PlainFits, traits: LogTraits, left: flo
 
 
 def _uneven(plain: PlainFits, traits: LogTraits) -> VaryingLoss | None:
-    """Return the loss that goes with what is measured and explains a log that nothing else does."""
+    """Return the loss that depends on a measured signal, if only that explains the log."""
     log, best = plain.log, plain.best
     if plain.explains(best) or log.gaps.size or log.passes_on or traits.loaded or len(log.drives) > MOST_ASKED:
         return None
@@ -279,7 +279,7 @@ def _losing_fit(plain: PlainFits, loss: VaryingLoss, sensed: ShownPlay) -> FormF
 
 
 def _elsewhere(plain: PlainFits, strange: Explanation) -> FitStart | None:
-    """Return from where the plain form explains the log better than what is strange; None where it does not."""
+    """Return where the plain form explains the log better than the hypotheses do; None if nowhere."""
     start, cost = plain.start, strange.fit.cost
     displacement = start.parameters.pump_displacement
     if not start.speed_offset and (
@@ -293,7 +293,7 @@ def _elsewhere(plain: PlainFits, strange: Explanation) -> FitStart | None:
 
 
 def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, traits: LogTraits) -> FormFit:
-    """Return the fit of a log with what is strange about it taken up."""
+    """Return the fit of a log with its unusual effects corrected."""
     strange = strange.in_detail
     one, p = strange.fit, plain.start.parameters
     modulus, bound = one.values["bulk_modulus"], bound_told(strange, plain.best)

@@ -1,4 +1,4 @@
-"""`guesses_about(around, model, p)`: guesses of the flow form's unknowns, of which the likeliest is followed."""
+"""`guesses_about(around, model, p)`: guesses of the flow form's unknowns. The search begins at the likeliest."""
 
 from collections.abc import Mapping, Sequence
 from itertools import product
@@ -16,19 +16,19 @@ GUESSED: Mapping[str, Sequence[float]] = {
     "flow_bias": (1.0, 3.5, 6.0),
     "bulk_modulus": (0.7, 1.0, 1.3),
 }
-"""Multiples of the first start's unknowns in the guesses of which the likeliest is followed [dimensionless]: from the
-healthy actuator to the worst of Table 3, leakage and flow bias as of the paper's rig."""
+"""Guesses of the unknowns, as multiples of the first start [dimensionless]: leakage and flow bias of the paper's rig,
+from the healthy actuator to the worst of Table 3."""
 
 
 def guesses_about(around: Mapping[str, float], model: GreyBoxModel, p: EhaParameters) -> list[Array]:
-    """Return all guesses about a start, each coordinate of which is made once.
+    """Return all combinations of guesses about a start.
 
     Parameters
     ----------
     around : Mapping[str, float]
-        The start, by unknown [SI].
+        Values of the start, by unknown [SI].
     model : GreyBoxModel
-        The form whose unknowns they are.
+        The form that has these unknowns.
     p : EhaParameters
         The actuator, for the size of its faults.
 

@@ -40,38 +40,39 @@ DRAIN_START = 0.05
 """First guess of the pump's case drain, as a share of the healthy leakage [fraction]."""
 
 PRESUMED_STD = 1.0
-"""Standard deviation of the logarithms of the last two about their first guesses, before the log is seen: where the
-make-up valves never open, no log tells a drain from leakage, and any drain would do [dimensionless]."""
+"""Prior standard deviation of the logarithms of the last two [dimensionless]. If make-up valves never open, no log can
+distinguish a drain from leakage, and any drain would fit."""
 
 WITHIN: Mapping[str, float] = {"makeup_conductance": math.log(100.0)}
-"""Standard deviation of the logarithm of a make-up valve's conductance about what a search finds [dimensionless],
-judged: two factors of ten. Where a valve is barely felt, slopes leave factors of e^30 open, which no valve has, and
-leakage goes with them."""
+"""Standard deviation of the logarithm of a make-up valve's conductance about the value that a search finds
+[dimensionless], judged: two factors of ten. If a valve hardly matters, slopes alone allow factors of e^30, which no
+valve has, and the leakage would vary along with them."""
 
 MOST_LEAD = 0.25
-"""Standard deviation of the motor's lead before a log is seen, over the sample time [dimensionless]: it is a twelfth of
-the sample time over the motor's lag, so that only a motor that settles within a sample leads by more."""
+"""Prior standard deviation of the motor's lead, over the sample time [dimensionless]. The lead is a twelfth of the
+sample time over the motor's lag, so only a motor that settles within one sample leads by more."""
 
 FULLEST = 0.7
-"""Share of a chamber that the piston is believed to sweep at most: an encoder's zero may be anywhere [fraction]."""
+"""Largest share of a chamber that the piston is believed to sweep [fraction]: the encoder's zero may be anywhere."""
 
 FELT_GAP = 0.1
-"""A gap in speed matters where what it leaves open moves pressure by this share of its noise or more [fraction]."""
+"""A gap in speed matters if its unknown volume moves pressure by at least this share of the pressure noise
+[fraction]."""
 
 FELT_NOISE = 0.1
-"""Noise of position matters to the slopes where it moves pressure by this share of the sensor's own [fraction]."""
+"""Position noise matters to the slopes if it moves pressure by this share of the sensor's noise [fraction]."""
 
 BESIDE_STOP = 0.02
-"""Share of its travel that an encoder homed at an end stop may read beyond the stop, which is soft; and what a log that
-begins in mid-stroke, at a reading of none, may read at first [fraction]."""
+"""Share of its travel that an encoder homed at an end stop may read beyond the stop, which is soft. Also the largest
+first reading of a log that begins in mid-stroke, where the reading should be zero [fraction]."""
 
 NOISY_BLOCK = 5e-3
-"""Length over which residuals are averaged then [s]: what they say of bulk modulus is slower, the noise is not. With 1
-ms, 50 um of noise put bulk modulus of leaky actuators up to 4 % low, with 5 ms 2.5 %."""
+"""Length over which residuals are averaged then [s]: their information on bulk modulus is slower than the noise. With 1
+ms, 50 um of noise put bulk modulus of leaky actuators up to 4 % low; with 5 ms, 2.5 %."""
 
 
 def require_flow_channels(record: Record) -> None:
-    """Refuse a record without the channels that the flow form needs.
+    """Refuse a record that lacks a channel of the flow form.
 
     Raises
     ------
@@ -144,9 +145,9 @@ def flow_log(
 ) -> GreyBoxLog:
     """Return a log for the flow form.
 
-    Position is both an input and noisy: what it is off by compresses the oil in the model alone. Where that is felt
-    beside the pressure sensor's own noise, the output's noise has a part that is proportional to bulk modulus, and the
-    fit takes no error of the encoder for soft oil.
+    Position is an input with noise, and the model takes its error for compressed oil. If that matters beside the
+    pressure sensor's own noise, the output noise gets a part proportional to bulk modulus. So the fit does not mistake
+    encoder noise for soft oil.
 
     Parameters
     ----------
@@ -164,7 +165,7 @@ def flow_log(
     Returns
     -------
     GreyBoxLog
-        Averaged where it is faster than the form has use for.
+        Averaged if it is faster than the form needs.
     """
     sensed, record = record, without_pauses(record)
     pressure = "differential_pressure_pa"  # a motor's blows stay in its noise: so intervals hold its course
@@ -207,12 +208,12 @@ def flow_log(
 
 
 def _noisy(log: GreyBoxLog, p: EhaParameters, record: Record) -> GreyBoxLog:
-    """Return a log whose output's noise has a part that goes with the oil's stiffness, and leaks off.
+    """Return a log whose output noise has a part that grows with the oil's stiffness and decays by leakage.
 
-    Position that is off by ``d`` compresses oil by ``b A d / V``, which leaks off in a time ``V / (b L)``. So means
-    over ``T`` are off by ``A d / (L T)`` at most, whatever the oil's stiffness. Without that bound, oil as stiff as
-    steel explained any log of a leaky actuator. How the noise goes with stiffness below it matters as much, and depends
-    on how alike an encoder's successive errors are.
+    A position error ``d`` compresses oil by ``b A d / V``, which leaks off within ``V / (b L)``. So means over ``T``
+    are off by at most ``A d / (L T)``, however stiff the oil. Without that bound, oil as stiff as steel explained any
+    log of a leaky actuator. How the noise grows below the bound matters as much; it depends on the correlation of
+    successive encoder errors.
     """
     averaged_over, samples = round(log.sample_time / record.sample_time), max(1, round(NOISY_BLOCK / log.sample_time))
     position, speed = record["position_m"], bridged(record["motor_speed_rad_s"])
@@ -235,8 +236,8 @@ def carried(
 ) -> GreyBoxLog:
     """Return a log in which noise of motor speed adds a random walk to the pressure.
 
-    What a noisy speed is off by is oil that the model pumps, and it stays until it has leaked off. To squares of the
-    residuals a softer oil and a larger leakage then look better than the true ones, for they keep less of it.
+    The model pumps oil according to the noisy speed, and the surplus stays until it has leaked off. In a sum of squared
+    residuals, softer oil and a larger leakage then look better than the true ones, since they keep less of the surplus.
 
     Parameters
     ----------
@@ -245,14 +246,14 @@ def carried(
     parameters : EhaParameters
         The actuator.
     values : Mapping[str, float]
-        Bulk modulus and leakage coefficient, as a first fit has found them [SI].
+        Bulk modulus and leakage coefficient of a first fit [SI].
     stiffest : float
-        Bulk modulus that counts at most [Pa].
+        Largest bulk modulus for which the walk is computed [Pa].
 
     Returns
     -------
     GreyBoxLog
-        The same log where the walk is not felt beside the pressure sensor's noise before the oil has leaked off.
+        The same log if the walk does not matter beside the pressure sensor's noise before the oil has leaked off.
     """
     (noise,), stiffness = log.noise, min(values["bulk_modulus"], stiffest) / parameters.chamber_volume
     speed = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
@@ -264,7 +265,7 @@ def carried(
 
 
 def homed_at_stop(log: GreyBoxLog) -> bool:
-    """Return whether an encoder may have been homed at an end stop: it reads one sign only, and not zero at first.
+    """Return whether an encoder may have been homed at an end stop: all readings have one sign, the first is not zero.
 
     Parameters
     ----------
@@ -278,11 +279,11 @@ def homed_at_stop(log: GreyBoxLog) -> bool:
 
 
 def _block(log: GreyBoxLog, p: EhaParameters) -> int:
-    """Return over how many samples a fast log is averaged: as many as leave corners of the pumped flow unnoticed.
+    """Return over how many samples a fast log is averaged: as many as keep corners of the pumped flow negligible.
 
-    Where a motor turns round, its pump loses nothing for a moment, and where it sets off its course has a corner. Means
-    over a time ``T`` in which speed changes by ``w`` pump wrongly by ``D w T / 8`` there. That is little oil, but small
-    chambers of stiff oil show it.
+    The loss of the pump is zero for a moment where the motor reverses, and the course of its speed has a corner where
+    it starts. Means over a time ``T`` in which speed changes by ``w`` have a volume error of ``D w T / 8`` there. That
+    is little oil, but small chambers of stiff oil show it.
     """
     speed, (noise,) = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")], log.noise
     rise = p.pump_displacement * p.bulk_modulus / p.chamber_volume
@@ -297,7 +298,7 @@ def _block(log: GreyBoxLog, p: EhaParameters) -> int:
 
 
 def _swept_share(position: Array, p: EhaParameters) -> float:
-    """Return the relative change of volume per piston travel, added over both chambers, by root mean square [1/m]."""
+    """Return the relative change of volume per piston travel, summed over both chambers, root mean square [1/m]."""
     area_1, area_2 = piston_areas(p)
     volume = 2.0 * p.chamber_volume
     swept = [np.clip(area * side * position / volume, -FULLEST, FULLEST) for area, side in ((area_1, 1), (area_2, -1))]
@@ -306,10 +307,11 @@ def _swept_share(position: Array, p: EhaParameters) -> float:
 
 
 def _balanced_across(open_gaps: Array, record: Record, drives: Array, p: EhaParameters) -> Array:
-    """Return the drives with speeds in gaps that deliver what the piston sweeps, and what the oil yields and leaks.
+    """Return the drives with speeds in gaps that deliver what the piston sweeps, plus compression and leakage.
 
-    That is known from the ends of a gap, at the rig's values well enough. Speeds on a straight line from end to end may
-    deliver so much less that a chamber of the model draws oil. No other valve lets it out again, so it would stay.
+    These follow well enough from the ends of a gap and the rig file. Speeds on a straight line across the gap may
+    deliver so much less that a chamber of the model draws oil in through a make-up valve. No other valve lets it out
+    again, so it would stay.
     """
     speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
     out, pressure = drives.copy(), bridged(record["differential_pressure_pa"])

@@ -5,19 +5,19 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class LogTraits:
-    """Traits of a log that a fit has to know: how it begins, and how its channels were logged.
+    """How a log begins, and how its channels were logged.
 
     Parameters
     ----------
     loaded : bool
         Whether the log begins under load, and not at rest.
     moving : bool
-        Whether the motor turns when it begins: both chambers may then stand at any pressure.
+        Whether the motor turns when the log begins. Both chambers may then be at any pressure.
     filtered : bool
-        Whether the pressure was filtered: it is then late, and by how much is fitted whatever that gains.
+        Whether the pressure was filtered. Its delay is then fitted, whatever that gains.
     speed_held : bool
-        Whether motor speed came slower than the rest: of a log that the plain form does not explain the motor's course
-        is then what is not known, and nothing is asked.
+        Whether motor speed was logged at a lower rate than the rest. If the plain form does not explain such a log, the
+        course of the speed is the likely cause, and no hypotheses are tested.
     """
 
     loaded: bool = False
@@ -27,4 +27,4 @@ class LogTraits:
 
 
 AT_REST = LogTraits()
-"""A log that begins at rest, each channel sampled in every row and as it is."""
+"""A log that begins at rest, with each channel sampled in every row and unfiltered."""

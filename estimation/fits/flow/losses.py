@@ -1,8 +1,8 @@
 """`losses(fits, weights)`: lumped leakage coefficient and flow bias of a log, with their covariance.
 
-The form knows two leaks: from chamber to chamber, and a drain of each port to the inner circuit. Equation 5.8 knows
-one, and Table 3 gives it: what flows across, and half of a port's drain (errata E17). A log often tells it far better
-than its parts. See decision 304.
+The form has two leaks: between the chambers, and a drain from each port to the inner circuit. Equation 5.8 and Table 3
+have one, the lumped leakage: the leak between the chambers plus half of a port's drain (errata E17). A log often
+determines it far better than its two parts. See decision 304.
 """
 
 import math
@@ -19,19 +19,19 @@ from plant.eha.model import EhaParameters
 LEAKAGE, DRAIN, BIAS = "leakage_coefficient", "case_leakage", "flow_bias"
 
 OF_DRAIN = 0.5
-"""Share of a port's drain that is lumped leakage [fraction]: of two ports each takes half of the differential
+"""Share of a port's drain that is lumped leakage [fraction]: each of the two ports takes half of the differential
 pressure."""
 
 UNEVEN_SIDES = 3e-4
-"""What a balance of a single rod leaves out, over the flow that its pump delivers at rated speed [fraction]: how its
-make-up valves open while the other side loads or unloads is not known. Of four building logs flow bias was off by that,
-root mean square."""
+"""What a single rod's balance omits, over the pump's flow at rated speed [fraction]: how the make-up valves open while
+the other side loads or unloads is unknown. The flow bias of four building logs was off by this, root mean square."""
 
 UNEVEN_OIL = 1e-3
-"""Relative standard deviation of bulk modulus from that [fraction]: root mean square error of 13 building logs."""
+"""Relative standard deviation of bulk modulus from the same cause [fraction]: root mean square error of 13 building
+logs."""
 
 MOST_ALIKE = 0.999
-"""Largest correlation of the two that is told [dimensionless]: a window's estimate of a covariance may have more than
+"""Largest correlation of the two that is reported [dimensionless]: a covariance estimated from windows may exceed
 one."""
 
 
@@ -41,15 +41,15 @@ def losses(fits: Sequence[GreyBoxFit], weights: Array) -> tuple[Array, Array]:
     Parameters
     ----------
     fits : sequence of GreyBoxFit
-        Of forms that balance flows.
+        Fits of flow forms.
     weights : ndarray, shape (fits,)
         How likely each is [fraction].
 
     Returns
     -------
     tuple of ndarray, shapes (2,) and (2, 2)
-        Values [m^3/(s Pa), m^3/s] and their covariance; what fits disagree on is part of it, and it is infinite where a
-        log does not tell one of the two.
+        Values [m^3/(s Pa), m^3/s] and their covariance. It includes the differences between fits, and is infinite if
+        the log does not determine one of the two.
     """
     heavy = [(fit, weight) for fit, weight in zip(fits, weights, strict=True) if weight > np.finfo(np.float64).eps]
     each = [_of(fit) for fit, _ in heavy]
@@ -80,22 +80,22 @@ def with_lumped(
     p: EhaParameters,
     pressure: float = np.inf,
 ) -> tuple[dict[str, tuple[float, float]], float]:
-    """Return the result with the lumped leakage coefficient, and the correlation of that with the flow bias.
+    """Return the result with the lumped leakage coefficient, and its correlation with the flow bias.
 
     Parameters
     ----------
     found : Mapping[str, tuple of float]
-        Value and deviation by parameter [SI]; the leakage coefficient is that from chamber to chamber, at the end of a
-        log in which it changes.
+        Value and deviation by parameter [SI]. The leakage coefficient is that between the chambers, at the end of a log
+        in which it changes.
     fits : sequence of GreyBoxFit
-        As of `losses`, the likeliest first where it alone told what was found.
+        As in `losses`; the first is the likeliest, if it alone was used.
     weights : ndarray, shape (fits,)
-        As of `losses`.
+        As in `losses`.
     p : EhaParameters
-        The actuator. Leakage is known no better than the flow that its pump delivers at rated speed is balanced by the
-        form's steps, at the relief setting.
+        The actuator. Leakage is known no better than the error of the form's balance at rated speed, over relief
+        pressure.
     pressure : float
-        Root mean square of the log's differential pressure, at which a single rod's is [Pa].
+        Root mean square of the log's differential pressure, which a single rod's error refers to [Pa].
 
     Returns
     -------

@@ -1,8 +1,9 @@
-"""`CorrectedLogs(logged, rig).misread(plain, found)`: a wrong sign or unit without which a log would be the rig's.
+"""`CorrectedLogs(logged, rig).misread(plain, found)`: a slip of sign or unit without which a log matches the rig.
 
-Correlations of channels name such a slip in most logs (`estimation.log_checks.channel_physics`). A short log, or one
-whose piston hardly moves, has too little of them. The flow form may even explain it, with oil a tenth as stiff and a
-pump that loses more than it pumps. So where a fit ends there, slips are corrected in turn and the log is fitted again.
+Correlations between channels reveal such a slip in most logs (`estimation.log_checks.channel_physics`). A short log, or
+one whose piston hardly moves, has too little information for that. The flow form may even explain it, with oil a tenth
+as stiff and a pump that loses more than it delivers. If a fit ends there, slips are corrected one at a time and the log
+is fitted again.
 """
 
 from collections.abc import Sequence
@@ -37,48 +38,48 @@ from plant.notes import Note
 Slips = tuple[Slip, ...]
 
 FOREIGN, KIN = 7.0, 3.0
-"""Times the rig file's bulk modulus, or its inverse, from which a slip is looked for, and up to which one that is set
-right leaves oil like the rig's [dimensionless]; judged: air may leave a fifth of an oil's stiffness, while rpm read as
-rad/s leaves a tenth."""
+"""Ratio of bulk modulus to the rig file's, or its inverse, from which a slip is looked for, and up to which a corrected
+log has oil like the rig's [dimensionless]; judged. Air may reduce an oil's stiffness to a fifth; rpm read as rad/s
+gives a tenth."""
 
 SURELY = 2.0
-"""Deviations by which a fit that explains a log must be beyond what a rig's may be [dimensionless]."""
+"""Deviations by which a fit that explains a log must be beyond what the rig allows [dimensionless]."""
 
 ASKED_SECONDS = 2.0
-"""Time from when the pump turns on which slips are tried first [s]: it refutes most of them."""
+"""Time after the pump first turns on which slips are tried first [s]: it rules out most of them."""
 
 TURNING = 0.1
 """Share of the highest speed from which the pump turns [fraction]: far above a resolver's noise at rest."""
 
 ALIKE = 0.1
-"""Share by which two fits' blocks may differ in number where their costs are compared [fraction]."""
+"""Share by which the block counts of two fits may differ if their costs are compared [fraction]."""
 
 FELT = 4.0
-"""Variance of a channel over that of its noise from which it changes [dimensionless]: twice the noise; judged. A dead
-sensor shows its noise alone, and any slower pump explains that."""
+"""Variance of a channel over that of its noise from which the channel counts as changing [dimensionless]; judged. A
+dead sensor shows its noise alone, and any slower pump would explain that."""
 
 UNLIKE_SLIPS = frozenset({OFFSET.name, PRESSURE_DRIFT.name, CHECKS_CRACK.name, MAKEUP_BENDS.name})
-"""Hypotheses that no slip looks like: they add to a pressure, or concern valves, and change no scale and no sign."""
+"""Hypotheses that no slip looks like: they add to a pressure or concern valves, and change neither scale nor sign."""
 
 HOPEFUL, MOST_FITTED = 10.0, 4
-"""Rough misfit up to which a slip that is set right may explain a log, as a mean squared normalised residual
-[dimensionless], and how many slips are fitted at most [count]; judged. Of right slips the rough misfit is 1.0 to 1.2,
-of wrong ones 2 to 3,000."""
+"""Rough misfit up to which a corrected slip may explain a log, as a mean squared normalised residual [dimensionless],
+and how many slips are fitted at most [count]; judged. The rough misfit of right slips is 1.0 to 1.2, of wrong ones 2 to
+3,000."""
 
 AS_RIGHT = 1.2
-"""Rough misfit up to which, and down to whose inverse, slips are alike: of right ones it is that much [dimensionless].
-Of alike ones those are fitted first whose pressure is nearest to what the rig's friction takes."""
+"""Ratio of rough misfits up to which slips count as equally good [dimensionless]: right slips have that misfit at most.
+Of these, the first to be fitted is that whose pressure is nearest to what the rig's friction takes."""
 
 HOPELESS = 300.0
-"""The same of the likeliest guess, from which on no search is made [dimensionless]: of right slips it is 2 to 120."""
+"""Rough misfit of the likeliest guess from which no search is made [dimensionless]: of right slips it is 2 to 120."""
 
 EVALUATIONS = 40
-"""Evaluations of the model by which a slip is judged roughly [count]."""
+"""Evaluations of the model for the rough misfit of a slip [count]."""
 
 
 @dataclass(frozen=True, eq=False)
 class CorrectedLogs:
-    """A log with its channels corrected for one slip at a time, and fitted where that is asked for.
+    """A log with one slip corrected at a time, each fitted when needed.
 
     Parameters
     ----------
@@ -92,7 +93,7 @@ class CorrectedLogs:
     rig: EhaParameters
 
     def misread(self, plain: PlainFits, found: GreyBoxFit, *, paired: bool = True) -> Note | None:
-        """Return the slips that make a log one of the rig's, where a fit says that it is none as it was read.
+        """Return the slips that make a log match the rig, if a fit says that it does not match as it was read.
 
         Parameters
         ----------
@@ -101,12 +102,13 @@ class CorrectedLogs:
         found : GreyBoxFit
             The fit that is believed most.
         paired : bool
-            Whether two slips together are tried where none alone explains the log.
+            Whether pairs of slips are tried if none alone explains the log.
 
         Returns
         -------
         Note or None
-            None where the fit explains the log as one of the rig's kin, no slip does, or pressure does not change.
+            None if the fit says that the log may be one of the rig's, if no slip explains it, or if pressure does not
+            change.
         """
         if (plain.explains(found) and self.is_kin(plain, found)) or not _changes(self.logged, PRESSURE):
             return None
@@ -114,7 +116,7 @@ class CorrectedLogs:
         return _told(slips) if slips else None
 
     def is_kin(self, plain: PlainFits, found: GreyBoxFit) -> bool:
-        """Return whether a fit says that the log may be one of the rig's, as it was read.
+        """Return whether a fit says that the log, as it was read, may be one of the rig's.
 
         Parameters
         ----------
@@ -129,20 +131,20 @@ class CorrectedLogs:
         return _kin(found, self.rig, times, SURELY if plain.explains(found) else 0.0)
 
     def is_sound(self, plain: PlainFits, strange: Explanation) -> bool:
-        """Return whether what is strange makes the log one of the rig's, and is nothing that a slip looks like.
+        """Return whether an effect makes the log match the rig and cannot be mistaken for a slip.
 
         Parameters
         ----------
         plain : PlainFits
             The log's fits by the plain form.
         strange : Explanation
-            What is strange about the log.
+            The effect.
         """
         return UNLIKE_SLIPS.issuperset(strange.names) and self.is_kin(plain, strange.fit)
 
     @cached_property
     def _beyond(self) -> float:
-        """How far pressure as read is beyond that at which pistons slide, see `beyond_sliding`; 0 of one at rest."""
+        """How far the pressure as read exceeds that at which pistons slide, see `beyond_sliding`; 0 for one at rest."""
         still = _still(self.logged, self.rig)
         return 0.0 if still else beyond_sliding(sliding_pressure(self.logged.record, self.rig))
 
@@ -155,7 +157,7 @@ class CorrectedLogs:
         return self._explained(PAIRS)
 
     def _explained(self, tried: Sequence[Slips]) -> Sequence[tuple[Slips, GreyBoxFit]]:
-        """Return the slips without which the log is one of the rig's, each with its fit."""
+        """Return the slips whose correction makes the log match the rig, each with its fit."""
         begun, rig = _beginning(self.logged), self.rig
         hopeful = _hopeful(tried, begun, rig)
         fits = [(slips, one) for slips in hopeful if (one := _right_with(slips, begun, rig)) is not None]
@@ -165,15 +167,15 @@ class CorrectedLogs:
 
 
 def _likeliest(explained: Sequence[tuple[Slips, GreyBoxFit]], found: GreyBoxFit) -> Sequence[Slips]:
-    """Return the slips that explain a log no worse than a fit of it as it was read, and than each other."""
+    """Return the slips that explain a log no worse than its fit as read, and no worse than each other."""
     fits = [found, *(one for _, one in explained)]
     return [slips for slips, one in explained if all(_lost_to(other, one) < WORTH for other in fits)]
 
 
 def _hopeful(tried: Sequence[Slips], logged: Logged, rig: EhaParameters) -> Sequence[Slips]:
-    """Return the slips that may explain a log once they are set right, by what a rough search of each leaves.
+    """Return the slips whose correction may explain a log, by the misfit of a rough search for each.
 
-    Noise tells no unit of position, and a piston that then stands still tells none at all.
+    Noise alone does not reveal a unit of position, and a piston that then stands still reveals none at all.
     """
     left: list[tuple[tuple[float, float], Slips]] = []
     changes, as_read = _changes(logged, POSITION), _off_sliding(logged, rig)
@@ -192,7 +194,7 @@ def _hopeful(tried: Sequence[Slips], logged: Logged, rig: EhaParameters) -> Sequ
 def _rough_misfit(logged: Logged, rig: EhaParameters) -> float:
     """Return the misfit of the balance by volume from the likeliest guess on, with long model steps [dimensionless].
 
-    It is infinite where that guess is hopeless already, and where the search ends at oil that is no kin of the rig's.
+    It is infinite if that guess is already hopeless, or if the search ends at oil unlike the rig's.
     """
     log = logged.seen_at(rig).taken_at(rig.bulk_modulus)
     form = relieving(FLOW_FORM) if reaches_relief(log.measured, rig.relief_pressure) else FLOW_FORM
@@ -214,7 +216,7 @@ def _told(found: Sequence[Slips]) -> Note:
 
 
 def _lost_to(found: GreyBoxFit, other: GreyBoxFit) -> float:
-    """Return by how much a fit is likelier than another; 0 where their blocks differ [log-likelihood]."""
+    """Return by how much a fit is likelier than another [log-likelihood]; 0 if their blocks differ."""
     lost = 0.5 * found.seen * (other.chi_square[0] - found.chi_square[0])
     return lost if abs(other.seen - found.seen) < ALIKE * found.seen else 0.0
 
@@ -222,8 +224,8 @@ def _lost_to(found: GreyBoxFit, other: GreyBoxFit) -> float:
 def _kin(fit: GreyBoxFit, rig: EhaParameters, times: float, surely: float) -> bool:
     """Return whether a fit's oil may be the rig's, and its pump loses no more than a leaky one does.
 
-    A flow bias is a quarter of the rated flow at most. A leak that takes all of it before the piston slides is none of
-    an actuator that moves; a piston without friction at rest slides at once, whatever leaks.
+    A flow bias is at most a quarter of the rated flow. If a leak took the whole flow before the piston slides, the
+    actuator would not move; a piston without friction at rest slides at once, whatever leaks.
     """
     slides = rig.friction_coulomb / rig.piston_area
     most_leaking = rig.rated_flow / slides if slides > 0.0 else np.inf
@@ -243,13 +245,13 @@ def _still(logged: Logged, rig: EhaParameters) -> bool:
 
 
 def _changes(logged: Logged, channel: str) -> bool:
-    """Return whether a channel is there and shows more than its noise."""
+    """Return whether a channel exists and shows more than its noise."""
     there = channel in logged.record and channel in logged.variances
     return there and bool(np.nanvar(logged.record[channel]) > FELT * logged.variances[channel])
 
 
 def _beginning(logged: Logged) -> Logged:
-    """Return a log up to where its pump has turned for some time; all of it if that is no less."""
+    """Return a log up to where its pump has turned for some time; all of it if it is shorter."""
     record = logged.record
     speed = np.abs(record[SPEED])
     told = np.all([np.isfinite(record[name]) for name in (SPEED, POSITION, PRESSURE)], axis=0)
@@ -261,16 +263,16 @@ def _beginning(logged: Logged) -> Logged:
 
 
 def _sliding(slips: Slips, logged: Logged, rig: EhaParameters, as_read: tuple[float, float]) -> Logged | None:
-    """Return a log with slips set right, None where it has no such channels, or its pressure then moves no piston.
+    """Return a log with slips corrected; None if it lacks such channels, or its pressure then moves no piston.
 
-    Its pressure must be no further from what the rig's friction takes than it was as read (`_off_sliding`).
+    Its pressure must be no further from what the rig's friction takes than as read (`_off_sliding`).
     """
     right = set_right(slips, logged)
     return right if right is not None and _off_sliding(right, rig) <= as_read else None
 
 
 def _right_with(slips: Slips, logged: Logged, rig: EhaParameters) -> GreyBoxFit | None:
-    """Return the fit of a log whose slips are set right, where it explains the log as one of the rig's."""
+    """Return the fit of a log with slips corrected, if it explains the log as one of the rig's."""
     right = _sliding(slips, logged, rig, _off_sliding(logged, rig))
     if right is None:
         return None
@@ -279,6 +281,6 @@ def _right_with(slips: Slips, logged: Logged, rig: EhaParameters) -> GreyBoxFit 
 
 
 def _off_sliding(logged: Logged, rig: EhaParameters) -> tuple[float, float]:
-    """Return how far pressure is from where pistons slide, and from what the rig's friction takes [logarithms]."""
+    """Return how far pressure is from that at which pistons slide, and from the rig's friction [logarithms]."""
     ratio = sliding_pressure(logged.record, rig)
     return abs(beyond_sliding(ratio)), abs(ln(ratio)) if ratio > 0.0 else np.inf

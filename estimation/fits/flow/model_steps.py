@@ -1,4 +1,4 @@
-"""`with_implicit_steps(plain)`: where a second fit needs model steps that err by less than noise does."""
+"""`with_implicit_steps(plain)`: whether a second fit needs implicit model steps, with errors below the noise."""
 
 from dataclasses import replace
 
@@ -13,30 +13,30 @@ from estimation.fits.greybox.spared_steps import step_errors
 from estimation.models.flow import HELD_FLOW_FORM
 
 STEPS_FELT = 1.0
-"""Error of a block's residual from which implicit steps are taken, in deviations of its noise [dimensionless]. Of 26
-random rigs 18 err by less than 1 at the true values, the others by 2 to 180."""
+"""Error of a block's residual due to model steps, over the standard deviation of its noise, from which steps are
+implicit [dimensionless]. Of 26 random rigs 18 have errors below 1 at the true values, the others 2 to 180."""
 
 LEAST_ERROR = 0.04
-"""Errors of steps over what a fit leaves of a log, root mean square, from which exact ones may explain it [fraction]:
-of those that they do explain it is 0.09 to 0.6, of one at 190 times the noise 0.02."""
+"""Root mean square error of model steps over that of the residuals, from which exact steps may explain the log
+[fraction]. In logs that they explain it is 0.09 to 0.6; in one at 190 times the noise it was 0.02."""
 
 STEEP, BESIDE_STEEP = 3.0, 10
-"""How many times as steep as the last of so many blocks the steepest is, where steps are looked at of a log that is
-explained, too [dimensionless, count]; judged."""
+"""How much steeper the steepest block must be than the last of so many blocks, before the steps of an explained log are
+checked too [dimensionless, count]; judged."""
 
 WRONG_VALLEY = 4.0
-"""What a fit leaves of a log, mean square over noise, from which its search may have ended in another valley, where
-valves are shut and no step is felt [dimensionless]; judged: such logs left 16 and more, and one of 1.6 was fitted no
-better with implicit steps, in three times the time."""
+"""Mean squared normalised residual from which a search may have ended in another minimum, where valves are shut and
+step errors do not matter [dimensionless]; judged. Such logs had 16 and more. A log with 1.6 was fitted no better with
+implicit steps, in three times the time."""
 
 
 def with_implicit_steps(plain: PlainFits) -> FitStart | None:
-    """Return the start of a second fit with implicit model steps, if those of the first err by more than noise does.
+    """Return the start of a second fit with implicit model steps, if the errors of explicit steps exceed the noise.
 
-    Valves of small chambers fill them in less time than a step takes. Where both sides of a piston float at the inner
-    circuit's pressure, make-up valves open and shut by turns, above all those that a pilot of the other side holds
-    open. With usual steps the model chatters there, by up to 300 deviations of the noise at the true values, and no
-    search finds a way.
+    Valves fill the small chambers of small rigs in less than a step. If both sides of a piston are at the inner
+    circuit's pressure, make-up valves open and close in turn, most of all if pilot pressure holds them open. With
+    explicit steps the model chatters there, by up to 300 standard deviations of the noise at the true values, and no
+    search converges.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ def with_implicit_steps(plain: PlainFits) -> FitStart | None:
     Returns
     -------
     FitStart or None
-        None where steps are exact enough, or implicit already. Not asked of a log that is explained, but for that of a
-        single rod, whose chatter may pass for a bulk modulus that the log does not tell or end a search above its
-        minimum, and for one whose slopes leap: the deviation of bulk modulus came out 26 times too small.
+        None if steps are exact enough, or implicit already. If the log is explained, only two cases are checked: a
+        single rod, whose chatter may look like a bulk modulus that the log does not determine, and a log with single
+        blocks of very steep slopes, where the deviation of bulk modulus came out 26 times too small.
     """
     if plain.start.implicit:
         return None
@@ -63,14 +63,14 @@ def with_implicit_steps(plain: PlainFits) -> FitStart | None:
 
 
 def _chatters(log: GreyBoxLog, fit: GreyBoxFit, least: float) -> bool:
-    """Return whether steps err by more than noise at a fit, and by the least share of what it leaves of its log."""
+    """Return whether step errors of a fit exceed the noise, and at least the least share of its residuals."""
     errors = step_errors(FreedProblem.of(fit.model, log), fit.model.theta(fit.values))
     share = float(np.sqrt(np.mean(errors**2) / max(fit.chi_square[0], 1.0)))
     return share >= least and float(np.max(np.abs(errors))) > STEPS_FELT
 
 
 def _leaps(fit: GreyBoxFit) -> bool:
-    """Return whether single blocks tell far more of bulk modulus than those that tell most after them."""
+    """Return whether a few blocks determine bulk modulus far better than all others."""
     if not fit.slopes.size:
         return False
     slopes = np.sort(np.abs(fit.slopes[:, fit.model.unknowns.index("bulk_modulus")]))[-BESIDE_STEEP:]

@@ -1,13 +1,12 @@
-"""`by_course(logged, plain)`, `with_open_turns(...)`: plain fits with the motor's course that the log shows, or none.
+"""`by_course(logged, plain)`, `with_open_turns(...)`: plain fits with the course of motor speed that the log shows.
 
-A motor whose speed is asked for continuously bends its course smoothly, and straight lines between samples are put
-right by its bends (`straightened`). One whose command is held from sample to sample bends at the samples alone: there
-the lead on the straight line is all, and what is added for bends is wrong. Neither is in a rig file, and both are
-built: where it is felt, the log says which.
+A motor with a continuous command changes its speed smoothly, and straight lines between samples are corrected for its
+curvature (`straightened`). If the command is held from sample to sample, the speed bends at the samples only: a lead on
+the straight line is then the whole correction, and one for curvature is wrong. A rig file does not say which, and both
+exist; where it matters, the log says so.
 
-And a motor at its current limit, or under a position loop that is sampled, has neither course. In the paper's chambers
-a millisecond of that is not felt; a pump that turns fast beside small chambers of stiff oil moves pressure by ten
-times as much. See decision 399.
+A motor at its current limit, or in a sampled position loop, follows neither. In the paper's chambers one millisecond of
+that does not matter. A fast pump with small chambers of stiff oil moves pressure ten times as much. See decision 399.
 """
 
 from dataclasses import replace
@@ -20,36 +19,36 @@ from estimation.fits.greybox.intersample_doubt import SLOW, turns
 from estimation.fits.hypothesis_search.between_samples import FIRST
 
 HELD_WORTH = 1.0
-"""Gain in log-likelihood from which a command is taken as held [dimensionless]; judged."""
+"""Gain in log-likelihood from which the command is taken as held [dimensionless]; judged."""
 
 ELSEWHERE = 6.0
-"""What bends may gain at most, from which a held command may lead to another minimum, and all is searched anew
-[dimensionless]; judged. For 20 s of the paper's actuator it is 2 to 4. For a flight control it is 20: its fit went on
-from the smooth one's to a minimum 180 above the right one, and its bulk modulus was 2.4 % off."""
+"""Largest possible gain of a held command, from which it may lead to another minimum and all starts are searched again
+[dimensionless]; judged. For 20 s of the paper's actuator it is 2 to 4. For a flight control it is 20: started from the
+smooth fit, its search ended 180 above the right minimum, with bulk modulus 2.4 % off."""
 
 FELT = 0.1
-"""What the largest turn may leave open beside the pressure's noise, from which it is felt [fraction]; judged. In the
-paper's actuator at 1 kHz it is 0.06 at its motor's limit."""
+"""Pressure that the largest turn may leave unexplained, over the pressure noise, from which it matters [fraction];
+judged. In the paper's actuator at 1 kHz it is 0.06 at the motor's limit."""
 
 NEARLY = 4.0
-"""Mean squared normalised residual of a plain fit up to which the turns' course may be what is left [dimensionless];
-judged: a load at the start leaves thousands."""
+"""Mean squared normalised residual of a plain fit up to which the course of turns may be the remaining cause
+[dimensionless]; judged: a load at the start leaves thousands."""
 
 
 def by_course(logged: Logged, plain: PlainFits) -> PlainFits:
-    """Return the plain fits of a log with the course of its motor between samples.
+    """Return the plain fits of a log with the right course of its motor between samples.
 
     Parameters
     ----------
     logged : Logged
         The log.
     plain : PlainFits
-        Its fits, the motor's course smooth.
+        Its fits with a smooth course.
 
     Returns
     -------
     PlainFits
-        The same ones where a smooth course is as good.
+        The same fits if a smooth course is as good.
     """
     told = plain.best.slopes.size and not plain.log.gaps.size
     if plain.start.held or plain.unturned.sample_time >= SLOW or not told:
@@ -64,9 +63,9 @@ def by_course(logged: Logged, plain: PlainFits) -> PlainFits:
 
 
 def with_open_turns(logged: Logged, plain: PlainFits) -> PlainFits:
-    """Return the plain fits of a log that nothing explains with the course of its motor's turns left open.
+    """Return the plain fits of a log that nothing else explains, with the course of its turns free.
 
-    It is asked last: what is left open at turns would take up what a gain or a lag of the pressure does there.
+    This is tried last: free turns would absorb the effects of a pressure sensor's gain or lag.
 
     Parameters
     ----------
@@ -78,7 +77,7 @@ def with_open_turns(logged: Logged, plain: PlainFits) -> PlainFits:
     Returns
     -------
     PlainFits
-        The same ones where turns are not felt, or do not explain the log either.
+        The same fits if turns do not matter, or do not explain the log either.
     """
     bare, left = not plain.log.gaps.size and plain.unturned.sample_time < SLOW, plain.best.chi_square[0]
     if not bare or plain.start.turns_open or plain.explains(plain.best) or left >= NEARLY or not _turns_felt(plain):
@@ -91,7 +90,7 @@ def with_open_turns(logged: Logged, plain: PlainFits) -> PlainFits:
 
 
 def _held_gains(logged: Logged, plain: PlainFits) -> float:
-    """Return the gain in log-likelihood, to first order, if the motor's command is held; under the same noise."""
+    """Return the first-order gain in log-likelihood of a held command, at the same noise."""
     log, best, smooth = plain.log, plain.best, plain.unturned.drives
     bare = logged.seen_at(plain.start.parameters, held=True).drives
     if len(bare) != len(smooth):  # averaged over other samples: so fast that no course is felt
@@ -104,9 +103,9 @@ def _held_gains(logged: Logged, plain: PlainFits) -> float:
 
 
 def _gains_at_most(plain: PlainFits) -> float:
-    """Return the gain in log-likelihood if the motor's command is held in truth, and none of it leaks off.
+    """Return the largest gain in log-likelihood of a held command, if nothing leaks off.
 
-    What is added for bends adds up to a twelfth of what speed changes by in a sample (Euler and Maclaurin).
+    The correction for curvature is at most a twelfth of the change of speed within a sample (Euler and Maclaurin).
     """
     (speed, *_), deviation = plain.unturned.drives.T, plain.unturned.noise[0].variance ** 0.5
     apart = _rise(plain) / 12.0 * np.diff(speed) / deviation
@@ -114,13 +113,13 @@ def _gains_at_most(plain: PlainFits) -> float:
 
 
 def _turns_felt(plain: PlainFits) -> bool:
-    """Return whether what the largest turn of the motor leaves open is felt beside the pressure's noise."""
+    """Return whether what the motor's largest turn leaves unexplained matters beside the pressure noise."""
     log = plain.unturned
     return FIRST * _rise(plain) * float(np.max(turns(log))) > FELT * log.noise[0].variance ** 0.5
 
 
 def _rise(plain: PlainFits) -> float:
-    """Return the pressure that a sample of motor speed adds to a shut chamber [Pa s/rad]."""
+    """Return the pressure that one sample of motor speed adds to a shut chamber [Pa s/rad]."""
     p = plain.start.parameters
     stiffness = plain.best.values["bulk_modulus"] / p.chamber_volume
     return plain.unturned.sample_time * p.pump_displacement * stiffness

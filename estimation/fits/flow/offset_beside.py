@@ -1,7 +1,7 @@
-"""`offset_settled(plain, strange, explained)`: an offset of motor speed as what is strange about a log leaves it.
+"""`offset_settled(plain, strange, explained)`: the offset of motor speed, fitted again beside what explains a log.
 
-An encoder with another zero, or a rod on one side, lets a plain fit ask for an offset of speed that is not there. What
-explains the log then stands beside that offset, and is several deviations off.
+An encoder with another zero, or a single rod, makes a plain fit find an offset of speed that does not exist. The effect
+is then fitted beside that wrong offset, and is several deviations off.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,24 +23,25 @@ def offset_settled(
     asked: Sequence[Hypothesis],
     explained: Callable[[PlainFits, Sequence[Hypothesis]], Explanation | None],
 ) -> tuple[PlainFits, Explanation | None]:
-    """Return a log's fits and what explains it, at the offset of speed that the explanation leaves.
+    """Return a log's fits and its explanation, at the offset of speed that fits beside the explanation.
 
     Parameters
     ----------
     plain : PlainFits
-        The log's plain fits, with the offset that they take up.
+        The log's plain fits, with the offset that they found.
     strange : Explanation or None
-        What explains the log beside them.
+        The effect that explains the log.
     asked : sequence of Hypothesis
-        What it was asked.
+        The hypotheses that were tested.
     explained : callable
-        ``explained(plain, asked)``: the explanation of a log by hypotheses, None where it is not believed.
+        ``explained(plain, asked)``: the explanation of a log by hypotheses, None if it is not believed.
 
     Returns
     -------
     tuple of (PlainFits, Explanation or None)
-        Both as they were where the explanation asks for no other offset, or does not keep what that promises. Beside
-        the other offset some of what explained the log may not be needed, or a worn pump may explain it instead.
+        Unchanged if the explanation needs no other offset, or if the other offset does not gain what slopes promise.
+        With the other offset, a part of the explanation may become unnecessary, or a worn pump may explain the log
+        instead.
     """
     if strange is None or plain.log.gaps.size:
         return plain, strange
@@ -66,7 +67,7 @@ def offset_settled(
 
 
 def _turned(plain: PlainFits, offset: float, std: float) -> PlainFits:
-    """Return plain fits whose log has another offset of speed; the fits are those of the log as it was."""
+    """Return plain fits whose log has another offset of speed; the fits are still those at the old offset."""
     turning = Turning(plain.turning.teeth, offset)
     drives = plain.log.drives.copy()
     drives[:, 0] = with_ripple(plain.unturned, turning.teeth, offset).drives[:, 0]

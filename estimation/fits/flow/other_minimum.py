@@ -1,4 +1,4 @@
-"""`lower_minimum(log, ...)`: a lower minimum of the plain flow form, found from the values of another explanation."""
+"""`lower_minimum(log, ...)`: a lower minimum of the plain flow form, reached from the values of another explanation."""
 
 from collections.abc import Mapping
 from typing import TypeAlias
@@ -22,31 +22,31 @@ from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
 FINISHING = 60
-"""Evaluations with short model steps. Most searches end by themselves by the tenth. Where oil is stiff and a pump is
-large, long model steps lead so far astray that 15 left 74 of log-likelihood, and bulk modulus 1.3 % off [count]."""
+"""Most evaluations with short model steps [count]. Most searches converge by the tenth. With stiff oil and a large
+pump, long model steps end so far off that 15 evaluations left 74 of log-likelihood, and bulk modulus 1.3 % wrong."""
 
 WITHIN = 0.3
-"""First radius of a search from a place in another valley [dimensionless]."""
+"""First trust radius of a search that starts in another valley [dimensionless]."""
 
 DRAIN = "case_leakage"
 
 VANISHING = ("leakage_coefficient", DRAIN, "makeup_opening")
-"""What another balance may have lost on its way."""
+"""What may have vanished in the search with another balance."""
 
 Found: TypeAlias = tuple[Problem, Point, tuple[Array, Array]]
 """A problem, its solution, and the bounds of its search."""
 
 
 def nearest(one: Found, other: Found, guesses: Mapping[str, float]) -> Point:
-    """Return the point from which a form's search goes on: its own, or where another form's ended if that is lower.
+    """Return where a form's search continues: at its own end, or at another form's end if that is lower.
 
-    A wrong balance may leave no leakage, from where its logarithm does not come back. So what may vanish begins at
-    first guesses there.
+    A wrong balance may drive leakage to zero, and its logarithm does not come back from there. So what may vanish
+    starts at its first guess.
 
     Parameters
     ----------
     one, other : Found
-        Where both searches have come to.
+        The ends of both searches.
     guesses : Mapping[str, float]
         First guesses [SI].
     """
@@ -67,11 +67,12 @@ def lower_minimum(
     found: Mapping[str, tuple[float, float]],
     wanted: float,
 ) -> Mapping[str, float] | None:
-    """Return a start from which the plain form falls below a cost, given a better explanation of the log.
+    """Return a start from which the plain form reaches a lower cost, given a better explanation of the log.
 
-    A form has several valleys where make-up valves open and shut. The way out of one may lead through a hypothesis of
-    which nothing is left at the end: a drain of one port that ends as the other one's. Or it is a drain's first guess:
-    with a drain that is too large, make-up valves that let in as much, and a stiffer accumulator.
+    A form has several minima, depending on when make-up valves open and close. The way out of one may lead through a
+    hypothesis that vanishes at the end: a drain of one port that becomes the other's. Or it leads through the first
+    guess of the drain: a drain that is too large goes with make-up valves that let in as much, and with a stiffer
+    accumulator.
 
     Parameters
     ----------
@@ -80,18 +81,18 @@ def lower_minimum(
     parameters : EhaParameters
         The actuator.
     fit : GreyBoxFit
-        The plain form's.
+        The fit of the plain form.
     found : Mapping[str, tuple of float]
-        Value and deviation of what explains the log, by parameter [SI].
+        Value and deviation of each parameter of the explanation [SI].
     wanted : float
-        The cost [dimensionless].
+        The cost to reach [dimensionless].
 
     Returns
     -------
     Mapping[str, float] or None
-        Values of the unknowns of the plain form [SI]; None where it leads nowhere so low, or the log has gaps. A form
-        that was not completed, since its search came nowhere near the log, is led on only if it is nearer there, and
-        not if make-up valves that are orifices were found: it would take them up unnamed.
+        Values of the plain form's unknowns [SI]; None if no lower cost is found, or if the log has gaps. A form that
+        was not completed, since its search came nowhere near the log, starts there only if that is nearer, and not if
+        the explanation has make-up valves that are orifices: the form would absorb them without a name.
     """
     if log.gaps.size:
         return None
@@ -112,7 +113,7 @@ def lower_minimum(
 def from_minimum(
     form: GreyBoxModel, log: GreyBoxLog, valley: Mapping[str, float], wanted: float = np.inf, *, bent: bool
 ) -> Found:
-    """Return the minimum of a completed form below given values, with short model steps where they matter.
+    """Return the minimum of a completed form, searched from given values, with short model steps where they matter.
 
     Parameters
     ----------
@@ -123,14 +124,14 @@ def from_minimum(
     valley : Mapping[str, float]
         The values [SI].
     wanted : float
-        A search that will not come down to this cost ends early [dimensionless].
+        A search that will not reach this cost ends early [dimensionless].
     bent : bool
         See `completed_form`.
 
     Returns
     -------
     Found
-        The form's problem, where it led, and how far it might have gone.
+        The form's problem, its minimum, and the bounds of the search.
     """
     form = completed_form(form, bent=bent)
     problem = FreedProblem.of(form, log)
@@ -141,14 +142,14 @@ def from_minimum(
 
 
 def completed_form(form: GreyBoxModel, *, bent: bool) -> GreyBoxModel:
-    """Return a form with what matters to the last digits alone; held chambers have no such valves.
+    """Return a form with the parameters that matter to the last digits only; held chambers have no such valves.
 
     Parameters
     ----------
     form : GreyBoxModel
         The form, completed or not.
     bent : bool
-        Whether make-up valves must let in so much that they are orifices.
+        Whether make-up valves must pass so much flow that they are modelled as orifices.
     """
     known = CRACKS[0] in form.unknowns or form.rates is HELD_FLOW_FORM.rates
     return form if known else completed(form, bent=bent)

@@ -1,4 +1,4 @@
-"""`plain_fits(logged, start) -> PlainFits`: fits of the plain flow form to a log, before any hypothesis is tested."""
+"""`plain_fits(logged, start) -> PlainFits`: fits of the plain flow form, before any hypothesis is tested."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,28 +26,29 @@ from plant.log.record import Record
 from plant.notes import Note
 
 LEAST_GUESS = 1e-2
-"""Share of the rig file's bulk modulus that a first guess is at least [fraction]."""
+"""Smallest first guess of bulk modulus, over the rig file's [fraction]."""
 
 TOO_LOUD = 2.0
-"""Variance of a residual by which a log was judged, over that at the bulk modulus that explains it, from which it is
-judged anew [dimensionless]: up to it gates of 1.1 to 1.44 times the noise still see a misfit, and searches of sound
-logs stay as they are."""
+"""Ratio of the noise variance assumed for a fit to that at the bulk modulus which explains the log, from which the log
+is fitted again [dimensionless]. Below it, gates at 1.1 to 1.44 times the noise still detect a misfit, and sound logs
+need no second search."""
 
 VALVE_DROP = 5e4
-"""Drop at which a make-up valve of a usual size passes the rated flow [Pa]; judged: check valves have 0.3 to 1 bar. In
-the paper's actuator such a valve fills a chamber in 7 ms, on small rigs of stiff oil in 0.02 to 0.1 ms."""
+"""Pressure drop at which a make-up valve of usual size passes the rated flow [Pa]; judged: check valves have 0.3 to 1
+bar. Such a valve fills a chamber of the paper's actuator in 7 ms, and one of a small rig with stiff oil in 0.02 to 0.1
+ms."""
 
 _cost = attrgetter("cost")
 
 
 @dataclass(frozen=True, eq=False)
 class Logged:
-    """A log without gross outliers, with its noise and traits.
+    """A log without gross outliers, with its noise.
 
     Parameters
     ----------
     record : Record
-        Its channels.
+        The channels.
     variances : Mapping[str, float]
         Measurement variance of each [SI squared].
     uncertainties : Mapping[str, float]
@@ -59,13 +60,13 @@ class Logged:
     uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def seen_at(self, parameters: EhaParameters, *, held: bool = False) -> GreyBoxLog:
-        """Return the log as the flow form sees it in an actuator, whose motor's command may be held."""
+        """Return the log as the flow form sees it for an actuator, whose motor command may be ``held``."""
         return flow_log(self.record, parameters, self.uncertainties, self.variances, held=held)
 
 
 @dataclass(frozen=True, eq=False)
 class FitStart:
-    """Starts of the searches of a fit.
+    """Where the searches of a fit begin.
 
     Parameters
     ----------
@@ -76,16 +77,16 @@ class FitStart:
     speed_offset : float
         First guess of how much the logged speed exceeds the shaft's [rad/s].
     valley : Mapping[str, float], optional
-        Values of the plain form's unknowns from which searches begin as well, see `lower_minimum` [SI].
+        Values of the plain form's unknowns at which searches begin as well, see `lower_minimum` [SI].
     stiffest : float
-        Bulk modulus that counts at most in what noise of motor speed leaves, see `quieter` [Pa].
+        Largest bulk modulus for which the effect of motor speed noise is computed, see `quieter` [Pa].
     turns_read : bool
-        Whether what a slow log's turns pump is read off the samples after them, see `with_turns_read`.
+        Whether the volume pumped in a slow log's turns is read from the samples after them, see `with_turns_read`.
     implicit : bool
         Whether model steps are implicit, see `with_implicit_steps`.
     held, turns_open : bool
-        Whether the motor's command is held between samples, and whether the course of its turns is open in a log that
-        is not slow; see `estimation.fits.flow.motor_course`.
+        Whether the motor's command is held between samples, and whether the course of turns is free in a log that is
+        not slow; see `estimation.fits.flow.motor_course`.
     """
 
     parameters: EhaParameters
@@ -106,22 +107,22 @@ class PlainFits:
     Parameters
     ----------
     start : FitStart
-        Where they began.
+        Where the searches began.
     starts : sequence of Mapping[str, float]
-        All places from which searches began [SI].
+        All starts of the searches [SI].
     fitted : callable
         ``fitted(log)``: the fits of a log by every form that counts.
     unturned, log : GreyBoxLog
-        The log before teeth and an offset of speed were taken up, and with them, noise of position as at the found bulk
-        modulus.
+        The log before and after correction for pump ripple and speed offset; the second with position noise at the bulk
+        modulus found.
     fits : sequence of GreyBoxFit
-        By every form that counts.
+        One fit by each form that counts.
     explains : callable
         ``explains(fit)``: whether a fit explains the log.
     teeth, teeth_left : tuple of Note
-        What was taken up of the pump's teeth and the speed's offset, and what residuals show of them beside.
+        Notes on the pump ripple and speed offset that were corrected, and on what residuals still show of them.
     turning : Turning
-        Teeth and offset of speed that were taken up.
+        The ripple and the offset that were corrected.
     """
 
     start: FitStart
@@ -137,22 +138,22 @@ class PlainFits:
 
     @cached_property
     def turns_told(self) -> bool:
-        """Whether what a slow log's turns pump can be read off the samples after them, and is not yet."""
+        """Whether the volume pumped in a slow log's turns can be read from the samples after them, and is not yet."""
         log = self.unturned
         return not self.start.turns_read and with_turns_read(log, self.start.parameters) is not log
 
     @property
     def best(self) -> GreyBoxFit:
-        """The likeliest."""
+        """The likeliest fit."""
         return min(self.fits, key=_cost)
 
     @property
     def swinging(self) -> GreyBoxFit:
-        """The likeliest with volumes that swing."""
+        """The likeliest fit with varying chamber volumes."""
         return likeliest_swinging(self.fits)
 
     def yields(self, sensed: ShownPlay, bulk_modulus: float) -> float:
-        """Return the compliance within the encoder's play over that of the oil.
+        """Return the compliance within the encoder's play, over that of the oil.
 
         Parameters
         ----------
@@ -170,19 +171,19 @@ class PlainFits:
         return softness * bulk_modulus
 
     def play_untaken(self, shown: ShownPlay, sensed: ShownPlay) -> tuple[float, tuple[Note, ...]]:
-        """Return the doubt due to a play that no fit took up; see `estimation.fits.greybox.play.play_untaken`.
+        """Return the uncertainty due to a play that no fit includes; see `estimation.fits.greybox.play.play_untaken`.
 
         Parameters
         ----------
         shown : ShownPlay
-            The play that the residuals show of the fit that is told.
+            The play that the residuals of the reported fit show.
         sensed : ShownPlay
             The play that a velocity sensor shows.
 
         Returns
         -------
         tuple of (float, tuple of Note)
-            Relative deviation of bulk modulus [fraction], and a remark where the gate is not shut for it.
+            Relative deviation of bulk modulus [fraction], and a note if the gate does not reject the fit for it.
         """
         return play_untaken(shown, sensed, self.yields(sensed, self.swinging.values["bulk_modulus"]))
 
@@ -190,7 +191,7 @@ class PlainFits:
 def plain_fits(logged: Logged, start: FitStart, near: Sequence[GreyBoxFit] = ()) -> PlainFits:
     """Fit the plain flow form to a log by every balance that counts.
 
-    What the motor's course between samples leaves open, a pump's teeth, and an offset of speed are taken up on the way.
+    On the way, the motor's course between samples, the pump's flow ripple and an offset of speed are corrected.
 
     Parameters
     ----------
@@ -199,7 +200,7 @@ def plain_fits(logged: Logged, start: FitStart, near: Sequence[GreyBoxFit] = ())
     start : FitStart
         Where searches begin.
     near : sequence of GreyBoxFit
-        Fits of the same log that are nearly its own: searches go on from there.
+        Fits of nearly the same log: searches start from them.
     """
     parameters = start.parameters
     log = logged.seen_at(parameters, held=start.held)
@@ -239,7 +240,7 @@ def fills_within_a_step(p: EhaParameters) -> bool:
 
 
 def stiffer(logged: Logged, plain: PlainFits) -> EhaParameters | None:
-    """Return the actuator with the stiff oil that was found, if noise of position starts to matter there.
+    """Return the actuator with the stiff oil that was found, if position noise starts to matter at that stiffness.
 
     Parameters
     ----------
@@ -251,7 +252,7 @@ def stiffer(logged: Logged, plain: PlainFits) -> EhaParameters | None:
     Returns
     -------
     EhaParameters or None
-        The actuator to fit the log anew at; None where noise of position counts already, or nowhere.
+        The actuator with which to fit the log again; None if position noise matters already, or nowhere.
     """
     parameters, swinging = plain.start.parameters, plain.swinging
     found = swinging.values["bulk_modulus"]
@@ -262,23 +263,23 @@ def stiffer(logged: Logged, plain: PlainFits) -> EhaParameters | None:
 
 
 def quieter(plain: PlainFits, strange: GreyBoxFit) -> FitStart | None:
-    """Return the start of a second fit, if the noise was judged at a far stiffer oil than the one that fits.
+    """Return the start of a second fit, if the noise was computed for far stiffer oil than the one that fits.
 
-    What noise of motor speed leaves in the chambers grows with the oil's stiffness. Where the plain form ends in a
-    wrong valley, as at 100 GPa, it is so large that an offset of 4 bar which is not there explains the log, and a wrong
-    bulk modulus seems certain to a thousandth.
+    The effect of motor speed noise on pressure grows with the oil's stiffness. If the plain form ends in a wrong
+    minimum, as at 100 GPa, the assumed noise is so large that a false pressure offset of 4 bar explains the log, and a
+    wrong bulk modulus seems certain to a thousandth.
 
     Parameters
     ----------
     plain : PlainFits
         The log's fits.
     strange : GreyBoxFit
-        What explains it.
+        The fit that explains the log.
 
     Returns
     -------
     FitStart or None
-        None where the noise is that of the oil that explains it, or is not felt.
+        None if the noise is already that of the oil that explains the log, or does not matter.
     """
     modulus, log = strange.values["bulk_modulus"], plain.log
     heard = min(plain.swinging.values["bulk_modulus"], plain.start.stiffest)

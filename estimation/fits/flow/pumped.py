@@ -1,4 +1,4 @@
-"""`pumped_evenly(means, log, ...)`: means of a log whose straight lines pump as much oil as the log's samples do.
+"""`pumped_evenly(means, log, ...)`: block means whose straight lines pump as much oil as the samples of the log do.
 
 See decisions 343 and 430.
 """
@@ -17,28 +17,28 @@ from plant.eha.model import EhaParameters
 
 
 def pumped_evenly(means: GreyBoxLog, log: GreyBoxLog, p: EhaParameters) -> GreyBoxLog:
-    """Return means with positions led by what straight lines between them pump too much.
+    """Return means whose positions are corrected for the oil that straight lines between them pump too much.
 
-    Between means the flow form moves the motor on a straight line. A speed that bends, ``w'' = -(2 pi f)^2 w``, pumps
-    up to ``T^2 / 12`` of its acceleration more, and one that passes the pump's dead zone (errata E8) is blunted there.
-    Pumped and swept oil nearly cancel, so that the compressed oil is off by far more: means over 0.6 ms of a chirp up
-    to 23 Hz put bulk modulus 0.09 % low, 3.2 deviations. The log's own samples tell what was pumped; a position that
-    leads by as much over the piston's area sweeps it. The rig file's flow bias serves until a fit has found another,
-    see `pumped_evenly_at`.
+    The flow form moves the motor on a straight line between means. A curved speed, ``w'' = -(2 pi f)^2 w``, pumps up to
+    ``T^2 / 12`` of its acceleration more. The averaging also rounds off the pump's dead zone (errata E8). Pumped and
+    swept oil nearly cancel, so the relative error of the compressed oil is far larger: with means over 0.6 ms of a
+    chirp up to 23 Hz, bulk modulus was 0.09 % low, 3.2 deviations. The samples of the log say how much was pumped. The
+    difference over the piston area, added to position, sweeps the same volume. The rig file's flow bias serves until a
+    fit has found another, see `pumped_evenly_at`.
 
     Parameters
     ----------
     means : GreyBoxLog
         The log, averaged by `estimation.fits.greybox.block_averages.averaged`.
     log : GreyBoxLog
-        The log before.
+        The log before averaging.
     p : EhaParameters
         The actuator.
 
     Returns
     -------
     GreyBoxLog
-        The means; the same ones where the log was not averaged.
+        The means; unchanged if the log was not averaged.
     """
     if means is log:
         return means
@@ -47,10 +47,10 @@ def pumped_evenly(means: GreyBoxLog, log: GreyBoxLog, p: EhaParameters) -> GreyB
 
 
 def pumped_evenly_at(means: GreyBoxLog, p: EhaParameters, values: Mapping[str, float]) -> GreyBoxLog:
-    """Return means with positions led as a pump of another flow bias asks for than that of the rig file.
+    """Return means whose positions are corrected for the flow bias of a first fit, in place of the rig file's.
 
-    A worn pump may have seven times the bias. Where its dead zone ends within a mean depends on it, and what is pumped
-    wrongly there stays until it has leaked off: it put leakage of a log at 10 kHz 5.8 deviations low.
+    A worn pump may have seven times the bias. The end of its dead zone depends on the bias, and a volume error there
+    stays until it has leaked off. In one log at 10 kHz it put leakage 5.8 deviations low.
 
     Parameters
     ----------
@@ -59,12 +59,12 @@ def pumped_evenly_at(means: GreyBoxLog, p: EhaParameters, values: Mapping[str, f
     p : EhaParameters
         The actuator.
     values : Mapping[str, float]
-        What a first fit has found [SI].
+        Parameters of a first fit [SI].
 
     Returns
     -------
     GreyBoxLog
-        The same one where the log was not averaged.
+        The same log if it was not averaged.
     """
     if means.sampled is None:
         return means
@@ -74,7 +74,7 @@ def pumped_evenly_at(means: GreyBoxLog, p: EhaParameters, values: Mapping[str, f
 def _led(
     means: GreyBoxLog, samples: tuple[Array, float], p: EhaParameters, biases: Sequence[tuple[float, float]]
 ) -> GreyBoxLog:
-    """Return means with positions led by what lines pump beyond the samples, added over flow biases times factors."""
+    """Return means with positions corrected for what lines pump too much, summed over flow biases by factors."""
     sampled, sample_time = samples
     block = round(means.sample_time / sample_time)
     speed, position = (FLOW_FORM.drives.index(name) for name in FLOW_FORM.drives)
@@ -89,6 +89,6 @@ def _led(
 
 
 def _pumped(speed: Array, sample_time: float, p: EhaParameters, flow_bias: float) -> Array:
-    """Return the oil that was pumped since the first sample [m^3]."""
+    """Return the oil pumped since the first sample [m^3]."""
     flow = np.asarray(pumped_flow(speed, p.pump_displacement, flow_bias))
     return np.concatenate([[0.0], np.cumsum(0.5 * (flow[1:] + flow[:-1])) * sample_time])

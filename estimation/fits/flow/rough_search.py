@@ -1,7 +1,7 @@
-"""`rough_optima(log, ...)`: where balances of the flow form are nearest to a log, with long model steps.
+"""`rough_optima(log, ...)`: optima of the flow form's balances with long model steps.
 
-The likeliest of many coarse guesses is followed first, for a run without slopes is cheap. Where it leads to a point
-that explains the log, nothing else is searched; else searches begin at leakages and flow biases of all conditions.
+Runs without slopes are cheap, so many guesses are compared first and the likeliest is followed. If that search explains
+the log, no other is made; otherwise searches begin at the leakages and flow biases of all conditions.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,17 +28,19 @@ from plant.eha.model import EhaParameters
 from plant.spare_processors import each
 
 GUESSED_WITHIN = 0.3
-"""First radius of a search from the likeliest guess [dimensionless]: half the distance between guesses of leakage."""
+"""First trust radius of a search from the likeliest guess [dimensionless]: half the distance between guesses of
+leakage."""
 
 SCREENED_SECONDS = 4.0
-"""Starts are compared on the beginning of the log, at least so long: it tells a wrong valley from a right one [s]."""
+"""Length of the log's beginning on which starts are compared, at least: it tells wrong minima from right ones [s]."""
 
 ROUGH_ENOUGH = 0.05
-"""Half the sum of squares that a further step must promise while model steps are long [dimensionless]: their errors put
-the optimum off by more. With 0.3 logs of a sine, whose valleys are flat, took twice as many short steps after."""
+"""Half the sum of squares that a further step must promise while model steps are long [dimensionless]: their errors
+shift the optimum by more than that. With 0.3, logs of a sine, whose minima are flat, took twice as many short steps
+afterwards."""
 
 UNLIKELY = 36.0
-"""Difference of log-likelihood from which a form of the balance counts for nothing beside the other [dimensionless]."""
+"""Difference of log-likelihood from which a balance has no weight beside another [dimensionless]."""
 
 RIVAL = 2.0 * UNLIKELY
 """The same between searches with long model steps, which have errors [dimensionless]."""
@@ -64,7 +66,7 @@ class RoughOptimum:
 
     @property
     def values(self) -> Mapping[str, float]:
-        """The unknowns, with an accumulator's stiffness where the balance has none [SI]."""
+        """The unknowns, with an accumulator's stiffness if the balance has none [SI]."""
         return {STIFFNESS: first_stiffness(self.problem.log), **self.problem.model.values(self.point.theta)}
 
 
@@ -73,8 +75,8 @@ def rough_optima(
 ) -> list[RoughOptimum]:
     """Return the optima of the balances with long model steps.
 
-    A single rod may pump up both chambers, beyond what a balance of volumes follows. If none explains its log, that by
-    mass leads, and counts if it comes far lower.
+    A single rod may pump up both chambers, which a balance of volumes cannot follow. If no balance explains its log,
+    the others start from the balance by mass, and their results count if they are far lower.
 
     Parameters
     ----------
@@ -103,7 +105,7 @@ def rough_optima(
 def _led(
     forms: Sequence[GreyBoxModel], log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]
 ) -> list[RoughOptimum]:
-    """Return the optima of the balances with long model steps, each searched from that of the first."""
+    """Return the optima of the balances with long model steps, each searched from the first one's."""
     afar = log.taken_at(parameters.bulk_modulus)
     begun = FreedProblem.of(forms[0], afar.beginning(_search(afar).screened).coarsened())
     guess, near = _guess(begun, afar, parameters, starts)
@@ -123,7 +125,7 @@ def _led(
 def _others(
     forms: Sequence[GreyBoxModel], log: GreyBoxLog, afar: GreyBoxLog, first: RoughOptimum, *, alone: bool = False
 ) -> list[RoughOptimum]:
-    """Return the optima of other forms, searched from that of the first, as far as they may count beside it."""
+    """Return the optima of other forms, searched from the first one's, if they may count beside it."""
     wanted = first.point.cost + RIVAL
     return each(lambda form: _searched(form, log, afar, [first.values], alone=alone, wanted=wanted), forms)
 
@@ -131,9 +133,9 @@ def _others(
 def _brought_near(
     rough: Sequence[RoughOptimum], forms: Sequence[GreyBoxModel], log: GreyBoxLog, afar: GreyBoxLog
 ) -> list[RoughOptimum]:
-    """Return optima of which those far behind the second are searched from there too.
+    """Return optima; those far behind the second are also searched from there.
 
-    The first may end in a wrong valley, and the third with it, where the second leaves it and explains the log.
+    The first may end in a wrong minimum, and the third with it, while the second leaves it and explains the log.
     """
     second = rough[1]
     lost = [at for at, one in enumerate(rough) if one.point.cost > second.point.cost + RIVAL]
@@ -149,9 +151,9 @@ def _explains(one: RoughOptimum) -> bool:
 def _guess(
     problem: FreedProblem, log: GreyBoxLog, parameters: EhaParameters, starts: Sequence[Mapping[str, float]]
 ) -> tuple[Mapping[str, float], bool]:
-    """Return the optimum from the most likely guess about the first start, and whether it explains the log.
+    """Return the optimum from the likeliest guess about the first start, and whether it explains the log.
 
-    Of the log its beginning is looked at, which the problem holds.
+    The problem holds only the beginning of the log.
     """
     search = _search(log)
     around = {STIFFNESS: first_stiffness(log), **starts[0]}
@@ -170,7 +172,7 @@ def _search(log: GreyBoxLog) -> Search:
 
 @lru_cache(maxsize=2)
 def _screened(log: GreyBoxLog) -> int:
-    """Return how long the beginning is on which starts are compared; kept for all searches of a log [samples]."""
+    """Return the length of the beginning on which starts are compared, the same for all searches of a log [samples]."""
     speed = log.drives[:, FLOW_FORM.drives.index("motor_speed_rad_s")]
     return driven_samples(speed, ceil(SCREENED_SECONDS / log.sample_time))
 
@@ -186,7 +188,7 @@ def _searched(
     hopeful: bool = False,
     screen: Callable[[Array], Point] | None = None,
 ) -> RoughOptimum:
-    """Return the best that is found from starts, at first with noise of position as it is at the rig's bulk modulus."""
+    """Return the best optimum from several starts, at first with position noise at the rig's bulk modulus."""
     search, fed = _search(log), {STIFFNESS: first_stiffness(log)}
     problem = FreedProblem.of(form, afar)
     guesses = [form.theta({**fed, **start}) for start in starts]

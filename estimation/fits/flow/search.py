@@ -41,43 +41,44 @@ LEAD_START = 1e-5
 """First guess of the motor's lead on the straight line between samples [s]."""
 
 ONE_SIDED = 0.5
-"""Mean differential pressure over its root mean square, from which a second drain is looked for [fraction]; judged. Of
-12 logs under a constant load it is 0.62 to 1, of 48 without one at most 0.4."""
+"""Mean differential pressure over its root mean square, from which a second minimum of the drain is looked for
+[fraction]; judged. In 12 logs under a constant load it is 0.62 to 1, in 48 without one at most 0.4."""
 
 LESS_DRAINED, APART = 0.05, 0.5
-"""Drain from which the search for a second one begins, over the first, and how far apart logarithms of two drains are
-[fraction, dimensionless]; judged. From a minimum with 14 times the drain the right one was found so. One that the log
-tells less well than that lies in a flat valley, in which there is no other: of seven such logs the deviation was 1, as
-is presumed, of five under a constant load at most 0.14."""
+"""Drain at which the search for a second minimum begins, over the first, and how far apart the logarithms of two drains
+must be [fraction, dimensionless]; judged. From a minimum with 14 times the drain, the right one was found in this way.
+A drain that the log determines less well than that has one flat minimum: in seven such logs the deviation was 1, as
+presumed, in five under a constant load at most 0.14."""
 
 RELIEF_RISE = 0.05
-"""Rise of pressure over its setting at which a relief valve passes the rated flow where searches begin, at least
-[fraction]: valves need 0.05 to 0.2. In small rigs the slope of a file that says nothing is a corner of 0.0004."""
+"""Least pressure rise above its setting at which a relief valve passes the rated flow where searches begin [fraction]:
+valves need 0.05 to 0.2. The default slope would be a corner of 0.0004 in small rigs."""
 
 NEAR = 0.2
-"""How far the residuals of a balance move at the end of a search before it is told, up to which they are taken along
-their slopes and not run [dimensionless], see `FreedProblem`: 0.02 in log-likelihood."""
+"""Change of a balance's residuals up to which the last short step of a search is computed from slopes and not run
+[dimensionless], see `FreedProblem`: 0.02 in log-likelihood."""
 
 COMPLETED, TOO_FAR = 10.0, 150.0
-"""Log-likelihood that short model steps, and valves that crack, gain at most where they hardly matter, and how far a
-balance is then behind one that leaves noise alone to be given up [dimensionless]. Of 100 logs one gained 180, where the
-likeliest balance gained 43; beside likeliest ones that gained less than 10 they gained 86 at most."""
+"""Gain of short model steps and cracking valves up to which they hardly matter, and distance from a balance that leaves
+only noise, from which another balance is dropped [log-likelihood]. In one of 100 logs such a balance gained 180, and
+the likeliest gained 43. If the likeliest gained less than 10, others gained at most 86."""
 
 VALVES = ("makeup_conductance", "makeup_opening", *CRACKS, BEND, STIFFNESS)
-"""What balances have in common to the last digits; oil and losses make up for what each is without."""
+"""Parameters that all balances share to the last digits; oil and losses compensate for the differences of the
+balances."""
 
 NO_SLOPES = np.zeros(0), np.zeros((0, 0))
-"""Of the misfit at a point whose cost alone is known."""
+"""Gradient and Hessian of a point of which only the cost is known."""
 
 NOWHERE: Mapping[str, float] = {}
-"""Where nothing has led."""
+"""Values of a search that no other leads."""
 
 SETTLING = 15
-"""Evaluations with short model steps of a form that does not explain its log: it is asked what is strange [count]."""
+"""Evaluations with short model steps of a form that does not explain its log, before hypotheses are tested [count]."""
 
 CLOSE = 0.75
-"""Cost over the count of residuals, 0.5 where noise alone is left, below which such a search goes on to its end
-[dimensionless]; judged. A single rod's was cut off at 0.65 on its way to 0.47, and passed its gate there."""
+"""Cost per residual (0.5 for noise alone) below which such a search continues to its end [dimensionless]; judged. The
+search for a single rod was stopped at 0.65 on its way to 0.47, and passed its gate there."""
 
 
 def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:
@@ -93,7 +94,7 @@ def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]
     Returns
     -------
     list of dict
-        Values of the unknowns [SI]; those of the healthy actuator at the first guess come first.
+        Values of the unknowns [SI]; the healthy actuator at the first guess of bulk modulus comes first.
     """
     leakage, bias = leakage_guess(p), flow_bias_guess(p)
     moduli = sorted({bulk_modulus, p.bulk_modulus})
@@ -133,15 +134,15 @@ def balanced(
     starts : sequence of Mapping[str, float]
         Where searches begin, see `flow_starts` [SI].
     valley : Mapping[str, float], optional
-        A place in a lower valley, see `lower_minimum`, where searches with short model steps begin as well [SI].
+        A place near a lower minimum, see `lower_minimum`, at which searches with short model steps begin as well [SI].
     stiffest : float
-        Bulk modulus that counts at most in what noise of motor speed leaves [Pa].
+        Largest bulk modulus for which the effect of motor speed noise is computed [Pa].
 
     Returns
     -------
     sequence of GreyBoxFit
-        One with volumes that swing at least. Rig slopes and lateness are told of the likeliest, and of the likeliest
-        with volumes that swing.
+        At least one has varying volumes. Rig slopes and lateness are determined for the likeliest fit, and for the
+        likeliest with varying volumes.
     """
     rough = rough_optima(log, parameters, starts)
     least = min(one.point.cost for one in rough)
@@ -174,7 +175,7 @@ def balanced(
 def followed(
     log: GreyBoxLog, parameters: EhaParameters, fits: Sequence[GreyBoxFit], stiffest: float = np.inf
 ) -> Sequence[GreyBoxFit]:
-    """Return the fits of a log that differs little from the one that others fit, from where these ended.
+    """Return the fits of a log that differs little from one already fitted, started from those fits.
 
     Parameters
     ----------
@@ -183,9 +184,9 @@ def followed(
     parameters : EhaParameters
         The actuator.
     fits : sequence of GreyBoxFit
-        The fits of the other, as of `balanced`.
+        The fits of the other log, as from `balanced`.
     stiffest : float
-        Bulk modulus that counts at most in what noise of motor speed leaves [Pa].
+        Largest bulk modulus for which the effect of motor speed noise is computed [Pa].
     """
     near = likeliest_swinging(fits)
     log = with_first_fit(log, parameters, near.values, stiffest)
@@ -200,12 +201,12 @@ def followed(
 
 
 def likeliest_swinging(fits: Sequence[GreyBoxFit]) -> GreyBoxFit:
-    """Return the likeliest of the fits whose volumes swing."""
+    """Return the likeliest of the fits with varying volumes."""
     return min((fit for fit in fits if fit.model.rates is not HELD_FLOW_FORM.rates), key=lambda fit: fit.cost)
 
 
 def _told(done: Sequence[Found], log: GreyBoxLog, steps: IntArray) -> Sequence[GreyBoxFit]:
-    """Return the fits at minima of the balances; those that are told get short model steps throughout."""
+    """Return the fits at the minima of the balances; those that are reported have short model steps throughout."""
     done = _told_ended(done, log)
     best, swinging = _told_of(done)
     least = best[1].cost
@@ -224,13 +225,13 @@ def _told(done: Sequence[Found], log: GreyBoxLog, steps: IntArray) -> Sequence[G
 
 
 def _is_noise(one: Found) -> bool:
-    """Return whether a minimum leaves no more of its log than noise does by chance."""
+    """Return whether the residuals at a minimum are no larger than noise by chance."""
     problem, point, _ = one
     return 2.0 * point.cost < largest_chi_square(problem.blocks, 1.0) * problem.blocks
 
 
 def _shaken(one: Found) -> Array | None:
-    """Return what noise of the drives does to the residuals of the likeliest, for the other balances too."""
+    """Return the effect of drive noise on the residuals of the likeliest balance, which the others share."""
     log = one[0].log
     noisy = any(spread > 0.0 for spread in log.drive_std) and not log.passes_on
     return moved_by_drives(one[0], one[1].theta) if noisy else None
@@ -245,13 +246,11 @@ def _finished(
     led: Mapping[str, float] = NOWHERE,
     bent: bool,
 ) -> Found:
-    """Return the optimum with short model steps; a form that needs them to explain its log is completed as well.
+    """Return the optimum with short model steps (``steps``); a form that explains its log is completed as well.
 
-    Steps are short where the log says so (``steps``).
-
-    A search that will not come down to the cost ``wanted`` ends early. One of a form that is completed begins with the
-    valves and the accumulator that another has found (``led``), which are what makes it long. Make-up valves that must
-    let in much are orifices (``bent``).
+    A search that will not reach the cost ``wanted`` ends early. A completed form begins with the valves and the
+    accumulator of another fit (``led``), since the search for these takes longest. Make-up valves that must pass much
+    flow are orifices (``bent``).
     """
     one = replace(one, problem=one.problem.on(log.stepped(steps)))
     if not _plain(one):
@@ -267,7 +266,7 @@ def _finished(
 
 
 def _told_ended(done: Sequence[Found], log: GreyBoxLog) -> list[Found]:
-    """Return minima of which those that are told have short model steps throughout."""
+    """Return minima; those that are reported have short model steps throughout."""
     done = list(done)
     while sparing := [one for one in _told_of(done) if one[0].log.steps is not log.steps]:
         done = each(lambda one, ending=sparing: _ended(one, log) if one in ending else one, done)
@@ -275,7 +274,7 @@ def _told_ended(done: Sequence[Found], log: GreyBoxLog) -> list[Found]:
 
 
 def _ended(one: Found, log: GreyBoxLog) -> Found:
-    """Return the end of a search whose last steps use short model steps throughout."""
+    """Return the end of a search whose last steps have short model steps throughout."""
     problem, point, bounds = one
     ending = with_steps(problem, log.steps)
     evaluations = FINISHING if explained(problem, point) else 1
@@ -283,7 +282,7 @@ def _ended(one: Found, log: GreyBoxLog) -> Found:
 
 
 def _valves(lead: Found) -> Mapping[str, float]:
-    """Return valves and accumulator of a form that explains its log [SI]; none of one that does not."""
+    """Return valves and accumulator of a form that explains its log [SI]; nothing otherwise."""
     if _held(lead[0]) or not explained(lead[0], lead[1]):
         return NOWHERE
     values = lead[0].model.values(lead[1].theta)
@@ -297,10 +296,10 @@ def _one_sided(log: GreyBoxLog) -> bool:
 
 
 def _with_less_drain(one: Found) -> list[Found]:
-    """Return a minimum, and beside it that with less drain, if there is another and both may be.
+    """Return a minimum, and a second one with less drain if it exists and is likely enough.
 
-    Under a load the low side is shut in. Its drain shows in little but the instant at which its make-up valve opens,
-    and likelihood has a minimum for each hold in which it may: one was 11 deviations of leakage off.
+    Under a load the low side is shut in. Its drain shows almost only in the time at which its make-up valve opens, and
+    the likelihood has a minimum for each hold in which that may be: one was 11 deviations of leakage off.
     """
     problem, point, bounds = one
     place = problem.model.unknowns.index("case_leakage")  # fitted as a logarithm
@@ -315,7 +314,7 @@ def _with_less_drain(one: Found) -> list[Found]:
 
 
 def _told_of(done: Sequence[Found]) -> tuple[Found, Found]:
-    """Return the likeliest, and the likeliest with volumes that swing."""
+    """Return the likeliest minimum, and the likeliest with varying volumes."""
     return min(done, key=_cost), min((one for one in done if not _held(one[0])), key=_cost)
 
 
@@ -330,8 +329,8 @@ def _held(problem: Problem) -> bool:
 def _plain(one: RoughOptimum) -> bool:
     """Return whether a form explains a log so well that the last digits matter.
 
-    Elsewhere valves that crack would take up what is strange and hide it: an encoder that was homed at the end stop,
-    or a worn pump. Held chambers are the lumped plant's, which has no such valves.
+    Otherwise cracking valves would absorb and hide another effect: an encoder homed at the end stop, or a worn pump.
+    Held chambers belong to the lumped plant, which has no such valves.
     """
     return not _held(one.problem) and explained(one.problem, one.point)
 
@@ -339,7 +338,7 @@ def _plain(one: RoughOptimum) -> bool:
 def _completed(
     one: RoughOptimum, log: GreyBoxLog, led: Mapping[str, float], *, bent: bool
 ) -> tuple[FreedProblem, Array, tuple[Array, Array]]:
-    """Return the problem with what matters to the last digits alone, where its search begins, and its bounds."""
+    """Return the problem with parameters that matter to the last digits only, where its search starts, and bounds."""
     problem = FreedProblem.of(completed_form(one.problem.model, bent=bent), one.problem.log)
     known, fresh = len(one.point.theta), {STIFFNESS: first_stiffness(log), BEND: 0.0, **dict.fromkeys(CRACKS, 0.0)}
     begun = problem.model.theta({**fresh, **one.values, **led})

@@ -1,4 +1,4 @@
-"""`shut_valves(plain)`: make-up valves that stay shut in a log though sound ones would have opened."""
+"""`shut_valves(plain)`: make-up valves that stay shut in a log where sound valves would have opened."""
 
 from dataclasses import replace
 
@@ -20,22 +20,23 @@ from plant.notes import Note
 MAKEUP = "makeup_conductance"
 
 BEHIND = 3.0
-"""Log-likelihood by which held chambers must be behind [dimensionless]: twenty to one. A lumped plant has no valves."""
+"""Log-likelihood by which held chambers must be behind [dimensionless]: odds of twenty to one. A lumped plant has no
+valves."""
 
 
 def shut_valves(plain: PlainFits, traits: LogTraits) -> tuple[Note, ...]:
-    """Return a note if the plain form explains a log in which no make-up valve is felt: one is stuck shut, or may be.
+    """Return a note if the plain form explains a log without any make-up flow: a valve is stuck shut, or may be.
 
-    One valve that is stuck shut may then be all that is wrong: the other one opens so seldom in small chambers that the
-    likeliest fit has neither. It is, if sound ones do not explain the log; else the log does not tell. A sound valve
-    passes the pump's rated flow at a drop of the inner circuit's pressure at most, since no drop can be larger.
+    If one valve is stuck shut, the other opens so seldom in small chambers that the likeliest fit may have neither. The
+    valve is stuck if sound valves do not explain the log; otherwise the log does not decide. A sound valve passes the
+    pump's rated flow at a drop no larger than the inner circuit's pressure, since no larger drop can occur.
 
     Parameters
     ----------
     plain : PlainFits
         Fits of a log.
     traits : LogTraits
-        How it begins: chambers that are shut in under load need no make-up for long.
+        How the log begins: chambers that are shut in under load need no make-up flow for a long time.
 
     Returns
     -------
@@ -55,21 +56,21 @@ def shut_valves(plain: PlainFits, traits: LogTraits) -> tuple[Note, ...]:
 
 
 def cost_of_sound_ones(plain: PlainFits, best: GreyBoxFit, narrowest: float) -> float:
-    """Return how much more valves leave that are no narrower, searched from the fit and from the rig file.
+    """Return how much worse valves of at least a given width fit, searched from the fit and from the rig file.
 
     Parameters
     ----------
     plain : PlainFits
         Fits of a log.
     best : GreyBoxFit
-        The one whose form is searched, in implicit model steps; what it leaves in these is compared.
+        The fit whose form is searched, with implicit model steps; both costs are compared with these.
     narrowest : float
-        Least conductance of the valves [m^3/(s Pa)].
+        Smallest conductance of the valves [m^3/(s Pa)].
 
     Returns
     -------
     float
-        In log-likelihood; may be negative [dimensionless].
+        Loss of log-likelihood; may be negative [dimensionless].
     """
     problem = FreedProblem.of(best.model, replace(plain.log, stiff=True))
     place = best.model.unknowns.index(MAKEUP)  # fitted as a logarithm

@@ -1,4 +1,4 @@
-"""Mistakes in how a log's channels were read, one or two at a time, and a log with them set right."""
+"""Slips in how a log's channels were read, one or two at a time, and a log with them corrected."""
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
@@ -33,7 +33,7 @@ PRESSURES: Mapping[float, str] = {
     PSI / 1e6: "psi read as MPa",
     0.1: "bar read as MPa",
 }
-"""Slips of a pressure's unit, by what the values are to be multiplied with."""
+"""Slips of a pressure's unit, by the factor that corrects the values."""
 
 SPEEDS: Mapping[float, str] = {
     **TURNS,
@@ -42,10 +42,10 @@ SPEEDS: Mapping[float, str] = {
     1.0 / 6.0: "deg/s read as rpm",
     60.0: "rev/s read as rpm",
 }
-"""The same of a speed's unit."""
+"""Slips of a speed's unit, likewise."""
 
 POSITIONS: Mapping[float, str] = {1e-3: LENGTHS[1e3], 1e3: LENGTHS[1e-3]}
-"""The same of a position's unit."""
+"""Slips of a position's unit, likewise."""
 
 
 class Slip(NamedTuple):
@@ -54,13 +54,13 @@ class Slip(NamedTuple):
     Parameters
     ----------
     channel : str
-        Which.
+        The channel.
     said : str
         What it looks like.
     factor : float
-        What sets it right [dimensionless]; 0 where the channel is `other`.
+        The factor that corrects it [dimensionless]; 0 if the channel was taken for `other`.
     other : str
-        Channel under whose heading it is; empty where it is under its own.
+        Channel under whose heading it was read; empty if under its own.
     """
 
     channel: str
@@ -86,21 +86,21 @@ SLIPS: Sequence[Slip] = (
     *_units(POSITION, POSITIONS),
     Slip(POSITION, f"{VELOCITY} in the place of {POSITION}", 0.0, VELOCITY),
 )
-"""Mistakes that are tried."""
+"""Slips that are tried."""
 
 USUAL_SPEEDS = (-1.0, 1.0 / RPM, RPM)
-"""Those of a speed, by what sets them right, that are tried together with one of another channel [dimensionless]."""
+"""Slips of a speed, by their factor, that are tried together with one of another channel [dimensionless]."""
 
 PAIRS: Sequence[tuple[Slip, Slip]] = tuple(
     (one, two)
     for one, two in combinations([slip for slip in SLIPS if slip.channel != SPEED or slip.factor in USUAL_SPEEDS], 2)
     if one.channel != two.channel and not (one.factor < 0.0 and two.factor < 0.0) and not (one.other or two.other)
 )
-"""Two mistakes that are tried together. Two wrong signs are one of the third channel."""
+"""Pairs of slips that are tried. Two wrong signs equal one wrong sign of the third channel."""
 
 
 def set_right(slips: Sequence[Slip], logged: Logged) -> Logged | None:
-    """Return a log with slips set right.
+    """Return a log with slips corrected.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def set_right(slips: Sequence[Slip], logged: Logged) -> Logged | None:
     Returns
     -------
     Logged or None
-        None where the log has no channel to put in another's place.
+        None if the log has no channel to put in the place of another.
     """
     record, variances = logged.record, dict(logged.variances)
     for slip in slips:

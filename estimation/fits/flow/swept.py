@@ -1,4 +1,4 @@
-"""`swept_evenly(log, ...)`: positions whose straight lines sweep the volume that the piston does; `with_first_fit`.
+"""`swept_evenly(log, ...)`: positions whose straight lines sweep the volume that the piston sweeps; `with_first_fit`.
 
 See decision 313.
 """
@@ -15,22 +15,22 @@ from estimation.models.flow import FLOW_FORM
 from plant.eha.model import EhaParameters
 
 FELT = 2e-4
-"""Share by which straight lines put bulk modulus off from which they count [fraction]: as much as other things that the
-balance leaves out."""
+"""Relative error of bulk modulus due to straight lines, from which they are corrected [fraction]: as large as other
+effects that the balance omits."""
 
 MOST = 0.15
-"""The same up to which a first order in it holds [fraction]; judged: samples are then 1.3 times as far apart as a
-chamber takes to leak empty."""
+"""The same up to which the first-order correction holds [fraction]; judged: the sample time is then 1.3 times the time
+in which a chamber leaks empty."""
 
 
 def swept_evenly(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float]) -> GreyBoxLog:
-    """Return a log with positions led by what a chamber leaks more between two samples than straight lines say.
+    """Return a log whose positions are corrected for what a chamber leaks between samples beyond the straight lines.
 
-    Between samples the flow form moves the piston at one velocity, and the motor on a straight line. A piston that
-    speeds up by ``w`` within a sample time ``T`` sweeps its oil late, so pressure stands ``A w T beta / (12 V)`` higher
-    on average, and ``A w T^2 / (12 t)`` more leaks, ``t = V / (beta L)`` being the time in which a chamber leaks empty.
-    That is a position which leads by ``T^2 / (12 t)``. Left out, the motor's lead takes it up, and bulk modulus comes
-    out too high by ``T^2 / (12 t^2)``.
+    Between samples the flow form moves the piston at constant velocity, and the motor on a straight line. A piston that
+    speeds up by ``w`` within a sample time ``T`` sweeps its oil late. So the mean pressure is ``A w T beta / (12 V)``
+    higher, and ``A w T^2 / (12 t)`` more oil leaks, where ``t = V / (beta L)`` is the time in which a chamber leaks
+    empty. A position that leads by ``T^2 / (12 t)`` has the same effect. Without the correction the motor's lead
+    absorbs it, and bulk modulus is too high by ``T^2 / (12 t^2)``.
 
     Parameters
     ----------
@@ -39,12 +39,12 @@ def swept_evenly(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str
     parameters : EhaParameters
         The actuator.
     values : Mapping[str, float]
-        Bulk modulus and leakage coefficient, as a first fit has found them [SI].
+        Bulk modulus and leakage coefficient of a first fit [SI].
 
     Returns
     -------
     GreyBoxLog
-        The same log where that is not felt.
+        The same log if the effect does not matter.
     """
     leaks = values["bulk_modulus"] * values["leakage_coefficient"] / parameters.chamber_volume
     off = (log.sample_time * leaks) ** 2 / 12.0
@@ -59,7 +59,7 @@ def swept_evenly(log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str
 def with_first_fit(
     log: GreyBoxLog, parameters: EhaParameters, values: Mapping[str, float], stiffest: float
 ) -> GreyBoxLog:
-    """Return a log as the flow form sees it once a first fit is known: noise of speed, even positions.
+    """Return a log as the flow form sees it once a first fit is known: with noise of speed and corrected positions.
 
     Parameters
     ----------
@@ -68,9 +68,9 @@ def with_first_fit(
     parameters : EhaParameters
         The actuator.
     values : Mapping[str, float]
-        What the first fit has found [SI].
+        Parameters of the first fit [SI].
     stiffest : float
-        As of `carried` [Pa].
+        As in `carried` [Pa].
     """
     log = pumped_evenly_at(log, parameters, values)
     return swept_evenly(carried(log, parameters, values, stiffest), parameters, values)

@@ -1,8 +1,8 @@
-"""`bound_told`, `ratio_doubt`: how well bulk modulus is known where the log tells the volume of the chambers.
+"""`bound_told`, `ratio_doubt`: how well bulk modulus is known if the log determines the volume of the chambers.
 
-Volume over bulk modulus is all that a piston at rest tells. One that travels changes its chambers by a share that hangs
-on their volume, so that the log tells both. Then a scale of all flows alike, with chambers that grow along, leaves bulk
-modulus as it is, and what is not known of displacement over area is open as far as the log leaves it.
+A piston at rest determines only volume over bulk modulus. A piston that travels changes its chambers by a share that
+depends on their volume, so the log determines both. A common scale of all flows and chamber volumes then leaves bulk
+modulus unchanged, and the uncertainty of displacement over area counts only as far as the log leaves it open.
 """
 
 import math
@@ -13,11 +13,11 @@ from estimation.fits.hypotheses import VOLUME
 from estimation.fits.hypothesis_search.explanation import Explanation
 
 RATIO = ("pump_displacement", "piston_area")
-"""Entries whose ratio scales all flows: bulk modulus answers to either alike, the other way round."""
+"""Entries whose ratio scales all flows: bulk modulus responds to both alike, in opposite directions."""
 
 
 def is_told(strange: Explanation | None) -> bool:
-    """Return whether an explanation of a log tells the volume of the chambers."""
+    """Return whether an explanation of a log determines the volume of the chambers."""
     return strange is not None and VOLUME.name in strange.names
 
 
@@ -27,34 +27,34 @@ def bound_told(strange: Explanation, plain: GreyBoxFit) -> float:
     Parameters
     ----------
     strange : Explanation
-        What explains the log.
+        The explanation of the log.
     plain : GreyBoxFit
         The plain form's fit, with the rig file's volume.
 
     Returns
     -------
     float
-        Where the explanation tells the volume, at most that with a known volume: a log that tells more is no less
-        observable for it [fraction].
+        If the explanation determines the volume, at most the bound at a known volume, since a log with more information
+        is no less observable [fraction].
     """
     bound, known = (one.std["bulk_modulus"] / one.values["bulk_modulus"] for one in (strange.fit, plain))
     return min(bound, known) if is_told(strange) else bound
 
 
 def ratio_doubt(strange: Explanation, uncertainties: Mapping[str, float]) -> float:
-    """Return the deviation of bulk modulus from displacement over area, as far as the log leaves it open.
+    """Return the deviation of bulk modulus due to displacement over area, as far as the log leaves the ratio open.
 
     Parameters
     ----------
     strange : Explanation
-        What explains the log.
+        The explanation of the log.
     uncertainties : Mapping[str, float]
         Relative standard deviation of the actuator's parameters [fraction].
 
     Returns
     -------
     float
-        Relative; none where the volume is not told, whose total interval holds all of it [fraction].
+        Relative; 0 if the volume is not determined, since the total interval then includes all of it [fraction].
     """
     slopes = [strange.fit.rig_slopes[name]["bulk_modulus"] for name in RATIO if name in strange.fit.rig_slopes]
     if not is_told(strange) or not slopes:

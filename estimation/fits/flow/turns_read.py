@@ -1,8 +1,8 @@
-"""`with_turns_read(log, parameters)`: a slow log whose turns deliver what the samples after each of them say.
+"""`with_turns_read(log, parameters)`: a slow log whose pumped volume in each turn is read from the samples after it.
 
-A command comes at an unknown time between two samples. A motor of first order is short of its new speed by a share
-there, and by the same fraction of that share a sample later. So the samples after a turn tell when the command came,
-and how much oil the pump delivered beside what straight lines say.
+A command comes at an unknown time between two samples. A first-order motor lacks a share of its change of speed at the
+next sample, and the same fraction of that share one sample later. So the samples after a turn determine when the
+command came, and how much oil the pump delivered beyond the straight lines.
 """
 
 from collections.abc import Iterable
@@ -17,21 +17,21 @@ from estimation.models.flow import FLOW_FORM
 from plant.eha.model import EhaParameters
 
 SHORT = 0.05
-"""Share of its whole rise by which a turn may depart from a motor of first order [fraction]; judged."""
+"""Share of its whole change by which a turn may depart from that of a first-order motor [fraction]; judged."""
 
 KNOWN = 3.0
-"""How many deviations of itself what a motor is still short of after a sample must be: in a log so slow that nothing is
-left by then, no sample tells when a command came [dimensionless]."""
+"""What a motor still lacks one sample later, in deviations [dimensionless]. In a log so slow that nothing is left by
+then, no sample tells when the command came."""
 
 SETTLING = 8
 """Samples after a turn over which it is followed [count]."""
 
 
 def with_turns_read(log: GreyBoxLog, parameters: EhaParameters) -> GreyBoxLog:
-    """Return a slow log whose turns are read off the samples after them; the same one where they tell nothing.
+    """Return a slow log with the volume of its turns read from later samples; unchanged if these do not determine it.
 
-    The volume is put where the piston is: swept by that much less, oil is compressed by as much. On motor speed at the
-    samples half of it would come a sample too late.
+    The volume is subtracted from position: a smaller swept volume compresses the oil as much. Added to the motor speed
+    at the samples, half of it would come a sample too late.
 
     Parameters
     ----------
@@ -52,14 +52,14 @@ def with_turns_read(log: GreyBoxLog, parameters: EhaParameters) -> GreyBoxLog:
 
 
 def turned_beside(speed: Array, sample_time: float, noise: float) -> Array:
-    """Return by how much further a motor turns up to each sample than the straight line from the one before says.
+    """Return by how much the motor turns further up to each sample than the straight line from the one before.
 
-    With lag ``l``, a command comes ``-l ln(R)`` before a sample at which the motor is short by share ``R`` of its rise.
+    With lag ``l``, a command comes ``-l ln(R)`` before a sample at which the motor lacks the share ``R`` of its change.
 
     Parameters
     ----------
     speed : ndarray, shape (n,)
-        At the samples [rad/s].
+        Motor speed at the samples [rad/s].
     sample_time : float
         Between them [s].
     noise : float
@@ -100,14 +100,14 @@ def turned_beside(speed: Array, sample_time: float, noise: float) -> Array:
 
 
 def _begins(rise: Array, k: int, loud: float) -> bool:
-    """Return whether a motor that was steady turns in the time up to sample ``k``, and is followed for three more."""
+    """Return whether a steady motor starts to turn before sample ``k``, and is followed for three more samples."""
     return 1 <= k < len(rise) - 3 and abs(rise[k - 1]) < loud
 
 
 def _left(rise: Array, turns: Iterable[int], loud: float) -> float:
-    """Return which fraction of what it is short of a motor is still short of a sample later; 0 where that is unknown.
+    """Return the fraction of its missing speed that a motor still lacks one sample later; 0 if unknown.
 
-    Turns count after which it falls by the same fraction twice.
+    A turn counts if the missing speed falls by the same fraction twice.
     """
     power = product = 0.0
     for k in turns:

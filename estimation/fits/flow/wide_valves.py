@@ -1,4 +1,4 @@
-"""Make-up valves that must let in much: those of a piston that outruns its pump, or of a single rod with pilots."""
+"""Make-up valves that must pass much flow: for a piston that outruns its pump, or a single rod with pilot valves."""
 
 import numpy as np
 
@@ -7,8 +7,9 @@ from estimation.models.flow import FLOW_FORM
 from plant.eha.model import EhaParameters
 
 OUTRUNS, OUTRUN_SPAN = 1.2, 5e-3
-"""How many times as fast as the pump's whole flow would move it a piston is that outruns it [dimensionless], and over
-which time [s]. Of 100 training logs without a constant load none is 0.95, of 20 with one seven are 1.8."""
+"""Piston speed over that at the pump's full flow, from which the piston outruns its pump [dimensionless], and the time
+over which it must [s]. In 100 training logs without a constant load it is at most 0.95; in seven of 20 with one it is
+1.8."""
 
 
 def outruns_pump(log: GreyBoxLog, p: EhaParameters) -> bool:
@@ -33,7 +34,7 @@ def outruns_pump(log: GreyBoxLog, p: EhaParameters) -> bool:
 
 
 def opens_wide(log: GreyBoxLog, p: EhaParameters) -> bool:
-    """Return whether make-up valves are orifices: they stand wide open.
+    """Return whether make-up valves must be modelled as orifices, since they stand wide open.
 
     Parameters
     ----------
