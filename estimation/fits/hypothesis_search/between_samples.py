@@ -1,4 +1,4 @@
-"""`with_course(log, fitted, ...)`: a slow log with what its motor's course between samples leaves open."""
+"""`with_course(log, fitted, ...)`: a slow log with the uncertainty of its motor's course between samples."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -13,17 +13,19 @@ from estimation.fits.greybox.log import GreyBoxLog
 from plant.eha.model import EhaParameters
 
 ROUNDS = 2
-"""How often what is open is read off a fit [count]."""
+"""How often the uncertainty is read from a fit [count]."""
 
 FIRST = 0.1
-"""What is open of both kinds at first, over what a turn of the speed could make of it [fraction]; judged."""
+"""First guess of both parts of the uncertainty, over the largest effect that a turn of the speed could have [fraction];
+judged."""
 
 LEAST = 0.005
-"""What is open at least [fraction]; judged: speed that turns suddenly is never straight between samples."""
+"""Least uncertainty [fraction]; judged: speed that turns suddenly is never straight between samples."""
 
 ALIKE = 3.0
-"""Factor on what comes back [dimensionless]: a motor passes each turn alike, so that it does not average out. With 1,
-17 logs of our circuit at 200 Hz have z of 1.25 by root mean square and one is 3.6 deviations low, with 3 none is."""
+"""Factor on the recurring part [dimensionless]: a motor passes each turn alike, so that the error does not average out.
+With 1, 17 logs of our circuit at 200 Hz have a root mean square z of 1.25, and one is 3.6 deviations low; with 3 none
+is."""
 
 
 def with_course(
@@ -33,7 +35,7 @@ def with_course(
     *,
     always: bool = False,
 ) -> GreyBoxLog:
-    """Return a slow log with what the motor's course between samples leaves open; any other as it is.
+    """Return a slow log with the uncertainty of its motor's course between samples; any other log unchanged.
 
     Parameters
     ----------
@@ -44,12 +46,12 @@ def with_course(
     parameters : EhaParameters
         The actuator.
     always : bool
-        Whether a log that is not slow has it too.
+        Whether a log that is not slow gets it too.
 
     Returns
     -------
     GreyBoxLog
-        The log. One with gaps in its speed is left as it is: there its kernel follows what they leave open.
+        The log. One with gaps in its speed is unchanged: its kernel models the uncertainty of the gaps.
     """
     if (log.sample_time < SLOW and not always) or log.gaps.size:
         return log
@@ -70,6 +72,6 @@ def with_course(
 
 
 def _kept(log: GreyBoxLog, values: Mapping[str, float], parameters: EhaParameters) -> float:
-    """Return the share of a chamber's excess oil that leakage leaves after a sample, make-up holding the other."""
+    """Return the share of a chamber's excess oil that leakage leaves after a sample, if make-up holds the other."""
     leaked = values["bulk_modulus"] * (values["leakage_coefficient"] + values["case_leakage"])
     return float(np.exp(-log.sample_time * leaked / (2.0 * parameters.chamber_volume)))

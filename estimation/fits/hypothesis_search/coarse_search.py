@@ -25,29 +25,30 @@ from estimation.models.wide_flow import LINEAR
 from plant.arrays import Array
 
 SETTLING = 40
-"""Evaluations of the model at most on a way down [count]."""
+"""Most evaluations of the model in one descent [count]."""
 
 SLIGHT = 1e-4
-"""Share of the cost that a further step must promise with long model steps [fraction]: these err by more."""
+"""Share of the cost that a further step must promise with long model steps [fraction]: their errors are larger."""
 
 NEAR = 2.0
-"""First radius of a search [dimensionless]: it begins where the plain form ended, or a simpler hypothesis."""
+"""First trust radius of a search [dimensionless]: it begins where the plain form or a simpler hypothesis ended."""
 
 FINEST_DELAY = 1e-3
-"""Step in which a delay is sought [s]; what is left of it goes into the lag."""
+"""Resolution of a delay in the search [s]; the remainder becomes part of the lag."""
 
 MAY_VANISH, VANISHED = ("leakage_coefficient", "flow_bias", "makeup_conductance"), 1e-2
-"""What a search may take for nothing by mistake, and the share of the rig's value below which it has."""
+"""Parameters that a search may wrongly reduce to nothing, and the share of the rig's value below which it has."""
 
 ONSETS, WIDTHS = np.linspace(0.03, 0.97, 21), (0.02, 0.07, 0.25)
-"""Middle times at which air is tried to get in once all else is known, and how long that takes [fraction of a log]."""
+"""Middle times of air entry that are tried once all else is known, and how long the entry takes [fraction of a log]."""
 
 STEP_NEAR, STEP_WIDTHS = np.linspace(-0.02, 0.02, 41), (5e-4, 2e-3, 1e-2)
-"""The same of a step of leakage, beside the time that a descent finds: a quick step holds it where it is. On rigs that
-leak little a step changes pressure within milliseconds."""
+"""The same for a step of leakage, relative to the time that a descent finds: the cost has a local minimum at any quick
+step. On rigs that leak little, a step changes pressure within milliseconds."""
 
 LEAST_BETTER = 10.0
-"""Gain in log-likelihood for which a change is led to another time [dimensionless]: the worth of a hypothesis."""
+"""Gain in log-likelihood for which a change is moved to another time [dimensionless]: the required gain of a
+hypothesis."""
 
 
 def search_coarsely(log: GreyBoxLog, tried: Trial, wanted: float = np.inf, every: int = 1) -> Trial:
@@ -58,11 +59,11 @@ def search_coarsely(log: GreyBoxLog, tried: Trial, wanted: float = np.inf, every
     log : GreyBoxLog
         The log, widened.
     tried : Trial
-        The set, from where it has come.
+        The set, at the end of its search so far.
     wanted : float
-        Cost above which it is of no use, so that it is not followed there [dimensionless].
+        Cost above which the result is of no use, so that the search ends [dimensionless].
     every : int
-        How many samples are one, see `decimated` [count].
+        How many samples are merged into one, see `decimated` [count].
     """
     early, known = coarsened(log, tried.delays, tried.together, every), freed_at_end(tried.together[:-1])
     tried = replace(tried, void=False)
@@ -82,9 +83,10 @@ def search_coarsely(log: GreyBoxLog, tried: Trial, wanted: float = np.inf, every
 
 
 def unless_quiet(log: GreyBoxLog, tried: Trial) -> Trial:
-    """Return a trial, void where it leaves far less than the noise of position makes.
+    """Return a trial; void if its residuals are far smaller than the effect of position noise.
 
-    Oil as stiff as steel makes that noise so large that it explains any log. No other explanation would come as low.
+    For oil as stiff as steel that noise is so large that it explains any log. No other explanation would cost as
+    little.
 
     Parameters
     ----------
@@ -97,12 +99,12 @@ def unless_quiet(log: GreyBoxLog, tried: Trial) -> Trial:
 
 
 def _led_down(log: GreyBoxLog, tried: Trial, start: Array, *more: str, wanted: float) -> Trial:
-    """Return a set of hypotheses led down with long model steps."""
+    """Return a set of hypotheses after a descent with long model steps."""
     return descended(log, tried, start, SETTLING, *more, wanted=wanted, least_share=SLIGHT)
 
 
 def _punctual(log: GreyBoxLog, best: Trial, every: int, *known: str) -> Trial:
-    """Return a set of hypotheses with the delay of its last one sought in steps of `FINEST_DELAY`."""
+    """Return a set of hypotheses with the delay of its last one searched in steps of `FINEST_DELAY`."""
     channel, early = best.together[-1].late, min(best.together[-1].delays) < 0.0
     least, most = (-LATEST, 0.0) if early else (0.0, LATEST)
     for step in (FINEST_DELAY, -FINEST_DELAY):
@@ -119,9 +121,9 @@ def _punctual(log: GreyBoxLog, best: Trial, every: int, *known: str) -> Trial:
 def _timed(
     log: GreyBoxLog, tried: Trial, names: tuple[str, str], times: Sequence[tuple[float, float]], wanted: float
 ) -> Trial:
-    """Return a set of hypotheses with a change that comes when, and as quickly as, it does likeliest.
+    """Return a set of hypotheses with the likeliest time and width of its change.
 
-    A descent finds the nearest time only, and none where the change is quick.
+    A descent finds only the nearest time, and none if the change is quick.
     """
     more = freed_at_end(tried.together)
     problem = freed(log, tried.together, *more)
@@ -140,7 +142,7 @@ def _timed(
 
 
 def _revived(log: GreyBoxLog, tried: Trial, *more: str) -> Array | None:
-    """Return a start with the rig's value of what has all but vanished, from where a logarithm finds no way back."""
+    """Return a start with the rig's value of what has almost vanished: a logarithm does not come back from there."""
     lost = vanished_values(log, tried.values)
     return freed(log, tried.together, *more).model.theta({**tried.values, **lost}) if lost else None
 
@@ -184,9 +186,9 @@ def descended(
     start : ndarray, shape (unknowns,)
         Fitted coordinates [dimensionless].
     evaluations : int
-        How often the model may be evaluated [count].
+        Most evaluations of the model [count].
     *more : str
-        What is freed beside the hypotheses.
+        Unknowns that are fitted beside those of the hypotheses.
     wanted : float
         See `search_coarsely` [dimensionless].
     least_share : float
@@ -213,11 +215,11 @@ def coarsened(
     log : GreyBoxLog
         The log, widened.
     delays : Mapping[str, float]
-        How late channels come [s].
+        Delay of each late channel [s].
     together : tuple of Hypothesis
-        The set; by mass if one of them says so.
+        The set of hypotheses; mass is balanced if one of them requires it.
     every : int
-        How many samples are one, see `decimated` [count].
+        How many samples are merged into one, see `decimated` [count].
     """
     row = decimated(delayed(log, delays), every)
     return balanced_by(row, 1.0) if any(one.by_mass for one in together) else row

@@ -1,4 +1,4 @@
-"""Common mistakes that a search by slopes leaves out: another pump delivery behind leaks, a zero behind an offset."""
+"""Common errors that slopes underrate: another pump delivery behind leaks, an encoder zero behind a pressure offset."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -14,29 +14,29 @@ from estimation.fits.hypothesis_search.screening import screen
 from estimation.fits.hypothesis_search.wide_log import delayed
 
 AS_WELL = 0.5
-"""Share of the largest gain that slopes promise, from which another delivery is followed to its end where nothing
-explains a log alone [fraction]; judged. An area 5 % low promised more as a leakage that changes, in four ways, and came
-nearest as a relief valve that opens early."""
+"""Share of the largest predicted gain from which another delivery is searched to its end, if no hypothesis explains a
+log alone [fraction]; judged. With an area 5 % low, slopes promised four ways of leakage that changes more than the
+delivery, and a relief valve that opens early came nearest."""
 
 BESIDE_OTHERS = 20.0
-"""Gain in log-likelihood that slopes promise another delivery beside an explanation, from which both are sought
-together [dimensionless]; judged, twice what a hypothesis must gain. A pump of 90 % beside a pressure 3.7 ms late
+"""Predicted gain in log-likelihood of another delivery beside an explanation, from which both are searched together
+[dimensionless]; judged, twice what a hypothesis must gain. With a pump of 90 % and a pressure 3.7 ms late, slopes
 promised 27, and bulk modulus was 11 % too low."""
 
 
 def delivery_followed(
     log: GreyBoxLog, finished: Sequence[Trial], gains: Mapping[str, float], spared: Decimation, accepted: Accepted
 ) -> list[Trial]:
-    """Return the end of a search for another pump delivery, where slopes promise it nearly as much as any.
+    """Return the end of a search for another pump delivery, if slopes promise it nearly as much as any hypothesis.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, widened.
     finished : sequence of Trial
-        What was tried alone, the best first.
+        Hypotheses tried alone, the best first.
     gains : Mapping[str, float]
-        What slopes promise each hypothesis [dimensionless].
+        Predicted gain of each hypothesis [dimensionless].
     spared : Decimation
         Samples and starts of the search.
     accepted : callable
@@ -45,7 +45,7 @@ def delivery_followed(
     Returns
     -------
     list of Trial
-        None where it has been followed already, or something explains the log.
+        Empty if the delivery was searched already, or if a hypothesis explains the log.
     """
     promises = DELIVERY.name in gains and gains[DELIVERY.name] >= AS_WELL * max(gains.values())
     followed = any(one.together == (DELIVERY,) and one.fits for one in finished)
@@ -55,17 +55,17 @@ def delivery_followed(
 
 
 def with_zero(log: GreyBoxLog, first: Trial, spared: Decimation, accepted: Accepted) -> list[Trial]:
-    """Return what is likeliest alone together with an encoder's zero, of a log that shows one, if both explain it.
+    """Return the likeliest hypothesis together with an encoder zero, if the log suggests one and both explain it.
 
-    Both are sought from where the first one was: alone it has taken up part of the zero. An offset of the pressure was
-    found a third too large, and no zero beside it.
+    Both are searched from the first one's start: alone it has absorbed part of the zero. A pressure offset was found a
+    third too large, and then no zero beside it.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, widened.
     first : Trial
-        What is likeliest alone.
+        The likeliest hypothesis alone.
     spared : Decimation
         Samples and starts of the search.
     accepted : callable
@@ -77,17 +77,17 @@ def with_zero(log: GreyBoxLog, first: Trial, spared: Decimation, accepted: Accep
 
 
 def rig_and_load(log: GreyBoxLog, load: Hypothesis, best: Trial, spared: Decimation, accepted: Accepted) -> list[Trial]:
-    """Return a load at the start of a log together with a pump and chambers that the rig file has wrong.
+    """Return a load at the start of a log together with a pump and chambers that the rig file states wrongly.
 
-    A load is no error of a rig file, so two errors may come beside it. Searched one after the other, each takes up what
-    belongs to the others. They are sought only where no two explain the log, and to their end, whatever two leave.
+    A load is not an error of a rig file, so two errors may come beside it. Searched one after the other, each absorbs
+    what belongs to the others. The three are searched only if no pair explains the log, and always to their end.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, widened.
     load : Hypothesis
-        That at the start of this log.
+        The load hypothesis that fits the start of this log.
     best : Trial
         The likeliest so far, alone or in a pair.
     spared : Decimation
@@ -101,14 +101,14 @@ def rig_and_load(log: GreyBoxLog, load: Hypothesis, best: Trial, spared: Decimat
 
 
 def with_delivery(log: GreyBoxLog, best: Trial, spared: Decimation, accepted: Accepted) -> list[Trial]:
-    """Return what explains a log together with another pump delivery, where slopes promise that it gains.
+    """Return the explanation of a log together with another pump delivery, if slopes promise a gain.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, widened.
     best : Trial
-        What explains the log, fitted to the end.
+        The explanation, fitted to the end.
     spared : Decimation
         Samples and starts of the search.
     accepted : callable
@@ -117,7 +117,7 @@ def with_delivery(log: GreyBoxLog, best: Trial, spared: Decimation, accepted: Ac
     Returns
     -------
     list of Trial
-        Delays beside those of the explanation; none where nothing explains the log.
+        Delays are relative to those of the explanation; empty if nothing explains the log.
     """
     if DELIVERY in best.together or not is_explained(best, accepted):
         return []
@@ -135,7 +135,7 @@ def _sought(
     delays: Mapping[str, float] = MappingProxyType({}),
     starts: Sequence[Mapping[str, float]] = (),
 ) -> list[Trial]:
-    """Return the ends of a search for hypotheses together, the best first; if asked, of those that explain the log."""
+    """Return the ends of a search for hypotheses together, best first; on request only those that explain the log."""
     late = delayed(log, delays)
     tried = [*screen(late, together, starts or spared.starts, every=spared.every)]
     ended = [replace(one, delays={**delays, **one.delays}) for one in likeliest(late, [tried], spared=spared)]

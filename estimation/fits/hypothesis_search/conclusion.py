@@ -1,4 +1,4 @@
-"""`conclude(log, parameters, counted, accepted) -> Explanation`: what hypotheses that explain a log say of it."""
+"""`conclude(log, parameters, counted, accepted) -> Explanation`: the result of hypotheses that explain a log."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -21,7 +21,7 @@ Accepted: TypeAlias = Callable[[GreyBoxFit], bool]
 
 
 def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial], accepted: Accepted) -> Explanation:
-    """Return the explanation of a log by the best set of hypotheses, its values weighed over rivals.
+    """Return the explanation of a log by the best set of hypotheses, its values weighted over rivals.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
     parameters : EhaParameters
         The actuator.
     counted : sequence of Trial
-        Sets that explain the log alike, fitted to the end, the best first.
+        Sets that explain the log about equally well, fitted to the end, the best first.
     accepted : callable
         ``accepted(fit)``: whether a fit explains the log.
     """
@@ -54,14 +54,14 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
 
 
 def is_explained(tried: Trial, accepted: Accepted) -> bool:
-    """Return whether a set of hypotheses, fitted to the end, explains a log and is what it says."""
+    """Return whether a set of hypotheses, fitted to the end, explains a log and keeps its meaning."""
     return not tried.void and bool(tried.fits) and accepted(tried.fit)
 
 
 def _detailed(
     log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial], accepted: Accepted
 ) -> Explanation | None:
-    """Return the explanation with the drops of make-up valves and the accumulator freed; None where it fails then."""
+    """Return the explanation with cracking drops of make-up valves and accumulator free; None if it then fails."""
     best, *rivals = (with_details(log, one) for one in counted)
     return conclude(log, parameters, (best, *rivals), accepted) if is_explained(best, accepted) else None
 

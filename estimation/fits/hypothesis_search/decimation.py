@@ -12,21 +12,21 @@ from estimation.models.wide_flow import WIDE_FLOW_FORM
 from plant.arrays import Array
 
 LONG_STEP, SHORT_STEP = 4e-3, 2e-3
-"""Step of the model while hypotheses are compared that have much to explain, or less [s]."""
+"""Model step for the comparison of hypotheses if the plain form leaves much, or little, unexplained [s]."""
 
 FEW = 8_000
-"""Length of a log of which all samples count [samples]: it takes a second or two, and its valleys are narrow."""
+"""Length of a log that is not decimated [samples]: it takes a second or two, and its minima are narrow."""
 
 LOUD, FAINT = 10.0, 2.0
-"""Half the sum of squares that the plain form leaves, or the first of two, over what noise alone makes of it, from
-which steps are long, and below which all samples count [dimensionless]."""
+"""Cost of the plain form, or of the first of two hypotheses, over that of noise alone, from which steps are long, and
+below which all samples are used [dimensionless]."""
 
 
 MOST_LONGER = 1.5
-"""How many times its usual length a step may take, to come from one pressure to the next [dimensionless]; judged."""
+"""Longest distance from one pressure sample to the next, over the usual step [dimensionless]; judged."""
 
 MOST_KEPT = 0.8
-"""Share of the pressures that a step comes to, below which all samples count [fraction]; judged."""
+"""Share of the pressure samples that steps must reach, else all samples are used [fraction]; judged."""
 
 
 class Decimation(NamedTuple):
@@ -35,9 +35,9 @@ class Decimation(NamedTuple):
     Parameters
     ----------
     every : int
-        How many samples are one [count].
+        How many samples are merged into one [count].
     left : float
-        What the plain form leaves, or the first of two, over the noise [dimensionless].
+        Cost of the plain form, or of the first of two hypotheses, over that of noise [dimensionless].
     starts : sequence of Mapping[str, float]
         Where searches begin [SI].
     """
@@ -53,18 +53,17 @@ NO_DECIMATION = Decimation(1, 1.0, ())
 def decimated(log: GreyBoxLog, every: int) -> GreyBoxLog:
     """Return a decimated log, with one model step from each sample to the next.
 
-    What is pumped and what is swept between two of them stay: motor speed is averaged as far as a straight line between
-    means needs, position is as it was read. A pressure is the mean over a block; one that came slower than the rest is
-    as it was read, and the samples that count are those that have one. Each sample left stands for as many residuals as
-    the log has, so that costs stay what they were, but for what white noise makes of them. What a gap in the speed
-    leaves open stays, too.
+    Pumped and swept volumes between samples are kept: motor speed is averaged as far as straight lines between means
+    need, and position is not averaged. A pressure is the mean over a block. A pressure at a lower rate is used as it
+    was read, and the samples that remain are those that have one. Each remaining sample represents as many residuals as
+    the log has, so that costs stay the same except for white noise. The uncertainty of gaps in speed is kept, too.
 
     Parameters
     ----------
     log : GreyBoxLog
-        The log, widened; one with pressures at no even distance is left as it is.
+        The log, widened; unchanged if its pressures are unevenly spaced.
     every : int
-        How many samples are one [count].
+        How many samples are merged into one [count].
     """
     if every < 2:
         return log.coarsened()
@@ -95,21 +94,21 @@ def decimated(log: GreyBoxLog, every: int) -> GreyBoxLog:
 
 
 def _smoothed(speed: Array, every: int) -> Array:
-    """Return a speed averaged by a triangle as wide as two steps: straight lines between means then hold its sum."""
+    """Return a speed averaged by a triangle two steps wide: straight lines between the means then keep its integral."""
     rising = np.arange(1.0, every + 1.0)
     window = np.concatenate([rising, rising[-2::-1]]) / every**2
     return np.convolve(np.pad(speed, every - 1, mode="edge"), window, "valid")
 
 
 def _gaps_at(gaps: Array, row: int, every: int) -> Array:
-    """Return gaps by the samples that are left from a row on; each opens what those opened that it stands for."""
+    """Return gaps for the samples that remain from a row on; each has the uncertainty of those it replaces."""
     first, last, variance = gaps.T
     begun, ended = (np.maximum(end - row, 0.0) // every for end in (first, last))
     return np.column_stack([begun, ended, variance * (last - first + 1.0) / (ended - begun + 1.0)])
 
 
 def _block_means(measured: Array, block: int) -> Array:
-    """Return the moving block means of the measurements; missing where a sample of the block is."""
+    """Return the moving block means of the measurements; missing if a sample of the block is missing."""
     if block < 2:
         return measured
     before = block // 2
@@ -131,7 +130,7 @@ def cost_over_noise(log: GreyBoxLog, cost: float) -> float:
     Returns
     -------
     float
-        About 1 where the log is explained [dimensionless].
+        About 1 if the log is explained [dimensionless].
     """
     seen = np.count_nonzero(np.isfinite(log.measured[:, 0])) / max(1, round(log.block / log.sample_time))
     return 2.0 * cost / max(seen, 1.0)
@@ -145,12 +144,12 @@ def decimation_for(log: GreyBoxLog, left: float) -> int:
     log : GreyBoxLog
         The log.
     left : float
-        What the plain form leaves, or the first of two, see `cost_over_noise` [dimensionless].
+        Cost of the plain form, or of the first of two hypotheses, see `cost_over_noise` [dimensionless].
 
     Returns
     -------
     int
-        One where little is left, since small gains are then what matters, and in short logs [count].
+        One if little is left, since small gains then matter, and in short logs [count].
     """
     if left < FAINT or len(log.drives) < FEW:
         return 1

@@ -1,8 +1,8 @@
 """`decimation_limit(log, values, every)`: how far a log may be decimated without a change of costs.
 
-A long model step errs where make-up valves and relief fill a chamber faster, and where the pumped flow has a corner. On
-the paper's rig that is 2 % of the cost at steps of 4 ms; where chambers are small and oil is stiff it was up to a
-hundred times the noise, at 1 ms, and searches ended in valleys of the step. See decision 312.
+A long model step has errors where make-up and relief valves fill a chamber within it, and at corners of the pumped
+flow. On the paper's rig that is 2 % of the cost at steps of 4 ms. With small chambers of stiff oil it was up to a
+hundred times the noise, at 1 ms, and searches ended in false minima that the steps created. See decision 312.
 """
 
 from collections.abc import Mapping
@@ -15,8 +15,8 @@ from estimation.fits.hypothesis_search.wide_log import usual_values
 from estimation.fits.hypothesis_search.wide_problem import freed, freed_at_end
 
 MOVED, MOVED_LEAST = 0.15, 0.3
-"""Share of what is left, and least of it over the noise, by which fewer samples may leave more or less [dimensionless];
-judged. On 20 strange training logs of the paper's rig it is 0.1 of what is left at most."""
+"""Change of the cost by decimation that is allowed: share of the cost, and at least so much over that of noise
+[dimensionless]; judged. In 20 strange training logs of the paper's rig the change is at most 0.1 of the cost."""
 
 
 def decimation_limit(
@@ -26,20 +26,20 @@ def decimation_limit(
     together: tuple[Hypothesis, ...] = (),
     delays: Mapping[str, float] | None = None,
 ) -> int:
-    """Return how many samples may be merged into one, at most as many as asked for.
+    """Return how many samples may be merged into one, at most ``every``.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, widened.
     values : Mapping[str, float]
-        Where a search has come [SI].
+        Where a search has ended [SI].
     every : int
-        How many samples are one if nothing speaks against it, see `decimation.decimation_for` [count].
+        How many samples are merged into one if nothing speaks against it, see `decimation.decimation_for` [count].
     together : tuple of Hypothesis
-        What is freed there.
+        The hypotheses that are fitted there.
     delays : Mapping[str, float], optional
-        How late channels come there [s]; none by default.
+        Delay of each late channel there [s]; none by default.
 
     Returns
     -------

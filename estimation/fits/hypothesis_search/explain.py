@@ -1,7 +1,8 @@
-"""`explain(log, parameters, ...) -> Explanation`: the hypotheses under which a log is explained, alone or two together.
+"""`explain(log, parameters, ...) -> Explanation`: the hypotheses that explain a log, alone or in pairs.
 
-A log that the plain flow form does not explain is fitted under the hypotheses that the slopes of that fit promise most
-of, then under the others, then under pairs with the likeliest; what is freed without need only widens the interval.
+A log that the plain flow form does not explain is fitted first under the hypotheses with the largest predicted gain,
+then under the others, then under pairs with the likeliest. No hypothesis is added without need: it would only widen the
+interval.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -40,15 +41,14 @@ from estimation.fits.hypothesis_search.wide_problem import freed, own_starts
 from plant.eha.model import EhaParameters
 
 NOISE = 1.05
-"""What is left over the noise by what explains a log, below which no other set is sought in its place
-[dimensionless]."""
+"""Cost of an explanation over that of noise below which no other set of hypotheses is searched [dimensionless]."""
 
 BESIDE = 50.0
-"""Gain in log-likelihood that slopes promise another volume beside a pump that delivers less, from which the two are
-sought together [dimensionless]; judged."""
+"""Predicted gain in log-likelihood of another volume beside a pump that delivers less, from which the two are searched
+together [dimensionless]; judged."""
 
 WORTH = 10.0
-"""Gain in log-likelihood below which a hypothesis is not accepted [dimensionless]."""
+"""Gain in log-likelihood that a hypothesis must reach to be accepted [dimensionless]."""
 
 
 def explain(
@@ -64,7 +64,7 @@ def explain(
     homed: bool = False,
     useful: float = np.inf,
 ) -> Explanation | None:
-    """Return the hypotheses that explain a log best, alone or two together.
+    """Return the hypotheses that explain a log best, alone or in pairs.
 
     Parameters
     ----------
@@ -77,23 +77,23 @@ def explain(
     accepted : callable
         ``accepted(fit)``: whether a fit explains the log.
     asked : sequence of Hypothesis
-        What is tried alone; pairs are with any other.
+        Hypotheses that are tried alone; in pairs each may be joined by any other.
     paired : bool
-        Whether pairs are tried where nothing explains the log alone.
+        Whether pairs are tried if no hypothesis explains the log alone.
     hopeless : float
-        Cost from which the best alone counts for so little that no pair is tried [dimensionless].
+        Cost of the best single hypothesis from which no pairs are tried [dimensionless].
     by_mass : bool
-        Whether mass is balanced while hypotheses are compared, as where the likelier plain fit does; else volume. At
-        high pressure the two differ by more than what is strange.
+        Whether mass is balanced while hypotheses are compared, as in the likelier plain fit; else volume. At high
+        pressure the two differ by more than the effects that are searched for.
     homed : bool
         Whether the log shows that its encoder was homed at a stop.
     useful : float
-        Cost above which what is tried alone is of no use [dimensionless].
+        Cost above which a single hypothesis is of no use [dimensionless].
 
     Returns
     -------
     Explanation or None
-        The likeliest; whether it explains the log is for the gate to say. None where it leaves far too much.
+        The likeliest; the gate decides whether it explains the log. None if it leaves far too much.
     """
     wide = balanced_by(widened(log, parameters, starts[0]), 1.0 if by_mass else 0.0)
     plain = _plain_point(wide, starts[0])
@@ -143,9 +143,9 @@ def _alone(
     accepted: Accepted,
     useful: float = np.inf,
 ) -> list[Trial]:
-    """Return the hypotheses that explain a log alone, best first: of those of largest predicted gain, else of all.
+    """Return single hypotheses, best first: those of largest predicted gain, and all if these do not explain the log.
 
-    Where the plain form leaves little, no start is tried again from which the first hypothesis came nowhere.
+    If the plain form leaves little, starts from which the first hypothesis got nowhere are not tried again.
     """
     starts, every = spared.starts, spared.every
     begun = [[*screen(log, (likely[0],), starts, every=every)]]
@@ -172,10 +172,10 @@ def _paired(
 ) -> list[Trial]:
     """Return the pairs of hypotheses that explain a log better than the first one alone, best first.
 
-    What slopes promise most, and what they do not see, is tried first, and all else where that does not explain the
-    log. Slopes are taken where the first hypothesis has gone to take up what the second one does. The best of it is
-    fitted to the end in any case.
-    Beside a rival of the best, ``rivalled`` is the cost of what is known, and a pair counts only if it comes lower.
+    The second hypotheses with the largest predicted gain, and those that slopes cannot predict, are tried first; all
+    others only if these do not explain the log. Slopes are taken where the first hypothesis has moved to absorb the
+    second one's effect. The best pair is fitted to the end in any case. Beside a rival of the best, ``rivalled`` is the
+    lowest cost so far, and a pair counts only if it costs less.
     """
     late = delayed(log, first.delays)
     taken = {one.name for one in first.together}
@@ -204,13 +204,13 @@ def _paired(
 
 
 def _better(first: Trial, pairs: Iterable[Trial], least: float) -> list[Trial]:
-    """Return the pairs that come lower than what is known, with the delays of the first hypothesis."""
+    """Return the pairs that cost less than all before, with the delays of the first hypothesis."""
     better = (one for one in pairs if one.cost < least - WORTH)
     return [replace(one, delays={**first.delays, **one.delays}) for one in better]
 
 
 def _as_useful(pairs: Sequence[Trial], useful: float) -> float:
-    """Return the cost above which no further pair is told, given those that are known, the best first."""
+    """Return the cost above which no further pair counts, given the known ones, the best first."""
     return min(useful, pairs[0].cost + ALIKE) if pairs and pairs[0].fits else useful
 
 
@@ -221,16 +221,16 @@ def _plain_point(log: GreyBoxLog, plain: Mapping[str, float]) -> Point:
 
 
 def _leaner(fewer: Trial, finished: Sequence[Trial], accepted: Accepted) -> list[Trial]:
-    """Return what is finished with a set of fewer hypotheses in place of all that hold it and more, if it explains."""
+    """Return the results with a smaller set of hypotheses in place of all that contain it, if it explains the log."""
     if fewer is finished[0] or not is_explained(fewer, accepted):
         return [*finished]
     return [fewer, *(one for one in finished[1:] if not all(each in one.together for each in fewer.together))]
 
 
 def _by_itself(log: GreyBoxLog, tried: Trial, accepted: Accepted) -> bool:
-    """Return whether a set of hypotheses explains a log, and is no worn pump that stands for a wrong area.
+    """Return whether a set of hypotheses explains a log and is not a worn pump in place of a wrong area.
 
-    An area is the ratio of what is delivered and of a volume: both are asked for then.
+    A wrong area changes the ratio of delivery and a volume: both are tested then.
     """
     if not is_explained(tried, accepted):
         return False
@@ -240,19 +240,19 @@ def _by_itself(log: GreyBoxLog, tried: Trial, accepted: Accepted) -> bool:
 
 
 def _same(one: Trial, other: Trial) -> bool:
-    """Return whether two sets free the same unknowns and reach the same optimum: a late or an early speed."""
+    """Return whether two sets fit the same unknowns and reach the same optimum, such as a late and an early speed."""
     free, others = ({name for each in tried.together for name in each.free} for tried in (one, other))
     return free == others and not ended_apart(one, other)
 
 
 def _begun_again(log: GreyBoxLog, first: Trial) -> Mapping[str, float]:
-    """Return the end of a search with long model steps as the next start, its vanished values reset."""
+    """Return the end of a search with long model steps as the next start, with vanished values reset."""
     ended = first.coarse or first.values
     return {**ended, **vanished_values(log, ended)}
 
 
 def _distinct(tried: Iterable[Trial]) -> list[Trial]:
-    """Return the best of each set of hypotheses, in whatever order these came; the best first."""
+    """Return the best trial of each set of hypotheses, best first."""
     best: dict[frozenset[str], Trial] = {}
     for one in ranked(tried):
         best.setdefault(frozenset(each.name for each in one.together), one)

@@ -1,4 +1,4 @@
-"""A set of hypotheses on trial, and the explanation of a log that comes out."""
+"""A set of hypotheses on trial, and the explanation of a log that results."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -20,21 +20,21 @@ class Trial:
     together : tuple of Hypothesis
         The hypotheses.
     point : Point
-        Where the search under them is.
+        Where its search stands.
     values : Mapping[str, float]
         The parameters there [SI].
     delays : Mapping[str, float]
-        Times by which channels come late beside their lags [s].
+        Delays of channels beside their lags [s].
     rig : Mapping[str, float]
-        What the rig file says, and what is strange absent [SI].
+        Values of the rig file, with all effects absent [SI].
     fits : tuple of GreyBoxFit
-        Once it is finished: the likelier balance first, by volume or by mass, then the other one if it counts.
+        Once finished: the likelier balance first, by volume or by mass, then the other one if it counts.
     void : bool
-        Whether what was found is not what the hypotheses say.
+        Whether the result no longer means what the hypotheses say.
     coarse : Mapping[str, float]
-        Once it is finished: its values where its search with long model steps ended [SI].
+        Once finished: its values at the end of its search with long model steps [SI].
     by_mass : bool
-        Once it is finished: whether its likelier balance is by mass.
+        Once finished: whether the likelier balance is by mass.
     """
 
     together: tuple[Hypothesis, ...]
@@ -49,12 +49,12 @@ class Trial:
 
     @property
     def cost(self) -> float:
-        """Cost of the best, infinite where it is not what the hypotheses say [dimensionless]."""
+        """Cost of the best point, infinite if it does not mean what the hypotheses say [dimensionless]."""
         return self.point.cost if self.meant and not self.void else np.inf
 
     @property
     def meant(self) -> bool:
-        """Whether what was found is what the hypotheses say, and no use of what they free beside."""
+        """Whether the result means what the hypotheses say, and does not just use the unknowns that they add."""
         large = all(not one.least or abs(self.values[one.free[0]]) >= one.least for one in self.together)
         return large and all(not one.lower or self.values[one.free[0]] < self.rig[one.free[0]] for one in self.together)
 
@@ -75,17 +75,17 @@ class Explanation:
     values : Mapping[str, tuple of float]
         Value and standard deviation by parameter, in SI.
     delays : Mapping[str, float]
-        Times by which channels come late beside their lags [s].
+        Delays of channels beside their lags [s].
     fits : tuple of GreyBoxFit
-        The fits that values are weighed over: first that under them by the likelier balance.
+        The fits over which values are weighted, the likelier balance first.
     rivals : int
         How many other sets of hypotheses explain the log about as well.
     stated_pressure : float
-        Absolute pressure that bulk modulus is stated at, where the oil holds air [Pa].
+        Absolute pressure at which bulk modulus is stated, if the oil contains air [Pa].
     opening : callable
-        Works out `delivery_open`, for which the log is linearised further.
+        Computes `delivery_open`, which needs further slopes.
     detailing : callable
-        Works out `in_detail`, for which the log is fitted further: of most explanations costs alone are read.
+        Computes `in_detail`, which needs a further fit: most explanations are used for their cost only.
     """
 
     names: tuple[str, ...]
@@ -104,10 +104,10 @@ class Explanation:
 
     @property
     def delivery_open(self) -> PredictedGain:
-        """What another delivery of the pump promises beside them; nothing where that is part of the explanation."""
+        """Predicted gain of another pump delivery beside them; nothing if the delivery is part of the explanation."""
         return self.opening()
 
     @property
     def in_detail(self) -> "Explanation":
-        """The same with what matters to the last digits alone freed, see `with_details`."""
+        """The same with the parameters free that matter to the last digits only, see `with_details`."""
         return self.detailing() or self

@@ -10,7 +10,7 @@ FAULTS_TRIED = ((1.0, 1.0), (5.0, 6.0), (12.5, 6.0))
 """Leakage and flow bias of the starts, as multiples of the healthy paper rig's: the spread of Table 3."""
 
 LEAST_LEAKAGE = 1e-3
-"""Least first guess of a leakage, as a share of the rated pump flow [fraction]; a logarithm cannot start at zero."""
+"""Smallest first guess of a leakage, over the rated pump flow [fraction]: a logarithm cannot start at zero."""
 
 
 def leakage_guess(p: EhaParameters) -> float:
@@ -24,7 +24,7 @@ def leakage_guess(p: EhaParameters) -> float:
     Returns
     -------
     float
-        The healthy actuator's, or a little where it has none.
+        The healthy actuator's, or a small one if it has none.
     """
     return max(p.leakage_coefficient, LEAST_LEAKAGE * p.rated_flow / p.relief_pressure)
 
@@ -40,7 +40,7 @@ def flow_bias_guess(p: EhaParameters) -> float:
     Returns
     -------
     float
-        The healthy actuator's, or a little where it has none.
+        The healthy actuator's, or a small one if it has none.
     """
     return max(p.flow_bias, LEAST_LEAKAGE * p.rated_flow)
 
@@ -48,8 +48,8 @@ def flow_bias_guess(p: EhaParameters) -> float:
 def faulty_coefficient(p: EhaParameters, name: str, healthy: float, factor: float) -> float:
     """Return a faulty coefficient: above the healthy one by as much as in the paper's rig at this multiple.
 
-    A multiple of the healthy value means nothing on another actuator: where little leaks that is sound, the last row
-    of Table 3 is forty times as much, not twelve.
+    A multiple of the healthy value means nothing on another actuator: if a sound one leaks very little, the last row of
+    Table 3 is forty times as much, not twelve.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def faulty_coefficient(p: EhaParameters, name: str, healthy: float, factor: floa
     healthy : float
         Its value before the fault [SI].
     factor : float
-        Multiple of the paper rig's healthy value; 1 where nothing is worse [dimensionless].
+        Multiple of the paper rig's healthy value; 1 for no fault [dimensionless].
 
     Returns
     -------

@@ -23,68 +23,70 @@ from estimation.models.wrong_pressure import SETTLING
 from plant.arrays import Array
 
 FINISHING = 12
-"""Evaluations of the model for the last search, with short model steps."""
+"""Evaluations of the model in each round of the last search, with short model steps."""
 
 ROUNDS = 6
-"""How often the last ones are made at most, while each gains what would tell a hypothesis from another [count]."""
+"""Most rounds of the last search, while each gains enough to tell hypotheses apart [count]."""
 
 UNFINISHED = 10.0
-"""Half the sum of squares over what noise alone makes of it, from which a set of hypotheses is not fitted with short
-model steps [dimensionless]; what explains a log comes to 1.2."""
+"""Cost over that of noise from which a set of hypotheses is not fitted with short model steps [dimensionless];
+explanations reach 1.2."""
 
 FINISHED, REACHED = 0.7, 1.5
-"""A search with short model steps goes on while its steps promise to bring the cost to the first share of itself (six
-rounds of it make an eighth), but is never asked for less than the second times what noise alone makes [fractions]."""
+"""A search with short model steps goes on while its steps promise to reduce the cost to the first share (six such
+rounds make an eighth), but never needs to promise less than the second times the cost of noise [fractions]."""
 
 FAR_BEHIND = 1.2
-"""How many times the cost that would be of use one still is after twelve evaluations that no more are made for it
-[dimensionless]."""
+"""Cost after twelve evaluations over the cost that would be of use, above which the search ends [dimensionless]."""
 
 NEVER = float(np.finfo(np.float64).max)
-"""Cost of a fit that is not what its hypotheses say, so that it is not believed [dimensionless]."""
+"""Cost of a fit that does not mean what its hypotheses say, so that it is never believed [dimensionless]."""
 
 VALVES = {*CRACKS, *CHECKS_CRACK.free}
 """Drops at which make-up valves open, of each and of both."""
 
 NO_SURER = 0.7
-"""Deviation of bulk modulus, over what it was, below which it is that of a model that chatters [dimensionless]: what is
-freed makes nothing surer. Of 58 logs two had 0.06 and 0.26, one of them 9 deviations off, and all others 0.78 to 2."""
+"""Ratio of the deviation of bulk modulus after and before parameters are added, below which the model chatters
+[dimensionless]: added parameters cannot reduce it. Two of 58 logs had 0.06 and 0.26, one of them 9 deviations off, and
+all others 0.78 to 2."""
 
 LITTLE = 1e-3
-"""Share of the cost below which a gain tells nothing of what leaves far more than noise [fraction]; judged."""
+"""Share of the cost below which a gain means nothing, if far more than noise is left [fraction]; judged."""
 
 EVEN = 10.0
-"""Gain in log-likelihood below which a drift of pressure is even [dimensionless]: the worth of a hypothesis."""
+"""Gain in log-likelihood below which a drift of pressure is linear [dimensionless]: the required gain of a
+hypothesis."""
 
 CLOSE = 60.0
 """Difference of log-likelihood up to which a rival is fitted to the end, with short model steps [dimensionless]."""
 
 ALIKE = 15.0
-"""Difference of log-likelihood up to which two sets of hypotheses are said to explain a log alike [dimensionless]."""
+"""Difference of log-likelihood up to which two sets of hypotheses explain a log equally well [dimensionless]."""
 
 
 def final_fit(log: GreyBoxLog, tried: Trial, useful: float = np.inf, *details: str) -> Trial:
     """Return the final fit of a set of hypotheses, balanced by volume and by mass.
 
-    Balanced by mass, the inner circuit yields as it does in the plain form. A log that does not tell the two apart is
-    believed neither alone: they may differ by three deviations. The balance in which the set was sought comes first,
-    and the other is not followed where it will not come as low.
+    Balanced by mass, the inner circuit is compliant as in the plain form. If a log does not distinguish the two
+    balances, neither is used alone: they may differ by three deviations. The balance in which the set was searched
+    comes first, and the other is dropped if it will not cost as little.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, widened.
     tried : Trial
-        The set, where long model steps led.
+        The set, at the end of its search with long model steps.
     useful : float
         Cost above which it is of no use [dimensionless].
     *details : str
-        What is freed beside it in either balance.
+        Unknowns that are fitted as well in either balance.
 
     Returns
     -------
     Trial
-        The set where short model steps lead, with its fits; one that is not what it says has the cost `NEVER`.
+        The set at the end of its search with short model steps, with its fits. If it no longer means what its
+        hypotheses say, its cost is `NEVER`.
     """
     row = delayed(log, tried.delays)
     done: list[tuple[Trial, FreedProblem]] = []
@@ -113,11 +115,11 @@ def final_fit(log: GreyBoxLog, tried: Trial, useful: float = np.inf, *details: s
 
 
 def with_details(log: GreyBoxLog, tried: Trial) -> Trial:
-    """Return the final fit of a set of hypotheses that explains a log, with what matters to the last digits freed.
+    """Return the final fit of a set of hypotheses that explains a log, with the details of valves and accumulator free.
 
-    While hypotheses are compared, drops at which make-up valves leave their seats and the accumulator are held, as they
-    would take up what is strange. What is strange is known now, and a drop of 2 kPa that is left out puts leakage and
-    bulk modulus several deviations off. See decision 378.
+    While hypotheses are compared, the cracking drops of make-up valves and the accumulator are held, since they would
+    absorb the effect. Once the effect is known they are fitted: to neglect a drop of 2 kPa puts leakage and bulk
+    modulus several deviations off. See decision 378.
 
     Parameters
     ----------
@@ -129,8 +131,8 @@ def with_details(log: GreyBoxLog, tried: Trial) -> Trial:
     Returns
     -------
     Trial
-        The set; as it was where it frees valves of its own, where it would not be what it says, and where its valves
-        chatter from open to closed.
+        The set; unchanged if it fits valves of its own, if it would no longer mean what it says, or if its valves
+        chatter.
     """
     if VALVES & {name for one in tried.together for name in (*one.free, *one.beside)}:
         return tried
@@ -146,21 +148,22 @@ def with_details(log: GreyBoxLog, tried: Trial) -> Trial:
 
 
 def behind_filter(log: GreyBoxLog, tried: Trial) -> Trial:
-    """Return the final fit of a set with a pressure filter of second order in place of a delay and a lag, if likelier.
+    """Return the final fit of a set with a second-order pressure filter in place of a delay and a lag, if likelier.
 
-    A filter's delay is of no whole samples: a delay of 8 ms put bulk modulus 4 deviations off behind one of 7.5 ms.
+    The delay of a filter is no whole number of samples: a modelled delay of 8 ms for one of 7.5 ms put bulk modulus 4
+    deviations off.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, widened.
     tried : Trial
-        The set, fitted to the end unless that is far from the log.
+        The set, fitted to the end unless it is far from the log.
 
     Returns
     -------
     Trial
-        The set as it was where its pressure is not late or only lags, and where no filter explains the log better.
+        The set unchanged if its pressure is not late or only lags, or if no filter explains the log better.
     """
     delay = tried.delays.get(PRESSURE_LATE.late, 0.0)
     if PRESSURE_LATE not in tried.together or delay <= 0.0:
@@ -176,10 +179,10 @@ def behind_filter(log: GreyBoxLog, tried: Trial) -> Trial:
 
 
 def without_idle(log: GreyBoxLog, tried: Trial, worth: float) -> Trial:
-    """Return the final fit of a set without a hypothesis of it that ended where what it says is absent.
+    """Return the final fit of a set without those of its hypotheses whose effect vanished.
 
-    A second one may lead a search out of a valley and end at nothing. Oil with air was explained together with a
-    make-up valve that is stuck shut, whose conductance was 1.02 ± 0.05 times the other's.
+    A second hypothesis may lead a search out of a false minimum and vanish at the end. Oil with air was explained
+    together with a make-up valve stuck shut, whose conductance was 1.02 ± 0.05 times the other's.
 
     Parameters
     ----------
@@ -188,12 +191,12 @@ def without_idle(log: GreyBoxLog, tried: Trial, worth: float) -> Trial:
     tried : Trial
         Several hypotheses, fitted to the end.
     worth : float
-        Gain in log-likelihood below which one more is not believed [dimensionless].
+        Gain in log-likelihood that each hypothesis must add to be believed [dimensionless].
 
     Returns
     -------
     Trial
-        The set as it was where each of it is there, or needed.
+        The set unchanged if each of its effects is present or needed.
     """
     if len(tried.together) < 2 or not tried.fits:
         return tried
@@ -208,7 +211,7 @@ def without_idle(log: GreyBoxLog, tried: Trial, worth: float) -> Trial:
 
 
 def _is_absent(one: Hypothesis, tried: Trial, deviations: float) -> bool:
-    """Return whether all that a hypothesis frees ended within so many deviations of its absence."""
+    """Return whether all unknowns of a hypothesis ended within so many deviations of "no effect"."""
     std, delayed_too = tried.fit.std, len(one.delays) > 1 and one.late in tried.delays
     near = (abs(tried.values[name] - tried.rig[name]) <= deviations * std.get(name, 0.0) for name in one.free)
     return not delayed_too and all(near)
@@ -220,7 +223,7 @@ def _concluded(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxF
 
 
 def _to_its_end(problem: FreedProblem, tried: Trial, start: Array, *more: str, useful: float = np.inf) -> Trial:
-    """Return the end of a search with short model steps: where they matter on the way, and all of them at the end."""
+    """Return the end of a search with short model steps: first where they matter, at last everywhere."""
     best = _led_on(problem, tried, start, *more, useful=useful)
     bounds = flow_bounds(problem.model, [best.point.theta], problem.log)
     point = descend(problem.at, best.point.theta, LAST, bounds, radius=NEAR, wanted=useful)
@@ -228,9 +231,9 @@ def _to_its_end(problem: FreedProblem, tried: Trial, start: Array, *more: str, u
 
 
 def _led_on(problem: FreedProblem, tried: Trial, start: Array, *more: str, useful: float = np.inf) -> Trial:
-    """Return the optimum with short model steps; that with long ones may be far from it.
+    """Return the optimum with short model steps, which may be far from that with long ones.
 
-    Which samples have them is found anew in each round.
+    Each round determines anew which samples need them.
     """
     log = problem.log
 
@@ -252,7 +255,7 @@ def _led_on(problem: FreedProblem, tried: Trial, start: Array, *more: str, usefu
 
 
 def _hoped(log: GreyBoxLog, cost: float) -> float:
-    """Return the cost to which a search with short model steps must promise to come, lest it ends."""
+    """Return the cost that a search with short model steps must promise to reach, or else it ends."""
     if len(log.drives) < FEW or not np.isfinite(cost):
         return np.inf
     return max(FINISHED * cost, REACHED * cost / cost_over_noise(log, cost))

@@ -8,28 +8,28 @@ from estimation.notes import EstimateCode
 from plant.notes import Note
 
 DOUBTED = 1.1
-"""The same above which a log that begins under load or in motion is not explained: its fit has many valleys, and the
-sensors' noise is known to a twentieth [dimensionless]."""
+"""The same for a log that begins under load or in motion: its fit has many minima, and the sensors' noise is known to a
+twentieth [dimensionless]."""
 
 LARGEST_AUTOCORRELATION = 0.1
-"""Correlation of neighbouring residuals above which the same is said [dimensionless]."""
+"""Correlation of neighbouring residuals above which a fit does not explain its log [dimensionless]."""
 
 NOISY = (1.44, 0.3)
-"""The same two where noise of position counts: it is known to a fifth, and an encoder's steps are not white."""
+"""The two limits if position noise matters: it is known to a fifth, and an encoder's steps are not white."""
 
 QUIET = 0.5
-"""Mean squared normalised residual where noise of position counts below which a fit is none [dimensionless]; judged.
-That noise grows with the oil's stiffness. A pressure that seems late keeps less of it, so that oil five times as stiff
-as it is explained a leaky rig's log at a fifth of the noise, gate open."""
+"""Mean squared normalised residual below which a fit is rejected if position noise matters [dimensionless]; judged.
+That noise grows with the oil's stiffness. A pressure that seems late reduces the residuals, so oil five times too stiff
+explained a leaky rig's log at a fifth of the noise, and passed the gate."""
 
 LATE_WORTH = 20.0
-"""Gain in log-likelihood from which speed or position is said to come late or early, if no hypothesis says more. On
-logs of 18 kinds of strange rigs, and on 18 of a foreign bench, the gain of a right explanation is 6 at most, and that
-of a position that lags by 3 ms is 390 to 2800. A log is asked from `WORTH` on: half a millisecond may gain 10, and move
-bulk modulus by seven deviations [dimensionless]."""
+"""Gain in log-likelihood from which speed or position is reported as late or early, if no hypothesis says more
+[dimensionless]. For right explanations the gain is at most 6, on logs of 18 kinds of strange rigs and on 18 of a
+foreign bench; for a position that lags by 3 ms it is 390 to 2800. The test begins at `WORTH`: half a millisecond may
+gain 10, and move bulk modulus by seven deviations."""
 
 NAMED_SHARE = 0.25
-"""Share of what a log leaves unexplained that a cause must take up to be named beside it [fraction]."""
+"""Share of the unexplained cost that a cause must account for, to be named beside it [fraction]."""
 
 
 def limits(noisy: bool, samples: float) -> tuple[float, float]:
@@ -38,9 +38,9 @@ def limits(noisy: bool, samples: float) -> tuple[float, float]:
     Parameters
     ----------
     noisy : bool
-        Whether the position's noise counts with the slopes.
+        Whether position noise matters.
     samples : float
-        Residuals that are counted [count].
+        Number of residuals [count].
 
     Returns
     -------
@@ -57,7 +57,7 @@ def doubted(fit: GreyBoxFit) -> bool:
     Parameters
     ----------
     fit : GreyBoxFit
-        The fit of a log whose noise of position does not count.
+        The fit of a log whose position noise does not matter.
     """
     return fit.chi_square[0] > largest_chi_square(fit.seen, DOUBTED)
 
@@ -70,12 +70,12 @@ def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
     fit : GreyBoxFit
         The fit.
     noisy : bool
-        Whether the position's noise counts with the slopes.
+        Whether position noise matters.
 
     Returns
     -------
     tuple of Note
-        Nothing where the fit explains the log.
+        Empty if the fit explains the log.
     """
     reasons: list[Note] = []
     largest, correlated = limits(noisy, fit.seen)
@@ -93,58 +93,58 @@ def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
 
 
 def objections_and_play(fit: GreyBoxFit, noisy: bool, shown: ShownPlay, sensed: ShownPlay) -> tuple[Note, ...]:
-    """Return the objections to a fit, and a play that it leaves.
+    """Return the objections to a fit, and an encoder play that it does not include.
 
     Parameters
     ----------
     fit : GreyBoxFit
         The fit.
     noisy : bool
-        Whether the position's noise counts with the slopes.
+        Whether position noise matters.
     shown, sensed : ShownPlay
-        Play that residuals show, and a velocity sensor.
+        Play that the residuals show, and play that a velocity sensor shows.
     """
     reasons = objections(fit, noisy)
     return (*reasons, *play_left(shown, sensed, _share_left(fit) if reasons else 0.0))
 
 
 def _share_left(fit: GreyBoxFit) -> float:
-    """Return the gain in log-likelihood that names a cause beside residuals of a fit that does not explain its log."""
+    """Return the gain in log-likelihood from which a cause is named beside a fit that does not explain its log."""
     return NAMED_SHARE * fit.cost * max(1.0 - 1.0 / fit.chi_square[0], 0.0)
 
 
 def is_too_close(fit: GreyBoxFit, noisy: bool) -> bool:
-    """Return whether a fit leaves far less than the noise of position makes: what is freed beside it leaves less still.
+    """Return whether residuals are far smaller than the effect of position noise, which other hypotheses only reduce.
 
     Parameters
     ----------
     fit : GreyBoxFit
         The fit.
     noisy : bool
-        Whether the position's noise counts with the slopes.
+        Whether position noise matters.
     """
     return noisy and 0.0 < fit.chi_square[0] < QUIET  # of a pressure that is 0 throughout nothing is left
 
 
 def _alternates(fit: GreyBoxFit, noisy: bool) -> bool:
-    """Return whether residuals alternate by their noise: the motor's was assumed too large, or the encoder's leaks off.
+    """Return whether residuals alternate due to their noise: motor noise was overestimated, or encoder noise leaks off.
 
-    The random walk that a motor's noise makes of pressure is then followed too closely. Intervals are too wide, not
-    too narrow. What losses leave of an encoder's noise is its change, and successive means share the reading between
-    them: where oil leaks off within a block, they alternate by up to -0.5.
+    The random walk that motor noise causes in pressure is then followed too closely, and intervals are too wide, not
+    too narrow. What leakage leaves of encoder noise is its change, and successive means share a reading: if oil leaks
+    off within a block, their correlation is as low as -0.5.
     """
     return fit.autocorrelation[0] < 0.0 and (noisy or fit.chi_square[0] < 1.0)
 
 
 def fit_explains(fit: GreyBoxFit, noisy: bool) -> bool:
-    """Return whether a fit has no objection; see `objections`.
+    """Return whether there is no objection to a fit; see `objections`.
 
     Parameters
     ----------
     fit : GreyBoxFit
         The fit.
     noisy : bool
-        Whether the position's noise counts with the slopes.
+        Whether position noise matters.
 
     Returns
     -------
@@ -162,7 +162,7 @@ def fit_explains_all(fit: GreyBoxFit, noisy: bool) -> bool:
     fit : GreyBoxFit
         The fit.
     noisy : bool
-        Whether the position's noise counts with the slopes.
+        Whether position noise matters.
 
     Returns
     -------

@@ -15,16 +15,16 @@ if TYPE_CHECKING:
     from estimation.fits.hypothesis_search.explanation import Explanation
 
 LONGEST_STEP = 2.5e-4
-"""Longest step of a form [s]; slower logs are sub-stepped."""
+"""Longest model step of a form [s]; logs with a longer sample time have several steps per sample."""
 
 TEMPER = 5.0
-"""What a difference of log-likelihood is divided by before models are weighed. None is exact: on a log of the circuit
-the balance that explained it better by 5.6 put bulk modulus five deviations off, the other one not [dimensionless]."""
+"""Divisor of log-likelihood differences before models are weighted [dimensionless]. No model is exact: on a log of the
+circuit the balance that was likelier by 5.6 put bulk modulus five deviations off, and the other did not."""
 
 DISCRETISED = 3e-5
-"""Relative standard deviation of bulk modulus from a form's steps and from what is averaged before it [fraction]. Two
-training logs at 10 kHz, known to 0.002 % from noise, are 0.005 and 0.007 % too high under any noise; likeliest on 876
-logs is 0.002 to 0.003 %."""
+"""Relative standard deviation of bulk modulus due to a form's steps and to averaging before it [fraction]. Two training
+logs at 10 kHz, known to 0.002 % from noise, are 0.005 and 0.007 % too high under any noise. On 876 logs the most likely
+value is 0.002 to 0.003 %."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,21 +34,21 @@ class FormFit:
     Parameters
     ----------
     parameters : Mapping[str, tuple of float]
-        Value and standard deviation in SI, by parameter name; the deviation is that of the log's noise.
+        Value and standard deviation in SI, by parameter name; the deviation is that due to the log's noise.
     bound : float
-        Relative standard deviation of bulk modulus from the log's noise [fraction].
+        Relative standard deviation of bulk modulus due to the log's noise [fraction].
     chi_square : float
         Mean squared residual over the sensor's variance [dimensionless].
     reasons : tuple of Note
-        What speaks against the fit.
+        Objections to the fit.
     rig_slopes : Mapping[str, Mapping[str, float]]
-        By uncertain entry of the rig: by how much each parameter would differ, in SI, per relative change of the entry.
+        By uncertain entry of the rig: change of each parameter, in SI, per relative change of the entry.
     explanation : Explanation or None
-        What was added to the form to explain the log; None where nothing had to be.
+        The effects added to the form to explain the log; None if none were needed.
     remarks : tuple of Note
-        What the log leaves open, and is nothing against the fit.
+        What the log leaves undecided, which is no objection to the fit.
     turning : Turning
-        Teeth of the pump and offset of the speed that were taken up.
+        Pump ripple and speed offset that were corrected.
     correlation : float
         Of the errors of leakage coefficient and flow bias [dimensionless].
     """
@@ -72,12 +72,12 @@ def with_structure(found: Mapping[str, tuple[float, float]], structure: float) -
     found : Mapping[str, tuple of float]
         Value and deviation by parameter [SI].
     structure : float
-        Relative standard deviation of bulk modulus from what the form leaves out [fraction].
+        Relative standard deviation of bulk modulus due to what the form omits [fraction].
 
     Returns
     -------
     dict[str, tuple of float]
-        The same, the deviation of bulk modulus wider [SI].
+        The same with the wider deviation [SI].
     """
     value, std = found["bulk_modulus"]
     return {**found, "bulk_modulus": (value, float(np.hypot(std, structure * value)))}
@@ -91,9 +91,9 @@ def weights_of(fits: Sequence[GreyBoxFit], temper: float = TEMPER, beforehand: S
     fits : sequence of GreyBoxFit
         Of the same log.
     temper : float
-        What a difference of log-likelihood is divided by [dimensionless].
+        Divisor of log-likelihood differences [dimensionless].
     beforehand : sequence of float, optional
-        Their weights before the log is seen [dimensionless]; equal ones if not given.
+        Prior weights [dimensionless]; equal if not given.
 
     Returns
     -------
@@ -109,10 +109,10 @@ def weights_of(fits: Sequence[GreyBoxFit], temper: float = TEMPER, beforehand: S
 def weighed(
     fits: Sequence[GreyBoxFit], temper: float = TEMPER, beforehand: Sequence[float] | None = None
 ) -> Mapping[str, tuple[float, float]]:
-    """Return values and deviations over several models of one log, each weighed by its likelihood.
+    """Return values and deviations over several models of one log, each weighted by its likelihood.
 
-    A model that explains the log less well counts by a power of ``exp(-chi^2/2)``, see `TEMPER`; where two explain it
-    alike, what they disagree on goes into the deviation (Hoeting et al. 1999, Statistical Science 14, equations 3 and
+    A model that explains the log less well counts by a power of ``exp(-chi^2/2)``, see `TEMPER`. If two explain it
+    equally well, their difference adds to the deviation (Hoeting et al. 1999, Statistical Science 14, equations 3 and
     4).
 
     Parameters
@@ -120,9 +120,9 @@ def weighed(
     fits : sequence of GreyBoxFit
         Of the same log, with the same unknowns.
     temper : float
-        What a difference of log-likelihood is divided by [dimensionless].
+        Divisor of log-likelihood differences [dimensionless].
     beforehand : sequence of float, optional
-        Their weights before the log is seen [dimensionless]; equal ones if not given.
+        Prior weights [dimensionless]; equal if not given.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """Regressors of a varying loss: position, shaft angle, speed, pressure, or direction.
 
-A scored bore leaks where the piston passes the score, a worn tooth once a turn, a pump that fills badly loses flow
-above some speed, a lip that lifts leaks above some pressure, and a leaking relief valve leaks one way.
-See decision 288.
+A scored bore leaks where the piston passes the score, and a worn tooth once a turn. A pump that fills badly loses flow
+above some speed, a lip that lifts leaks above some pressure, and a leaking relief valve leaks in one direction. See
+decision 288.
 """
 
 from collections.abc import Mapping
@@ -17,21 +17,21 @@ from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
 BORE, TOOTH, FILLING, LIFTING, ONE_WAY, WEAR = "bore", "tooth", "filling", "lifting", "one_way", "wear"
-"""What a loss goes with: position, the shaft's angle, speed from some speed on, pressure from some pressure on, the
-direction of pressure, speed."""
+"""What a loss depends on: position, the shaft's angle, speed above a limit, pressure above a limit, the sign of
+pressure, speed."""
 
 AVERAGED = 1e-2
-"""Time over which pressure is averaged where its direction is asked for [s]; judged: it reverses about as fast."""
+"""Time over which pressure is averaged to find its sign [s]; judged: it reverses about as fast."""
 
 NARROWEST = 2e-4
-"""Least width of a score [m], or of a tooth's passing over its tenth [rad]; judged."""
+"""Least width of a score [m], or of a tooth's engagement over a tenth of it [rad]; judged."""
 
 LEAST_POWER, MOST_POWER = 0.7, 3.0
-"""Powers with which a loss may grow from where it begins [dimensionless]: a flow that a pump no longer takes in grows
-evenly, a lip that is pushed open with the cube of its gap."""
+"""Exponents with which a loss may grow above its limit [dimensionless]: a flow that the pump cannot take in grows
+linearly, the flow through a lip that pressure opens grows with the cube of its gap."""
 
 WIDEST_TOOTH = 1.0
-"""Largest width of a tooth's passing [rad]: a wider one is no single tooth's."""
+"""Largest width of a tooth's engagement [rad]: a wider one is not that of a single tooth."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,9 @@ class LossRegressor:
     kind : str
         `BORE`, `TOOTH`, `FILLING`, `LIFTING`, `ONE_WAY` or `WEAR`.
     at : float
-        Where it is largest [m, rad], from where on it grows [rad/s, Pa], or the sign of its pressure.
+        Where it is largest [m, rad], the limit above which it grows [rad/s, Pa], or the sign of its pressure.
     width : float
-        How wide it is [m, rad], or the power with which it grows from there [dimensionless]; 1 where it has neither.
+        Its width [m, rad], or the exponent of its growth above the limit [dimensionless]; 1 if it has neither.
     """
 
     kind: str
@@ -59,16 +59,16 @@ class LossRegressor:
 
 
 class LossSignals(NamedTuple):
-    """The measured signals that loss regressors are made of.
+    """The measured signals from which loss regressors are computed.
 
     Parameters
     ----------
     speed, angle, position, pressure : ndarray, shape (n,)
-        Of the motor [rad/s, rad], of the piston [m], across it [Pa].
+        Motor speed and angle [rad/s, rad], piston position [m], differential pressure [Pa].
     steady : ndarray, shape (n,)
-        The same pressure averaged over `AVERAGED` [Pa]: at rest, half of its noise would pass for one direction.
+        The pressure averaged over `AVERAGED` [Pa]: at rest, half of its noise would count as one direction.
     leakage, displacement : float
-        Of the rig [m^3/(s Pa), m^3/rad].
+        Values of the rig [m^3/(s Pa), m^3/rad].
     """
 
     speed: Array
@@ -80,12 +80,12 @@ class LossSignals(NamedTuple):
     displacement: float
 
     def of(self, course: LossRegressor) -> Array:
-        """Return a unit of a loss: a healthy leakage at its worst, or all flow above a speed.
+        """Return one unit of a loss: a healthy leakage at its maximum, or all flow above a speed limit.
 
         Parameters
         ----------
         course : LossRegressor
-            What it goes with [SI].
+            What it depends on [SI].
 
         Returns
         -------
@@ -108,12 +108,12 @@ class LossSignals(NamedTuple):
                 return self.leakage * np.where(self.steady * course.at > 0.0, self.steady, 0.0)
 
     def tried(self) -> list[LossRegressor]:
-        """Return the courses that a log is asked for.
+        """Return the regressors that are tried on a log.
 
         Returns
         -------
         list of LossRegressor
-            A score only where the piston moves by several of its least widths.
+            A score only if the piston moves by several of its least widths.
         """
         low, high = float(np.min(self.position)), float(np.max(self.position))
         fastest = float(np.max(np.abs(self.speed)))
@@ -135,24 +135,25 @@ class LossSignals(NamedTuple):
         Parameters
         ----------
         course : LossRegressor
-            What a loss goes with [SI].
+            What a loss depends on [SI].
 
         Returns
         -------
         dict
-            By field that is sought, in its unit.
+            By fitted field, in its unit.
         """
         along = {BORE: 0.05 * course.width, TOOTH: 0.05, FILLING: 0.01 * course.at, LIFTING: 0.01 * course.at}
         return {name: along[course.kind] if name == "at" else 0.05 * course.width for name in course.free}
 
 
 def _above(what: Array, course: LossRegressor) -> Array:
-    """Return a power of how far a signal is above where a loss begins, in that unit: itself where the power is 1."""
+    """Return a power of the excess of a signal over a limit, in the signal's unit; the excess itself for a power of
+    1."""
     return course.at * np.maximum(np.abs(what) / course.at - 1.0, 0.0) ** course.width
 
 
 def loss_signals(log: GreyBoxLog, parameters: EhaParameters) -> LossSignals:
-    """Return the signals that loss regressors are made of.
+    """Return the signals from which loss regressors are computed.
 
     Parameters
     ----------
@@ -164,7 +165,7 @@ def loss_signals(log: GreyBoxLog, parameters: EhaParameters) -> LossSignals:
     Returns
     -------
     LossSignals
-        Pressure is interpolated where it is missing, and none where it is missing throughout.
+        Pressure is interpolated over gaps, and zero if it is missing throughout.
     """
     speed, position, pressure = log.drives[:, 0], log.drives[:, 1], log.measured[:, 0]
     rows, seen = np.arange(len(pressure)), np.isfinite(pressure)
@@ -189,16 +190,16 @@ def shifted(course: LossRegressor, step: Mapping[str, float], share: float) -> L
     Parameters
     ----------
     course : LossRegressor
-        What a loss goes with [SI].
+        What a loss depends on [SI].
     step : Mapping[str, float]
-        By how much, by field [SI].
+        The step, by field [SI].
     share : float
         Of that step [fraction].
 
     Returns
     -------
     LossRegressor
-        No width changes by more than a factor of two, nor leaves its bounds.
+        Widths change by at most a factor of two, and stay within their bounds.
 
     Examples
     --------

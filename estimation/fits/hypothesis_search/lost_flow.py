@@ -1,8 +1,7 @@
-"""Lost flow between pump and piston, piece by piece, and when it likeliest changes: a first guess for searches.
+"""Flow lost between pump and piston, piece by piece, and when it most likely changes: a first guess for searches.
 
-What the pump delivers and the piston does not sweep leaks, or goes into the oil as its pressure rises. A regression of
-that loss, with a leakage that steps or oil that gives way as bubbles do from some time on, is solved for many times at
-once.
+What the pump delivers and the piston does not sweep leaks, or compresses the oil as pressure rises. That loss is
+regressed on a leakage with a step, or on oil with bubbles from some time on, for many times at once.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,14 +16,15 @@ from estimation.log_checks.channel_names import POSITION, SPEED
 from estimation.models.wide_flow import WIDE_FLOW_FORM
 
 PIECES = 200
-"""Pieces of the log in which flows and pressure are averaged [count]: a time is then known to half a percent of it."""
+"""Pieces of the log in which flows and pressure are averaged [count]: times are then known to half a percent of the
+log."""
 
 EDGE = 0.05
-"""Share of the log before and after which no change is sought [fraction]."""
+"""Share of the log at each end in which no change is searched for [fraction]."""
 
 
 TINY = float(np.finfo(float).tiny)
-"""What stands for nothing in a divisor [in the divisor's unit]."""
+"""What replaces zero in a divisor [in the divisor's unit]."""
 
 
 class LostFlow(NamedTuple):
@@ -33,17 +33,17 @@ class LostFlow(NamedTuple):
     Parameters
     ----------
     lost : ndarray, shape (pieces,)
-        Flow that is lost, on average [m^3/s].
+        Mean lost flow [m^3/s].
     pressure, sign : ndarray, shape (pieces,)
-        Differential pressure [Pa] and the speed's sign [dimensionless], on average.
+        Mean differential pressure [Pa] and mean sign of the speed [dimensionless].
     time : ndarray, shape (pieces,)
         Length of a piece [s].
     ends : ndarray, shape (pieces + 1,)
-        Differential pressure where pieces begin and end [Pa].
+        Differential pressure at the ends of pieces [Pa].
     positions : ndarray, shape (pieces + 1,)
         Position there [m].
     rig : Mapping[str, float]
-        The rig's own parameters [SI].
+        The rig's parameters [SI].
     """
 
     lost: Array
@@ -86,7 +86,7 @@ class Change(NamedTuple):
     at : float
         When [fraction of the log].
     share : float
-        How much it explains of what no change leaves of the lost flow [fraction].
+        Share of the lost flow's unexplained variance that the change explains [fraction].
     before, after : float
         Leakage before and after it [m^3/(s Pa)].
     """
@@ -101,9 +101,9 @@ NO_CHANGE = Change(0.5, 0.0)
 
 
 class _Split(NamedTuple):
-    """The piece from which on a further column is likeliest there, and how much it explains of what none leaves.
+    """The piece from which a further column is likeliest, and how much of the unexplained sum of squares it explains.
 
-    With both coefficients, and the sum of squares that none leaves, which is no less than the smallest number.
+    With both coefficients, and the sum of squares without it, which is at least the smallest number.
     """
 
     left: float
@@ -114,14 +114,14 @@ class _Split(NamedTuple):
 
 
 def _time(split: _Split, begins: Array) -> float:
-    """Return when a piece begins, of those that are there [fraction of the log]."""
+    """Return when a piece begins, counting pieces without missing values [fraction of the log]."""
     return NO_CHANGE.at if split.piece is None else float(begins[split.piece])
 
 
 def likeliest_step(log: GreyBoxLog) -> Change:
     """Return the most likely step of leakage.
 
-    A seal may be so tight before it that noise makes its leakage negative: then there is none.
+    The seal may be so tight before the step that noise makes its leakage negative: it is then zero.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def likeliest_step(log: GreyBoxLog) -> Change:
     Returns
     -------
     Change
-        `NO_CHANGE` where pressure is missing or still.
+        `NO_CHANGE` if pressure is missing or constant.
     """
     lost, always, _, begins = _regressors(log)
     pressure = always[:, 0]
@@ -155,7 +155,7 @@ def likeliest_entry(log: GreyBoxLog) -> Change:
     Returns
     -------
     Change
-        `NO_CHANGE` where pressure is missing or still, or no oil becomes softer.
+        `NO_CHANGE` if pressure is missing or constant, or the oil does not become softer.
     """
     lost, always, bubbles, begins = _regressors(log)
     entry = _likeliest(lost, always, bubbles, lambda _, more: more > 0.0)
@@ -163,10 +163,10 @@ def likeliest_entry(log: GreyBoxLog) -> Change:
 
 
 def _likeliest(lost: Array, always: Array, then: Array, may_be: Callable[[Array, Array], BoolArray]) -> _Split:
-    """Return from which piece on a loss likeliest goes with a further column too.
+    """Return the piece from which a loss most likely has a further column.
 
-    Only pieces count at which ``may_be(first, more)`` holds of the coefficients of the first column that is always
-    there, and of the further one.
+    Only pieces count for which ``may_be(first, more)`` holds, with the coefficients of the first permanent column and
+    of the further one.
     """
     pieces = len(lost)
     if pieces < PIECES // 2:
@@ -194,10 +194,10 @@ def _likeliest(lost: Array, always: Array, then: Array, may_be: Callable[[Array,
 
 
 def _regressors(log: GreyBoxLog) -> tuple[Array, Array, Array, Array]:
-    """Return the flow that is lost, what it goes with in any case, and with bubbles, and when each piece begins.
+    """Return the lost flow, its permanent regressors and those of bubbles, and when each piece begins.
 
-    In any case that is pressure, the speed's sign and the rise of pressure; bubbles shrink by what the inverse of the
-    loaded chamber's pressure loses.
+    The permanent ones are pressure, the sign of speed and the rise of pressure. Bubbles shrink in proportion to the
+    decrease of the inverse pressure of the loaded chamber.
     """
     flow = lost_flow(log)
     rig, at_ends = flow.rig, flow.ends

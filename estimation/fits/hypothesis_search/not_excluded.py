@@ -15,13 +15,13 @@ from estimation.notes import RigCode
 from plant.notes import Note
 
 OPEN_DELIVERY = 0.1
-"""How far the logarithm of the pump's delivery may lie below that of a sound one, within two deviations, from which a
-worn pump is not excluded [dimensionless]: the probability of one that delivers less than 90 % is then 2 % or more."""
+"""Decrease of the logarithm of the pump's delivery that two deviations must allow before a worn pump is "not excluded"
+[dimensionless]: the probability of a delivery below 90 % is then 2 % or more."""
 
 LEAST_WORN = 0.03
-"""How far it must likeliest lie below for a worn pump not to be excluded where two deviations exclude a sound one
-[dimensionless]: slopes promise too little of a pump that is far from sound. None of 88 sound training logs at one speed
-promised as much without being open already."""
+"""Most likely decrease from which a worn pump is "not excluded" although two deviations exclude a sound one
+[dimensionless]: slopes predict too little for a pump that is far from sound. In 88 sound training logs at one speed no
+prediction was as large unless it was open already."""
 
 LOSE_FLOW = frozenset(
     {
@@ -37,19 +37,19 @@ LOSE_FLOW = frozenset(
         "single_rod",
     }
 )
-"""Hypotheses under which flow is lost, or swept, that is neither leakage of one coefficient nor a flow bias."""
+"""Hypotheses with a loss or swept flow that is neither leakage of one coefficient nor a flow bias."""
 
 
 def unseen_valve_note(fit: GreyBoxFit) -> tuple[Note, ...]:
     """Return a note if a log shows the effect of one make-up valve only.
 
-    With a valve that never opens a log has the same likelihood whatever the valve is. In sound actuators that are
-    driven to and fro both are felt.
+    A valve that never opens does not change the likelihood. In sound actuators that are driven in both directions both
+    valves have an effect.
 
     Parameters
     ----------
     fit : GreyBoxFit
-        A fit of the flow form; one without valves that crack tells nothing.
+        A fit of the flow form; one without cracking valves gives no note.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def unseen_note(side: str) -> Note:
     Parameters
     ----------
     side : str
-        Its chamber, or both where a log shows neither.
+        Its chamber, or both if the log shows neither.
     """
     return RigCode.MAKEUP_UNSEEN.note(side=side)
 
@@ -77,7 +77,7 @@ def blocked_note(side: str) -> Note:
     Parameters
     ----------
     side : str
-        Its chamber, or both where a log does not show which.
+        Its chamber, or both if the log does not show which.
     """
     return RigCode.MAKEUP_BLOCKED.note(side=side)
 
@@ -85,27 +85,27 @@ def blocked_note(side: str) -> Note:
 def share_lost(
     log: GreyBoxLog, values: Mapping[str, float], displacement: float, strange: Collection[str] = ()
 ) -> float:
-    """Return how far the logarithm of a pump's delivery may lie below that of a sound pump, if no leakage is negative.
+    """Return how far the logarithm of a pump's delivery may be below that of a sound pump, if no leakage is negative.
 
-    Oil that a worn pump does not deliver is oil that a fit with a sound one takes for leakage and flow bias. Slopes do
-    not know that neither of the two is less than nothing.
+    The flow that a worn pump does not deliver is leakage and flow bias in a fit with a sound pump. Slopes do not know
+    that both are positive.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, as a flow form sees it.
     values : Mapping[str, float]
-        What a fit with a sound pump found [SI].
+        Parameters of a fit with a sound pump [SI].
     displacement : float
-        Of that pump [m^3/rad].
+        Displacement of that pump [m^3/rad].
     strange : collection of str
         Hypotheses that explain the log.
 
     Returns
     -------
     float
-        Logarithm of what is pumped over what is left of it, in the mean of the log [dimensionless]; infinite where all
-        is lost, where the fit tells neither, and where flow is lost in yet another way.
+        Logarithm of the pumped flow over what remains of it, in the mean of the log [dimensionless]; infinite if all is
+        lost, if the fit determines neither loss, or if flow is lost in another way.
     """
     if LOSE_FLOW & set(strange) or not {"flow_bias", "leakage_coefficient"} <= set(values):
         return math.inf
@@ -121,10 +121,9 @@ def open_wear_note(delivery: PredictedGain, most: float = math.inf) -> tuple[Not
     Parameters
     ----------
     delivery : PredictedGain
-        What a delivery of its own promises beside all that is fitted.
+        Predicted gain of another delivery beside all that is fitted.
     most : float
-        How far the logarithm of the delivery may lie below that of a sound pump at most, see `share_lost`
-        [dimensionless].
+        How far the logarithm of the delivery may be below that of a sound pump, see `share_lost` [dimensionless].
 
     Returns
     -------

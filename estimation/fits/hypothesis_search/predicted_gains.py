@@ -17,28 +17,28 @@ from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
 LIKELIEST = 4
-"""Hypotheses that are tried first, of which the slopes of the fit so far promise most."""
+"""Hypotheses that are tried first: those of largest predicted gain [count]."""
 
 STEPPED = 0.25
-"""Share that a step must explain of what one leakage leaves of the lost flow, to be tried first [fraction]; judged. A
-step that multiplies leakage is too large for slopes to promise it."""
+"""Share of the lost flow's variance that a step of leakage must explain to be tried first [fraction]; judged. A step
+that multiplies leakage is too large for slopes to predict."""
 
 AIRED = 0.1
-"""The same of air that gets in within the log, of what oil that stays as it is leaves [fraction]; judged."""
+"""The same for air that enters within the log, relative to oil of constant stiffness [fraction]; judged."""
 
 
 class PredictedGain(NamedTuple):
-    """Gain in log-likelihood that a hypothesis predicts beside a fit, to first order.
+    """First-order prediction of the gain in log-likelihood of a hypothesis beside a fit.
 
     Parameters
     ----------
     gain : float
         In log-likelihood, Rao's score statistic over two [dimensionless].
     size : float
-        How far up what is freed first would move in its fitted coordinate: for a logarithm a relative change
+        Predicted change of its first unknown in the fitted coordinate: for a logarithm a relative change
         [dimensionless].
     deviation : float
-        How well that coordinate would then be known, what is presumed of it included [dimensionless].
+        Standard deviation of that coordinate then, its prior included [dimensionless].
     """
 
     gain: float
@@ -47,13 +47,13 @@ class PredictedGain(NamedTuple):
 
 
 NO_GAIN = PredictedGain(0.0, 0.0, 0.0)
-"""Of what is known already."""
+"""Prediction for a hypothesis that is already part of the fit."""
 
 
 def predicted_gain(
     log: GreyBoxLog, parameters: EhaParameters, plain: Mapping[str, float], one: Hypothesis, *, by_mass: bool = False
 ) -> PredictedGain:
-    """Return the predicted gain of a hypothesis beside the plain fit, to first order.
+    """Return the first-order predicted gain of a hypothesis beside the plain fit.
 
     Parameters
     ----------
@@ -62,11 +62,11 @@ def predicted_gain(
     parameters : EhaParameters
         The actuator.
     plain : Mapping[str, float]
-        What the plain form found [SI].
+        Parameters of the plain fit [SI].
     one : Hypothesis
-        What is asked.
+        The hypothesis.
     by_mass : bool
-        Whether the plain fit balances mass: promises are of where it stands.
+        Whether the plain fit balances mass.
     """
     return predicted_gains(log, parameters, plain, (one,), by_mass=by_mass)[0]
 
@@ -89,13 +89,13 @@ def predicted_gains(
     parameters : EhaParameters
         The actuator.
     plain : Mapping[str, float]
-        What the plain form found [SI].
+        Parameters of the plain fit [SI].
     asked : sequence of Hypothesis
-        What is asked; none holds an unknown of the plain form.
+        The hypotheses; none may hold an unknown of the plain form.
     by_mass : bool
         Whether the plain fit balances mass.
     slopes : Mapping[str, ndarray of shape (blocks,)], optional
-        Derivatives of the plain fit's normalised residuals, by unknown; they need not be taken again [dimensionless].
+        Derivatives of the plain fit's normalised residuals, by unknown; computed if not given [dimensionless].
     """
     wide = widened(log, parameters, plain)
     return _promises(balanced_by(wide, 1.0 if by_mass else 0.0), (), plain, asked, slopes)
@@ -111,13 +111,13 @@ def predicted_gain_beside(
     log : GreyBoxLog
         The log, widened.
     together : tuple of Hypothesis
-        What is taken already.
+        The accepted hypotheses.
     found : Mapping[str, float]
-        What the fit under them found [SI].
+        Parameters of the fit under them [SI].
     one : Hypothesis
-        What is asked.
+        The further hypothesis.
     *more : str
-        What else that fit freed.
+        Other unknowns of that fit.
     """
     return _promises(log, together, found, (one,), more=more)[0]
 
@@ -132,11 +132,11 @@ def by_predicted_gain(
     log : GreyBoxLog
         The log, widened.
     together : tuple of Hypothesis
-        What is taken already.
+        The accepted hypotheses.
     found : Mapping[str, float]
-        What the fit so far found [SI].
+        Parameters of the fit so far [SI].
     asked : sequence of Hypothesis
-        What else is asked.
+        The further hypotheses.
 
     Returns
     -------
@@ -195,8 +195,8 @@ def slopes_of(fit: GreyBoxFit, log: GreyBoxLog) -> Mapping[str, Array]:
     Returns
     -------
     Mapping[str, ndarray]
-        By unknown, shape (samples,) [dimensionless]; none where noise counts with them, or speed has gaps: they are the
-        fit's own then.
+        By unknown, shape (samples,) [dimensionless]; empty if position noise matters or speed has gaps, since slopes
+        are then specific to the fit.
     """
     if log.passes_on or log.gaps.size:
         return {}

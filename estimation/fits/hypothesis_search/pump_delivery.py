@@ -12,19 +12,19 @@ if TYPE_CHECKING:
 
 
 def delivered(found: "Explanation", parameters: EhaParameters) -> float | None:
-    """Return what the pump delivers, as a share of its displacement in the rig file.
+    """Return the pump's delivery as a share of its displacement in the rig file.
 
     Parameters
     ----------
     found : Explanation
-        What explains a log.
+        The explanation of a log.
     parameters : EhaParameters
-        What the rig file says.
+        The actuator, as its rig file has it.
 
     Returns
     -------
     float or None
-        The share [fraction]; None where the delivery is no part of the explanation.
+        The share [fraction]; None if the delivery is not part of the explanation.
     """
     if "pump_displacement" not in found.values:
         return None

@@ -1,4 +1,4 @@
-"""`with_pump_ripple(log, fitted)`: fits of a log with the pump's ripple in its speed, if residuals show one."""
+"""`with_pump_ripple(log, fitted)`: fits of a log with the pump's flow ripple in its speed, if residuals show one."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -14,83 +14,85 @@ from estimation.notes import EstimateCode, RigCode
 from plant.notes import Note
 
 TEETH_WORTH = 10.0
-"""Gain in log-likelihood from which a log is asked for a pump's teeth [dimensionless]: by chance the likeliest of all
-counts gains it in one log of 1500. Of 60 training logs without teeth none gains 6."""
+"""Gain in log-likelihood from which pump ripple is fitted [dimensionless]: by chance one log in 1500 gains it with the
+best of all tooth counts. In 60 training logs without ripple no gain is above 6."""
 
 OFFSET_WORTH = 20.0
-"""Gain in log-likelihood from which an offset of speed is subtracted before teeth are looked for [dimensionless]."""
+"""Gain in log-likelihood from which an offset of speed is subtracted before ripple is searched for [dimensionless]."""
 
 OFFSET_SETTLED = 2.0
-"""Gain from which an offset that was subtracted is corrected [dimensionless]: two deviations."""
+"""Gain from which a subtracted offset is corrected again [dimensionless]: two deviations."""
 
 KEPT = 0.5
-"""Share of its promise that an offset of speed must keep [fraction]: residuals answer it evenly, so that one keeps 0.8
-or more."""
+"""Share of its predicted gain that an offset of speed must reach [fraction]: residuals respond linearly, so a real one
+reaches 0.8 or more."""
 
 SURE = 0.3
-"""Share of what no fit may leave that one with an offset of speed and no teeth may [fraction]; judged. A piston with a
-rod on one side looks like an offset: a log passed with one, bulk modulus 39 % too low, that left 12 % of its noise's
-variance too much. Of 160 plain training logs none leaves more than 6 %."""
+"""Share of the rejection limit that a fit with an offset of speed and no ripple may reach [fraction]; judged. A single
+rod looks like an offset: a log passed with one, with bulk modulus 39 % too low and a variance 12 % above the noise. In
+160 plain training logs it is at most 6 %."""
 
 CHANCE = 3.0
-"""Standard deviations of the mean of squared noise that are no misfit [dimensionless]: they count in short logs."""
+"""Standard deviations of the mean of squared noise that do not count as a misfit [dimensionless]: they matter in short
+logs."""
 
 CONTRADICTS = 4.0
-"""Deviations of the flow's offset of speed from that of teeth from which they are not of one log [dimensionless]."""
+"""Deviations between the offset of speed from the flow and that from ripple, above which they contradict each other
+[dimensionless]."""
 
 LEAST_OFFSET = 0.01
-"""Offset of speed from which it is told [rad/s]; judged: a tenth of a revolution a minute is what encoders drift by."""
+"""Offset of speed from which it is reported [rad/s]; judged: encoders drift by a tenth of a revolution per minute."""
 
 MOST_LINEAR = 0.5
-"""Deviations by which smaller teeth may move bulk modulus before they are taken up too [dimensionless]: to first order
-they moved one log by 0.06 %, and in full by none."""
+"""Deviations by which small ripple may move bulk modulus before it is corrected too [dimensionless]: in one log the
+first-order prediction was 0.06 %, and the actual change zero."""
 
 ONE_SIDED_95 = 1.645
-"""Deviations by which teeth that are left must be larger than small ones [dimensionless]: pumps are sound up to there,
-and in one of 400 plain logs of pumps with 0 to 3 % noise alone carried a ripple of 2 % above 3 %."""
+"""Deviations by which uncorrected ripple must exceed small ripple [dimensionless]. Sound pumps have ripple up to that
+limit, and in one of 400 plain logs of pumps with 0 to 3 %, noise alone moved a ripple of 2 % above 3 %."""
 
 SURELY_WORTH = 15.0
-"""Gain in log-likelihood from which large teeth that do not move bulk modulus are left all the same [dimensionless]: by
-chance one log in 220,000 has it. A sound log was refused for teeth of 5 % that gained 11 and moved it by 0.02
-deviations."""
+"""Gain in log-likelihood from which large ripple is reported although it does not move bulk modulus [dimensionless]: by
+chance one log in 220,000 has it. A sound log was refused for a ripple of 5 % that gained 11 and moved bulk modulus by
+0.02 deviations."""
 
 MOST_TEETH = 0.4
-"""Amplitude up to which teeth are believed, as a share of the flow [fraction]; judged: a pump's flow does not pulse so.
-Where speed is logged with an offset, teeth seem to wander, and another count took up 59 %."""
+"""Largest believed amplitude of ripple, over the mean flow [fraction]; judged: no pump pulsates more. With an offset in
+the logged speed the phase of the ripple drifts, and another tooth count absorbed 59 %."""
 
 STANDS_OUT, BY_CHANCE = 4.0, 5.0
-"""How many times as much as any other count the teeth must gain, less what another one gains by chance [dimensionless]:
-what a fit leaves for other reasons shows in several counts. The other gains that beside them, since teeth that pass at
-a steady speed show as another count with an offset of speed too. On 184 training logs of 34 kinds what stands out so
-is the count that is there, 13 times."""
+"""Factor by which the ripple's gain must exceed that of any other tooth count, and the gain by chance that is
+subtracted from the other's [dimensionless]: a misfit of another origin shows in several counts. The other's gain is
+counted beside the ripple, since ripple at constant speed with an offset of speed looks like another count. In 184
+training logs of 34 kinds all 13 counts found in this way are right."""
 
 OVERTONE_WORTH = 5.0
-"""Gain from which twice their count is taken up with them [dimensionless]: by chance one log in 150 gains it."""
+"""Gain from which the double tooth count is fitted as well [dimensionless]: by chance one log in 150 gains it."""
 
 HOPE = 10.0
-"""How many times what residuals promise teeth or an offset of speed may gain at most, where they would have to explain
-a log that is not explained without [dimensionless]; judged: residuals answer both nearly evenly."""
+"""Largest factor by which the actual gain of ripple or speed offset may exceed the predicted one, if the log is not
+explained without them [dimensionless]; judged: residuals respond almost linearly to both."""
 
 ROUNDS = 4
-"""How often teeth are corrected at most [count]."""
+"""Most corrections of the ripple [count]."""
 
 SETTLED = 0.5
-"""Gain in log-likelihood that is left where a correction matters no more: a deviation [dimensionless]."""
+"""Remaining gain in log-likelihood at which no further correction is made [dimensionless]: one deviation."""
 
 
 class RippleFits(NamedTuple):
-    """Fits of a log, with the pump ripple that they take up.
+    """Fits of a log, with the pump ripple that they include.
 
     Parameters
     ----------
     log : GreyBoxLog
-        The log, its speed with the teeth that were taken up, and without its offset.
+        The log; its speed includes the ripple found, and not its offset.
     fits : sequence of GreyBoxFit
-        By every form that counts.
+        One fit by each form that counts.
     remarks : tuple of Note
-        What was taken up.
+        Notes on what was corrected.
     left : tuple of Note
-        What residuals show and was not taken up: an objection to a fit that nothing else speaks against.
+        Notes on what residuals show and was not corrected: an objection to a fit without other objections.
     """
 
     log: GreyBoxLog
@@ -116,7 +118,7 @@ def with_pump_ripple(
 ) -> RippleFits:
     """Return the fits of a log, with pump ripple and an offset of speed if its residuals show them.
 
-    A log with gaps in its speed is not asked: the angle of its shaft is not known.
+    A log with gaps in its speed is not tested: the angle of its shaft is not known.
 
     Parameters
     ----------
@@ -125,8 +127,8 @@ def with_pump_ripple(
     fitted : callable
         ``fitted(log)``: its fits by every form that counts.
     explains : callable
-        ``explains(fit)``: whether a fit explains the log. Where it does not with teeth, something else is strange that
-        they would hide: a pump that delivers 4 % more looked like teeth of 19 %.
+        ``explains(fit)``: whether a fit explains the log. If a fit with ripple does not, the ripple hides another
+        effect: a pump that delivers 4 % more looked like a ripple of 19 %.
     largest : float
         Mean squared normalised residual above which no fit explains a log [dimensionless].
     offset : float
@@ -135,7 +137,7 @@ def with_pump_ripple(
     Returns
     -------
     RippleFits
-        The log, its fits, and notes on what was taken up.
+        The log, its fits, and notes on what was corrected.
     """
     if log.gaps.size:
         return RippleFits(log, fitted(log))
@@ -166,21 +168,21 @@ def with_pump_ripple(
 
 
 def is_sure(found: RippleFits, largest: float) -> bool:
-    """Return whether fits with an offset of speed leave so little that nothing else is likely to look like one.
+    """Return whether the residuals with an offset of speed are so small that hardly any other effect can look like it.
 
     Parameters
     ----------
     found : RippleFits
         The fits.
     largest : float
-        As of `with_pump_ripple` [dimensionless].
+        As in `with_pump_ripple` [dimensionless].
     """
     left, by_chance = found.best.chi_square[0], CHANCE * (2.0 / len(found.log.drives)) ** 0.5
     return left <= 1.0 + SURE * (largest - 1.0) + by_chance
 
 
 def _by_chance(plain: GreyBoxFit, with_them: GreyBoxFit) -> bool:
-    """Return whether a fit with pump ripple kept its predicted gain, and gained no more than chance does."""
+    """Return whether a fit with ripple reached its predicted gain, and gained no more than chance does."""
     promised = max(one.gain for one in plain.teeth.values())
     return KEPT * promised < plain.cost - with_them.cost < TEETH_WORTH
 
@@ -200,9 +202,9 @@ def _hopeful(fits: Sequence[GreyBoxFit], largest: float) -> bool:
 
 
 def _shifted(log: GreyBoxLog, plain: RippleFits, fitted: Fitted, largest: float) -> RippleFits | None:
-    """Return the fits of a log without what its speed is off by; None where residuals ask for none, or for much.
+    """Return the fits of a log without its offset of speed; None if residuals show none, or a large one.
 
-    It ends where that leaves a log unexplained, and neither teeth nor more of an offset may explain the rest.
+    The correction ends if the log is then unexplained and neither ripple nor more offset may explain the rest.
     """
     found, offset, wanted = plain, plain.log.speed_offset, OFFSET_SETTLED if plain.log.speed_offset else OFFSET_WORTH
     for _ in range(ROUNDS):
@@ -223,7 +225,7 @@ def _shifted(log: GreyBoxLog, plain: RippleFits, fitted: Fitted, largest: float)
 
 
 def _with_teeth(log: GreyBoxLog, begun: RippleFits, fitted: Fitted) -> RippleFits | None:
-    """Return the fits with the teeth that others ask for, corrected until nothing is left; None if there are none."""
+    """Return fits with the ripple that other fits show, corrected until nothing is left; None if there is none."""
     if (first := _asked_for(begun.best)) is None:
         return None
     found, taken, offset = None, [first.teeth], begun.log.speed_offset + first.offset
@@ -254,9 +256,9 @@ def _felt(fit: GreyBoxFit) -> float:
 
 
 def _shown(fit: GreyBoxFit, *, small: bool = False) -> list[ShownRipple]:
-    """Return the teeth that a fit's residuals show, the likeliest first; none if their size does not matter.
+    """Return the ripple that a fit's residuals show, the likeliest first; none if its size does not matter.
 
-    ``small`` ones matter where they move bulk modulus.
+    ``small`` ripple matters if it moves bulk modulus.
     """
     ranked = sorted((one for one in fit.teeth.values() if _possible(one, fit)), key=lambda one: -one.gain)
     if not ranked or ranked[0].gain < TEETH_WORTH:
@@ -266,9 +268,9 @@ def _shown(fit: GreyBoxFit, *, small: bool = False) -> list[ShownRipple]:
 
 
 def _possible(one: ShownRipple, fit: GreyBoxFit) -> bool:
-    """Return whether the flow shows the speed offset that comes with a ripple, or the ripple is surely large.
+    """Return whether the flow shows the same offset of speed as the ripple, or the ripple is surely large.
 
-    What a pump delivers tells an offset however its teeth stand, so that small ones which need another are chance.
+    The pump's mean flow determines the offset whatever the ripple, so small ripple that needs another offset is chance.
     """
     differs = abs(one.offset - fit.speed_offset.value)
     told = differs > max(CONTRADICTS * fit.speed_offset.std, KEPT * abs(one.offset))
@@ -280,7 +282,7 @@ def _surely_large(one: ShownRipple) -> bool:
 
 
 def _asked_for(fit: GreyBoxFit) -> ShownRipple | None:
-    """Return the teeth that a fit's residuals ask for, if no other count does as well but their overtones."""
+    """Return the ripple that a fit's residuals show, if no other tooth count fits as well except its overtones."""
     if not (ranked := _shown(fit, small=True)):
         return None
     count = ranked[0].teeth.count
@@ -290,10 +292,9 @@ def _asked_for(fit: GreyBoxFit) -> ShownRipple | None:
 
 
 def _left(found: RippleFits) -> tuple[Note, ...]:
-    """Return the note on a ripple left in residuals; none for a slow log, in which motor speed can imitate one.
+    """Return the note on ripple left in residuals; none for a slow log, in which motor speed can look like ripple.
 
-    Teeth that may be as small as any pump's, or chance, are integrated out: they are left only where they move bulk
-    modulus.
+    Ripple that may be as small as any pump's, or chance, is ignored: it is reported only if it moves bulk modulus.
     """
     likeliest = [] if found.log.course is not None else _shown(found.best)[:1]
     felt = _felt(found.best) > MOST_LINEAR
@@ -303,7 +304,7 @@ def _left(found: RippleFits) -> tuple[Note, ...]:
 
 
 def _corrected(taken: Sequence[Ripple], left: Mapping[int, ShownRipple]) -> list[Ripple]:
-    """Return the teeth with what residuals still ask for; none where that matters no more."""
+    """Return the ripple with the correction that residuals show; None if it no longer matters."""
     held = {one.count for one in taken}
     near = all(left[count].gain < OVERTONE_WORTH for count in held)  # else their own phase may look like an overtone
     new = [one.teeth for one in left.values() if near and one.teeth.count not in held and one.gain > OVERTONE_WORTH]
@@ -324,12 +325,12 @@ def _told(teeth: Ripple, offset: float, left: ShownRipple) -> tuple[Note, ...]:
 
 
 def told_offset(offset: float, std: float) -> tuple[Note, ...]:
-    """Return the note on an offset of motor speed; none where it is too small to matter.
+    """Return the note on an offset of motor speed; none if it is too small to matter.
 
     Parameters
     ----------
     offset, std : float
-        By how much the logged speed exceeds the shaft's, and the standard deviation of that [rad/s].
+        Offset of the logged speed from the shaft's, and its standard deviation [rad/s].
     """
     if abs(offset) < LEAST_OFFSET:
         return ()

@@ -15,18 +15,18 @@ from estimation.fits.hypothesis_search.wide_log import usual_values
 from estimation.fits.hypothesis_search.wide_problem import freed, freed_at_end
 
 FINALISTS, CARRIED = 3, 2
-"""Hypotheses that are carried on, and starts of each."""
+"""Hypotheses that are searched further, and starts of each [count]."""
 
 NEARLY_AS_GOOD = 1.1
-"""What the cost of a finished set is multiplied by before others are compared with it: their model steps are long, and
-have errors [dimensionless]."""
+"""Factor on the cost of a finished set before others are compared with it [dimensionless]: the others have long model
+steps, which have errors."""
 
 STRAYED = 1.05
-"""How many times its cost on few samples a set costs with all of them that it has strayed into another valley
-[dimensionless]; the two differ by 1 % in most."""
+"""Cost of a set with all samples over that with few, from which it has left its minimum [dimensionless]; the two mostly
+differ by 1 %."""
 
 MUCH = 0.2
-"""What the best set of hypotheses leaves at most of what was left, to be searched anew with all samples [fraction]."""
+"""Largest share of the previous cost that the best set may leave, to be searched again with all samples [fraction]."""
 
 
 def likeliest(
@@ -38,9 +38,9 @@ def likeliest(
 ) -> list[Trial]:
     """Return the most likely sets of hypotheses, each searched from several starts, best first.
 
-    The first set is carried on in any case: a few steps from a start are no measure of what promises most. What cannot
-    come close to the best, or to what is known, is not followed to its optimum. Where few samples were ``spared``,
-    all of them count at the end. What leaves far more than any fit that explains a log is not fitted to the end.
+    The first set is searched in any case: a few steps from a start do not show which predicted gain is largest. A set
+    that cannot come close to the best, or to a known cost, is not searched to its optimum. If few samples were used
+    (``spared``), all are used at the end. A set that leaves far more than any explanation is not fitted to the end.
 
     Parameters
     ----------
@@ -51,14 +51,14 @@ def likeliest(
     known : float
         The least cost so far [dimensionless].
     spared : Decimation
-        What is spared.
+        Samples and starts of the search.
     useful : float
         Cost above which a set is of no use [dimensionless].
 
     Returns
     -------
     list of Trial
-        Those that were carried on and came near the best.
+        Those that were searched and came near the best.
     """
     return refined(log, ranked_optima(log, tried, known, spared), known, spared, useful)
 
@@ -66,7 +66,7 @@ def likeliest(
 def ranked_optima(
     log: GreyBoxLog, tried: Iterable[Iterable[Trial]], known: float = np.inf, spared: Decimation = NO_DECIMATION
 ) -> list[Trial]:
-    """Return the most likely sets of hypotheses at their optima, on a decimated log if decimation is allowed.
+    """Return the most likely sets of hypotheses at their optima, on a decimated log if allowed.
 
     Parameters
     ----------
@@ -77,12 +77,12 @@ def ranked_optima(
     known : float
         The least cost so far [dimensionless].
     spared : Decimation
-        What is spared.
+        Samples and starts of the search.
 
     Returns
     -------
     list of Trial
-        Those that were carried on, the best first.
+        Those that were searched, the best first.
     """
     known *= NEARLY_AS_GOOD
     first, *others = [ranked(one) for one in tried]
@@ -113,11 +113,11 @@ def refined(
     log : GreyBoxLog
         The log, widened.
     ended : sequence of Trial
-        The sets, where few samples led if these are spared.
+        The sets, at the end of a search that may have used few samples.
     known : float
         The least cost so far [dimensionless].
     spared : Decimation
-        What is spared.
+        Samples and starts of the search.
     useful : float
         Cost above which a set is of no use [dimensionless].
 
@@ -135,10 +135,10 @@ def refined(
 
 
 def _with_all(log: GreyBoxLog, ended: Iterable[Trial], known: float, spared: Decimation) -> Iterator[Trial]:
-    """Yield sets of hypotheses led on where all samples count, as far as they may still explain the log.
+    """Yield sets of hypotheses searched on with all samples, if they may still explain the log.
 
-    Few samples may have a valley by themselves, and a search with all may end in another. So the best set is sought
-    anew with all, where it explains much, but not all yet, or less than on few samples.
+    A decimated log may have a minimum of its own, and a search with all samples may end in another. So the best set is
+    searched again with all samples if it explains much but not all, or less than on few samples.
     """
     for place, one in enumerate(ranked(ended)):
         near = one.cost <= NEARLY_AS_GOOD * known + CLOSE

@@ -1,4 +1,4 @@
-"""Screening: a few steps from each start rank the hypotheses before any is brought to its optimum."""
+"""Screening: a few steps from each start rank the hypotheses before any is searched to its optimum."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
@@ -23,10 +23,10 @@ from estimation.fits.hypothesis_search.wide_problem import (
 )
 
 SCREENING = 7
-"""Evaluations of the model for a start [count]."""
+"""Evaluations of the model per start [count]."""
 
 NEARLY = 3.0
-"""Up to which share of the best start's cost others count [dimensionless]."""
+"""Cost over that of the best start up to which other starts count [dimensionless]."""
 
 
 def screen(
@@ -43,13 +43,13 @@ def screen(
     log : GreyBoxLog
         The log, widened.
     together : tuple of Hypothesis
-        The set of hypotheses, what is new last.
+        The set of hypotheses, the new one last.
     starts : sequence of Mapping[str, float]
         Where searches begin [SI].
     wanted : float
         Cost above which a result is of no use [dimensionless].
     every : int
-        How many samples are one, see `decimated` [count].
+        How many samples are merged into one, see `decimated` [count].
     """
     absent = usual_values(log)
     asked = [{together[-1].late: delay} if delay else dict[str, float]() for delay in together[-1].delays]
@@ -80,14 +80,14 @@ def screen(
 def promising_starts(
     starts: Sequence[Mapping[str, float]], screened_each: Sequence[Sequence[Trial]]
 ) -> list[Mapping[str, float]]:
-    """Return the starts from which a good hypothesis ended near its own best.
+    """Return the starts from which good hypotheses ended near their own best.
 
     Parameters
     ----------
     starts : sequence of Mapping[str, float]
         Where searches began [SI].
     screened_each : sequence of sequence of Trial
-        What hypotheses came to from each.
+        Results of the hypotheses from each start.
 
     Returns
     -------
@@ -108,23 +108,23 @@ def nearing(
     known: float,
     every: int,
 ) -> Iterator[Sequence[Trial]]:
-    """Yield hypotheses from their starts, first those without a predicted gain; none is followed far from the best.
+    """Yield hypotheses from their starts, first those without a predicted gain; searches far from the best end early.
 
-    Those begin from every start, the others from the ``likely`` ones. Where one of those comes lower than all that is
-    known, the others begin from where it did so.
+    The first ones begin at every start, the others at the ``likely`` ones. If one of the first costs less than all
+    known, the others begin where it did.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, widened.
     asked : iterable of Hypothesis
-        What is tried.
+        The hypotheses.
     starts, likely : sequence of Mapping[str, float]
         Where searches begin [SI].
     known : float
         The least cost so far [dimensionless].
     every : int
-        How many samples are one, see `decimated` [count].
+        How many samples are merged into one, see `decimated` [count].
     """
     lower: list[Sequence[Trial]] = []
     for one in sorted(asked, key=lambda each: not each.far):

@@ -1,10 +1,10 @@
-"""An offset of motor speed that slopes do not tell: one mistaken for an offset of pressure, and one on a tight rig.
+"""An offset of motor speed that slopes do not show: one that looks like a pressure offset, and one on a tight rig.
 
-Leakage under a pressure that reads too much is what a pump would have to deliver in the other direction. Only what else
-hangs on a chamber's pressure, as make-up does, tells the two apart.
+Leakage under a pressure offset equals a pump flow in the other direction. Only other effects of chamber pressure, such
+as make-up flow, distinguish the two.
 
-Oil that a pump seems to deliver too much leaks off under a pressure of its own, which is large where little leaks. The
-plain form then ends in another valley. What is lost between pump and piston tells the offset without it.
+A surplus of pumped oil leaks off at a pressure of its own, which is large if leakage is small. The plain form then ends
+in another minimum. The flow lost between pump and piston determines the offset without it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,12 +20,12 @@ from estimation.fits.hypothesis_search.wide_log import widened
 from plant.eha.model import EhaParameters
 
 TOLD = 4.0
-"""Deviations from which lost flow tells an offset of speed [dimensionless]; judged: a fit with it says whether it is
-one, and pieces of a log are not independent."""
+"""Deviations from which the lost flow determines an offset of speed [dimensionless]; judged: pieces of a log are not
+independent, and a fit with the offset decides."""
 
 MOST_SHARE = 0.03
-"""Largest offset that is told so, over the rated speed [fraction]; judged: converters and tachometers promise 0.1 to 2
-%. A slow loop with hardly a pressure told 12 %."""
+"""Largest offset found in this way, over the rated speed [fraction]; judged: converters and tachometers have 0.1 to 2
+%. A slow loop with hardly any pressure gave 12 %."""
 
 
 def speed_offset_instead(
@@ -35,7 +35,7 @@ def speed_offset_instead(
     displacement: float,
     cost: float,
 ) -> float:
-    """Return the offset of the logged speed, if it explains a log better than an offset of pressure.
+    """Return the offset of the logged speed, if it explains a log better than a pressure offset does.
 
     Parameters
     ----------
@@ -44,16 +44,16 @@ def speed_offset_instead(
     fitted : callable
         ``fitted(log)``: its fits by every plain form that counts.
     found : Mapping[str, tuple of float]
-        Value and deviation of what explains the log, by parameter [SI].
+        Value and deviation of the explanation, by parameter [SI].
     displacement : float
-        Of the pump [m^3/rad].
+        Displacement of the pump [m^3/rad].
     cost : float
-        What a plain fit has to stay below [dimensionless].
+        Cost that a plain fit must stay below [dimensionless].
 
     Returns
     -------
     float
-        Offset of speed [rad/s]; zero where no pressure offset was found, and where the speed explains less.
+        Offset of speed [rad/s]; zero if no pressure offset was found, or the speed offset explains less.
     """
     if "pressure_offset" not in found:
         return 0.0
@@ -64,10 +64,9 @@ def speed_offset_instead(
 
 
 def offset_by_lost_flow(log: GreyBoxLog, parameters: EhaParameters) -> float:
-    """Return the offset of the logged speed by what is lost between pump and piston.
+    """Return the offset of the logged speed from the flow lost between pump and piston.
 
-    Least squares over pieces of the log, beside leakage, flow bias, what the oil takes up and a pump that delivers
-    less.
+    Least squares over pieces of the log, with leakage, flow bias, compression and another delivery as further unknowns.
 
     Parameters
     ----------
@@ -79,7 +78,7 @@ def offset_by_lost_flow(log: GreyBoxLog, parameters: EhaParameters) -> float:
     Returns
     -------
     float
-        First guess [rad/s]; zero where the log tells none.
+        First guess [rad/s]; zero if the log does not determine it.
     """
     flow = lost_flow(widened(log, parameters))
     rise, swept = np.diff(flow.ends) / flow.time, np.diff(flow.positions) / flow.time
@@ -99,14 +98,14 @@ def offset_by_lost_flow(log: GreyBoxLog, parameters: EhaParameters) -> float:
 
 
 def bears_out(found: RippleFits, largest: float, parameters: EhaParameters) -> bool:
-    """Return whether fits with an offset by lost flow leave nothing for anything else, or another offset, to explain.
+    """Return whether fits with an offset from lost flow leave nothing to explain for other effects or another offset.
 
     Parameters
     ----------
     found : RippleFits
         The fits.
     largest : float
-        As of `with_pump_ripple` [dimensionless].
+        As in `with_pump_ripple` [dimensionless].
     parameters : EhaParameters
         The actuator.
     """

@@ -12,10 +12,10 @@ from estimation.fits.hypothesis_search.wide_log import delayed
 
 
 def stuck_instead(log: GreyBoxLog, best: Trial, spared: Decimation, worth: float) -> list[Trial]:
-    """Return the best hypotheses with a stuck make-up valve, where one that opens far later is hardly likelier.
+    """Return the best hypotheses with a stuck make-up valve, if one that opens much later is hardly likelier.
 
-    A valve that opens below all that a log has looks as late as the log allows. It is one fault with one unknown where
-    two drops are two, and the class of the log cannot be told beside it.
+    A valve that never opens in a log looks like one that opens as late as the log allows. It is one fault with one
+    unknown in place of two drops, and it leaves the class of the log undecided.
 
     Parameters
     ----------
@@ -24,9 +24,9 @@ def stuck_instead(log: GreyBoxLog, best: Trial, spared: Decimation, worth: float
     best : Trial
         The likeliest hypotheses.
     spared : Decimation
-        What is spared, and where searches begin.
+        Samples and starts of the search.
     worth : float
-        Gain in log-likelihood below which the late valve is not believed instead [dimensionless].
+        Gain in log-likelihood below which the late valve is not preferred [dimensionless].
 
     Returns
     -------

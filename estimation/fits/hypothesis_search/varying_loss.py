@@ -1,8 +1,8 @@
 """`varying_loss(log, ...)`: a loss that varies with a measured signal and explains a log that no hypothesis explains.
 
-Its course follows from the log, up to where it lies and how wide it is (`loss_courses`); its size is one more unknown
-of the flow form. What residuals promise of some seventy courses is read off side by side; the best of each kind is
-followed, its course moved by Gauss-Newton steps between steps of all that is fitted. See decision 288.
+The regressor of the loss is computed from the log, given its place and width (`loss_regressors`); its size is one more
+unknown of the flow form. The predicted gains of some seventy regressors are computed side by side. The best of each
+kind is searched: Gauss-Newton steps of its place and width alternate with descents of all unknowns. See decision 288.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -40,37 +40,37 @@ from plant.eha.model import EhaParameters
 from plant.notes import Note
 
 NUDGE = 0.05
-"""Units of a loss by which the residuals' answer to it is read off [dimensionless]."""
+"""Units of a loss for the finite difference of the residuals [dimensionless]."""
 
 TRIED, SHIFTED = 3, 12
-"""Kinds that are followed, those first that promise most, and how often each is moved at most [count]."""
+"""Kinds that are searched, those of largest predicted gain, and how often each regressor is moved at most [count]."""
 
 HOPE = 10.0
-"""How many times what residuals promise a loss may gain at most [dimensionless]; judged: it may be far from none."""
+"""Largest factor by which the actual gain of a loss may exceed the predicted one [dimensionless]; judged: it may be far
+from zero."""
 
 ONE_WAY_TRIED = 2.0
-"""Units of a loss in one direction with which a search begins whatever is promised [dimensionless]."""
+"""Size at which the search for a loss in one direction begins whatever the prediction [units of a loss]."""
 
 SETTLING, MOVING, FINISHING = 20, 5, 40
-"""Evaluations of the model on a way down with long steps, after a course was moved, and with short steps [count]."""
+"""Evaluations of the model in a descent with long steps, after a regressor was moved, and with short steps [count]."""
 
 WORTH = 50.0
-"""Gain in log-likelihood from which a loss is believed [dimensionless]: of some seventy courses the best one gains 8 by
-chance, and what is mended by less is wrong for another reason."""
+"""Gain in log-likelihood from which a loss is believed [dimensionless]: the best of some seventy regressors gains 8 by
+chance, and a log that gains less than 50 has another fault."""
 
 SHORTEST = 0.1
-"""Least share of a step by which a course is moved [fraction]."""
+"""Least share of a step by which a regressor is moved [fraction]."""
 
 ROUGH_ENOUGH = 0.05
-"""Half the sum of squares that a further step must promise while model steps are long [dimensionless]: they err by
-more."""
+"""Half the sum of squares that a further step must promise while model steps are long [dimensionless]: their errors are
+larger."""
 
 BEHIND = 3.0
-"""How many times the cost of the best start one has after its first search, that its course is not moved
-[dimensionless]."""
+"""Cost after a first search over that of the best start, from which a regressor is not moved [dimensionless]."""
 
 SETTLED, SLIGHT = 0.5, 1e-4
-"""Gain, and share of the cost, below which a course is moved no more [dimensionless]."""
+"""Gain, and share of the cost, below which a regressor is no longer moved [dimensionless]."""
 
 
 class VaryingLoss(NamedTuple):
@@ -79,15 +79,15 @@ class VaryingLoss(NamedTuple):
     Parameters
     ----------
     course : LossRegressor
-        What it goes with [SI].
+        What it depends on [SI].
     size, std : float
-        Its size, and standard deviation of it [units of `Measured.of`].
+        Its size and standard deviation [units of `LossSignals.of`].
     fit : GreyBoxFit
         The fit with it.
     opened : float
-        Relative standard deviation of bulk modulus from where the loss lies and how wide it is [fraction].
+        Relative standard deviation of bulk modulus due to the place and width of the loss [fraction].
     measured : LossSignals
-        What its course is made of.
+        The signals from which its regressor is computed.
     """
 
     course: LossRegressor
@@ -115,13 +115,13 @@ def varying_loss(
     parameters : EhaParameters
         The actuator.
     starts : sequence of Mapping[str, float]
-        Where searches begin; courses are compared at the first, where the plain form ended [SI].
+        Where searches begin; regressors are compared at the first, where the plain form ended [SI].
     explains : callable
         ``explains(fit)``: whether a fit explains the log.
     wanted : float
         Cost of the best fit without a loss [dimensionless].
     largest : float
-        What a fit that explains the log leaves at most, over the noise [dimensionless].
+        Largest mean squared residual of a fit that explains the log [dimensionless].
 
     Returns
     -------
@@ -145,12 +145,12 @@ def varying_loss(
 
 
 def loss_notes(loss: VaryingLoss) -> tuple[Note, ...]:
-    """Return the note that names a loss; none for one that may be zero, which led the search to a lower minimum.
+    """Return the note that names a loss; none for one that may be zero and only led the search to a lower minimum.
 
     Returns
     -------
     tuple of Note
-        With where or from when on it is, and how large.
+        With its place, or its limit, and its size.
     """
     return (_loss_note(loss),) if loss.size > NORMAL_95 * loss.std else ()
 
@@ -192,7 +192,7 @@ class _Search:
         self._measured, self._log, self._wide = loss_signals(log, parameters), log, widened(log, parameters)
 
     def promising(self, start: Mapping[str, float], largest: float) -> list[tuple[LossRegressor, float]]:
-        """Return the best course of each kind and its size, those first that promise most."""
+        """Return the best regressor of each kind and its size, the largest predicted gain first."""
         problem = self._problem(None, coarse=True)
         theta = self._theta(problem, {**start, LOSS_SIZE: 0.0})
         theta = descend(problem.at, theta, SETTLING, self._bounds(problem, theta)).theta
@@ -287,7 +287,7 @@ class _Search:
         return [(one - known).ravel() / step for one, step in zip(answers, small.values(), strict=True)]
 
     def _step(self, problem: FreedProblem, theta: Array, course: LossRegressor) -> dict[str, float]:
-        """Return the Gauss-Newton step of a course, all else that is fitted following."""
+        """Return the Gauss-Newton step of a regressor, with all other unknowns free."""
         errors, slopes = problem.linearised(theta)
         columns = np.column_stack([slopes, *self._answers(problem, theta, course)])
         scale = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)

@@ -29,17 +29,18 @@ from plant.solvers.steps import parameter_names, parameter_row
 START_LEVEL = "start_level"
 
 HELD = (STIFFNESS, *CRACKS, BEND)
-"""What the plain form found and a search for what is strange holds: it would take that up."""
+"""Parameters of the plain fit that a search for other effects holds, since they would absorb these."""
 
 LEVEL_OPEN = 3.0**-0.5
-"""Root mean square of the level at which the lower side begins, over the most that it may be, before a log is seen: it
-is anywhere between none and that [fraction]."""
+"""Prior root mean square of the pressure level at which the lower side begins, over its largest possible value
+[fraction]: it is anywhere between zero and that."""
 
 EVEN = 3.0**-0.5
-"""Standard deviation of what is anywhere between two ends, over half their distance [dimensionless]."""
+"""Standard deviation of a uniform distribution over half its range [dimensionless]."""
 
 LEAST_PEAK = 1.0
-"""Highest differential pressure taken of a log whose sensor is dead: the logarithm of none is no start [Pa]."""
+"""Least value used for the highest differential pressure if the sensor is dead [Pa]: a search cannot start at the
+logarithm of zero."""
 
 
 def widened(
@@ -54,12 +55,12 @@ def widened(
     parameters : EhaParameters
         The actuator.
     found : Mapping[str, float], optional
-        What the plain form found; of it `HELD` is kept [SI].
+        Parameters of the plain fit; `HELD` ones are kept [SI].
 
     Returns
     -------
     GreyBoxLog
-        The log, with what is presumed.
+        The log, with its priors.
     """
     samples, position = len(log.drives), log.drives[:, FLOW_FORM.drives.index(POSITION)]
     courses = crossings(position, log.measured[:, 0], log.sample_time)
@@ -92,7 +93,7 @@ def shut_in(log: GreyBoxLog) -> float:
     Returns
     -------
     float
-        Level over the inner circuit's pressure [Pa].
+        As a pressure above the inner circuit's [Pa].
     """
     return max(0.5 * float(np.nanmax(np.abs(log.measured))), LEAST_PEAK)
 
@@ -121,7 +122,7 @@ def usual_values(log: GreyBoxLog) -> dict[str, float]:
     Returns
     -------
     dict
-        What the rig file says, and what is strange absent [SI].
+        Values of the rig file, with all effects absent [SI].
     """
     return dict(zip(parameter_names(WideFlowParameters), log.parameters.tolist(), strict=True))
 
@@ -165,13 +166,13 @@ def delayed(log: GreyBoxLog, delays: Mapping[str, float]) -> GreyBoxLog:
     log : GreyBoxLog
         The log, widened.
     delays : Mapping[str, float]
-        How late channels come [s]; what is no drive is the output. A drive may be early: its time is negative, and it
-        is put back.
+        Delay of each channel [s]; a name that is no drive is the output. An early drive has a negative delay and is
+        shifted back.
 
     Returns
     -------
     GreyBoxLog
-        The log, its last outputs missing; its first where a drive is early.
+        The log without its last outputs; without its first if a drive is early.
     """
     measured, drives = log.measured, log.drives
     for channel, delay in delays.items():

@@ -36,31 +36,31 @@ from plant.arrays import Array
 from plant.solvers.steps import parameter_names
 
 RELIEF_START = 1e-10
-"""Slope of a relief valve that opens early, first guess [m^3/(s Pa)]."""
+"""First guess of the slope of a relief valve that opens early [m^3/(s Pa)]."""
 
 SHARPEST_RELIEF = 3e-3
-"""Least rise of pressure over its setting within which a relief valve passes the largest flow of the log [fraction].
-Valves need 0.05 to 0.2. At a sharper corner, which no sensor resolves, the model chatters from open to closed: slopes
-are then so steep that the deviation of bulk modulus comes out twenty times too small."""
+"""Least pressure rise above its setting within which a relief valve passes the largest flow of the log [fraction].
+Valves need 0.05 to 0.2. At a sharper corner, which no sensor resolves, the model chatters: slopes are then so steep
+that the deviation of bulk modulus comes out twenty times too small."""
 
 FASTEST_MAKEUP, FASTEST_FOLLOWED = 0.5 * LONGEST_STEP, 0.02 * LONGEST_STEP
-"""Least time in which a wide open make-up valve fills a chamber, and the same with implicit steps [s]. At a fifth of a
+"""Least time in which an open make-up valve fills a chamber, and the same with implicit steps [s]. At a fifth of a
 model step the model may chatter, as at a sharp relief valve: the deviation of bulk modulus came out nine times too
-small. Implicit steps do not; valves of random rigs need 0.013 ms and more."""
+small. Implicit steps do not chatter; valves of random rigs need 0.013 ms and more."""
 
 FARTHEST_ZERO = 0.3
-"""Share of a chamber's length in mid-stroke that an encoder's zero is sought from at most [fraction]; judged. 60 mm
-are 4 % of the paper's actuator's, and more than a drone's has."""
+"""Largest start of the search for an encoder's zero, over a chamber's length in mid-stroke [fraction]; judged. 60 mm is
+4 % in the paper's actuator, and more than a drone's has."""
 
 MOST_VOLUME = 2.0
-"""Factor by which a chamber's volume is sought above or below the rig file's [dimensionless]: 4.6 deviations of what is
-presumed. Volumes 4 and 80 times as large took the place of an encoder's zero."""
+"""Factor within which a chamber's volume is searched about the rig file's [dimensionless]: 4.6 prior deviations.
+Volumes 4 and 80 times as large replaced an encoder's zero."""
 
 MOST_DEVIATIONS = 5.0
-"""Deviations of what is presumed of an accumulator by which it is stiffer at most [dimensionless]; judged."""
+"""Prior deviations by which an accumulator may be stiffer at most [dimensionless]; judged."""
 
 MOST_WORN = 0.2
-"""Most that a worn pump loses of its displacement where the search for it begins [fraction]; judged."""
+"""Largest loss of displacement at which the search for a worn pump begins [fraction]; judged."""
 
 FORMS = {
     (False, False, False): WIDE_FLOW_FORM,
@@ -72,7 +72,7 @@ FORMS = {
     (True, True, False): FILTERED_TURBULENT_FLOW_FORM,
     (True, True, True): FILTERED_TURBULENT_QUICK_FLOW_FORM,
 }
-"""By whether pressure passes a filter of second order, a leak is turbulent, and bubbles have an exponent."""
+"""Forms, by whether pressure passes a second-order filter, a leak is turbulent, and bubbles have an exponent."""
 
 FLOW_BIAS = "flow_bias"
 
@@ -83,22 +83,22 @@ AIR_ONSET, AIR_WIDTH = "air_onset", "air_width"
 STEP_AT, STEP_WIDTH = "step_at", "step_width"
 
 FIRST_WIDTH = 0.02
-"""Length of the step of leakage with which a search begins [fraction of the log]: four pieces."""
+"""Duration of a step of leakage at which a search begins [fraction of the log]: four pieces."""
 
 START_PRESSURE = "start_pressure"
 
 MISREAD = {"pressure_offset", "pressure_drift", "pressure_sides"}
-"""Parameters with which the pressure that is shown goes evenly."""
+"""Parameters in which the displayed pressure is linear."""
 
 SHARES = 0.7 ** np.arange(8)
-"""Of what slopes promise of these, how much is tried [fraction]: side by side as quick as once."""
+"""Shares of the predicted size of these that are tried [fraction]: side by side they take as long as one."""
 
 LEVELS_TRIED = (0.0, 0.3, 0.8)
-"""Levels over the accumulator's pressure with which both sides may begin, as shares of the most [fraction]."""
+"""Levels above the accumulator's pressure at which both sides may begin, as shares of the largest [fraction]."""
 
 MOST_BIASED = 2.0
-"""Factor by which position's noise may have put the first bulk modulus off [dimensionless]. Far above it there is a
-second valley, where all that the log shows is noise that the oil's stiffness makes large."""
+"""Factor by which position noise may bias the first bulk modulus [dimensionless]. Far above it there is a second
+minimum, where noise that grows with the oil's stiffness explains everything."""
 
 
 def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedProblem:
@@ -109,14 +109,15 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedP
     log : GreyBoxLog
         The log, widened.
     together : sequence of Hypothesis
-        What is freed beside the plain form's unknowns.
+        Hypotheses whose unknowns are fitted beside the plain form's.
     *more : str
-        Parameters that are freed in any case.
+        Parameters that are fitted in any case.
 
     Returns
     -------
     FreedProblem
-        The problem; relief is free where the log reaches its setting. A channel whose lag is free is not asked about.
+        The problem; relief is fitted if the log reaches its setting. A channel whose lag is fitted is not tested for a
+        delay.
     """
     extra = [*(name for one in together for name in (*one.free, *one.beside)), *more]
     relieved = reaches_relief(log.measured, usual_values(log)["relief_pressure"])
@@ -132,7 +133,7 @@ def freed(log: GreyBoxLog, together: Sequence[Hypothesis], *more: str) -> FreedP
 
 
 def freed_at_end(together: Iterable[Hypothesis]) -> list[str]:
-    """Return the parameters that a hypothesis frees only at the end of its search; beside another one, from the start.
+    """Return the parameters that a hypothesis fits only at the end of its search; beside another one, from the start.
 
     Returns
     -------
@@ -163,19 +164,19 @@ def flow_speed(log: GreyBoxLog) -> float:
 def worn_start(log: GreyBoxLog, plain: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
     """Return a second start of the search for pump delivery: healthy flow bias, all other loss by wear.
 
-    At one speed the two nearly cancel, and a search along their ridge ends before it comes to a worn pump.
+    At one speed the two nearly cancel, and a search along their ridge ends before it reaches a worn pump.
 
     Parameters
     ----------
     log : GreyBoxLog
         The log, widened.
     plain : Mapping[str, float]
-        What the plain form found [SI].
+        Parameters of the plain fit [SI].
 
     Returns
     -------
     sequence of Mapping[str, float]
-        One first guess, none where the flow bias is hardly larger than a healthy one [SI].
+        One first guess; none if the flow bias is hardly larger than a healthy one [SI].
     """
     usual = usual_values(log)
     displacement, bias = usual[DELIVERY.free[0]], plain[FLOW_BIAS]
@@ -187,10 +188,10 @@ def worn_start(log: GreyBoxLog, plain: Mapping[str, float]) -> Sequence[Mapping[
 
 
 def misread_start(problem: FreedProblem, guess: Array, one: Hypothesis) -> Sequence[Array]:
-    """Return a second start of the search for what a gauge reads wrong: so much of it as explains most beside a guess.
+    """Return a second start of the search for what a gauge misreads: the amount that explains most beside a guess.
 
-    The pressure that is shown goes evenly with it. Step by step, valves that switch hold a search up long before it
-    comes to a drift of some bar. What is far off counts less than its square, so that slopes promise too much.
+    The displayed pressure is linear in it. A search step by step is held up by valves that switch, long before it
+    reaches a drift of some bar. Large residuals count less than their square, so slopes predict too much.
 
     Parameters
     ----------
@@ -199,12 +200,12 @@ def misread_start(problem: FreedProblem, guess: Array, one: Hypothesis) -> Seque
     guess : ndarray, shape (unknowns,)
         First guess [dimensionless].
     one : Hypothesis
-        What is asked.
+        The hypothesis.
 
     Returns
     -------
     sequence of ndarray, shape (unknowns,)
-        One first guess, none where another hypothesis is asked, or nothing of it explains more [dimensionless].
+        One first guess; none for another hypothesis, or if no amount explains more [dimensionless].
     """
     if not set(one.free) <= MISREAD:
         return []
@@ -258,7 +259,7 @@ def widest_makeup(chamber_volume: float, bulk_modulus: float, log: GreyBoxLog) -
     chamber_volume : float
         Dead volume, half of a chamber's [m^3].
     bulk_modulus : float
-        Of the oil [Pa].
+        Bulk modulus of the oil [Pa].
     log : GreyBoxLog
         The log, whose steps may be implicit.
 
